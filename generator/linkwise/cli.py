@@ -1,0 +1,165 @@
+"""The command line: parse, call, print."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from linkwise.errors import LinkwiseError
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Which joint's movement loads which joint, through which link.",
+)
+
+Robot = Annotated[
+    str, typer.Argument(help="planar3, planarN, puma560, or a .toml, .urdf or .py file")
+]
+Lock = Annotated[list[str] | None, typer.Option(help="Hold a joint: JOINT=VALUE; may be repeated")]
+Unphysical = Annotated[
+    bool, typer.Option("--allow-unphysical", help="Accept bodies that cannot exist")
+]
+Base = Annotated[str, typer.Option(help="fixed or floating")]
+Root = Annotated[str | None, typer.Option(help="Keep only what hangs on this link")]
+Tip = Annotated[str | None, typer.Option(help="Keep only the chain to this link")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
+
+
+def _options(
+    lock: list[str] | None,
+    parameters: str,
+    base: str,
+    root: str | None,
+    tip: str | None,
+    unphysical: bool,
+) -> Any:
+    from linkwise.model import Options
+
+    if parameters not in ("numeric", "symbolic"):
+        raise LinkwiseError(f"--parameters is {parameters!r}; choose numeric or symbolic")
+    if base not in ("fixed", "floating"):
+        raise LinkwiseError(f"--base is {base!r}; choose fixed or floating")
+    locked: dict[str, float] = {}
+    for item in lock or []:
+        joint, _, value = item.rpartition("=")
+        try:
+            locked[joint] = float(value)
+        except ValueError:
+            joint = ""
+        if not joint or abs(locked[joint]) == float("inf") or locked[joint] != locked[joint]:
+            raise LinkwiseError(
+                f"--lock {item!r} is not of the form JOINT=VALUE, such as --lock elbow=0.5"
+            )
+    return Options(parameters, locked, base, root, tip, unphysical)  # type: ignore[arg-type]
+
+
+@app.command()
+def generate(
+    robot: Robot,
+    out: Annotated[Path, typer.Option(help="Directory that gets the package")],
+    name: Annotated[
+        str | None, typer.Option(help="Name of the package; the robot's if not given")
+    ] = None,
+    backend: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="autograd, torch, numpy, c or formulas; may be repeated; all if not given"
+        ),
+    ] = None,
+    parameters: Annotated[
+        str, typer.Option(help="numeric, or symbolic: keep them as run-time parameters")
+    ] = "numeric",
+    lock: Lock = None,
+    base: Base = "fixed",
+    root: Root = None,
+    tip: Tip = None,
+    allow_unphysical: Unphysical = False,
+) -> None:
+    """Write the package of a robot."""
+    from linkwise import pipeline
+    from linkwise.emit import BACKENDS
+    from linkwise.emit.write import write_package
+    from linkwise.progress import progress
+
+    options = _options(lock, parameters, base, root, tip, allow_unphysical)
+    request = {
+        "robot": robot if not Path(robot).is_file() else Path(robot).name,
+        "backends": backend or list(BACKENDS),
+        "parameters": parameters,
+        "lock": dict(options.lock),
+        "base": base,
+        "root": root,
+        "tip": tip,
+        "allow_unphysical": allow_unphysical,
+    }
+    system = pipeline.read_system(robot, options)
+    with progress() as report:
+        files = pipeline.generate(system, backend or list(BACKENDS), name, request, report)
+    directory = out / json.loads(files["manifest.json"])["name"]
+    write_package(files, directory)
+    typer.echo(
+        f"wrote {directory}: {len(system.coordinates)} joints, {len(system.links)} links, {len(files)} files"
+    )
+
+
+@app.command()
+def check(
+    package: Annotated[Path, typer.Argument(help="Directory of a generated package")],
+    samples: Annotated[int, typer.Option(min=1, help="Random states")] = 100,
+    as_json: Json = False,
+) -> None:
+    """Prove a package right: hashes, back ends, an independent recursion, closure, structure."""
+    from linkwise.check import check_package
+
+    results = check_package(package, samples)
+    if as_json:
+        typer.echo(json.dumps([result.__dict__ for result in results], indent=1))
+    else:
+        for result in results:
+            typer.echo(f"{'ok  ' if result.passed else 'FAIL'}  {result.name:<58} {result.detail}")
+    if not all(result.passed for result in results):
+        raise typer.Exit(1)
+
+
+@app.command()
+def inspect(
+    robot: Robot,
+    lock: Lock = None,
+    base: Base = "fixed",
+    root: Root = None,
+    tip: Tip = None,
+    parameters: Annotated[str, typer.Option(help="numeric or symbolic")] = "numeric",
+    allow_unphysical: Unphysical = False,
+    as_json: Json = False,
+) -> None:
+    """Show a robot's joints, links and parameters, and what was merged, locked or ignored."""
+    from linkwise import pipeline
+    from linkwise.inspection import inspection, table
+
+    system = pipeline.read_system(
+        robot, _options(lock, parameters, base, root, tip, allow_unphysical)
+    )
+    data = inspection(system)
+    typer.echo(json.dumps(data, indent=1) if as_json else table(data))
+
+
+def _register() -> None:
+    from linkwise.motion import commands as motion
+    from linkwise.report import commands as report
+
+    report.register(app)
+    motion.register(app)
+
+
+def main() -> None:
+    """Run the command line; a user's mistake is one line on stderr and exit status 2."""
+    _register()
+    try:
+        app()
+    except LinkwiseError as error:
+        print(f"linkwise: error: {' '.join(str(error).split())}", file=sys.stderr)
+        sys.exit(2)

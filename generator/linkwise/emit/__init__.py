@@ -1,0 +1,61 @@
+"""Back ends: each turns a derivation into files; adding one adds an entry here and touches nothing else."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from linkwise.emit.autograd import autograd_files
+from linkwise.emit.c import c_files
+from linkwise.emit.closed_forms import closed_form_files
+from linkwise.emit.formulas import formula_files
+from linkwise.emit.package import Derivation
+from linkwise.emit.render import render
+
+Files = Iterator[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Backend:
+    """How a back end's files are made; `module` is what `load` imports, empty for files that nothing loads."""
+
+    name: str
+    module: str
+    doc: str
+    files: Callable[[Derivation], Files]
+
+
+def _runtime(name: str) -> Files:
+    from linkwise import __version__
+
+    yield f"{name}.py", render(f"package/{name}.py.j2", {"version": __version__})
+
+
+def _autograd(d: Derivation) -> Files:
+    yield from autograd_files(d.system, d.linear)
+    yield from _runtime("autograd_backend")
+    yield from _runtime("torch_backend")
+
+
+def _torch(d: Derivation) -> Files:
+    yield from closed_form_files(d.system, d.kernels, "torch")
+    yield from _runtime("torch_backend")
+
+
+def _numpy(d: Derivation) -> Files:
+    yield from closed_form_files(d.system, d.kernels, "numpy")
+
+
+BACKENDS = {
+    backend.name: backend
+    for backend in (
+        Backend("numpy", "numpy_backend", "closed forms on NumPy arrays", _numpy),
+        Backend("torch", "torch_backend", "closed forms on torch tensors", _torch),
+        Backend(
+            "autograd",
+            "autograd_backend",
+            "each link's Lagrangian, differentiated by torch",
+            _autograd,
+        ),
+        Backend("c", "", "closed forms in C99, to compile into a program of your own", c_files),
+        Backend("formulas", "", "closed forms to read, for small robots", formula_files),
+    )
+}

@@ -1,0 +1,146 @@
+"""Closed forms in C99: kernels over a block of samples, one file a link, and entry points over them.
+
+A kernel's text doesn't say how wide its block or its numbers are: the files that include it do, so that one text
+serves one sample and many, float and double, and a link's file stays the same in a longer robot.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from linkwise import __version__
+from linkwise.emit.code import straight_line
+from linkwise.emit.package import Derivation
+from linkwise.emit.printer import CPrinter
+from linkwise.emit.render import render
+from linkwise.graph.derive import Kernel, parameter_names
+from linkwise.graph.differentiate import substitute
+from linkwise.graph.expression import Node
+from linkwise.symbolic.system import System
+
+BLOCK = {"double": 8, "float": 16}
+"""Samples in a block: one cache line of each quantity."""
+
+
+@dataclass(frozen=True)
+class KernelFunction:
+    """One C function over a block; outputs are (array, position, expression)."""
+
+    name: str
+    arrays: tuple[str, ...]
+    inputs: tuple[tuple[str, str], ...]
+    assignments: tuple[tuple[str, str], ...]
+    outputs: tuple[tuple[str, int, str], ...]
+    unused: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class LinkSizes:
+    """Number of packed values of one link, and where they start in the robot's arrays."""
+
+    number: int
+    acceleration: int
+    velocity: int
+    gravity: int
+    linear: int
+    at_acceleration: int
+    at_velocity: int
+    at_gravity: int
+    at_linear: int
+
+
+def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
+    """Paths inside the package and texts."""
+    system, name = derivation.system, derivation.package
+    shared = {"version": __version__}
+    for j, kernel in enumerate(derivation.kernels):
+        view = {**shared, "number": j + 1, "functions": list(_functions(system, kernel, j + 1))}
+        yield f"c/link_{j + 1}.inc", render("c/link.inc.j2", view)
+    sizes = list(link_sizes(derivation.kernels))
+    last = sizes[-1]
+    robot = {
+        **shared,
+        "name": name,
+        "upper": name.upper(),
+        "n": len(system.coordinates),
+        "links": sizes,
+        "parameters": len(system.parameters),
+        "total_acceleration": last.at_acceleration + last.acceleration,
+        "total_velocity": last.at_velocity + last.velocity,
+        "total_gravity": last.at_gravity + last.gravity,
+        "total_linear": last.at_linear + last.linear,
+        "largest": max(max(k.acceleration, k.velocity) for k in sizes),
+        "types": [("double", "", BLOCK["double"]), ("float", "f", BLOCK["float"])],
+    }
+    yield f"c/{name}.h", render("c/robot.h.j2", robot)
+    yield "c/robot.inc", render("c/robot.inc.j2", robot)
+    for kind, suffix in (("double", ""), ("float", "f")):
+        view = {**shared, "name": name, "type": kind, "suffix": suffix, "block": BLOCK[kind]}
+        yield f"c/{name}_{kind}.c", render("c/robot.c.j2", view)
+
+
+def link_sizes(kernels: Sequence[Kernel]) -> Iterator[LinkSizes]:
+    """Sizes and offsets of the links' packed values, in order."""
+    c2 = c1 = g = linear = 0
+    for number, kernel in enumerate(kernels, 1):
+        forms = kernel.forms[0]
+        counts = (
+            len(forms.acceleration),
+            len(forms.velocity),
+            len(forms.gravity),
+            len(forms.linear_block(kernel.graph.zero)),
+        )
+        yield LinkSizes(number, *counts, c2, c1, g, linear)
+        c2, c1, g, linear = c2 + counts[0], c1 + counts[1], g + counts[2], linear + counts[3]
+
+
+def _functions(system: System, kernel: Kernel, number: int) -> Iterator[KernelFunction]:
+    forms = kernel.forms[0]
+    decomposition = {
+        "acceleration": list(forms.acceleration.values()),
+        "velocity": list(forms.velocity.values()),
+        "gravity": list(forms.gravity.values()),
+        "torque": list(forms.torque.values()),
+        "linear": forms.linear_block(kernel.graph.zero),
+    }
+    for name, groups in (
+        ("decomposition", decomposition),
+        ("torque", {"torque": list(forms.torque.values())}),
+        ("position_gradient", {"gradient": list(forms.position_gradient.values())}),
+    ):
+        yield kernel_function(system, kernel, f"link_{number}_{name}", groups)
+
+
+def kernel_function(
+    system: System, kernel: Kernel, name: str, groups: dict[str, list[Node]]
+) -> KernelFunction:
+    """C function whose output arrays are `groups`; sines and cosines of the coordinates are inputs."""
+    g = kernel.graph
+    sines = {
+        g.call(f, q): f"{f[0]}{k + 1}"
+        for k, q in enumerate(kernel.inputs.q)
+        for f in ("sin", "cos")
+    }
+    given = {node: g.symbol(symbol) for node, symbol in sines.items()}
+    nodes = [substitute(g, node, given) for group in groups.values() for node in group]
+    code = straight_line(g, nodes, CPrinter())
+    sources = {
+        f"{prefix}{k + 1}": f"{array}[{k} * W + b]"
+        for prefix, array in (
+            ("q", "q"),
+            ("qd", "qd"),
+            ("qdd", "qdd"),
+            ("s", "sine"),
+            ("c", "cosine"),
+        )
+        for k in range(len(system.coordinates))
+    }
+    sources |= {name: f"p[{at}]" for at, name in enumerate(parameter_names(system).values())}
+    inputs = tuple((symbol, source) for symbol, source in sources.items() if symbol in code.symbols)
+    places = [(array, at) for array, group in groups.items() for at in range(len(group))]
+    outputs = tuple(
+        (array, at, text) for (array, at), text in zip(places, code.outputs, strict=True)
+    )
+    used = {source.split("[")[0] for _, source in inputs}
+    unused = [a for a in ("q", "qd", "qdd", "sine", "cosine", "p") if a not in used]
+    unused += [array for array, group in groups.items() if not group]
+    return KernelFunction(name, tuple(groups), inputs, code.assignments, outputs, tuple(unused))

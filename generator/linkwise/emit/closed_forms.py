@@ -1,0 +1,80 @@
+"""Closed forms as Python functions over NumPy arrays or torch tensors, one file a link."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from linkwise import __version__
+from linkwise.emit.code import straight_line
+from linkwise.emit.energy_code import fetched
+from linkwise.emit.printer import PythonPrinter
+from linkwise.emit.render import render
+from linkwise.graph.derive import Kernel
+from linkwise.graph.expression import Node
+from linkwise.symbolic.system import System
+
+
+@dataclass(frozen=True)
+class FormFunction:
+    """One emitted function; each group of outputs is packed into an array of its own."""
+
+    name: str
+    doc: str
+    inputs: tuple[str, ...]
+    assignments: tuple[tuple[str, str], ...]
+    groups: tuple[str, ...]
+
+
+def closed_form_files(
+    system: System, kernels: Sequence[Kernel], library: str
+) -> Iterator[tuple[str, str]]:
+    """Paths inside the package and texts; `library` is numpy or torch."""
+    folder, prefix = f"{library}_forms", {"numpy": "np", "torch": "torch"}[library]
+    imported = "import numpy as np" if library == "numpy" else "import torch"
+    for j, kernel in enumerate(kernels):
+        view = {
+            "number": j + 1,
+            "version": __version__,
+            "import_library": imported,
+            "name": ascii(system.links[j].name),
+            "path": repr(kernel.forms[0].path),
+            "functions": list(_functions(system, kernel, PythonPrinter(prefix))),
+        }
+        yield f"{folder}/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
+    numbers = range(1, len(kernels) + 1)
+    init = {"library": library, "version": __version__, "numbers": numbers}
+    yield f"{folder}/__init__.py", render("closed_forms/init.py.j2", init)
+
+
+def _functions(system: System, kernel: Kernel, printer: PythonPrinter) -> Iterator[FormFunction]:
+    forms = kernel.forms[0]
+    groups: Mapping[str, tuple[str, list[Sequence[Node]]]] = {
+        "decomposition": (
+            "c2_ik for i <= k, c1_ik, g_i, tau_i, and the part of c1 linear in qd.",
+            [
+                list(forms.acceleration.values()),
+                list(forms.velocity.values()),
+                list(forms.gravity.values()),
+                list(forms.torque.values()),
+                forms.linear_block(kernel.graph.zero),
+            ],
+        ),
+        "torque": ("tau_i.", [list(forms.torque.values())]),
+        "position_gradient": (
+            "c0_ik = d(tau_i)/d(q_k).",
+            [list(forms.position_gradient.values())],
+        ),
+    }
+    for name, (doc, outputs) in groups.items():
+        code = straight_line(kernel.graph, [node for group in outputs for node in group], printer)
+        texts = iter(code.outputs)
+        packed = tuple(_tuple([next(texts) for _ in group]) for group in outputs)
+        yield FormFunction(name, doc, fetched(system, code, "[..., {}]"), code.assignments, packed)
+
+
+def _tuple(texts: Sequence[str]) -> str:
+    """Tuple display, one entry a line where it is long."""
+    if len(texts) == 0:
+        return "()"
+    if sum(map(len, texts)) < 60:
+        return f"({', '.join(texts)},)"
+    return "(\n" + "".join(f"            {text},\n" for text in texts) + "        )"

@@ -1,0 +1,31 @@
+"""The one place that knows Jinja2."""
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, meta
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("linkwise.templates", ""),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment
+
+
+def render(template: str, view: Mapping[str, Any]) -> str:
+    """Text of `templates/<template>` with the fields of `view`; a missing field raises."""
+    return _environment().get_template(template).render(view)
+
+
+def variables(template: str) -> set[str]:
+    """Names that a template needs, for the test that they are its view's fields."""
+    environment = _environment()
+    source, _, _ = environment.loader.get_source(environment, template)  # type: ignore[union-attr]
+    return meta.find_undeclared_variables(environment.parse(source))

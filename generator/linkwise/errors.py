@@ -1,0 +1,17 @@
+"""The one error that a user's mistake raises."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class LinkwiseError(ValueError):
+    """A mistake in the input; the message says where it is and how to mend it."""
+
+
+@contextmanager
+def within(place: str) -> Iterator[None]:
+    """Prefix every LinkwiseError raised inside with `place`, the file or stage at fault."""
+    try:
+        yield
+    except LinkwiseError as error:
+        raise LinkwiseError(f"{place}: {error}") from error

@@ -1,0 +1,220 @@
+"""A hash-consed expression graph: equal expressions are one node.
+
+A node is an index into `Graph.nodes`; an entry is `(op, a, b)`. Operands of `add`, `sub`, `mul`, `div` and
+`neg` are nodes; a `const` holds its value, a `symbol` its name, and a `call` its function's name and argument.
+Construction folds constants, drops zeros and ones, and pulls signs outward, so that x − y and y − x, or
+(−x)·y and x·y, share their work.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+Node = int
+Entry = tuple[str, Any, Any]
+Vector = tuple[Node, Node, Node]
+Matrix = tuple[Vector, Vector, Vector]
+
+FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "sin": math.sin,
+    "cos": math.cos,
+    "tan": math.tan,
+    "asin": math.asin,
+    "acos": math.acos,
+    "atan": math.atan,
+    "sinh": math.sinh,
+    "cosh": math.cosh,
+    "tanh": math.tanh,
+    "exp": math.exp,
+    "log": math.log,
+    "sqrt": math.sqrt,
+}
+
+
+class Graph:
+    """A growing set of shared expressions; every method returns a node."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Entry] = []
+        self.names: dict[Node, str] = {}
+        self._index: dict[Entry, Node] = {}
+        self.zero = self.const(0.0)
+        self.one = self.const(1.0)
+
+    def _node(self, op: str, a: Any, b: Any) -> Node:
+        entry = (op, a, b)
+        node = self._index.get(entry)
+        if node is None:
+            node = self._index[entry] = len(self.nodes)
+            self.nodes.append(entry)
+        return node
+
+    def name(self, node: Node, name: str) -> Node:
+        """Suggest the variable that holds `node` in emitted code; leaves stay unnamed."""
+        if self.nodes[node][0] in ("add", "sub", "mul", "div", "call"):
+            self.names.setdefault(node, name)
+        return node
+
+    def const(self, value: float) -> Node:
+        """Node of a number; −0.0 becomes 0.0."""
+        return self._node("const", float(value) + 0.0, None)
+
+    def symbol(self, name: str) -> Node:
+        """Node of an input."""
+        return self._node("symbol", name, None)
+
+    def value(self, node: Node) -> float | None:
+        """Return the number that `node` is, or None."""
+        op, a, _ = self.nodes[node]
+        return a if op == "const" else None
+
+    def neg(self, a: Node) -> Node:
+        """−a."""
+        op, x, y = self.nodes[a]
+        if op == "const":
+            return self.const(-x)
+        if op == "neg":
+            return int(x)
+        if op == "sub" and ("sub", y, x) in self._index:
+            return self._index["sub", y, x]
+        return self._node("neg", a, None)
+
+    def add(self, a: Node, b: Node) -> Node:
+        """a + b."""
+        if a == self.zero:
+            return b
+        if b == self.zero:
+            return a
+        op_a, xa, _ = self.nodes[a]
+        op_b, xb, _ = self.nodes[b]
+        if op_a == "const" and op_b == "const":
+            return self.const(xa + xb)
+        if op_b == "neg":
+            return self.neg(self.add(xa, xb)) if op_a == "neg" else self.sub(a, xb)
+        if op_a == "neg":
+            return self.sub(b, xa)
+        if op_a == "const" and xa < 0.0:
+            return self.sub(b, self.const(-xa))
+        if op_b == "const" and xb < 0.0:
+            return self.sub(a, self.const(-xb))
+        if a == b:
+            return self.mul(self.const(2.0), a)
+        return self._node("add", a, b) if a < b else self._node("add", b, a)
+
+    def sub(self, a: Node, b: Node) -> Node:
+        """a − b."""
+        if a == b:
+            return self.zero
+        if b == self.zero:
+            return a
+        if a == self.zero:
+            return self.neg(b)
+        op_a, xa, _ = self.nodes[a]
+        op_b, xb, _ = self.nodes[b]
+        if op_a == "const" and op_b == "const":
+            return self.const(xa - xb)
+        if op_b == "neg":
+            return self.add(a, xb)
+        if op_a == "neg":
+            return self.neg(self.add(xa, b))
+        if op_b == "const" and xb < 0.0:
+            return self.add(a, self.const(-xb))
+        swapped = self._index.get(("sub", b, a))
+        if swapped is not None:
+            return self.neg(swapped)
+        return self._node("sub", a, b)
+
+    def mul(self, a: Node, b: Node) -> Node:
+        """a · b."""
+        if a == self.zero or b == self.zero:
+            return self.zero
+        if a == self.one:
+            return b
+        if b == self.one:
+            return a
+        op_a, xa, _ = self.nodes[a]
+        op_b, xb, _ = self.nodes[b]
+        if op_b == "const":
+            a, b, op_a, xa, op_b, xb = b, a, op_b, xb, op_a, xa
+        if op_a == "const":
+            if op_b == "const":
+                return self.const(xa * xb)
+            if xa < 0.0:
+                return self.neg(self.mul(self.const(-xa), b))
+            if op_b == "mul" and (inner := self.value(xb)) is not None:
+                return self.mul(self.const(xa * inner), self.nodes[b][2])
+        if op_a == "neg":
+            return self.neg(self.mul(xa, b))
+        if op_b == "neg":
+            return self.neg(self.mul(a, xb))
+        if op_a != "const" and b < a:
+            a, b = b, a
+        return self._node("mul", a, b)
+
+    def div(self, a: Node, b: Node) -> Node:
+        """a / b; division by a number becomes a product."""
+        divisor = self.value(b)
+        if divisor == 0.0:
+            raise ZeroDivisionError("an expression divides by zero")
+        if divisor is not None:
+            return self.mul(a, self.const(1.0 / divisor))
+        if a == self.zero:
+            return a
+        if self.nodes[a][0] == "neg":
+            return self.neg(self.div(self.nodes[a][1], b))
+        return self._node("div", a, b)
+
+    def call(self, function: str, a: Node) -> Node:
+        """function(a), one of FUNCTIONS; odd and even functions shed the sign of `a`."""
+        value = self.value(a)
+        if value is not None:
+            return self.const(FUNCTIONS[function](value))
+        if self.nodes[a][0] == "neg":
+            if function == "cos":
+                return self.call("cos", self.nodes[a][1])
+            if function == "sin":
+                return self.neg(self.call("sin", self.nodes[a][1]))
+        return self._node("call", function, a)
+
+    def power(self, a: Node, exponent: int) -> Node:
+        """a**exponent for a whole exponent, by repeated squaring."""
+        if exponent < 0:
+            return self.div(self.one, self.power(a, -exponent))
+        result, square = self.one, a
+        while exponent:
+            if exponent & 1:
+                result = self.mul(result, square)
+            square = self.mul(square, square) if exponent > 1 else square
+            exponent >>= 1
+        return result
+
+    def sum(self, terms: Iterable[Node]) -> Node:
+        """Sum of `terms` from left to right."""
+        total = self.zero
+        for term in terms:
+            total = self.add(total, term)
+        return total
+
+
+def operands(entry: Entry) -> tuple[Node, ...]:
+    """Return the nodes that an entry is computed from."""
+    op, a, b = entry
+    if op in ("const", "symbol"):
+        return ()
+    if op == "neg":
+        return (a,)
+    if op == "call":
+        return (b,)
+    return (a, b)
+
+
+def reachable(graph: Graph, outputs: Iterable[Node]) -> list[Node]:
+    """Every node that `outputs` need, operands before users."""
+    needed = set()
+    stack = list(outputs)
+    while stack:
+        node = stack.pop()
+        if node not in needed:
+            needed.add(node)
+            stack.extend(operands(graph.nodes[node]))
+    return sorted(needed)

@@ -1,0 +1,96 @@
+"""Joint types as chains of revolute and prismatic axes."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from linkwise.errors import LinkwiseError
+from linkwise.model.description import Connection
+from linkwise.model.geometry import align_z
+from linkwise.model.robot import Note, is_finite
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+Vector = tuple[float, float, float]
+SINGLE = {
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "hinge": "revolute",
+    "prismatic": "prismatic",
+}
+BALL = (("yaw", "revolute", Z), ("pitch", "revolute", Y), ("roll", "revolute", X))
+FLOATING = (("x", "prismatic", X), ("y", "prismatic", Y), ("z", "prismatic", Z), *BALL)
+KNOWN = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating", "ball")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One degree of freedom of a file's joint; `last` carries the child link."""
+
+    name: str
+    connection: str
+    suffix: str
+    kind: Literal["revolute", "prismatic"]
+    direction: Vector
+    last: bool
+
+    @property
+    def unit(self) -> Literal["rad", "m"]:
+        """Return rad or m."""
+        return "rad" if self.kind == "revolute" else "m"
+
+
+def expand(connection: Connection, notes: list[Note]) -> list[Axis]:
+    """Return the axes of a joint, none for a fixed one; raises LinkwiseError for an unknown type or zero axis.
+
+    A floating joint is x, y, z of its parent's frame, then yaw, pitch, roll about the moved z, y, x: the order of
+    rpy. A ball is its last three. A planar joint slides in the plane normal to its axis, then turns about it.
+    """
+    if connection.type == "fixed":
+        return []
+    if connection.type in SINGLE:
+        kind: Literal["revolute", "prismatic"] = SINGLE[connection.type]  # type: ignore[assignment]
+        return [Axis(connection.name, connection.name, "", kind, _unit(connection), True)]
+    if connection.type in ("floating", "ball"):
+        parts = FLOATING if connection.type == "floating" else BALL
+    elif connection.type == "planar":
+        columns = tuple(zip(*align_z(_unit(connection)), strict=True))
+        parts = (
+            ("x", "prismatic", columns[0]),
+            ("y", "prismatic", columns[1]),
+            ("yaw", "revolute", columns[2]),
+        )
+    else:
+        raise LinkwiseError(
+            f"joint {connection.name!r} has the unknown type {connection.type!r}; use one of {', '.join(KNOWN)}"
+        )
+    notes.append(
+        Note(
+            "expanded",
+            connection.name,
+            f"{connection.type}: " + ", ".join(part[0] for part in parts),
+        )
+    )
+    return [
+        Axis(
+            f"{connection.name}_{suffix}",
+            connection.name,
+            suffix,
+            kind,
+            direction,
+            index == len(parts) - 1,
+        )  # type: ignore[arg-type]
+        for index, (suffix, kind, direction) in enumerate(parts)
+    ]
+
+
+def _unit(connection: Connection) -> Vector:
+    x, y, z = connection.axis
+    if not all(is_finite(a) for a in connection.axis):
+        raise LinkwiseError(
+            f"joint {connection.name!r} has NaN or infinity in its axis; give numbers"
+        )
+    length = (x * x + y * y + z * z) ** 0.5
+    if length < 1e-9:
+        raise LinkwiseError(
+            f"joint {connection.name!r} has a zero axis; give its direction, such as 0 0 1"
+        )
+    return x / length, y / length, z / length

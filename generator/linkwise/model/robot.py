@@ -1,0 +1,137 @@
+"""A rigid-body robot: links moved by one-coordinate joints, checked once when it is built."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+import sympy as sp
+
+from linkwise.errors import LinkwiseError
+
+Scalar: TypeAlias = float | sp.Expr
+"""A number, or a SymPy expression in named parameters."""
+
+Vec3: TypeAlias = tuple[Scalar, Scalar, Scalar]
+Mat3: TypeAlias = tuple[Vec3, Vec3, Vec3]
+Rotation: TypeAlias = tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A generalized coordinate: its name, and rad for an angle or m for a length."""
+
+    name: str
+    unit: Literal["rad", "m"] = "rad"
+
+    @property
+    def q(self) -> sp.Symbol:
+        """The coordinate as a SymPy symbol."""
+        return sp.Symbol(self.name, real=True)
+
+    @property
+    def qd(self) -> sp.Symbol:
+        """Its velocity as a SymPy symbol."""
+        return sp.Symbol(f"d({self.name})/dt", real=True)
+
+    @property
+    def qdd(self) -> sp.Symbol:
+        """Its acceleration as a SymPy symbol."""
+        return sp.Symbol(f"d²({self.name})/dt²", real=True)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One degree of freedom between a parent link's frame and a link's frame.
+
+    The link's frame has its z axis on the joint's axis. With q the coordinate, a revolute joint places it at
+    `translation`, turned by `rotation` · Rz(ratio·q); a prismatic one at `translation` + `rotation` z ratio·q.
+    """
+
+    name: str
+    kind: Literal["revolute", "prismatic"]
+    coordinate: int
+    rotation: Rotation
+    translation: Vec3
+    ratio: float = 1.0
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid body in its own frame: mass in kg, centre of mass in m, inertia about it in kg·m²."""
+
+    name: str
+    parent: int | None
+    joint: Joint
+    mass: Scalar
+    com: Vec3
+    inertia: Mat3
+
+    @property
+    def massless(self) -> bool:
+        """Whether the link carries neither mass nor inertia, and so has no Lagrangian."""
+        return self.mass == 0 and all(entry == 0 for row in self.inertia for entry in row)
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something the reader did with the description, for `inspect`: what happened to whom."""
+
+    kind: Literal[
+        "merged",
+        "locked",
+        "massless",
+        "ignored",
+        "snapped",
+        "mimic",
+        "cut",
+        "expanded",
+        "unphysical",
+    ]
+    subject: str
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A tree of links, parents before children, moved by `coordinates`; gravity in m/s²."""
+
+    name: str
+    coordinates: tuple[Coordinate, ...]
+    links: tuple[Link, ...]
+    gravity: Vec3 = (0.0, 0.0, -9.81)
+    parameters: tuple[tuple[str, float], ...] = ()
+    notes: tuple[Note, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.coordinates:
+            raise LinkwiseError("no joint moves: give at least one revolute or prismatic joint")
+        for index, link in enumerate(self.links):
+            if link.parent is not None and not 0 <= link.parent < index:
+                raise LinkwiseError(f"link {link.name!r} must follow its parent")
+        for what, names in (
+            ("joint", [c.name for c in self.coordinates]),
+            ("link", [link.name for link in self.links]),
+        ):
+            for name in names:
+                if not name.strip():
+                    raise LinkwiseError(f"a {what} has an empty name; name it")
+                if names.count(name) > 1:
+                    raise LinkwiseError(f"two {what}s are named {name!r}; rename one")
+
+    def chain(self, link: int) -> tuple[int, ...]:
+        """Indices of the links from the root to `link`, itself included."""
+        chain: list[int] = []
+        at: int | None = link
+        while at is not None:
+            chain.append(at)
+            at = self.links[at].parent
+        return tuple(reversed(chain))
+
+    def joints_to(self, link: int) -> tuple[Joint, ...]:
+        """Return the joints from the root to `link`."""
+        return tuple(self.links[at].joint for at in self.chain(link))
+
+
+def is_finite(value: Scalar) -> bool:
+    """Whether a scalar is no NaN and no infinity; an expression counts as finite."""
+    return not isinstance(value, (int, float)) or math.isfinite(value)

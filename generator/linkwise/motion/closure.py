@@ -1,0 +1,55 @@
+"""How well the parts of a result sum to the whole."""
+
+from dataclasses import asdict, dataclass
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.errors import LinkwiseError
+
+LIMIT = 1e-9
+"""A relative error above this is no rounding: the package does not compute what it says."""
+
+
+@dataclass(frozen=True)
+class Closure:
+    """Largest errors of Σ_k τp_ij + g_ij against τ_ij (`terms`) and of Σ_j τ_ij against τ_i (`links`).
+
+    Absolute in N·m (N), relative to the largest sum of magnitudes in the same block of samples.
+    """
+
+    terms_absolute: float = 0.0
+    terms_relative: float = 0.0
+    links_absolute: float = 0.0
+    links_relative: float = 0.0
+
+    def __or__(self, other: "Closure") -> "Closure":
+        """The larger of both, error by error."""
+        a, b = asdict(self), asdict(other)
+        return Closure(**{name: max(a[name], b[name]) for name in a})
+
+    def check(self) -> None:
+        """Raise LinkwiseError where the parts do not sum to the whole."""
+        worst = max(self.terms_relative, self.links_relative)
+        if not worst <= LIMIT:
+            raise LinkwiseError(
+                f"the robot's torques do not close (relative error {worst:.2g});"
+                " run `linkwise check` on it"
+            )
+
+
+def residual(parts: list[NDArray[np.float64]], whole: NDArray[np.float64]) -> tuple[float, float]:
+    """Largest |Σ parts - whole| over samples, and the largest Σ |parts|."""
+    if not parts:
+        return float(np.abs(whole).max(initial=0.0)), 0.0
+    error = reduce(np.add, parts) - whole
+    scale = reduce(np.add, map(np.abs, parts))
+    return float(np.abs(error).max(initial=0.0)), float(scale.max(initial=0.0))
+
+
+def relative(pairs: list[tuple[float, float]]) -> tuple[float, float]:
+    """Largest error of (error, scale) pairs, absolute and relative to the largest scale."""
+    error = max((pair[0] for pair in pairs), default=0.0)
+    scale = max((pair[1] for pair in pairs), default=0.0)
+    return error, error / scale if scale else error

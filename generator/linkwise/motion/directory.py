@@ -1,0 +1,42 @@
+"""A directory of results that appears whole or not at all."""
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from linkwise.errors import LinkwiseError
+
+
+@contextmanager
+def whole_directory(target: Path, mark: str) -> Iterator[Path]:
+    """Yield a directory to write into; it becomes `target` at the end, and goes after an error.
+
+    An existing `target` is replaced only if it is empty or, holding the file `mark`, a former result.
+    """
+    if target.exists() and not (target.is_dir() and (_empty(target) or (target / mark).is_file())):
+        raise LinkwiseError(
+            f"{target}: exists and is no former result (it has no {mark}); give another --out"
+        )
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
+    except OSError as error:
+        raise LinkwiseError(f"{target}: cannot be written: {error.strerror}") from error
+    try:
+        yield draft
+        draft.chmod(0o755)
+        if target.exists():
+            former = draft.with_name(draft.name + ".former")
+            target.rename(former)
+            draft.rename(target)
+            shutil.rmtree(former)
+        else:
+            draft.rename(target)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _empty(directory: Path) -> bool:
+    return next(directory.iterdir(), None) is None

@@ -1,0 +1,34 @@
+"""Samples of uneven time brought to an even rate, window by window."""
+
+from pathlib import Path
+
+import numpy as np
+
+from linkwise.errors import LinkwiseError
+from linkwise.motion.extras import extra
+from linkwise.motion.log import BLOCK, Array
+from linkwise.motion.spool import Spool
+
+OVERLAP = 64
+"""Knots seen past a window. A knot's influence on a cubic spline at least halves from one knot to the
+next, so what is cut away is below 2⁻⁶⁴ of the signal."""
+
+
+def resample(samples: Array, rate: float, spool: Path | None, rows: int = BLOCK) -> Array:
+    """Cubic splines through samples (S, 1 + n), time first, at `rate` Hz from the first time on."""
+    spline = extra("scipy.interpolate").CubicSpline
+    time = samples[:, 0]
+    count = int(np.floor((time[-1] - time[0]) * rate * (1 + 1e-12))) + 1
+    if len(samples) < 4 or count < 5:
+        raise LinkwiseError(
+            f"{len(samples)} samples give {count} at {rate:g} Hz; 5 or more are needed"
+        )
+    table = Spool(samples.shape[1], spool)
+    for start in range(0, count, rows):
+        at = time[0] + np.arange(start, min(start + rows, count)) / rate
+        low = max(0, int(np.searchsorted(time, at[0])) - OVERLAP)
+        high = min(len(time), int(np.searchsorted(time, at[-1])) + OVERLAP)
+        window = np.asarray(samples[low:high])
+        values = spline(window[:, 0], window[:, 1:], axis=0)(np.minimum(at, time[-1]))
+        table.append(np.column_stack([at, values]))
+    return table.finish()

@@ -1,0 +1,148 @@
+"""A generated robot package, imported from its directory."""
+
+import importlib.util
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.errors import LinkwiseError
+from linkwise.motion.skeleton import Body, read_skeleton
+
+Array = NDArray[np.float64]
+BACKENDS = ("native", "numpy")
+"""Back ends in the order tried: compiled C is the fastest, NumPy always works."""
+
+
+class PackedLayout(Protocol):
+    """Index rows of the packed terms: (i, j, k) joint, link, cause; or (i, j)."""
+
+    acceleration: NDArray[np.int_]
+    velocity: NDArray[np.int_]
+    gravity: NDArray[np.int_]
+    torque: NDArray[np.int_]
+
+
+class Packed(Protocol):
+    """c2, c1, g and τ_ij without the zeros, each (..., terms); `layout` says which is which."""
+
+    acceleration: Array
+    velocity: Array
+    gravity: Array
+    torque: Array
+    layout: PackedLayout
+
+
+class Propagation(Protocol):
+    """Propagation torques (..., n, N, n) by order, and gravity (..., n, N)."""
+
+    acceleration: Array
+    velocity: Array
+    gravity: Array
+
+
+class Model(Protocol):
+    """What a generated package's `load` returns, as far as the analysis uses it."""
+
+    joint_names: Sequence[str]
+    link_names: Sequence[str]
+    joint_units: Sequence[str]
+
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Joint torques τ_i (..., n)."""
+
+    def propagation(
+        self, q: Array, qd: Array, qdd: Array, convention: str = "closing"
+    ) -> Propagation:
+        """Each coefficient times its motion."""
+
+    def packed(self, q: Array, qd: Array, qdd: Array) -> Packed:
+        """All coefficients that are not identically 0."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A loaded robot: names in the order of every array, and which back end computes."""
+
+    name: str
+    joints: tuple[str, ...]
+    units: tuple[str, ...]
+    links: tuple[str, ...]
+    backend: str
+    model: Model
+    skeleton: tuple[Body, ...] | None
+    manifest_sha256: str
+
+
+def load_robot(directory: Path, backend: str | None = None) -> Robot:
+    """Import the package in `directory`, with `backend` or the fastest that works here."""
+    import hashlib
+
+    manifest_path = directory / "manifest.json"
+    if not manifest_path.is_file():
+        raise LinkwiseError(
+            f"{directory}: no generated robot there (no manifest.json);"
+            " make one with `linkwise generate`"
+        )
+    text = manifest_path.read_bytes()
+    try:
+        manifest: dict[str, Any] = json.loads(text)
+        name, skeleton = str(manifest["name"]), read_skeleton(manifest.get("skeleton"))
+    except (ValueError, KeyError, TypeError) as error:
+        raise LinkwiseError(
+            f"{manifest_path}: damaged ({error}); generate the robot again"
+        ) from error
+    package = _import(directory)
+    chosen, model = _load(directory, package, BACKENDS if backend is None else (backend,))
+    return Robot(
+        name,
+        tuple(model.joint_names),
+        tuple(model.joint_units),
+        tuple(model.link_names),
+        chosen,
+        model,
+        skeleton,
+        hashlib.sha256(text).hexdigest(),
+    )
+
+
+def _import(directory: Path) -> ModuleType:
+    """Import by path, under a name of its own: the parent need not be on sys.path."""
+    resolved = directory.resolve()
+    name = f"linkwise_robot_{abs(hash(resolved)):x}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(
+        name, resolved / "__init__.py", submodule_search_locations=[str(resolved)]
+    )
+    if spec is None or spec.loader is None or not (resolved / "__init__.py").is_file():
+        raise LinkwiseError(f"{directory}: no package there (no __init__.py); generate it again")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        raise LinkwiseError(
+            f"{directory}: cannot be imported: {error}; generate it again"
+        ) from error
+    return module
+
+
+def _load(directory: Path, package: ModuleType, backends: Sequence[str]) -> tuple[str, Model]:
+    reasons = []
+    for backend in backends:
+        try:
+            return backend, package.load(backend)
+        except Exception as error:  # A back end may lack its compiler, its library or its files.
+            reasons.append(f"{backend}: {error}")
+    raise LinkwiseError(
+        f"{directory}: no back end for the analysis ({'; '.join(reasons)});"
+        " generate the robot with --backend numpy"
+    )

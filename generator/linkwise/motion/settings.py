@@ -1,0 +1,91 @@
+"""How a log is read and its movement derived: the user's choices, recorded in every output."""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from linkwise.errors import LinkwiseError
+
+Units = Literal["rad", "deg"]
+Derivative = Literal["five-point", "savitzky-golay"]
+Padding = Literal["odd", "even", "constant", "none"]
+Edges = Literal["one-sided", "trim"]
+Convention = Literal["closing", "gradient"]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How columns become joint coordinates.
+
+    `units` is the angles' unit; None takes the file's own word (`inDegrees`), else radians. Lengths
+    are metres always. `mapping` holds (column, joint) pairs; a joint without one takes the column of
+    its name.
+    """
+
+    units: Units | None = None
+    time: str | None = None
+    mapping: tuple[tuple[str, str], ...] = ()
+    ignore_extra: bool = False
+    resample: float | None = None
+    """Sampling rate in Hz to bring a log of uneven time to, by cubic splines."""
+
+    def __post_init__(self) -> None:
+        if self.resample is not None and not 0 < self.resample < float("inf"):
+            raise LinkwiseError(f"--resample {self.resample:g}: give a rate in Hz above 0")
+
+
+@dataclass(frozen=True)
+class Lowpass:
+    """A Butterworth low-pass run forwards and backwards, so without a shift in time.
+
+    `cutoff` is in Hz and `order` is that of one pass: both together have twice the order and -6 dB at
+    the cutoff. `padding` says how the log is continued past its ends while filtering.
+    """
+
+    cutoff: float
+    order: int = 2
+    padding: Padding = "odd"
+
+    def __post_init__(self) -> None:
+        if not 0 < self.cutoff < float("inf"):
+            raise LinkwiseError(f"--cutoff {self.cutoff:g}: give a frequency in Hz above 0")
+        if not 1 <= self.order <= 12:
+            raise LinkwiseError(f"--filter-order {self.order}: give an order from 1 to 12")
+
+
+@dataclass(frozen=True)
+class Processing:
+    """How velocities and accelerations come from the samples, and the convention of the terms.
+
+    The low-pass, if any, is applied to q before it is differentiated; both are linear, so away from
+    the ends this is the paper's filter after the derivative. `window` and `degree` are
+    Savitzky–Golay's.
+    """
+
+    derivative: Derivative = "five-point"
+    window: int = 11
+    degree: int = 4
+    lowpass: Lowpass | None = None
+    edges: Edges = "one-sided"
+    convention: Convention = "closing"
+
+    def __post_init__(self) -> None:
+        if self.derivative == "savitzky-golay":
+            if self.degree < 2:
+                raise LinkwiseError(f"--degree {self.degree}: an acceleration needs 2 or more")
+            if self.window % 2 == 0 or self.window <= self.degree:
+                raise LinkwiseError(
+                    f"--window {self.window}: give an odd number above the degree {self.degree}"
+                )
+
+    @property
+    def span(self) -> int:
+        """Samples that one derivative looks at."""
+        return 5 if self.derivative == "five-point" else self.window
+
+
+def record(reading: Reading, processing: Processing) -> dict[str, Any]:
+    """All choices as plain data, for the outputs."""
+    kept = asdict(processing)
+    if processing.derivative == "five-point":
+        del kept["window"], kept["degree"]
+    return {"reading": asdict(reading), "processing": kept}

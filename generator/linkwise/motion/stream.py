@@ -1,0 +1,83 @@
+"""A whole log, block by block: each is differentiated, analysed, summed up and handed on."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.errors import LinkwiseError
+from linkwise.motion.analysis import Totals
+from linkwise.motion.closure import Closure
+from linkwise.motion.differentiate import derivatives
+from linkwise.motion.samples import Progress, Samples
+from linkwise.motion.settings import Processing
+from linkwise.motion.terms import Terms
+
+Array = NDArray[np.float64]
+Sink = Callable[[Array], None]
+"""Takes one block (columns, samples) after the other; the block is the sink's own."""
+
+INNER = 4096
+"""Samples computed at once, so that the intermediate values stay in the cache."""
+
+BLOCK_BYTES = 48 << 20
+"""Size of a block handed on, about: some three of them are in memory at any time."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is known once every block is done."""
+
+    totals: Totals
+    closure: Closure
+    samples: int
+
+
+def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
+    """First sample analysed and the one after the last; LinkwiseError if there are too few."""
+    count, needed = len(samples.time), processing.span
+    cut = needed // 2 if processing.edges == "trim" else 0
+    if count < needed + 2 * cut:
+        raise LinkwiseError(
+            f"{count} samples, but the {processing.derivative} formula"
+            f"{' with trimmed edges' if cut else ''} needs {needed + 2 * cut} or more"
+        )
+    return cut, count - cut
+
+
+def run(
+    samples: Samples, terms: Terms, processing: Processing, sink: Sink, progress: Progress
+) -> Run:
+    """Send every block to `sink`, which works in a thread beside the computation."""
+    start, stop = span_of(samples, processing)
+    total = np.zeros(len(terms.columns))
+    peak = np.zeros(len(terms.columns))
+    closure = Closure()
+    with ThreadPoolExecutor(1) as writer:
+        pending: Future[None] | None = None
+        for first, last in _blocks(start, stop, len(terms.columns)):
+            block = np.empty((len(terms.columns), last - first))
+            for at in range(first, last, INNER):
+                end = min(at + INNER, last)
+                q, qd, qdd = derivatives(samples.q, samples.rate, at, end, processing)
+                out = block[:, at - first : end - first]
+                closure |= terms.fill(out, samples.time[at:end], q, qd, qdd)
+                magnitude = np.abs(out)
+                total += magnitude.sum(axis=1)
+                np.maximum(peak, magnitude.max(axis=1), out=peak)
+            closure.check()
+            if pending is not None:
+                pending.result()
+            pending = writer.submit(sink, block)
+            progress("analysing", last - start, stop - start)
+        if pending is not None:
+            pending.result()
+    return Run(Totals(total / (stop - start), peak), closure, stop - start)
+
+
+def _blocks(start: int, stop: int, columns: int) -> Iterator[tuple[int, int]]:
+    rows = max(INNER, BLOCK_BYTES // (8 * columns) // INNER * INNER)
+    for at in range(start, stop, rows):
+        yield at, min(at + rows, stop)

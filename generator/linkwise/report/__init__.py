@@ -1,0 +1,1 @@
+"""Term counts, operation counts and the cost-reduction curve."""

@@ -1,0 +1,48 @@
+"""Reports on disk: all files of a report, or none."""
+
+import csv
+import io
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from linkwise.errors import LinkwiseError
+
+
+def write_all(directory: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
+    """Write every file beside its target, then rename; raises LinkwiseError if the directory refuses."""
+    waiting: list[tuple[Path, Path]] = []
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            target = directory / name
+            beside = directory / f".{name}.{os.getpid()}"
+            waiting.append((beside, target))
+            beside.write_bytes(content)
+        for beside, target in waiting:
+            beside.replace(target)
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise LinkwiseError(
+            f"{directory}: cannot write the report ({reason}); choose another --out"
+        ) from error
+    finally:
+        for beside, _ in waiting:
+            beside.unlink(missing_ok=True)
+    return tuple(target for _, target in waiting)
+
+
+def json_text(data: Any) -> str:
+    """JSON as people read it."""
+    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+
+
+def csv_text(header: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """Comma-separated values; None is an empty cell."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
+    return out.getvalue()

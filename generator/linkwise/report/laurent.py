@@ -1,0 +1,171 @@
+"""Exact sparse polynomials in complex exponentials, velocities and parameters.
+
+A trigonometric sum is a Laurent polynomial in z_k = exp(i q_k): cos q = (z + 1/z)/2, sin q = (z − 1/z)/2i. In it
+every product of sines and cosines is already one sine or cosine of an angle sum, and like terms meet by
+themselves. A monomial is one integer whose digits are the exponents, so that multiplying monomials is adding
+integers. Digits are balanced (−128..127); the lowest one is the power of i, kept at 0 or 1 by i² = −1.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+
+DIGIT = 8
+"""Bits of an exponent."""
+LIMIT = (1 << (DIGIT - 2)) - 1
+"""Highest exponent, half of what a digit holds: a product of two can be examined before it overflows."""
+I_SQUARED = 2
+
+
+class BudgetExceededError(Exception):
+    """A polynomial grew beyond the terms it was allowed."""
+
+
+class ExponentError(Exception):
+    """A power too high for its digit."""
+
+
+@dataclass(frozen=True)
+class Laurent:
+    """Σ coefficient · monomial, over one common denominator.
+
+    terms: packed exponents to a whole numerator, never zero
+    bound: no exponent exceeds it in size
+    """
+
+    terms: dict[int, int]
+    denominator: int = 1
+    bound: int = 0
+
+    def __bool__(self) -> bool:
+        return bool(self.terms)
+
+    def __len__(self) -> int:
+        return len(self.terms)
+
+    def scaled(self, factor: Fraction | int) -> "Laurent":
+        """factor · self."""
+        if not factor:
+            return ZERO
+        top, below = Fraction(factor).as_integer_ratio()
+        terms = self.terms if top == 1 else {key: top * c for key, c in self.terms.items()}
+        return Laurent(terms, self.denominator * below, self.bound)
+
+    def reduced(self) -> "Laurent":
+        """Return the same polynomial in lowest terms; keeps numerators short."""
+        common = math.gcd(self.denominator, *self.terms.values())
+        if common == 1:
+            return self
+        terms = {key: c // common for key, c in self.terms.items()}
+        return Laurent(terms, self.denominator // common, self.bound)
+
+    def pruned(self, relative: float) -> "Laurent":
+        """Drop coefficients below `relative` times the largest: what rounded rotations leave behind."""
+        if not relative or not self.terms:
+            return self
+        least = relative * max(map(abs, self.terms.values()))
+        terms = {key: c for key, c in self.terms.items() if abs(c) > least}
+        return Laurent(terms, self.denominator, self.bound)
+
+
+ZERO = Laurent({})
+ONE = Laurent({0: 1})
+
+
+def constant(value: Fraction | int) -> Laurent:
+    """Return the number `value`."""
+    return ONE.scaled(value)
+
+
+def add(parts: Iterable[Laurent]) -> Laurent:
+    """Sum of polynomials."""
+    summands = [part for part in parts if part]
+    if len(summands) < 2:
+        return summands[0] if summands else ZERO
+    denominator = math.lcm(*(part.denominator for part in summands))
+    total: dict[int, int] = {}
+    get = total.get
+    for part in summands:
+        factor = denominator // part.denominator
+        for key, c in part.terms.items():
+            total[key] = get(key, 0) + factor * c
+    kept = {key: c for key, c in total.items() if c}
+    return Laurent(kept, denominator, max(part.bound for part in summands))
+
+
+def multiply(a: Laurent, b: Laurent, budget: int) -> Laurent:
+    """Return a · b; raises BudgetExceededError once the product has more than `budget` terms."""
+    if len(a) > len(b):
+        a, b = b, a
+    square = a is b
+    product: dict[int, int] = {}
+    get = product.get
+    every = list(b.terms.items())
+    for at, (key_a, c_a) in enumerate(a.terms.items()):
+        rest, weight = every, c_a
+        if square:
+            # (Σ x)² = Σ x² + 2 Σ x y over later y: half the work.
+            _accumulate(product, 2 * key_a, c_a * c_a)
+            rest, weight = every[at + 1 :], 2 * c_a
+        for key_b, c_b in rest:
+            key = key_a + key_b
+            if key & I_SQUARED:
+                key -= I_SQUARED
+                product[key] = get(key, 0) - weight * c_b
+            else:
+                product[key] = get(key, 0) + weight * c_b
+        if len(product) > budget:
+            raise BudgetExceededError
+    terms = {key: c for key, c in product.items() if c}
+    result = Laurent(terms, a.denominator * b.denominator, a.bound + b.bound)
+    return bounded(result.reduced())
+
+
+def _accumulate(product: dict[int, int], key: int, c: int) -> None:
+    if key & I_SQUARED:
+        key, c = key - I_SQUARED, -c
+    product[key] = product.get(key, 0) + c
+
+
+def power(base: Laurent, exponent: int, budget: int) -> Laurent:
+    """Return base**exponent; a negative exponent needs a base of one term."""
+    if exponent < 0:
+        ((key, c),) = base.terms.items()
+        inverse = Fraction(base.denominator, c) * (-1 if key & 1 else 1)
+        flipped = -key + 2 * (key & 1)
+        return power(Laurent({flipped: 1}, 1, base.bound).scaled(inverse), -exponent, budget)
+    result = ONE
+    for _ in range(exponent):
+        result = multiply(result, base, budget)
+    return result
+
+
+def bounded(p: Laurent) -> Laurent:
+    """Return `p` with a bound within LIMIT; raises ExponentError where its exponents truly exceed that."""
+    if p.bound <= LIMIT:
+        return p
+    digits = max(key.bit_length() for key in p.terms) // DIGIT + 2
+    highest = max(abs(e) for key in p.terms for e in exponents(key, digits))
+    if highest > LIMIT:
+        raise ExponentError
+    return Laurent(p.terms, p.denominator, highest)
+
+
+def exponents(key: int, digits: int) -> list[int]:
+    """Unpack the lowest `digits` exponents of a monomial, the power of i first."""
+    half = 1 << (DIGIT - 1)
+    raised = key + lifted(digits)
+    mask = (1 << DIGIT) - 1
+    return [((raised >> (DIGIT * at)) & mask) - half for at in range(digits)]
+
+
+def lifted(digits: int) -> int:
+    """Return what makes every one of `digits` balanced digits non-negative when added to a key."""
+    half = 1 << (DIGIT - 1)
+    return sum(half << (DIGIT * at) for at in range(digits))
+
+
+def at_digit(at: int) -> int:
+    """Return the monomial whose only exponent is a 1 in digit `at`."""
+    return 1 << (DIGIT * at)

@@ -1,0 +1,175 @@
+"""Measured time: one coefficient extracted, against everything computed, through a generated package."""
+
+import importlib
+import platform
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from linkwise.emit.code import straight_line
+from linkwise.emit.energy_code import fetched
+from linkwise.emit.printer import PythonPrinter
+from linkwise.emit.render import render
+from linkwise.graph.derive import Kernel
+from linkwise.graph.expression import Node
+from linkwise.pipeline import derive, generate
+from linkwise.report.extras import report_extra
+from linkwise.report.survey import Progress
+from linkwise.symbolic.system import System
+
+BATCH = 1024
+REPEATS, SHORTEST = 7, 0.02
+"""Runs of which the fastest counts, and the least time of one run in s."""
+PACKAGE = "linkwise_measured"
+
+
+@dataclass(frozen=True)
+class Timing:
+    """µs a sample, batch 1,024, float64, one thread, for the first `dof` links.
+
+    extract: the part of τ_1 with q̈_1 alone
+    whole: τ_1 in closed form; by autograd every τ_i, which one sweep gives together
+    everything: all coefficients of all links
+    """
+
+    dof: int
+    method: str
+    extract: float
+    whole: float
+    everything: float
+
+    @property
+    def reduction(self) -> float:
+        """Share of the time that extracting saves; negative where it takes longer."""
+        return 1.0 - self.extract / self.whole
+
+
+def measure(system: System, dof: tuple[int, ...], progress: Progress) -> tuple[Timing, ...]:
+    """Time the arms of the first 1..n links of a serial arm, for each n of `dof`."""
+    torch = report_extra("torch", "torch")
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    timings: list[Timing] = []
+    try:
+        for done, n in enumerate(dof):
+            timings += _of_arm(first_links(system, n), n)
+            progress(done + 1, len(dof))
+    finally:
+        torch.set_num_threads(threads)
+    return tuple(timings)
+
+
+def first_links(system: System, n: int) -> System:
+    """Return the serial arm of the first n links."""
+    robot = system.robot
+    if robot is not None:
+        robot = replace(robot, coordinates=robot.coordinates[:n], links=robot.links[:n])
+    return replace(system, coordinates=system.coordinates[:n], links=system.links[:n], robot=robot)
+
+
+def machine() -> dict[str, str]:
+    """Where the seconds were measured."""
+    versions = {name: report_extra(name, "torch").__version__ for name in ("numpy", "torch")}
+    return {"machine": platform.machine(), "python": platform.python_version(), **versions}
+
+
+def _of_arm(system: System, n: int) -> Iterator[Timing]:
+    numpy, torch = report_extra("numpy", "torch"), report_extra("torch", "torch")
+    random = numpy.random.default_rng(n)
+    q, qd, qdd = (random.standard_normal((BATCH, n)) for _ in range(3))
+    kernels = derive(system)
+    files = generate(system, ["numpy", "torch", "autograd"], name=PACKAGE)
+    files["row.py"] = render(
+        "report/row.py.j2", {"functions": list(_row_functions(system, kernels))}
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        package = _imported(files, Path(folder) / PACKAGE)
+        closed, auto = package.load("numpy"), package.load("autograd")
+        row = importlib.import_module(f"{PACKAGE}.row")
+        p = closed.parameters
+        yield Timing(
+            n,
+            "closed form",
+            _fastest(lambda: [extract(q, qd, qdd, p) for extract in row.EXTRACT]),
+            _fastest(lambda: [whole(q, qd, qdd, p) for whole in row.WHOLE]),
+            _fastest(lambda: closed.coefficients(q, qd)),
+        )
+        tq, tqd, tqdd = (torch.from_numpy(a) for a in (q, qd, qdd))
+        yield Timing(
+            n,
+            "autograd",
+            _fastest(lambda: [_second(torch, module, tq, tqd) for module in auto.backend.modules]),
+            _fastest(lambda: auto.partial_torque(tq, tqd, tqdd)),
+            _fastest(lambda: auto.coefficients(tq, tqd)),
+        )
+    _forget()
+
+
+def _second(torch: Any, lagrangian: Any, q: Any, qd: Any) -> Any:
+    """c2_1j1 = ∂²L_j/∂q̇_1², two reverse sweeps and nothing else."""
+    first = qd[..., :1].detach().requires_grad_()
+    energy = lagrangian(q, torch.cat([first, qd[..., 1:]], -1)).sum()
+    (slope,) = torch.autograd.grad(energy, first, create_graph=True)
+    return torch.autograd.grad(slope.sum(), first)[0]
+
+
+@dataclass(frozen=True)
+class RowFunction:
+    """One emitted function of one link."""
+
+    name: str
+    inputs: tuple[str, ...]
+    assignments: tuple[tuple[str, str], ...]
+    output: str
+
+
+def _row_functions(system: System, kernels: tuple[Kernel, ...]) -> Iterator[RowFunction]:
+    """Functions for c2_1j1 and for τ_1j, written as the package writes its own."""
+    for j, kernel in enumerate(kernels):
+        forms = kernel.forms[0]
+        yield _function(system, kernel, f"extract_{j + 1}", forms.acceleration[0, 0])
+        yield _function(system, kernel, f"whole_{j + 1}", forms.torque[0])
+
+
+def _function(system: System, kernel: Kernel, name: str, output: Node) -> RowFunction:
+    code = straight_line(kernel.graph, [output], PythonPrinter("np"))
+    return RowFunction(name, fetched(system, code, "[..., {}]"), code.assignments, code.outputs[0])
+
+
+def _imported(files: dict[str, str], folder: Path) -> ModuleType:
+    for path, text in files.items():
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, encoding="utf-8")
+    sys.path.insert(0, str(folder.parent))
+    try:
+        return importlib.import_module(PACKAGE)
+    finally:
+        sys.path.remove(str(folder.parent))
+
+
+def _forget() -> None:
+    """Drop the measured package, so that the next arm's is imported afresh."""
+    for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
+        del sys.modules[name]
+    importlib.invalidate_caches()
+
+
+def _fastest(call: Callable[[], object]) -> float:
+    """µs a sample: the fastest of a few runs, each long enough to time."""
+    call()
+    started = time.perf_counter()
+    call()
+    loops = max(1, round(SHORTEST / max(time.perf_counter() - started, 1e-9)))
+    best = float("inf")
+    for _ in range(REPEATS):
+        started = time.perf_counter()
+        for _ in range(loops):
+            call()
+        best = min(best, (time.perf_counter() - started) / loops)
+    return best / BATCH * 1e6

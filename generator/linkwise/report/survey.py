@@ -1,0 +1,90 @@
+"""Every link's torques, expanded one link at a time within a budget of terms."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from linkwise.errors import LinkwiseError, within
+from linkwise.report import laurent
+from linkwise.report.count import FORM, TermCount, count_terms
+from linkwise.report.expand import ROUNDING, Expansion, Variables
+from linkwise.report.laurent import BudgetExceededError, ExponentError, Laurent
+from linkwise.report.torque import Differentiation
+from linkwise.symbolic.system import System
+
+BUDGET = 2_000_000
+"""Terms that one polynomial may hold unless told otherwise; about 0.5 GB."""
+
+Progress = Callable[[int, int], None]
+"""Told how many links are done, and how many there are."""
+
+
+@dataclass(frozen=True)
+class LinkTorques:
+    """τ_ij of link j for the joints asked for; joints off path(j) are missing, their torque is zero."""
+
+    link: int
+    torques: dict[int, Laurent]
+    variables: Variables
+
+
+def link_torques(
+    system: System,
+    joints: tuple[int, ...],
+    budget: int,
+    progress: Progress,
+    links: int | None = None,
+) -> Iterator[LinkTorques]:
+    """Expand the first `links` links (None: all); raises BudgetExceededError at the first too large."""
+    rounding = 0.0 if is_exact(system) else ROUNDING
+    expansion = Expansion(system.coordinates, budget, rounding)
+    wanted = system.links[:links]
+    for j, link in enumerate(wanted):
+        with within(f"link {link.name!r}"):
+            try:
+                expansion.define((*link.twist.definitions, *link.height.definitions))
+                parts = expansion(link.kinetic), expansion(link.potential).scaled(-1)
+                lagrangian = laurent.add(parts).pruned(rounding)
+                by = Differentiation(system.coordinates, expansion.variables)
+                path = system.path(j)
+                torques = {i: by.torque(lagrangian, i, path) for i in path if i in joints}
+            except ExponentError as error:
+                raise LinkwiseError(
+                    f"a power above {laurent.LIMIT} is more than a term count can hold; lower it"
+                ) from error
+        if any(len(torque) > budget for torque in torques.values()):
+            raise BudgetExceededError
+        yield LinkTorques(j, torques, expansion.variables)
+        progress(j + 1, len(wanted))
+
+
+def is_exact(system: System) -> bool:
+    """Whether every fixed rotation is of 0 and ±1, so that no coefficient is rounded."""
+    links = system.robot.links if system.robot is not None else ()
+    return all(e in (-1.0, 0.0, 1.0) for link in links for row in link.joint.rotation for e in row)
+
+
+def form_of(system: System) -> str:
+    """Name the canonical form that the counts of `system` are taken in."""
+    rounded = f"fixed rotations as decimals, coefficients below {ROUNDING:g} of the largest dropped"
+    return f"{FORM}; {'coefficients exact' if is_exact(system) else rounded}"
+
+
+class RunningCount:
+    """Terms of Σ_j τ_ij while links are added; like terms of different links are collected."""
+
+    def __init__(self, n: int) -> None:
+        self.count = TermCount.none(n)
+        self._parts: list[Laurent] = []
+        self._keys: set[int] = set()
+
+    def add(self, torque: Laurent, variables: Variables) -> TermCount:
+        """Add one link's torque; returns its own count."""
+        own = count_terms(torque, variables)
+        if self._keys.isdisjoint(torque.terms):
+            self._parts.append(torque)
+            self.count += own
+        else:
+            self._parts = [laurent.add([*self._parts, torque])]
+            self.count = count_terms(self._parts[0], variables)
+        self._keys.update(torque.terms)
+        return own

@@ -1,0 +1,102 @@
+"""How many terms each partial torque has, and how many of them one bucket needs."""
+
+from dataclasses import dataclass
+
+from linkwise.errors import LinkwiseError
+from linkwise.report.count import TermCount
+from linkwise.report.laurent import BudgetExceededError
+from linkwise.report.operations import LinkOperations, link_operations
+from linkwise.report.question import Question
+from linkwise.report.survey import Progress, RunningCount, form_of, link_torques
+from linkwise.symbolic.system import System
+
+
+@dataclass(frozen=True)
+class TorqueTerms:
+    """Terms of τ_ij; `link` None is the sum over the links counted."""
+
+    joint: int
+    link: int | None
+    count: TermCount
+    kept: int
+
+    @property
+    def reduction(self) -> float | None:
+        """Share of the terms that need no computing, 1 − kept/total; None where the torque is zero."""
+        return 1.0 - self.kept / self.count.total if self.count.total else None
+
+
+@dataclass(frozen=True)
+class TermsReport:
+    """The answer for one robot; the first `counted` of the links `wanted` fitted the budget."""
+
+    robot: str
+    question: Question
+    form: str
+    joints: tuple[str, ...]
+    links: tuple[str, ...]
+    counted: int
+    wanted: int
+    budget: int
+    rows: tuple[TorqueTerms, ...]
+    operations: tuple[LinkOperations, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every link asked for was counted."""
+        return self.counted == self.wanted
+
+
+def terms_report(
+    system: System, question: Question, budget: int, progress: Progress
+) -> TermsReport:
+    """Count terms and operations; raises LinkwiseError if nothing asked for fits the budget."""
+    wanted = len(system.links) if question.link is None else question.link + 1
+    rows, counted = _rows(system, question, wanted, budget, progress)
+    if not rows or (question.link is not None and counted < wanted):
+        raise LinkwiseError(
+            f"{system.name}: link {system.links[counted].name!r} needs more than {budget} terms; "
+            "raise --budget"
+        )
+    costs = link_operations(system, question.joints(len(system.coordinates)), question)
+    return TermsReport(
+        system.name,
+        question,
+        form_of(system),
+        tuple(c.name for c in system.coordinates),
+        tuple(link.name for link in system.links),
+        counted,
+        wanted,
+        budget,
+        rows,
+        tuple(cost for cost in costs if question.link in (None, cost.link)),
+    )
+
+
+def _rows(
+    system: System, question: Question, wanted: int, budget: int, progress: Progress
+) -> tuple[tuple[TorqueTerms, ...], int]:
+    """Counts of each τ_ij and of the sums over j, and how many links fitted the budget."""
+    n = len(system.coordinates)
+    sums = {i: RunningCount(n) for i in question.joints(n)}
+    rows: list[TorqueTerms] = []
+    counted = 0
+    try:
+        for found in link_torques(system, tuple(sums), budget, progress, wanted):
+            for i, running in sums.items():
+                torque = found.torques.get(i)
+                own = TermCount.none(n) if torque is None else running.add(torque, found.variables)
+                if question.link in (None, found.link):
+                    rows.append(_row(i, found.link, own, question))
+            counted += 1
+    except BudgetExceededError:
+        pass  # the report says how far it got
+    if question.link is None and rows:
+        rows += [_row(i, None, running.count, question) for i, running in sums.items()]
+    # τ_i1, τ_i2, …, then their sum, joint after joint.
+    rows.sort(key=lambda row: (row.joint, wanted if row.link is None else row.link))
+    return tuple(rows), counted
+
+
+def _row(joint: int, link: int | None, count: TermCount, question: Question) -> TorqueTerms:
+    return TorqueTerms(joint, link, count, count.kept(question.order, question.coordinate))

@@ -1,0 +1,131 @@
+"""The terms report as data, as a table and as a page."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from linkwise.emit.render import render
+from linkwise.report.files import csv_text
+from linkwise.report.operations import LinkOperations, Operations
+from linkwise.report.terms import TermsReport, TorqueTerms
+
+DIGITS = 6
+"""Decimals of a rate: more would be noise in a file that is compared byte for byte."""
+
+
+def data(report: TermsReport) -> dict[str, Any]:
+    """Return the whole report as JSON values; joints and links count from 1."""
+    question = report.question
+    return {
+        "schema": 1,
+        "robot": report.robot,
+        "form": report.form,
+        "kept": str(question),
+        "joints": list(report.joints),
+        "links": list(report.links),
+        "complete": report.complete,
+        "links_counted": report.counted,
+        "term_budget": report.budget,
+        "torques": [_torque(row) for row in report.rows],
+        "operations": [_operations(cost) for cost in report.operations],
+    }
+
+
+def _torque(row: TorqueTerms) -> dict[str, Any]:
+    return {
+        "joint": row.joint + 1,
+        "link": "all" if row.link is None else row.link + 1,
+        "terms": row.count.total,
+        "kept": row.kept,
+        "reduction": rate(row.reduction),
+        "acceleration": list(row.count.acceleration),
+        "velocity": list(row.count.velocity),
+        "gravity": row.count.gravity,
+    }
+
+
+def _operations(cost: LinkOperations) -> dict[str, Any]:
+    return {
+        "link": cost.link + 1,
+        "everything": _pair(cost.everything),
+        "torque": {str(i + 1): _pair(o) for i, o in cost.torque.items()},
+        "kept": {str(i + 1): _pair(o) for i, o in cost.bucket.items()},
+    }
+
+
+def _pair(cost: Operations) -> dict[str, int]:
+    return {"before_sharing": cost.written, "after_sharing": cost.shared}
+
+
+def rate(value: float | None) -> float | None:
+    """Round a rate for print."""
+    return None if value is None else round(value, DIGITS)
+
+
+def table(report: TermsReport) -> str:
+    """Return every count as comma-separated values, one torque a row."""
+    n = range(1, len(report.joints) + 1)
+    header = ["joint", "link", "terms", "kept", "reduction", "gravity"]
+    header += [f"acceleration_{k}" for k in n] + [f"velocity_{k}" for k in n]
+    return csv_text(
+        header,
+        (
+            [t["joint"], t["link"], t["terms"], t["kept"], t["reduction"], t["gravity"]]
+            + t["acceleration"]
+            + t["velocity"]
+            for t in (_torque(row) for row in report.rows)
+        ),
+    )
+
+
+def page(report: TermsReport) -> str:
+    """Return the report as Markdown."""
+    return render("report/terms.md.j2", view(report))
+
+
+def view(report: TermsReport) -> dict[str, Any]:
+    """Fields of the page's template."""
+    names = report.links
+    return {
+        "robot": report.robot,
+        "form": report.form,
+        "kept": str(report.question),
+        "progress": progress_line(report),
+        "summary": [_summary(row, names) for row in report.rows],
+        "coordinates": list(range(1, len(report.joints) + 1)),
+        "buckets": [
+            (_name(row), row.count.gravity, row.count.acceleration, row.count.velocity)
+            for row in report.rows
+        ],
+        "operations": [line for cost in report.operations for line in _lines(cost)],
+    }
+
+
+def progress_line(report: TermsReport) -> str:
+    """Say how far the count got."""
+    if report.complete:
+        return f"Links counted: all {report.counted} asked for."
+    stopped = report.links[report.counted]
+    return (
+        f"Stopped early: links 1 to {report.counted} of {report.wanted} were counted; link {stopped} needs more "
+        f"than the budget of {report.budget} terms. Sums are over the links counted."
+    )
+
+
+def _name(row: TorqueTerms) -> str:
+    return f"τ_{row.joint + 1}" + ("" if row.link is None else f",{row.link + 1}")
+
+
+def _summary(row: TorqueTerms, links: Sequence[str]) -> tuple[str, str, int, int, str]:
+    link = "all counted" if row.link is None else links[row.link]
+    share = "–" if row.reduction is None else f"{100 * row.reduction:.1f} %"
+    return _name(row), link, row.count.total, row.kept, share
+
+
+def _lines(cost: LinkOperations) -> list[tuple[str, int, int]]:
+    j = cost.link + 1
+    lines = [(f"link {j}: everything", cost.everything.written, cost.everything.shared)]
+    for i, torque in cost.torque.items():
+        kept = cost.bucket[i]
+        lines.append((f"τ_{i + 1},{j} as a whole", torque.written, torque.shared))
+        lines.append((f"τ_{i + 1},{j}, the part kept alone", kept.written, kept.shared))
+    return lines

@@ -1,0 +1,35 @@
+"""D_i L_j in SymPy by the explicit chain rule: readable for a small robot, an oracle for the rest.
+
+D_i L = Σ_s ∂²L/∂q̇_i∂q_s q̇_s + Σ_s ∂²L/∂q̇_i∂q̇_s q̈_s − ∂L/∂q_i
+"""
+
+import sympy as sp
+
+from linkwise.symbolic.system import System
+
+
+def lagrangian(system: System, link: int) -> sp.Expr:
+    """L_j with the named definitions written out; grows with the chain, so for small robots only."""
+    twist: dict[sp.Symbol, sp.Expr] = {}
+    height: dict[sp.Symbol, sp.Expr] = {}
+    for energy in system.lineage(link):
+        for known, steps in ((twist, energy.twist), (height, energy.height)):
+            for symbol, expr in steps.definitions:
+                known[symbol] = expr.xreplace(known)
+    energy = system.links[link]
+    return energy.kinetic.xreplace(twist) - energy.potential.xreplace(height)
+
+
+def partial_torques(system: System, link: int) -> dict[int, sp.Expr]:
+    """τ_ij for every coordinate i on the path of link j, unsimplified."""
+    value, path = lagrangian(system, link), system.path(link)
+    c = system.coordinates
+    torques = {}
+    for i in path:
+        momentum = sp.diff(value, c[i].qd)
+        rate = sum(
+            sp.diff(momentum, c[s].q) * c[s].qd + sp.diff(momentum, c[s].qd) * c[s].qdd
+            for s in path
+        )
+        torques[i] = rate - sp.diff(value, c[i].q)
+    return torques
