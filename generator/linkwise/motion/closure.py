@@ -14,7 +14,7 @@ LIMIT = 1e-9
 
 @dataclass(frozen=True)
 class Closure:
-    """Largest errors of Σ_k τp_ij + g_ij against τ_ij (`terms`) and of Σ_j τ_ij against τ_i (`links`).
+    """Largest errors of Σ_k τp_ij + g_ij against τ_ij (terms) and of Σ_j τ_ij against τ_i (links).
 
     Absolute in N·m (N), relative to the largest sum of magnitudes in the same block of samples.
     """

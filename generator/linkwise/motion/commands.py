@@ -108,8 +108,8 @@ def analyze(
     closure = analysis.closure
     typer.echo(
         f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {loaded.backend};"
-        f" terms sum to partial torques within {closure.terms_relative:.1e}, these to joint torques within"
-        f" {closure.links_relative:.1e} (relative)"
+        f" terms sum to partial torques within {closure.terms_relative:.1e},"
+        f" these to joint torques within {closure.links_relative:.1e} (relative)"
     )
     for file in files:
         typer.echo(file)

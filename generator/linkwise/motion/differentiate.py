@@ -12,7 +12,7 @@ from linkwise.motion.settings import Processing
 
 Array = NDArray[np.float64]
 
-# Five-point formulas: row p holds 12 times the weights of the derivative at the p-th of five samples.
+# Five-point formulas: row p holds 12 times the weights of the derivative at the p-th of 5 samples.
 FIRST = np.array(
     [
         [-25, 48, -36, 16, -3],

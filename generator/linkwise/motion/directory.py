@@ -13,7 +13,7 @@ from linkwise.errors import LinkwiseError
 def whole_directory(target: Path, mark: str) -> Iterator[Path]:
     """Yield a directory to write into; it becomes `target` at the end, and goes after an error.
 
-    An existing `target` is replaced only if it is empty or, holding the file `mark`, a former result.
+    An existing `target` is replaced only if empty or, by its file `mark`, a former result.
     """
     if target.exists() and not (target.is_dir() and (_empty(target) or (target / mark).is_file())):
         raise LinkwiseError(

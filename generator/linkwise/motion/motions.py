@@ -28,7 +28,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Motion:
-    """Joint angles over time, in rad: `start`, then moves; read with noise and an encoder's step."""
+    """Joint angles over time, in rad: `start`, then moves; read with noise and in steps."""
 
     name: str
     start: tuple[float, ...]

@@ -10,7 +10,7 @@ from linkwise.motion.log import BLOCK, Array
 from linkwise.motion.spool import Spool
 
 OVERLAP = 64
-"""Knots seen past a window. A knot's influence on a cubic spline at least halves from one knot to the
+"""Knots seen past a window. A knot's influence on a cubic spline at least halves from one to the
 next, so what is cut away is below 2⁻⁶⁴ of the signal."""
 
 

@@ -17,8 +17,8 @@ class Reading:
     """How columns become joint coordinates.
 
     `units` is the angles' unit; None takes the file's own word (`inDegrees`), else radians. Lengths
-    are metres always. `mapping` holds (column, joint) pairs; a joint without one takes the column of
-    its name.
+    are metres always. `mapping` holds (column, joint) pairs; other joints take the column of their
+    name.
     """
 
     units: Units | None = None
@@ -37,8 +37,8 @@ class Reading:
 class Lowpass:
     """A Butterworth low-pass run forwards and backwards, so without a shift in time.
 
-    `cutoff` is in Hz and `order` is that of one pass: both together have twice the order and -6 dB at
-    the cutoff. `padding` says how the log is continued past its ends while filtering.
+    `cutoff` is in Hz, `order` that of one pass: both have twice the order and -6 dB at the cutoff.
+    `padding` says how the log is continued past its ends while filtering.
     """
 
     cutoff: float

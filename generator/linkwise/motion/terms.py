@@ -12,7 +12,7 @@ from linkwise.motion.settings import Convention
 
 Array = NDArray[np.float64]
 Source = tuple[int, int, int]
-"""Row of the result, column of the packed values, the coordinate that multiplies them (-1: none)."""
+"""Row of the result, column of the packed values, the coordinate that multiplies (-1: none)."""
 
 
 @dataclass(frozen=True)
