@@ -21,7 +21,7 @@ from linkwise.report.terms import terms_report
 from linkwise.symbolic.system import System
 
 CHECKED_TO = 14
-"""A planar arm is counted at least to here: the paper's ten joints, and four more to confirm the polynomials."""
+"""A planar arm is counted at least to here: the paper's ten joints, and four to confirm."""
 
 Out = Annotated[Path | None, typer.Option(help="Directory for the report's files.")]
 Budget = Annotated[int, typer.Option(min=1, help="Terms that one expansion may hold.")]
@@ -54,7 +54,7 @@ def terms(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Count the terms and the operations of the partial torques, and those that one bucket needs."""
+    """Count terms and operations of the partial torques, and those that one bucket needs."""
     options = Options(parameters=parameters, lock=_locks(lock or []))
     system = read_system(robot, options)
     joints, links = [c.name for c in system.coordinates], [part.name for part in system.links]
@@ -90,7 +90,7 @@ def reduction(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Draw the share of terms of τ_1 that its q̈_1 part does not need, over degrees of freedom (Fig. 15)."""
+    """Draw the share of terms of τ_1 that its q̈_1 part does not need (Fig. 15)."""
     first, last = _range(dof)
     beyond = max(last, CHECKED_TO) if robot == "planar" else last
     spec = f"planar{beyond}" if robot == "planar" else robot

@@ -8,8 +8,8 @@ from linkwise.report.expand import Variables
 from linkwise.report.laurent import DIGIT, Laurent
 
 FORM = (
-    "fully expanded; every product of sines and cosines written as one sine or cosine of an angle sum; "
-    "like terms collected"
+    "fully expanded; every product of sines and cosines written as one sine or cosine of an "
+    "angle sum; like terms collected"
 )
 """The canonical form that every count is taken in."""
 
@@ -19,7 +19,7 @@ class TermCount:
     """Terms of one τ_ij, or of a sum of them whose links share no parameter.
 
     total: all terms
-    acceleration, velocity: terms with q̈_k, with q̇_k, by coordinate k; one with q̇_a q̇_b is in both a's and b's
+    acceleration, velocity: terms with q̈_k, with q̇_k, by k; one with q̇_a q̇_b is in both
     gravity: terms with neither velocity nor acceleration
     """
 
@@ -37,7 +37,7 @@ class TermCount:
         )
 
     def kept(self, order: int, k: int) -> int:
-        """Terms needed for one bucket: order 2 is the acceleration of k, 1 its velocity, 0 is gravity."""
+        """Terms of one bucket: order 2 is the acceleration of k, 1 its velocity, 0 gravity."""
         return (self.gravity, self.velocity[k], self.acceleration[k])[order]
 
     @classmethod
@@ -49,8 +49,8 @@ class TermCount:
 def count_terms(p: Laurent, x: Variables) -> TermCount:
     """Count the sines and cosines behind the exponentials of `p`.
 
-    c cos(a·q) + s sin(a·q) is one entry c/2 at each of ±a for the cosine and one ∓i s/2 for the sine; a term
-    without an angle is one entry. So a term is half of its two entries, or its only one.
+    c cos(a·q) + s sin(a·q) is one entry c/2 at each of ±a for the cosine and one ∓i s/2 for the
+    sine; a term without an angle is one entry. So a term is half of two entries, or its only one.
     """
     lifted, n = laurent.lifted(x.digits), x.n
     angle_mask = (1 << (DIGIT * n)) - 1

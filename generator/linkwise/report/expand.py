@@ -1,7 +1,7 @@
 """From a link's symbolic energy to a fully expanded polynomial.
 
-Digits of a monomial: the power of i, then z_k, q̇_k and q̈_k of the n coordinates, then parameters (and q_k
-itself, for slides and springs) as they turn up.
+Digits of a monomial: the power of i, then z_k, q̇_k and q̈_k of the n coordinates, then parameters
+(and q_k itself, for slides and springs) as they turn up.
 """
 
 import math
@@ -17,7 +17,7 @@ from linkwise.report.laurent import Laurent
 from linkwise.symbolic.system import Definition
 
 ROUNDING = 1e-9
-"""Coefficients below this share of the largest are rounding, where a rotation is no exact 0 or ±1."""
+"""Where a rotation is no exact 0 or ±1, smaller shares of the largest coefficient are rounding."""
 
 
 class Variables:
@@ -59,7 +59,7 @@ class Variables:
 
 
 class Expansion:
-    """Expands SymPy expressions over the given coordinates; remembers what each symbol stands for."""
+    """Expands SymPy expressions over coordinates; remembers what each symbol stands for."""
 
     def __init__(
         self, coordinates: Iterable[Coordinate], budget: int, rounding: float = 0.0
@@ -97,8 +97,8 @@ class Expansion:
         if expr.is_number:
             return laurent.constant(Fraction(repr(float(expr))))
         raise LinkwiseError(
-            f"{expr.func.__name__}(…) cannot be expanded into terms; counts need sums and products of "
-            "sines, cosines, velocities and parameters"
+            f"{expr.func.__name__}(…) cannot be expanded into terms; counts need sums and "
+            "products of sines, cosines, velocities and parameters"
         )
 
     def _product(self, factors: list[Laurent]) -> Laurent:
@@ -113,13 +113,13 @@ class Expansion:
         base, exponent = self(expr.base), expr.exp
         if not exponent.is_Integer or (exponent < 0 and len(base) != 1):
             raise LinkwiseError(
-                f"the power ({expr.base})**({exponent}) cannot be expanded into terms; counts need whole "
-                "exponents, and single parameters below a fraction line"
+                f"the power ({expr.base})**({exponent}) cannot be expanded into terms; "
+                "counts need whole exponents, and single parameters below a fraction line"
             )
         return laurent.power(base, int(exponent), self.budget)
 
     def _wave(self, expr: sp.Expr) -> Laurent:
-        """Sine or cosine of a whole combination of angles: (z^a ± z^−a) / 2, over i for the sine."""
+        """Sine or cosine of a whole combination of angles: (z^a ± z^−a)/2, the sine over i."""
         key, phase = 0, 0.0
         bound = 0
         for term in sp.Add.make_args(sp.expand(expr.args[0])):

@@ -12,7 +12,7 @@ from linkwise.errors import LinkwiseError
 
 
 def write_all(directory: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
-    """Write every file beside its target, then rename; raises LinkwiseError if the directory refuses."""
+    """Write every file beside its target, then rename; raises LinkwiseError if that fails."""
     waiting: list[tuple[Path, Path]] = []
     try:
         directory.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,7 @@ PAPER_A, PAPER_RATE = 0.95, 0.44
 
 @dataclass(frozen=True)
 class Saturation:
-    """y(n) = a (1 − exp(−rate n)), and how it misses the points: residual y − y(n), in their order."""
+    """y(n) = a (1 − exp(−rate n)), and its residuals, point minus curve, in the points' order."""
 
     a: float
     rate: float
@@ -29,6 +29,7 @@ class Saturation:
         return max(map(abs, self.residuals))
 
     def __call__(self, n: float) -> float:
+        """y(n)."""
         return _curve(self.a, self.rate, n)
 
 
@@ -38,7 +39,7 @@ def held_against(a: float, rate: float, dof: Sequence[int], y: Sequence[float]) 
 
 
 def fit(dof: Sequence[int], y: Sequence[float]) -> Saturation | None:
-    """Least-squares fit of A and λ; None for fewer than three points, which leave nothing to check."""
+    """Least-squares fit of A and λ; None for fewer than three points, which it would meet."""
     if len(dof) < 3:
         return None
     solution = report_extra("scipy.optimize").least_squares(

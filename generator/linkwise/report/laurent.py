@@ -1,9 +1,10 @@
 """Exact sparse polynomials in complex exponentials, velocities and parameters.
 
-A trigonometric sum is a Laurent polynomial in z_k = exp(i q_k): cos q = (z + 1/z)/2, sin q = (z − 1/z)/2i. In it
-every product of sines and cosines is already one sine or cosine of an angle sum, and like terms meet by
-themselves. A monomial is one integer whose digits are the exponents, so that multiplying monomials is adding
-integers. Digits are balanced (−128..127); the lowest one is the power of i, kept at 0 or 1 by i² = −1.
+A trigonometric sum is a Laurent polynomial in z_k = exp(i q_k): cos q = (z + 1/z)/2 and
+sin q = (z − 1/z)/2i. In it every product of sines and cosines is already one sine or cosine of an
+angle sum, and like terms meet by themselves. A monomial is one integer whose digits are the
+exponents, so that multiplying monomials is adding integers. Digits are balanced (−128..127); the
+lowest one is the power of i, kept at 0 or 1 by i² = −1.
 """
 
 import math
@@ -14,7 +15,7 @@ from fractions import Fraction
 DIGIT = 8
 """Bits of an exponent."""
 LIMIT = (1 << (DIGIT - 2)) - 1
-"""Highest exponent, half of what a digit holds: a product of two can be examined before it overflows."""
+"""Highest exponent; a digit holds twice that, so a product can be examined before it overflows."""
 I_SQUARED = 2
 
 
@@ -61,7 +62,7 @@ class Laurent:
         return Laurent(terms, self.denominator // common, self.bound)
 
     def pruned(self, relative: float) -> "Laurent":
-        """Drop coefficients below `relative` times the largest: what rounded rotations leave behind."""
+        """Drop coefficients below `relative` times the largest, which rounding leaves behind."""
         if not relative or not self.terms:
             return self
         least = relative * max(map(abs, self.terms.values()))
@@ -142,7 +143,7 @@ def power(base: Laurent, exponent: int, budget: int) -> Laurent:
 
 
 def bounded(p: Laurent) -> Laurent:
-    """Return `p` with a bound within LIMIT; raises ExponentError where its exponents truly exceed that."""
+    """Return `p` with a bound within LIMIT; raises ExponentError if an exponent exceeds that."""
     if p.bound <= LIMIT:
         return p
     digits = max(key.bit_length() for key in p.terms) // DIGIT + 2

@@ -83,7 +83,10 @@ def _methods(timings: tuple[Timing, ...]) -> list[str]:
 def _verdict(result: Study, timings: list[Timing]) -> str:
     last = timings[-1]
     terms = {p.dof: p.reduction for p in result.points}.get(last.dof)
-    text = f"**{last.method.capitalize()}**: at {last.dof} DoF extracting saves {last.reduction:.1%} of the time"
+    text = (
+        f"**{last.method.capitalize()}**: at {last.dof} DoF extracting saves {last.reduction:.1%} "
+        "of the time"
+    )
     if terms is None:
         return text + "."
     verdict = "weaker" if last.reduction < terms else "stronger"

@@ -33,7 +33,7 @@ NO_OPERATIONS = Operations(0, 0)
 
 @dataclass(frozen=True)
 class LinkOperations:
-    """Link j's cost: everything (c2, c1, g, τ of all its joints), and by joint i, τ_ij and the bucket asked for."""
+    """Link j's cost: everything (c2, c1, g, τ of all joints); by joint i, τ_ij and its bucket."""
 
     link: int
     everything: Operations
@@ -58,7 +58,7 @@ def link_operations(
 
 
 def bucket(forms: LinkForms, i: int, question: Question) -> list[Node]:
-    """Node of the coefficient asked for; none where it is zero because the coordinate is off the path."""
+    """Node of the coefficient asked for; none where it is zero, its coordinate off the path."""
     k = question.coordinate
     if question.order == 0:
         return [forms.gravity[i]]

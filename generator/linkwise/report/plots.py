@@ -98,7 +98,7 @@ def _whole_numbers(axes: Any, dof: Sequence[int]) -> None:
 
 
 def terms_images(report: TermsReport) -> dict[str, bytes]:
-    """Terms of each τ_ij as a table of shades: joints down, links across, the kept ones in brackets."""
+    """Terms of each τ_ij as a table of shades: joints down, links across, kept in brackets."""
     rows = len({row.joint for row in report.rows})
     columns = len({row.link for row in report.rows})
     size = max(4.2, 1.2 + 0.95 * columns), max(1.7, 1.0 + 0.62 * rows)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from math import comb, factorial
 
 CHECKED_AT_LEAST = 2
@@ -31,6 +32,7 @@ class CountPolynomial:
         return Fraction(self.coefficients[-1], factorial(self.degree))
 
     def __call__(self, n: int) -> int:
+        """count(n)."""
         return sum(c * comb(n - 1, d) for d, c in enumerate(self.coefficients))
 
     def __str__(self) -> str:
@@ -50,12 +52,12 @@ def _term(c: int, d: int) -> str:
 def count_polynomial(counts: Sequence[int]) -> CountPolynomial | None:
     """Return the polynomial of the lowest degree through counts(1), counts(2), …, or None.
 
-    Degree d is fixed by d + 1 counts; every further one must agree, and at least CHECKED_AT_LEAST of them do.
+    Degree d is fixed by d + 1 counts; every further one, CHECKED_AT_LEAST or more, must agree.
     """
     differences, row = [], list(counts)
     while row:
         differences.append(row[0])
-        row = [b - a for a, b in zip(row, row[1:], strict=False)]
+        row = [b - a for a, b in pairwise(row)]
         if len(row) >= CHECKED_AT_LEAST and not any(row):
             return CountPolynomial(tuple(differences), len(differences), len(counts))
     return None

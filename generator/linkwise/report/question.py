@@ -31,7 +31,7 @@ class Question:
 
 
 def position(text: str, names: Sequence[str], option: str) -> int:
-    """Index of a name, or of a number that counts from 1; raises LinkwiseError naming the choices."""
+    """Index of a name, or of a number from 1; raises LinkwiseError naming the choices."""
     if text in names:
         return names.index(text)
     if text.isascii() and text.isdigit() and 1 <= int(text) <= len(names):

@@ -1,4 +1,4 @@
-"""The cost-reduction curve: y(n) = 1 − kept(n)/total(n) over the first n links of a serial arm (Fig. 15)."""
+"""The cost-reduction curve (Fig. 15): y(n) = 1 − kept(n)/total(n), over an arm's first n links."""
 
 from dataclasses import dataclass
 
@@ -46,9 +46,9 @@ class Point:
 
 
 def curve(system: System, most: int, budget: int, progress: Progress) -> tuple[Point, ...]:
-    """Points for 1..most links; raises LinkwiseError for a tree or for a robot beyond the budget.
+    """Points for 1..most links; raises LinkwiseError for a tree, or beyond the budget.
 
-    A link's torques depend on nothing behind it, so the arm of n links is the one of n − 1 and one link more.
+    A link's torques depend on nothing behind it: the arm of n links is that of n − 1 and one more.
     """
     _require_serial(system, most)
     running = RunningCount(len(system.coordinates))
@@ -77,7 +77,7 @@ def curve(system: System, most: int, budget: int, progress: Progress) -> tuple[P
 def _require_serial(system: System, most: int) -> None:
     if most > len(system.links):
         raise LinkwiseError(
-            f"{system.name}: --dof reaches {most}, but {len(system.links)} links move; ask for fewer"
+            f"{system.name}: --dof reaches {most}, but {len(system.links)} links move; reduce it"
         )
     for j in range(most):
         if system.path(j) != tuple(range(j + 1)):

@@ -1,6 +1,7 @@
-"""Measured time: one coefficient extracted, against everything computed, through a generated package."""
+"""Measured time: one coefficient extracted, or everything computed, by a generated package."""
 
 import importlib
+import math
 import platform
 import sys
 import tempfile
@@ -92,21 +93,19 @@ def _of_arm(system: System, n: int) -> Iterator[Timing]:
         closed, auto = package.load("numpy"), package.load("autograd")
         row = importlib.import_module(f"{PACKAGE}.row")
         p = closed.parameters
-        yield Timing(
-            n,
-            "closed form",
-            _fastest(lambda: [extract(q, qd, qdd, p) for extract in row.EXTRACT]),
-            _fastest(lambda: [whole(q, qd, qdd, p) for whole in row.WHOLE]),
-            _fastest(lambda: closed.coefficients(q, qd)),
+        times = _fastest(
+            lambda: [extract(q, qd, qdd, p) for extract in row.EXTRACT],
+            lambda: [whole(q, qd, qdd, p) for whole in row.WHOLE],
+            lambda: closed.coefficients(q, qd),
         )
+        yield Timing(n, "closed form", *times)
         tq, tqd, tqdd = (torch.from_numpy(a) for a in (q, qd, qdd))
-        yield Timing(
-            n,
-            "autograd",
-            _fastest(lambda: [_second(torch, module, tq, tqd) for module in auto.backend.modules]),
-            _fastest(lambda: auto.partial_torque(tq, tqd, tqdd)),
-            _fastest(lambda: auto.coefficients(tq, tqd)),
+        times = _fastest(
+            lambda: [_second(torch, module, tq, tqd) for module in auto.backend.modules],
+            lambda: auto.partial_torque(tq, tqd, tqdd),
+            lambda: auto.coefficients(tq, tqd),
         )
+        yield Timing(n, "autograd", *times)
     _forget()
 
 
@@ -160,16 +159,21 @@ def _forget() -> None:
     importlib.invalidate_caches()
 
 
-def _fastest(call: Callable[[], object]) -> float:
-    """µs a sample: the fastest of a few runs, each long enough to time."""
-    call()
-    started = time.perf_counter()
-    call()
-    loops = max(1, round(SHORTEST / max(time.perf_counter() - started, 1e-9)))
-    best = float("inf")
+def _fastest(*calls: Callable[[], object]) -> list[float]:
+    """µs a sample of each call: the fastest of a few runs, in turns so that all see one machine."""
+    loops = []
+    for call in calls:
+        call()
+        loops.append(max(1, round(SHORTEST / max(_elapsed(call, 1), 1e-9))))
+    best = [math.inf] * len(calls)
     for _ in range(REPEATS):
-        started = time.perf_counter()
-        for _ in range(loops):
-            call()
-        best = min(best, (time.perf_counter() - started) / loops)
-    return best / BATCH * 1e6
+        for at, call in enumerate(calls):
+            best[at] = min(best[at], _elapsed(call, loops[at]) / loops[at])
+    return [seconds / BATCH * 1e6 for seconds in best]
+
+
+def _elapsed(call: Callable[[], object], times: int) -> float:
+    started = time.perf_counter()
+    for _ in range(times):
+        call()
+    return time.perf_counter() - started

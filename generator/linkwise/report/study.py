@@ -1,4 +1,4 @@
-"""The cost-reduction study of one arm: counted curve, fits, exact polynomials, and what they say of the paper."""
+"""The cost-reduction study of one arm: curve, fits, exact polynomials, verdicts on the paper."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ PAPER_REDUNDANT = {5: 3, 10: 16}
 
 @dataclass(frozen=True)
 class Study:
-    """points: those asked for; the polynomials rest on these and on further ones up to `total.checked`."""
+    """points: those asked for; the polynomials rest on further ones too, up to `checked`."""
 
     robot: str
     form: str
@@ -52,7 +52,7 @@ def study(
 
 
 def verdicts(result: Study) -> Iterator[str]:
-    """Say where the paper's claim holds, and where it is weaker or stronger, as far as the points tell."""
+    """Say where the paper's claim holds, and where it is weaker or stronger, by the points."""
     yield _curve_verdict(result)
     for point in result.points:
         if point.dof in PAPER_REDUNDANT:
@@ -66,8 +66,8 @@ def _curve_verdict(result: Study) -> str:
     paper = result.paper
     verdict = "Holds" if paper.rmse <= CLOSE else "Does not hold here"
     text = (
-        f"**{verdict}: the curve.** {PAPER_A} (1 − exp(−{PAPER_RATE} n)) misses the counted points by at most "
-        f"{paper.largest:.4f} (RMSE {paper.rmse:.4f})"
+        f"**{verdict}: the curve.** {PAPER_A} (1 − exp(−{PAPER_RATE} n)) misses the counted points "
+        f"by at most {paper.largest:.4f} (RMSE {paper.rmse:.4f})"
     )
     if result.fitted is None:
         return text + "."
@@ -91,8 +91,9 @@ def _long_run(total: CountPolynomial, kept: CountPolynomial) -> str:
     excess = total.degree - kept.degree
     beyond = next((n for n in range(1, 1000) if 1 - kept(n) / total(n) > PAPER_A), None)
     text = (
-        f"**{'Stronger' if excess > 0 else 'Weaker'} in the long run.** Both counts are polynomials "
-        f"(degrees {total.degree} and {kept.degree}), so the exponential is a fit and no law: "
+        f"**{'Stronger' if excess > 0 else 'Weaker'} in the long run.** Both counts are "
+        f"polynomials (degrees {total.degree} and {kept.degree}), so the exponential is a fit and "
+        "no law: "
     )
     if excess <= 0:
         return text + "the reduction has a limit below one."
@@ -104,8 +105,9 @@ def _long_run(total: CountPolynomial, kept: CountPolynomial) -> str:
 def _operations_verdict(last: Point) -> str:
     verdict = "Weaker" if last.operations_reduction < last.reduction else "Stronger"
     return (
-        f"**{verdict} in emitted code.** At {last.dof} DoF the part kept takes {last.bucket.shared} operations and "
-        f"the whole {last.torque.shared}: {last.operations_reduction:.1%} are saved, against {last.reduction:.1%} "
-        f"of the terms. Emitted code computes once what an expanded sum repeats; with nothing shared "
+        f"**{verdict} in emitted code.** At {last.dof} DoF the part kept takes "
+        f"{last.bucket.shared} operations and the whole {last.torque.shared}: "
+        f"{last.operations_reduction:.1%} are saved, against {last.reduction:.1%} of the terms. "
+        "Emitted code computes once what an expanded sum repeats; with nothing shared "
         f"{last.written_reduction:.1%} of the operations would be saved."
     )

@@ -1,4 +1,4 @@
-"""How every plot looks: legible on paper, in grey, and to the colour-blind; the same bytes from run to run."""
+"""How every plot looks: legible on paper, in grey and to the colour-blind; the same on each run."""
 
 import io
 from collections.abc import Callable

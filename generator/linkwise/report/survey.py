@@ -20,7 +20,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class LinkTorques:
-    """τ_ij of link j for the joints asked for; joints off path(j) are missing, their torque is zero."""
+    """τ_ij of link j for the joints asked for; those off path(j) are missing: their torque is 0."""
 
     link: int
     torques: dict[int, Laurent]
@@ -34,7 +34,7 @@ def link_torques(
     progress: Progress,
     links: int | None = None,
 ) -> Iterator[LinkTorques]:
-    """Expand the first `links` links (None: all); raises BudgetExceededError at the first too large."""
+    """Expand the first `links` links (None: all); raises BudgetExceededError at one too large."""
     rounding = 0.0 if is_exact(system) else ROUNDING
     expansion = Expansion(system.coordinates, budget, rounding)
     wanted = system.links[:links]

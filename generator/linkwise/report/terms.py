@@ -22,7 +22,7 @@ class TorqueTerms:
 
     @property
     def reduction(self) -> float | None:
-        """Share of the terms that need no computing, 1 − kept/total; None where the torque is zero."""
+        """Share of terms that need no computing, 1 − kept/total; None where the torque is 0."""
         return 1.0 - self.kept / self.count.total if self.count.total else None
 
 

@@ -106,8 +106,8 @@ def progress_line(report: TermsReport) -> str:
         return f"Links counted: all {report.counted} asked for."
     stopped = report.links[report.counted]
     return (
-        f"Stopped early: links 1 to {report.counted} of {report.wanted} were counted; link {stopped} needs more "
-        f"than the budget of {report.budget} terms. Sums are over the links counted."
+        f"Stopped early: links 1 to {report.counted} of {report.wanted} were counted; link "
+        f"{stopped} needs more than the budget of {report.budget} terms. Sums are over the links counted."
     )
 
 

@@ -1,7 +1,8 @@
 """Fully expanded partial torques.
 
     τ_ij = d/dt ∂L_j/∂q̇_i − ∂L_j/∂q_i,   d/dt p = Σ_s ∂p/∂q_s q̇_s + ∂p/∂q̇_s q̈_s
-On an expanded polynomial each derivative is one pass over the terms: ∂/∂q of exp(i e q) brings down i e.
+On an expanded polynomial each derivative is one pass over the terms: ∂/∂q of exp(i e q) brings
+down i e.
 """
 
 from linkwise.model.robot import Coordinate
