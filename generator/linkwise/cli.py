@@ -16,13 +16,9 @@ app = typer.Typer(
     help="Which joint's movement loads which joint, through which link.",
 )
 
-Robot = Annotated[
-    str, typer.Argument(help="planar3, planarN, puma560, or a .toml, .urdf or .py file")
-]
+Robot = Annotated[str, typer.Argument(help="planar3, planarN, puma560, or a .toml, .urdf or .py file")]
 Lock = Annotated[list[str] | None, typer.Option(help="Hold a joint: JOINT=VALUE; may be repeated")]
-Unphysical = Annotated[
-    bool, typer.Option("--allow-unphysical", help="Accept bodies that cannot exist")
-]
+Unphysical = Annotated[bool, typer.Option("--allow-unphysical", help="Accept bodies that cannot exist")]
 Base = Annotated[str, typer.Option(help="fixed or floating")]
 Root = Annotated[str | None, typer.Option(help="Keep only what hangs on this link")]
 Tip = Annotated[str | None, typer.Option(help="Keep only the chain to this link")]
@@ -51,9 +47,7 @@ def _options(
         except ValueError:
             joint = ""
         if not joint or abs(locked[joint]) == float("inf") or locked[joint] != locked[joint]:
-            raise LinkwiseError(
-                f"--lock {item!r} is not of the form JOINT=VALUE, such as --lock elbow=0.5"
-            )
+            raise LinkwiseError(f"--lock {item!r} is not of the form JOINT=VALUE, such as --lock elbow=0.5")
     return Options(parameters, locked, base, root, tip, unphysical)  # type: ignore[arg-type]
 
 
@@ -61,14 +55,10 @@ def _options(
 def generate(
     robot: Robot,
     out: Annotated[Path, typer.Option(help="Directory that gets the package")],
-    name: Annotated[
-        str | None, typer.Option(help="Name of the package; the robot's if not given")
-    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the package; the robot's if not given")] = None,
     backend: Annotated[
         list[str] | None,
-        typer.Option(
-            help="autograd, torch, numpy, c or formulas; may be repeated; all if not given"
-        ),
+        typer.Option(help="autograd, torch, numpy, c or formulas; may be repeated; all if not given"),
     ] = None,
     parameters: Annotated[
         str, typer.Option(help="numeric, or symbolic: keep them as run-time parameters")
@@ -140,9 +130,7 @@ def inspect(
     from linkwise import pipeline
     from linkwise.inspection import inspection, table
 
-    system = pipeline.read_system(
-        robot, _options(lock, parameters, base, root, tip, allow_unphysical)
-    )
+    system = pipeline.read_system(robot, _options(lock, parameters, base, root, tip, allow_unphysical))
     data = inspection(system)
     typer.echo(json.dumps(data, indent=1) if as_json else table(data))
 

@@ -40,9 +40,7 @@ class NewtonEuler:
                     about = moment + np.cross(com - origin, force)
                 else:
                     about = force
-                tau[:, upper["coordinate"], j] += upper["ratio"] * np.einsum(
-                    "si,si->s", axis, about
-                )
+                tau[:, upper["coordinate"], j] += upper["ratio"] * np.einsum("si,si->s", axis, about)
                 back = upper["parent"]
         return tau
 

@@ -62,18 +62,12 @@ def read_manifest(directory: Path) -> dict[str, Any]:
     """Return a package's manifest; raises LinkwiseError when there is none that can be read."""
     path = directory / "manifest.json"
     if not path.is_file():
-        raise LinkwiseError(
-            f"{directory} holds no manifest.json; give the directory of a generated package"
-        )
+        raise LinkwiseError(f"{directory} holds no manifest.json; give the directory of a generated package")
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise LinkwiseError(f"{path} is no JSON ({error}); generate the package again") from None
-    if (
-        not isinstance(data, dict)
-        or data.get("schema") != 1
-        or not isinstance(data.get("files"), dict)
-    ):
+    if not isinstance(data, dict) or data.get("schema") != 1 or not isinstance(data.get("files"), dict):
         raise LinkwiseError(f"{path} has another schema; generate the package again")
     return data
 
@@ -81,9 +75,7 @@ def read_manifest(directory: Path) -> dict[str, Any]:
 def import_package(directory: Path) -> ModuleType:
     """Import a package from its directory, under a name of its own; nothing is put on sys.path."""
     path = directory.resolve()
-    digest = hashlib.sha256(str(path).encode() + (path / "manifest.json").read_bytes()).hexdigest()[
-        :16
-    ]
+    digest = hashlib.sha256(str(path).encode() + (path / "manifest.json").read_bytes()).hexdigest()[:16]
     name = f"_linkwise_{digest}"
     if name in sys.modules:
         return sys.modules[name]
@@ -134,9 +126,7 @@ def _load(package: ModuleType) -> tuple[dict[str, _Answers], list[Result]]:
         except (ImportError, RuntimeError) as error:
             missing.append(Result(f"{name}: not checked", True, None, " ".join(str(error).split())))
     if not loaded:
-        missing.append(
-            Result("back ends", False, None, "none could be loaded; nothing was checked")
-        )
+        missing.append(Result("back ends", False, None, "none could be loaded; nothing was checked"))
     return loaded, missing
 
 
@@ -188,9 +178,7 @@ def _against_oracle(
     tau = ask("partial_torque", q, qd, qdd)
     yield _compare(f"{name}: tau_ij against {oracle.name}", tau, oracle.tau, oracle.tolerance)
     total = ask("inverse_dynamics", q, qd, qdd)
-    yield _compare(
-        f"{name}: tau_i against {oracle.name}", total, oracle.tau.sum(-1), oracle.tolerance
-    )
+    yield _compare(f"{name}: tau_i against {oracle.name}", total, oracle.tau.sum(-1), oracle.tolerance)
     if oracle.mass is not None:
         mass = ask("coefficients", q, qd).acceleration
         yield _compare(f"{name}: M^j against {oracle.name}", mass, oracle.mass)
@@ -207,17 +195,13 @@ def _structure(
     for j, link in enumerate(manifest["links"]):
         off[link["path"], j] = False
     error = float(np.abs(tau[:, off]).max(initial=0.0))
-    yield Result(
-        f"{name}: tau_ij = 0 off the path", error == 0.0, error, f"largest value {error:.1e}"
-    )
+    yield Result(f"{name}: tau_ij = 0 off the path", error == 0.0, error, f"largest value {error:.1e}")
     mass = ask("coefficients", q, qd).acceleration
     yield _compare(f"{name}: M^j symmetric", mass, np.swapaxes(mass, 1, 3))
     smallest = float(np.linalg.eigvalsh(mass.sum(2)).min())
     unphysical = bool(manifest["request"].get("allow_unphysical")) or manifest["skeleton"] is None
     detail = f"smallest eigenvalue {smallest:.1e}"
-    yield Result(
-        f"{name}: total mass matrix positive definite", smallest > 0 or unphysical, smallest, detail
-    )
+    yield Result(f"{name}: total mass matrix positive definite", smallest > 0 or unphysical, smallest, detail)
 
 
 def _agreement(
@@ -229,9 +213,7 @@ def _agreement(
         ("position_gradient", (q, qd, qdd)),
     ):
         a, b = one(call, *motion), other(call, *motion)
-        fields = (
-            zip(("c2", "c1", "g"), a, b, strict=False) if isinstance(a, tuple) else [("", a, b)]
-        )
+        fields = zip(("c2", "c1", "g"), a, b, strict=False) if isinstance(a, tuple) else [("", a, b)]
         for field, x, y in fields:
             what = field or {"partial_torque": "tau_ij", "position_gradient": "c0"}[call]
             yield _compare(f"{name} against {other_name}: {what}", x, y)

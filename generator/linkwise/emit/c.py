@@ -115,11 +115,7 @@ def kernel_function(
 ) -> KernelFunction:
     """C function whose output arrays are `groups`; sines and cosines of the coordinates are inputs."""
     g = kernel.graph
-    sines = {
-        g.call(f, q): f"{f[0]}{k + 1}"
-        for k, q in enumerate(kernel.inputs.q)
-        for f in ("sin", "cos")
-    }
+    sines = {g.call(f, q): f"{f[0]}{k + 1}" for k, q in enumerate(kernel.inputs.q) for f in ("sin", "cos")}
     given = {node: g.symbol(symbol) for node, symbol in sines.items()}
     nodes = [substitute(g, node, given) for group in groups.values() for node in group]
     code = straight_line(g, nodes, CPrinter())
@@ -137,9 +133,7 @@ def kernel_function(
     sources |= {name: f"p[{at}]" for at, name in enumerate(parameter_names(system).values())}
     inputs = tuple((symbol, source) for symbol, source in sources.items() if symbol in code.symbols)
     places = [(array, at) for array, group in groups.items() for at in range(len(group))]
-    outputs = tuple(
-        (array, at, text) for (array, at), text in zip(places, code.outputs, strict=True)
-    )
+    outputs = tuple((array, at, text) for (array, at), text in zip(places, code.outputs, strict=True))
     used = {source.split("[")[0] for _, source in inputs}
     unused = [a for a in ("q", "qd", "qdd", "sine", "cosine", "p") if a not in used]
     unused += [array for array, group in groups.items() if not group]

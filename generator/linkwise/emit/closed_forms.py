@@ -24,9 +24,7 @@ class FormFunction:
     groups: tuple[str, ...]
 
 
-def closed_form_files(
-    system: System, kernels: Sequence[Kernel], library: str
-) -> Iterator[tuple[str, str]]:
+def closed_form_files(system: System, kernels: Sequence[Kernel], library: str) -> Iterator[tuple[str, str]]:
     """Paths inside the package and texts; `library` is numpy or torch."""
     folder, prefix = f"{library}_forms", {"numpy": "np", "torch": "torch"}[library]
     imported = "import numpy as np" if library == "numpy" else "import torch"

@@ -30,9 +30,7 @@ def energy_functions(system: System, link: int) -> tuple[Function, ...]:
     functions = []
     if energy.body is not None:
         functions = [
-            _state(
-                system, energy, "twist", "q, qd, p", energy.twist, "Velocity of the link's frame"
-            ),
+            _state(system, energy, "twist", "q, qd, p", energy.twist, "Velocity of the link's frame"),
             _state(
                 system,
                 energy,
@@ -43,15 +41,11 @@ def energy_functions(system: System, link: int) -> tuple[Function, ...]:
             ),
         ]
     kinetic = _energy(system, energy.kinetic, "kinetic", "q, qd, p", "twist", energy.twist.exports)
-    potential = _energy(
-        system, energy.potential, "potential", "q, p", "height", energy.height.exports
-    )
+    potential = _energy(system, energy.potential, "potential", "q, p", "height", energy.height.exports)
     return (*functions, kinetic, potential)
 
 
-def _state(
-    system: System, energy: LinkEnergy, name: str, arguments: str, steps: Steps, doc: str
-) -> Function:
+def _state(system: System, energy: LinkEnergy, name: str, arguments: str, steps: Steps, doc: str) -> Function:
     lower = _lowering(system)
     before: Sequence[sp.Symbol] = ()
     if energy.parent is not None:
@@ -84,9 +78,7 @@ def _energy(
     lower.symbols |= {symbol: lower.graph.symbol(symbol.name) for symbol in exports}
     code = straight_line(lower.graph, [lower(expr)], PythonPrinter("torch"))
     lines = (*_unpacked(exports, f"{state}({arguments})", code), *fetched(system, code))
-    return Function(
-        name, arguments, f"{name.capitalize()} energy in J.", lines, code, code.outputs[0]
-    )
+    return Function(name, arguments, f"{name.capitalize()} energy in J.", lines, code, code.outputs[0])
 
 
 def _lowering(system: System) -> Lowering:

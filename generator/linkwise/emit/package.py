@@ -73,9 +73,7 @@ def shared_files(derivation: Derivation, backends: Sequence[str]) -> Iterator[tu
         yield "numpy_backend.py", render("package/numpy_backend.py.j2", shared)
 
 
-def manifest(
-    derivation: Derivation, files: Mapping[str, str], operations: Sequence[OperationCount]
-) -> str:
+def manifest(derivation: Derivation, files: Mapping[str, str], operations: Sequence[OperationCount]) -> str:
     """JSON text: what was generated, from what, and the SHA-256 of every file."""
     system = derivation.system
     data = {
@@ -108,9 +106,7 @@ def manifest(
             "gravity": list(_floats(system)),
         },
         "skeleton": skeleton(system),
-        "files": {
-            path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(files.items())
-        },
+        "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(files.items())},
     }
     return json.dumps(data, indent=1) + "\n"
 

@@ -35,8 +35,6 @@ def write_package(files: Mapping[str, str], directory: Path) -> None:
             shutil.rmtree(directory)
         staging.rename(directory)
     except OSError as error:
-        raise LinkwiseError(
-            f"cannot write {directory}: {error.strerror}; choose another --out"
-        ) from None
+        raise LinkwiseError(f"cannot write {directory}: {error.strerror}; choose another --out") from None
     finally:
         shutil.rmtree(staging, ignore_errors=True)

@@ -95,9 +95,7 @@ def _rigid_kernel(
             if e.body is not None
         )
         kernel = Kernel(lower.graph, x, _parameters(system, lower), forms)
-        cost = count_operations(
-            lower.graph, [o for f in forms for o in f.decomposition()]
-        ).arithmetic
+        cost = count_operations(lower.graph, [o for f in forms for o in f.decomposition()]).arithmetic
         if best is None or cost < best[0]:
             best = cost, frame, kernel
 

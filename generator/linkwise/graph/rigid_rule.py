@@ -80,9 +80,7 @@ class Kinematics:
             self._advance(f)
 
     def _matrix(self, joint: Joint) -> Matrix:
-        a, b, c = (
-            (self.g.const(r[0]), self.g.const(r[1]), self.g.const(r[2])) for r in joint.rotation
-        )
+        a, b, c = ((self.g.const(r[0]), self.g.const(r[1]), self.g.const(r[2])) for r in joint.rotation)
         return a, b, c
 
     def _turn(self, joint: Joint) -> Matrix:
@@ -114,9 +112,7 @@ class Kinematics:
     def _locate(self, origin: int) -> dict[int, Vector]:
         """Origin of every frame, from the common origin."""
         g, at = self.g, origin
-        steps = [
-            vec.apply(g, self.rotations[parent], self._offset(joint)) for parent, joint in self.tree
-        ]
+        steps = [vec.apply(g, self.rotations[parent], self._offset(joint)) for parent, joint in self.tree]
         positions: dict[int, Vector] = {at: (g.zero, g.zero, g.zero)}
         while at >= 0:
             parent = self.tree[at][0]
@@ -168,9 +164,7 @@ def rigid_forms(kin: Kinematics, body: RigidBody, chain: Sequence[int]) -> LinkF
     path = tuple(sorted({screw.coordinate for screw in screws}))
     link = _Inertia(kin, body, end)
     weight = link.weight()
-    wrench = spatial_add(
-        g, link.accelerated(kin.accelerations[end]), link.coriolis(kin.twists[end])
-    )
+    wrench = spatial_add(g, link.accelerated(kin.accelerations[end]), link.coriolis(kin.twists[end]))
     pairs = [(i, k) for i in path for k in path]
     c2 = {pair: g.zero for pair in pairs if pair[0] <= pair[1]}
     c1, c0 = dict.fromkeys(pairs, g.zero), dict.fromkeys(pairs, g.zero)

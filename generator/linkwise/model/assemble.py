@@ -82,9 +82,7 @@ def _coordinates(
     known = {axis.name: axis for axis in axes}
     for name in lock:
         if name not in known:
-            raise LinkwiseError(
-                f"--lock names no moving joint {name!r}; the joints are {', '.join(known)}"
-            )
+            raise LinkwiseError(f"--lock names no moving joint {name!r}; the joints are {', '.join(known)}")
     motion: dict[str, tuple[int | None, float, float]] = {}
     coordinates: list[Coordinate] = []
     for axis in axes:
@@ -124,9 +122,7 @@ def _links(
 ) -> tuple[Link, ...]:
     """Moving links, each with the bodies that are rigidly connected to it merged."""
     bodies = {body.name: body for body in description.bodies}
-    by_connection = {
-        c.name: [axis for axis in axes if axis.connection == c.name] for c in connections
-    }
+    by_connection = {c.name: [axis for axis in axes if axis.connection == c.name] for c in connections}
     moving: list[tuple[str, int | None, Joint]] = []
     members: dict[int | None, list[Placed]] = {}
     places = {"": _Place(None), root: _Place(None)}

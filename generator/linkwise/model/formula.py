@@ -30,9 +30,7 @@ def parse_formula(text: str, parameters: Mapping[str, float]) -> Scalar:
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise LinkwiseError(
-            f"{text!r} is no formula; write numbers, parameters and + - * / **"
-        ) from None
+        raise LinkwiseError(f"{text!r} is no formula; write numbers, parameters and + - * / **") from None
     try:
         return _value(tree, text, parameters)
     except (ZeroDivisionError, OverflowError, ValueError) as error:

@@ -29,10 +29,7 @@ def transpose(rotation: Rotation) -> Rotation:
 def compose(a: Rotation, b: Rotation) -> Rotation:
     """Return a · b, snapped."""
     return snap(
-        [
-            [sum(x * y for x, y in zip(row, col, strict=True)) for col in zip(*b, strict=True)]
-            for row in a
-        ]
+        [[sum(x * y for x, y in zip(row, col, strict=True)) for col in zip(*b, strict=True)] for row in a]
     )
 
 
@@ -96,8 +93,7 @@ def align_z(axis: Sequence[float]) -> Rotation:
 def snap(rows: Sequence[Sequence[float]]) -> Rotation:
     """Round entries within 1e-12 of −1, 0 or 1; ±90° turns then leave no 6e-17 behind."""
     return tuple(
-        tuple(float(round(e)) + 0.0 if abs(e - round(e)) < SNAP else float(e) for e in row)
-        for row in rows
+        tuple(float(round(e)) + 0.0 if abs(e - round(e)) < SNAP else float(e) for e in row) for row in rows
     )
 
 

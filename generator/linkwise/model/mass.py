@@ -37,11 +37,7 @@ def merge(bodies: list[Placed]) -> tuple[Scalar, Vec3, Mat3]:
     inertia = np.zeros((3, 3), dtype=object)
     for m, c, i in placed:
         d = np.array([a - b for a, b in zip(c, com, strict=True)], dtype=object)
-        inertia = (
-            inertia
-            + np.array(i, dtype=object)
-            + m * ((d @ d) * np.eye(3, dtype=int) - np.outer(d, d))
-        )
+        inertia = inertia + np.array(i, dtype=object) + m * ((d @ d) * np.eye(3, dtype=int) - np.outer(d, d))
     a, b, c = (tuple(inertia[min(i, k)][max(i, k)] for k in range(3)) for i in range(3))
     return mass, com, (a, b, c)  # type: ignore[return-value]
 

@@ -23,9 +23,7 @@ def _vector(a: Vec3, values: dict[sp.Symbol, float]) -> Vec3:
 
 def _body(body: Body, values: dict[sp.Symbol, float]) -> Body:
     a, b, c = (_vector(row, values) for row in body.inertia)
-    return replace(
-        body, mass=_number(body.mass, values), com=_vector(body.com, values), inertia=(a, b, c)
-    )
+    return replace(body, mass=_number(body.mass, values), com=_vector(body.com, values), inertia=(a, b, c))
 
 
 def _symbols(values: Values) -> dict[sp.Symbol, float]:
@@ -91,9 +89,7 @@ def promoted(robot: Robot) -> Robot:
 
     links = tuple(link(old) for old in robot.links)
     used = _used(links, robot.gravity)
-    return replace(
-        robot, links=links, parameters=tuple((k, v) for k, v in values.items() if k in used)
-    )
+    return replace(robot, links=links, parameters=tuple((k, v) for k, v in values.items() if k in used))
 
 
 def _used(links: tuple[Link, ...], gravity: Vec3) -> set[str]:

@@ -26,17 +26,11 @@ def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
             return assemble(planar(int(match[1])), options)
         path = Path(spec)
         if str(spec) == "puma560":
-            with resources.as_file(
-                resources.files("linkwise.model.robots") / "puma560.toml"
-            ) as built_in:
+            with resources.as_file(resources.files("linkwise.model.robots") / "puma560.toml") as built_in:
                 return assemble(read_toml(built_in), options)
         if not path.is_file():
-            raise LinkwiseError(
-                f"no such file or built-in robot; the built-ins are {', '.join(BUILT_IN)}"
-            )
+            raise LinkwiseError(f"no such file or built-in robot; the built-ins are {', '.join(BUILT_IN)}")
         reader = READERS.get(path.suffix.lower())
         if reader is None:
-            raise LinkwiseError(
-                f"unknown kind of file {path.suffix!r}; give {', '.join(READERS)} or .py"
-            )
+            raise LinkwiseError(f"unknown kind of file {path.suffix!r}; give {', '.join(READERS)} or .py")
         return assemble(reader(path), options)

@@ -20,9 +20,7 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 class _Table:
     """One table of the file; getters that name table and key when something is wrong."""
 
-    def __init__(
-        self, place: str, data: Any, known: Iterable[str], parameters: Mapping[str, float]
-    ) -> None:
+    def __init__(self, place: str, data: Any, known: Iterable[str], parameters: Mapping[str, float]) -> None:
         if not isinstance(data, dict):
             raise LinkwiseError(f"{place} must be a table")
         self.place, self.data, self.parameters = place, data, parameters
@@ -56,9 +54,7 @@ class _Table:
     def numbers(self, key: str, default: list[float]) -> tuple[float, float, float]:
         x, y, z = self.vector(key, default)
         if not all(isinstance(item, float) for item in (x, y, z)):
-            raise LinkwiseError(
-                f"{self.place}: {key!r} takes numbers only, parameters cannot turn a frame"
-            )
+            raise LinkwiseError(f"{self.place}: {key!r} takes numbers only, parameters cannot turn a frame")
         return x, y, z  # type: ignore[return-value]
 
 

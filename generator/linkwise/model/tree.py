@@ -70,25 +70,17 @@ def _check_names(description: Description) -> None:
             raise LinkwiseError(f"joint {c.name!r} has NaN or infinity in its origin; give numbers")
 
 
-def cut(
-    description: Description, root: str | None, tip: str | None, notes: list[Note]
-) -> Description:
+def cut(description: Description, root: str | None, tip: str | None, notes: list[Note]) -> Description:
     """Keep what hangs on link `root`, and of that only the chain to link `tip`."""
     known = {body.name for body in description.bodies}
     for flag, link in (("--root", root), ("--tip", tip)):
         if link is not None and link not in known:
-            raise LinkwiseError(
-                f"{flag} names no link {link!r}; the links are {', '.join(sorted(known))}"
-            )
+            raise LinkwiseError(f"{flag} names no link {link!r}; the links are {', '.join(sorted(known))}")
     kept = known
     if root is not None:
         kept, frontier = {root}, [root]
         while frontier:
-            new = [
-                c.child
-                for c in description.connections
-                if c.parent in frontier and c.child not in kept
-            ]
+            new = [c.child for c in description.connections if c.parent in frontier and c.child not in kept]
             kept, frontier = kept | set(new), new
     if tip is not None:
         parent = {c.child: c.parent for c in description.connections if c.parent in kept}
@@ -97,15 +89,11 @@ def cut(
             at = parent[at]
             chain.add(at)
         if root is not None and root not in chain:
-            raise LinkwiseError(
-                f"--tip {tip!r} does not hang on --root {root!r}; choose links of one chain"
-            )
+            raise LinkwiseError(f"--tip {tip!r} does not hang on --root {root!r}; choose links of one chain")
         kept &= chain
     notes += [Note("cut", body.name) for body in description.bodies if body.name not in kept]
     return replace(
         description,
         bodies=tuple(b for b in description.bodies if b.name in kept),
-        connections=tuple(
-            c for c in description.connections if c.parent in kept and c.child in kept
-        ),
+        connections=tuple(c for c in description.connections if c.parent in kept and c.child in kept),
     )

@@ -76,8 +76,7 @@ def _body(element: Element) -> Body:
     xx = yy = zz = xy = xz = yz = 0.0
     if inertia is not None:
         xx, yy, zz, xy, xz, yz = (
-            _numbers(inertia, f"i{key}", "0", 1, place)[0]
-            for key in ("xx", "yy", "zz", "xy", "xz", "yz")
+            _numbers(inertia, f"i{key}", "0", 1, place)[0] for key in ("xx", "yy", "zz", "xy", "xz", "yz")
         )
     tensor = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     turned = geo.rotate_inertia(geo.snap(rotation), tensor)

@@ -34,8 +34,7 @@ class Closure:
         worst = max(self.terms_relative, self.links_relative)
         if not worst <= LIMIT:
             raise LinkwiseError(
-                f"the robot's torques do not close (relative error {worst:.2g});"
-                " run `linkwise check` on it"
+                f"the robot's torques do not close (relative error {worst:.2g}); run `linkwise check` on it"
             )
 
 

@@ -34,9 +34,7 @@ def analyze(
     out: Annotated[Path, typer.Option(help="Directory to write; a former result is replaced.")],
     units: Annotated[
         Units | None,
-        typer.Option(
-            help="Unit of the angles; lengths are metres. [default: the file's, else rad]"
-        ),
+        typer.Option(help="Unit of the angles; lengths are metres. [default: the file's, else rad]"),
     ] = None,
     time: Annotated[str | None, typer.Option(help="Column of the time, in s.")] = None,
     mapping: Annotated[
@@ -57,9 +55,7 @@ def analyze(
         float | None, typer.Option(help="Zero-phase Butterworth low-pass, Hz. [default: no filter]")
     ] = None,
     filter_order: Annotated[int, typer.Option(help="The filter's order, of one pass.")] = 2,
-    padding: Annotated[
-        Padding, typer.Option(help="How the filter continues the log past its ends.")
-    ] = "odd",
+    padding: Annotated[Padding, typer.Option(help="How the filter continues the log past its ends.")] = "odd",
     edges: Annotated[
         Edges, typer.Option(help="First and last samples: one-sided formulas, or cut off.")
     ] = "one-sided",
@@ -118,9 +114,7 @@ def analyze(
 def motion(
     out: Annotated[Path, typer.Option(help="Directory for recorded.csv and simulated.csv.")],
     kind: Annotated[Kind, typer.Option(help="Which of the two motions.")] = "both",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print what was written as JSON.")
-    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
 ) -> None:
     """Write the paper's two motions (Fig. 5 and 10) for the arm of Table 2, `planar3`."""
     from linkwise.motion.motions import MOTIONS, RATE, write_csv

@@ -70,7 +70,6 @@ def _savitzky_golay(q: Array, rate: float, processing: Processing) -> tuple[Arra
     """q, q̇, q̈ of the polynomial fitted to each window; at the ends, of the last full window's."""
     savgol = extra("scipy.signal").savgol_filter
     fitted = [
-        savgol(q, processing.window, processing.degree, deriv=m, delta=1 / rate, axis=0)
-        for m in range(3)
+        savgol(q, processing.window, processing.degree, deriv=m, delta=1 / rate, axis=0) for m in range(3)
     ]
     return fitted[0], fitted[1], fitted[2]

@@ -23,8 +23,7 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536) -> None
     signal = extra("scipy.signal")
     if settings.cutoff >= rate / 2:
         raise LinkwiseError(
-            f"--cutoff {settings.cutoff:g} Hz is not below half the sampling rate of {rate:g} Hz;"
-            " lower it"
+            f"--cutoff {settings.cutoff:g} Hz is not below half the sampling rate of {rate:g} Hz; lower it"
         )
     sos = signal.butter(settings.order, settings.cutoff, fs=rate, output="sos")
     pad = padding_length(sos) if settings.padding != "none" else 0

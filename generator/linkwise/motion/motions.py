@@ -43,9 +43,7 @@ class Motion:
         time = np.arange(round(self.duration * rate) + 1) / rate
         q = np.tile(np.array(self.start), (len(time), 1))
         for move in self.moves:
-            q[:, move.joint] += move.by * minimum_jerk(
-                (time - move.start) / (move.stop - move.start)
-            )
+            q[:, move.joint] += move.by * minimum_jerk((time - move.start) / (move.stop - move.start))
         if self.noise:
             q += np.random.default_rng(self.seed).normal(scale=self.noise, size=q.shape)
         if self.step:
@@ -96,9 +94,6 @@ def write_csv(path: Path, motion: Motion, joints: Sequence[str] = JOINTS) -> int
     """Write a motion as CSV, exactly; returns how many samples."""
     time, q = motion.samples()
     lines = [",".join(["time", *joints])]
-    lines += [
-        ",".join(map(repr, [t, *angles]))
-        for t, angles in zip(time.tolist(), q.tolist(), strict=True)
-    ]
+    lines += [",".join(map(repr, [t, *angles])) for t, angles in zip(time.tolist(), q.tolist(), strict=True)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return len(time)

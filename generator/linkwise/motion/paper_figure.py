@@ -76,11 +76,7 @@ def own_joints(analysis: Analysis) -> tuple[int, ...]:
         known.get(
             link,
             max(
-                (
-                    c.joint or 0
-                    for c in analysis.columns
-                    if c.quantity == "tau_link" and c.link == j
-                ),
+                (c.joint or 0 for c in analysis.columns if c.quantity == "tau_link" and c.link == j),
                 default=0,
             ),
         )

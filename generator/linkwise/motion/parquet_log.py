@@ -43,8 +43,7 @@ class ParquetLog:
                         block[:, at] = batch.column(name).cast(arrow.float64())
                     except (arrow.ArrowInvalid, arrow.ArrowNotImplementedError) as error:
                         raise LinkwiseError(
-                            f"{self.path}: column {name!r} holds {batch.column(name).type},"
-                            " not numbers"
+                            f"{self.path}: column {name!r} holds {batch.column(name).type}, not numbers"
                         ) from error
                 done += len(block)
                 yield block, done

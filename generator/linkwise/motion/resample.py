@@ -20,9 +20,7 @@ def resample(samples: Array, rate: float, spool: Path | None, rows: int = BLOCK)
     time = samples[:, 0]
     count = int(np.floor((time[-1] - time[0]) * rate * (1 + 1e-12))) + 1
     if len(samples) < 4 or count < 5:
-        raise LinkwiseError(
-            f"{len(samples)} samples give {count} at {rate:g} Hz; 5 or more are needed"
-        )
+        raise LinkwiseError(f"{len(samples)} samples give {count} at {rate:g} Hz; 5 or more are needed")
     table = Spool(samples.shape[1], spool)
     for start in range(0, count, rows):
         at = time[0] + np.arange(start, min(start + rows, count)) / rate

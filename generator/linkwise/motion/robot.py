@@ -57,9 +57,7 @@ class Model(Protocol):
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Joint torques τ_i (..., n)."""
 
-    def propagation(
-        self, q: Array, qd: Array, qdd: Array, convention: str = "closing"
-    ) -> Propagation:
+    def propagation(self, q: Array, qd: Array, qdd: Array, convention: str = "closing") -> Propagation:
         """Each coefficient times its motion."""
 
     def packed(self, q: Array, qd: Array, qdd: Array) -> Packed:
@@ -87,17 +85,14 @@ def load_robot(directory: Path, backend: str | None = None) -> Robot:
     manifest_path = directory / "manifest.json"
     if not manifest_path.is_file():
         raise LinkwiseError(
-            f"{directory}: no generated robot there (no manifest.json);"
-            " make one with `linkwise generate`"
+            f"{directory}: no generated robot there (no manifest.json); make one with `linkwise generate`"
         )
     text = manifest_path.read_bytes()
     try:
         manifest: dict[str, Any] = json.loads(text)
         name, skeleton = str(manifest["name"]), read_skeleton(manifest.get("skeleton"))
     except (ValueError, KeyError, TypeError) as error:
-        raise LinkwiseError(
-            f"{manifest_path}: damaged ({error}); generate the robot again"
-        ) from error
+        raise LinkwiseError(f"{manifest_path}: damaged ({error}); generate the robot again") from error
     package = _import(directory)
     chosen, model = _load(directory, package, BACKENDS if backend is None else (backend,))
     return Robot(
@@ -129,9 +124,7 @@ def _import(directory: Path) -> ModuleType:
         spec.loader.exec_module(module)
     except Exception as error:
         del sys.modules[name]
-        raise LinkwiseError(
-            f"{directory}: cannot be imported: {error}; generate it again"
-        ) from error
+        raise LinkwiseError(f"{directory}: cannot be imported: {error}; generate it again") from error
     return module
 
 

@@ -63,9 +63,7 @@ def read_samples(
             samples, rate = resample(samples, reading.resample, spool), reading.resample
     names = [log.columns[at] for at in selection.joints]
     peaks = [(names[at - 1], float(reach[at])) for at in angles]
-    return Samples(
-        samples[:, 0], samples[:, 1:], rate, selection.ignored, units.doubts(peaks, scale)
-    )
+    return Samples(samples[:, 0], samples[:, 1:], rate, selection.ignored, units.doubts(peaks, scale))
 
 
 def _check_finite(block: Array, path: Path, row: int, log: Log, selection: Selection) -> None:

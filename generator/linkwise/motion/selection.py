@@ -31,8 +31,7 @@ def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> S
     for column, joint in reading.mapping:
         if joint not in source:
             raise LinkwiseError(
-                f"--map {column}={joint}: the robot has no joint {joint!r};"
-                f" its joints are {_list(joints)}"
+                f"--map {column}={joint}: the robot has no joint {joint!r}; its joints are {_list(joints)}"
             )
         if column not in columns:
             raise LinkwiseError(
@@ -61,9 +60,7 @@ def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> S
 def _time(columns: Sequence[str], reading: Reading) -> int:
     if reading.time is not None:
         if reading.time not in columns:
-            raise LinkwiseError(
-                f"--time {reading.time}: no such column; the log has {_list(columns)}"
-            )
+            raise LinkwiseError(f"--time {reading.time}: no such column; the log has {_list(columns)}")
         return list(columns).index(reading.time)
     for at, name in enumerate(columns):
         if name.lower() in {"time", "t"}:

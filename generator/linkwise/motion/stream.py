@@ -47,9 +47,7 @@ def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
     return cut, count - cut
 
 
-def run(
-    samples: Samples, terms: Terms, processing: Processing, sink: Sink, progress: Progress
-) -> Run:
+def run(samples: Samples, terms: Terms, processing: Processing, sink: Sink, progress: Progress) -> Run:
     """Send every block to `sink`, which works in a thread beside the computation."""
     start, stop = span_of(samples, processing)
     total = np.zeros(len(terms.columns))

@@ -79,9 +79,7 @@ class Terms:
         worst = Closure()
         for whole, links in self.wholes:
             terms = [
-                residual([out[row] for row in rows], out[link])
-                for link, rows in self.parts
-                if link in links
+                residual([out[row] for row in rows], out[link]) for link, rows in self.parts if link in links
             ]
             sums = [residual([out[row] for row in links], out[whole])]
             worst |= Closure(*relative(terms), *relative(sums))

@@ -121,9 +121,7 @@ def open_storage(path: Path) -> TextLog:
             if line.strip().lower() == "endheader":
                 break
         else:
-            raise LinkwiseError(
-                f"{path}: no line 'endheader'; the file is cut off or not OpenSim's"
-            )
+            raise LinkwiseError(f"{path}: no line 'endheader'; the file is cut off or not OpenSim's")
         names = handle.readline()
     delimiter = "\t" if "\t" in names else None
     columns = tuple(name.strip() for name in _cells(names.rstrip(), delimiter))
@@ -132,8 +130,7 @@ def open_storage(path: Path) -> TextLog:
     wanted = _count(path, facts, "nColumns")
     if wanted is not None and wanted != len(columns):
         raise LinkwiseError(
-            f"{path}: row {row + 1}: {len(columns)} column names where the header promises"
-            f" nColumns={wanted}"
+            f"{path}: row {row + 1}: {len(columns)} column names where the header promises nColumns={wanted}"
         )
     degrees = {"yes": True, "no": False}.get(facts.get("indegrees", "").lower())
     # Values are padded with blanks, so any run of blanks parts them, whatever parts the names.

@@ -33,8 +33,5 @@ def doubts(peaks: Sequence[tuple[str, float]], factor: float) -> tuple[str, ...]
             " degrees, pass --units deg",
         )
     if factor != 1.0 and 0 < peak <= math.pi:
-        return (
-            f"no angle exceeds {peak:.4g} degrees ({column!r}): if that is radians,"
-            " pass --units rad",
-        )
+        return (f"no angle exceeds {peak:.4g} degrees ({column!r}): if that is radians, pass --units rad",)
     return ()

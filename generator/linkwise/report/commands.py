@@ -76,9 +76,7 @@ def terms(
 
 
 def reduction(
-    robot: Annotated[
-        str, typer.Option(help="planar for the paper's arm, or any serial robot.")
-    ] = "planar",
+    robot: Annotated[str, typer.Option(help="planar for the paper's arm, or any serial robot.")] = "planar",
     dof: Annotated[str, typer.Option(metavar="FIRST..LAST", help="Degrees of freedom.")] = "1..10",
     measure_seconds: Annotated[
         bool, typer.Option("--measure", help="Time generated code too; needs torch.")
@@ -154,7 +152,5 @@ def _locks(entries: list[str]) -> dict[str, float]:
         except ValueError:
             name = ""
         if not name:
-            raise LinkwiseError(
-                f"--lock {entry!r} is not JOINT=VALUE; write such as --lock finger=0.02"
-            )
+            raise LinkwiseError(f"--lock {entry!r} is not JOINT=VALUE; write such as --lock finger=0.02")
     return locks

@@ -61,9 +61,7 @@ class Variables:
 class Expansion:
     """Expands SymPy expressions over coordinates; remembers what each symbol stands for."""
 
-    def __init__(
-        self, coordinates: Iterable[Coordinate], budget: int, rounding: float = 0.0
-    ) -> None:
+    def __init__(self, coordinates: Iterable[Coordinate], budget: int, rounding: float = 0.0) -> None:
         self.coordinates = tuple(coordinates)
         self.variables = Variables(len(self.coordinates))
         self.budget, self.rounding = budget, rounding

@@ -25,8 +25,7 @@ def data(robot: str, timings: tuple[Timing, ...], machine: dict[str, str]) -> di
         "dtype": "float64",
         **machine,
         "timings": [
-            {k: round(v, DIGITS) if isinstance(v, float) else v for k, v in row.items()}
-            for row in rows
+            {k: round(v, DIGITS) if isinstance(v, float) else v for k, v in row.items()} for row in rows
         ],
     }
 
@@ -37,9 +36,7 @@ def read(path: Path) -> dict[str, Any]:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         timings_of(found)
     except OSError as error:
-        raise LinkwiseError(
-            f"{path}: cannot be read ({error.strerror}); give --seconds FILE"
-        ) from error
+        raise LinkwiseError(f"{path}: cannot be read ({error.strerror}); give --seconds FILE") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise LinkwiseError(
             f"{path}: not a measurement; give the measured.json that --measure writes"
@@ -68,9 +65,7 @@ def page(result: Study, found: dict[str, Any]) -> str:
         "robot": found["robot"],
         "batch": found["batch"],
         "machine": ", ".join(f"{k} {found[k]}" for k in ("machine", "python", "numpy", "torch")),
-        "verdicts": [
-            _verdict(result, [t for t in timings if t.method == m]) for m in _methods(timings)
-        ],
+        "verdicts": [_verdict(result, [t for t in timings if t.method == m]) for m in _methods(timings)],
         "rows": [_line(t) for t in timings],
     }
     return render("report/measured.md.j2", view)
@@ -84,8 +79,7 @@ def _verdict(result: Study, timings: list[Timing]) -> str:
     last = timings[-1]
     terms = {p.dof: p.reduction for p in result.points}.get(last.dof)
     text = (
-        f"**{last.method.capitalize()}**: at {last.dof} DoF extracting saves {last.reduction:.1%} "
-        "of the time"
+        f"**{last.method.capitalize()}**: at {last.dof} DoF extracting saves {last.reduction:.1%} of the time"
     )
     if terms is None:
         return text + "."

@@ -41,9 +41,7 @@ class LinkOperations:
     bucket: dict[int, Operations]
 
 
-def link_operations(
-    system: System, joints: tuple[int, ...], question: Question
-) -> Iterator[LinkOperations]:
+def link_operations(system: System, joints: tuple[int, ...], question: Question) -> Iterator[LinkOperations]:
     """Operations of each link's own kernel, link after link."""
     for j in range(len(system.links)):
         kernel = link_kernel(system, j)
@@ -75,6 +73,4 @@ def operations(graph: Graph, outputs: list[Node]) -> Operations:
     for node in reachable(graph, outputs):
         entry = graph.nodes[node]
         cost[node] = (entry[0] in ARITHMETIC) + sum(cost[o] for o in operands(entry))
-    return Operations(
-        sum(cost[output] for output in outputs), count_operations(graph, outputs).arithmetic
-    )
+    return Operations(sum(cost[output] for output in outputs), count_operations(graph, outputs).arithmetic)

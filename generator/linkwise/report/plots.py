@@ -120,9 +120,7 @@ def _terms(figure: Any, report: TermsReport) -> None:
         if row.count.total:
             ink = "white" if shade > 0.45 else style.INK
             axes.text(x, y - 0.13, f"{row.count.total:,}", ha="center", va="center", color=ink)
-            axes.text(
-                x, y + 0.2, f"({row.kept:,})", ha="center", va="center", color=ink, fontsize=7.5
-            )
+            axes.text(x, y + 0.2, f"({row.kept:,})", ha="center", va="center", color=ink, fontsize=7.5)
     axes.set_xlim(-0.5, len(columns) - 0.5)
     axes.set_ylim(len(joints) - 0.5, -0.5)
     axes.set_xticks(range(len(columns)), ["all" if j is None else f"link {j + 1}" for j in columns])

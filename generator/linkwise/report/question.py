@@ -36,6 +36,4 @@ def position(text: str, names: Sequence[str], option: str) -> int:
         return names.index(text)
     if text.isascii() and text.isdigit() and 1 <= int(text) <= len(names):
         return int(text) - 1
-    raise LinkwiseError(
-        f"{option} {text!r} is not there; choose 1..{len(names)} or {', '.join(names)}"
-    )
+    raise LinkwiseError(f"{option} {text!r} is not there; choose 1..{len(names)} or {', '.join(names)}")

@@ -17,9 +17,7 @@ def readings(result: Study, timings: Sequence[Timing] = ()) -> tuple[Reading, ..
     """Lines of the comparison; the measured ones only where there are timings."""
     points, dof = result.points, result.dof
     counted = (
-        Reading(
-            "terms, as in the paper", dof, tuple(p.reduction for p in points), style.BLUE, "o", "-"
-        ),
+        Reading("terms, as in the paper", dof, tuple(p.reduction for p in points), style.BLUE, "o", "-"),
         Reading(
             "operations, nothing shared",
             dof,

@@ -56,16 +56,12 @@ def curve(system: System, most: int, budget: int, progress: Progress) -> tuple[P
     points: list[Point] = []
     costs = link_operations(system, (0,), PAPER)
     try:
-        for found, cost in zip(
-            link_torques(system, (0,), budget, progress, most), costs, strict=False
-        ):
+        for found, cost in zip(link_torques(system, (0,), budget, progress, most), costs, strict=False):
             running.add(found.torques[0], found.variables)
             torque, bucket = torque + cost.torque[0], bucket + cost.bucket[0]
             everything += cost.everything
             count = running.count
-            points.append(
-                Point(len(points) + 1, count.total, count.kept(2, 0), torque, bucket, everything)
-            )
+            points.append(Point(len(points) + 1, count.total, count.kept(2, 0), torque, bucket, everything))
     except BudgetExceededError as error:
         raise LinkwiseError(
             f"{system.name}: {len(points) + 1} links need more than {budget} terms; "

@@ -47,9 +47,7 @@ class TermsReport:
         return self.counted == self.wanted
 
 
-def terms_report(
-    system: System, question: Question, budget: int, progress: Progress
-) -> TermsReport:
+def terms_report(system: System, question: Question, budget: int, progress: Progress) -> TermsReport:
     """Count terms and operations; raises LinkwiseError if nothing asked for fits the budget."""
     wanted = len(system.links) if question.link is None else question.link + 1
     rows, counted = _rows(system, question, wanted, budget, progress)

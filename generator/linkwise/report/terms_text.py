@@ -93,8 +93,7 @@ def view(report: TermsReport) -> dict[str, Any]:
         "summary": [_summary(row, names) for row in report.rows],
         "coordinates": list(range(1, len(report.joints) + 1)),
         "buckets": [
-            (_name(row), row.count.gravity, row.count.acceleration, row.count.velocity)
-            for row in report.rows
+            (_name(row), row.count.gravity, row.count.acceleration, row.count.velocity) for row in report.rows
         ],
         "operations": [line for cost in report.operations for line in _lines(cost)],
     }

@@ -37,11 +37,7 @@ class Differentiation:
         """∂p/∂q_k: through exp(i q_k), and through a bare q_k of a slide or a spring."""
         through_angle = self._by_angle(p, k)
         digit = self._bare[k]
-        return (
-            through_angle
-            if digit is None
-            else laurent.add([through_angle, self._by_digit(p, digit)])
-        )
+        return through_angle if digit is None else laurent.add([through_angle, self._by_digit(p, digit)])
 
     def _by_digit(self, p: Laurent, digit: int) -> Laurent:
         lifted, shift, one = self._lifted, DIGIT * digit, laurent.at_digit(digit)

@@ -27,9 +27,6 @@ def partial_torques(system: System, link: int) -> dict[int, sp.Expr]:
     torques = {}
     for i in path:
         momentum = sp.diff(value, c[i].qd)
-        rate = sum(
-            sp.diff(momentum, c[s].q) * c[s].qd + sp.diff(momentum, c[s].qd) * c[s].qdd
-            for s in path
-        )
+        rate = sum(sp.diff(momentum, c[s].q) * c[s].qd + sp.diff(momentum, c[s].qd) * c[s].qdd for s in path)
         torques[i] = rate - sp.diff(value, c[i].q)
     return torques

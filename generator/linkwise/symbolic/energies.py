@@ -45,12 +45,8 @@ def read_energies(path: Path, symbolic: bool = False) -> System:
         raise LinkwiseError(f"running the file failed: {type(error).__name__}: {error}") from error
     for required, kind in (("coordinates", Coordinate), ("links", LinkEnergy)):
         items = scope.get(required)
-        if not isinstance(items, (list, tuple)) or not all(
-            isinstance(item, kind) for item in items
-        ):
-            raise LinkwiseError(
-                f"the file must define {required!r}, a list of linkwise.{kind.__name__}"
-            )
+        if not isinstance(items, (list, tuple)) or not all(isinstance(item, kind) for item in items):
+            raise LinkwiseError(f"the file must define {required!r}, a list of linkwise.{kind.__name__}")
     return energy_system(
         scope.get("name", path.stem),
         scope["coordinates"],

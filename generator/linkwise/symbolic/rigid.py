@@ -145,8 +145,7 @@ def _kinetic(state: _Motion, m: Scalar, c: Vec3, inertia: Mat3) -> sp.Expr:
     w, v = state.omega, state.v
     cc = _dot(c, c)
     about_origin = [
-        [inertia[i][k] - m * c[i] * c[k] + (m * cc if i == k else 0) for k in range(3)]
-        for i in range(3)
+        [inertia[i][k] - m * c[i] * c[k] + (m * cc if i == k else 0) for k in range(3)] for i in range(3)
     ]
     spin = sum(HALF * about_origin[i][i] * w[i] ** 2 for i in range(3)) + sum(
         about_origin[i][k] * w[i] * w[k] for i, k in ((0, 1), (0, 2), (1, 2))
