@@ -2,30 +2,23 @@
 
 import re
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
 import typer
 
 from linkwise.errors import LinkwiseError
-from linkwise.model import Options
-from linkwise.pipeline import read_system
-from linkwise.report import measured_text, plots, study_text, terms_text
-from linkwise.report.files import json_text, write_all
-from linkwise.report.progress import progress_bar
-from linkwise.report.question import Question, position
-from linkwise.report.readings import readings
-from linkwise.report.seconds import machine, measure
-from linkwise.report.study import Study, study
-from linkwise.report.survey import BUDGET
-from linkwise.report.terms import terms_report
-from linkwise.symbolic.system import System
 
 CHECKED_TO = 14
 """A planar arm is counted at least to here: the paper's ten joints, and four to confirm."""
+BUDGET = 2_000_000
+"""Terms of one expansion; a polynomial of this size takes about 0.5 GB."""
 
-Out = Annotated[Path | None, typer.Option(help="Directory for the report's files.")]
-Budget = Annotated[int, typer.Option(min=1, help="Terms that one expansion may hold.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the data as JSON.")]
+Budget = Annotated[int, typer.Option(min=1, help="Terms that one expansion may hold")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
+Lock = Annotated[list[str] | None, typer.Option(help="Hold a joint: JOINT=VALUE; may be repeated")]
+Out = Annotated[Path | None, typer.Option(help="Directory that gets the report's files")]
+Root = Annotated[str | None, typer.Option(help="Keep only what hangs on this link")]
+Tip = Annotated[str | None, typer.Option(help="Keep only the chain to this link")]
 
 
 def register(app: typer.Typer) -> None:
@@ -37,26 +30,34 @@ def register(app: typer.Typer) -> None:
 
 
 def terms(
-    robot: Annotated[str, typer.Argument(help="Built-in name, .toml, .urdf or .py file.")],
-    joint: Annotated[str, typer.Option(help="Joint i: name, number from 1, or all.")] = "1",
-    link: Annotated[str, typer.Option(help="Link j: name, number from 1, or all.")] = "all",
-    coordinate: Annotated[str, typer.Option(help="Joint k whose motion is kept.")] = "1",
-    order: Annotated[
-        int, typer.Option(min=0, max=2, help="What is kept: 2 acceleration, 1 velocity, 0 gravity.")
-    ] = 2,
+    robot: Annotated[str, typer.Argument(help="planar3, planarN, puma560, or a .toml, .urdf or .py file")],
+    joint: Annotated[str, typer.Option(help="Joint i: its name, its number from 1, or all")] = "1",
+    link: Annotated[str, typer.Option(help="Link j: its name, its number from 1, or all")] = "all",
+    coordinate: Annotated[str, typer.Option(help="Joint k, whose motion is kept")] = "1",
+    order: Annotated[int, typer.Option(min=0, max=2, help="Kept: 2 acceleration, 1 velocity, 0 gravity")] = 2,
     parameters: Annotated[
-        Literal["symbolic", "numeric"], typer.Option(help="A symbol a parameter, or its number.")
+        str, typer.Option(help="symbolic: a symbol a parameter; numeric: its number")
     ] = "symbolic",
-    lock: Annotated[
-        list[str] | None, typer.Option(metavar="JOINT=VALUE", help="Hold a joint at a value.")
-    ] = None,
+    lock: Lock = None,
+    root: Root = None,
+    tip: Tip = None,
     budget: Budget = BUDGET,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="Report on the links that fit the budget")
+    ] = False,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
     """Count terms and operations of the partial torques, and those that one bucket needs."""
-    options = Options(parameters=parameters, lock=_locks(lock or []))
-    system = read_system(robot, options)
+    from linkwise.pipeline import read_system
+    from linkwise.progress import progress
+    from linkwise.report import terms_text
+    from linkwise.report.files import json_text, require_writable, write_all
+    from linkwise.report.publish import terms_files
+    from linkwise.report.question import Question, position
+    from linkwise.report.terms import terms_report
+
+    system = read_system(robot, _options(parameters, lock, root, tip))
     joints, links = [c.name for c in system.coordinates], [part.name for part in system.links]
     question = Question(
         None if joint == "all" else position(joint, joints, "--joint"),
@@ -64,76 +65,58 @@ def terms(
         position(coordinate, joints, "--coordinate"),
         order,
     )
-    with progress_bar(f"expanding {system.name}") as progress:
-        result = terms_report(system, question, budget, progress)
-    data, page = json_text(terms_text.data(result)), terms_text.page(result)
     if out is not None:
-        files = {"terms.json": data, "terms.md": page, "terms.csv": terms_text.table(result)}
-        write_all(out, _encoded(files) | plots.terms_images(result))
-    typer.echo(data if as_json else page, nl=False)
+        require_writable(out)
+    with progress() as advance:
+        result = terms_report(system, question, budget, partial, advance)
+    if out is not None:
+        write_all(out, terms_files(result))
+    typer.echo(json_text(terms_text.data(result)) if as_json else terms_text.page(result), nl=False)
     if not result.complete:
         typer.echo(terms_text.progress_line(result), err=True)
 
 
 def reduction(
-    robot: Annotated[str, typer.Option(help="planar for the paper's arm, or any serial robot.")] = "planar",
-    dof: Annotated[str, typer.Option(metavar="FIRST..LAST", help="Degrees of freedom.")] = "1..10",
-    measure_seconds: Annotated[
-        bool, typer.Option("--measure", help="Time generated code too; needs torch.")
-    ] = False,
-    seconds: Annotated[
-        Path | None, typer.Option(help="Draw the times of an earlier measured.json instead.")
-    ] = None,
+    robot: Annotated[
+        str, typer.Option(help="planar: the paper's arm; or any serial robot, as in terms")
+    ] = "planar",
+    dof: Annotated[str, typer.Option(help="Degrees of freedom, FIRST..LAST")] = "1..10",
+    lock: Lock = None,
+    root: Root = None,
+    tip: Tip = None,
+    measured: Annotated[bool, typer.Option("--measure", help="Time generated code too; needs torch")] = False,
+    seconds: Annotated[Path | None, typer.Option(help="Draw the times of an earlier measured.json")] = None,
     budget: Budget = BUDGET,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Draw the share of terms of τ_1 that its q̈_1 part does not need (Fig. 15)."""
-    first, last = _range(dof)
-    beyond = max(last, CHECKED_TO) if robot == "planar" else last
-    spec = f"planar{beyond}" if robot == "planar" else robot
-    system = read_system(spec, Options(parameters="symbolic"))
-    name = "planar arm" if robot == "planar" else system.name
-    found = measured_text.read(seconds) if seconds is not None else None
-    with progress_bar(f"expanding {name}") as progress:
-        result = study(name, system, first, last, beyond, budget, progress)
-    if measure_seconds and found is None:
-        found = _measured(system, result)
-    data, page = json_text(study_text.data(result)), study_text.page(result)
+    """Draw the share of terms of τ_1 that its q̈_1 part does not need (the paper's Fig. 15)."""
+    from linkwise.pipeline import read_system
+    from linkwise.progress import progress
+    from linkwise.report import measured_text, study_text
+    from linkwise.report import seconds as timing
+    from linkwise.report.files import json_text, require_writable, write_all
+    from linkwise.report.publish import study_files
+    from linkwise.report.study import study
+
+    first, last = dof_range(dof)
+    most = max(last, CHECKED_TO) if robot == "planar" else last
+    spec, name = (f"planar{most}", "planar arm") if robot == "planar" else (robot, Path(robot).stem)
+    system = read_system(spec, _options("symbolic", lock, root, tip))
+    found = None if seconds is None else measured_text.read(seconds)
     if out is not None:
-        files = {
-            "reduction.json": data,
-            "reduction.md": page,
-            "reduction.csv": study_text.table(result),
-        }
-        write_all(out, _encoded(files) | _images(result) | _measured_files(result, found))
-    typer.echo(data if as_json else page, nl=False)
+        require_writable(out)
+    with progress() as advance:
+        result = study(name, system, first, last, most, budget, advance)
+        if measured and found is None:
+            found = measured_text.data(name, timing.measure(system, result.dof, advance))
+    if out is not None:
+        write_all(out, study_files(result, found))
+    typer.echo(json_text(study_text.data(result)) if as_json else study_text.page(result), nl=False)
 
 
-def _measured(system: System, result: Study) -> dict[str, object]:
-    with progress_bar("measuring") as progress:
-        timings = measure(system, result.dof, progress)
-    return measured_text.data(result.robot, timings, machine())
-
-
-def _images(result: Study) -> dict[str, bytes]:
-    drawn = plots.readings_images("readings", result.robot, readings(result))
-    return plots.reduction_images(result) | drawn
-
-
-def _measured_files(result: Study, found: dict[str, object] | None) -> dict[str, bytes]:
-    if found is None:
-        return {}
-    lines = readings(result, measured_text.timings_of(found))
-    files = {"measured.json": json_text(found), "measured.md": measured_text.page(result, found)}
-    return _encoded(files) | plots.readings_images("measured", result.robot, lines)
-
-
-def _encoded(files: dict[str, str]) -> dict[str, bytes]:
-    return {name: text.encode() for name, text in files.items()}
-
-
-def _range(text: str) -> tuple[int, int]:
+def dof_range(text: str) -> tuple[int, int]:
+    """Parse FIRST..LAST or a single number; raises LinkwiseError for an empty or negative range."""
     match = re.fullmatch(r"(-?\d+)(?:\.\.(-?\d+))?", text)
     first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
     if not 1 <= first <= last:
@@ -143,14 +126,19 @@ def _range(text: str) -> tuple[int, int]:
     return first, last
 
 
-def _locks(entries: list[str]) -> dict[str, float]:
+def _options(parameters: str, lock: list[str] | None, root: str | None, tip: str | None) -> Any:
+    """Reading options; raises LinkwiseError for a lock that is not JOINT=VALUE."""
+    from linkwise.model import Options
+
+    if parameters not in ("numeric", "symbolic"):
+        raise LinkwiseError(f"--parameters is {parameters!r}; choose numeric or symbolic")
     locks = {}
-    for entry in entries:
-        name, _, value = entry.rpartition("=")
+    for entry in lock or []:
+        joint, _, value = entry.rpartition("=")
         try:
-            locks[name] = float(value)
-        except ValueError:
-            name = ""
-        if not name:
-            raise LinkwiseError(f"--lock {entry!r} is not JOINT=VALUE; write such as --lock finger=0.02")
-    return locks
+            locks[joint] = float(value)
+        except ValueError as error:
+            raise LinkwiseError(
+                f"--lock {entry!r} is not JOINT=VALUE; write such as --lock elbow=0.5"
+            ) from error
+    return Options(parameters, locks, root=root, tip=tip)  # type: ignore[arg-type]

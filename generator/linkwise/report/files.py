@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import os
+import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -24,14 +25,28 @@ def write_all(directory: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
         for beside, target in waiting:
             beside.replace(target)
     except OSError as error:
-        reason = error.strerror or type(error).__name__
-        raise LinkwiseError(
-            f"{directory}: cannot write the report ({reason}); choose another --out"
-        ) from error
+        raise _refused(directory, error) from error
     finally:
         for beside, _ in waiting:
             beside.unlink(missing_ok=True)
     return tuple(target for _, target in waiting)
+
+
+def require_writable(directory: Path) -> None:
+    """Raise LinkwiseError, before any work is done, if no file can be made where `directory` is to be."""
+    place = directory
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    try:
+        with tempfile.TemporaryFile(dir=place):
+            pass
+    except OSError as error:
+        raise _refused(directory, error) from error
+
+
+def _refused(directory: Path, error: OSError) -> LinkwiseError:
+    reason = error.strerror or type(error).__name__
+    return LinkwiseError(f"{directory}: cannot write the report ({reason}); choose another --out")
 
 
 def json_text(data: Any) -> str:

@@ -7,13 +7,13 @@ from typing import Any
 
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
-from linkwise.report.seconds import BATCH, Timing
+from linkwise.report.seconds import BATCH, Timing, machine
 from linkwise.report.study import Study
 
 DIGITS = 4
 
 
-def data(robot: str, timings: tuple[Timing, ...], machine: dict[str, str]) -> dict[str, Any]:
+def data(robot: str, timings: tuple[Timing, ...]) -> dict[str, Any]:
     """Return the measurement as JSON values; times in µs a sample."""
     rows = [{**asdict(t), "reduction": t.reduction} for t in timings]
     return {
@@ -23,7 +23,7 @@ def data(robot: str, timings: tuple[Timing, ...], machine: dict[str, str]) -> di
         "batch": BATCH,
         "threads": 1,
         "dtype": "float64",
-        **machine,
+        **machine(),
         "timings": [
             {k: round(v, DIGITS) if isinstance(v, float) else v for k, v in row.items()} for row in rows
         ],

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
+from linkwise.pipeline import Progress
 from linkwise.report.laurent import BudgetExceededError
 from linkwise.report.operations import NO_OPERATIONS, Operations, link_operations
 from linkwise.report.question import Question
-from linkwise.report.survey import Progress, RunningCount, link_torques
+from linkwise.report.survey import RunningCount, link_torques
 from linkwise.symbolic.system import System
 
 PAPER = Question(joint=0, link=None, coordinate=0, order=2)

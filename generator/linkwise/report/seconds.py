@@ -18,9 +18,8 @@ from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
 from linkwise.graph.derive import Kernel
 from linkwise.graph.expression import Node
-from linkwise.pipeline import derive, generate
+from linkwise.pipeline import Progress, derive, generate
 from linkwise.report.extras import report_extra
-from linkwise.report.survey import Progress
 from linkwise.symbolic.system import System
 
 BATCH = 1024
@@ -59,7 +58,7 @@ def measure(system: System, dof: tuple[int, ...], progress: Progress) -> tuple[T
     try:
         for done, n in enumerate(dof):
             timings += _of_arm(first_links(system, n), n)
-            progress(done + 1, len(dof))
+            progress("measure", done + 1, len(dof))
     finally:
         torch.set_num_threads(threads)
     return tuple(timings)

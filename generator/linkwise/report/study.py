@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from linkwise.pipeline import Progress
 from linkwise.report.fit import PAPER_A, PAPER_RATE, Saturation, fit, held_against
 from linkwise.report.polynomial import CountPolynomial, count_polynomial
 from linkwise.report.reduction import Point, curve
-from linkwise.report.survey import Progress, form_of
+from linkwise.report.survey import form_of
 from linkwise.symbolic.system import System
 
 CLOSE = 0.02

@@ -1,21 +1,16 @@
 """Every link's torques, expanded one link at a time within a budget of terms."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError, within
+from linkwise.pipeline import Progress
 from linkwise.report import laurent
 from linkwise.report.count import FORM, TermCount, count_terms
 from linkwise.report.expand import ROUNDING, Expansion, Variables
 from linkwise.report.laurent import BudgetExceededError, ExponentError, Laurent
 from linkwise.report.torque import Differentiation
 from linkwise.symbolic.system import System
-
-BUDGET = 2_000_000
-"""Terms that one polynomial may hold unless told otherwise; about 0.5 GB."""
-
-Progress = Callable[[int, int], None]
-"""Told how many links are done, and how many there are."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +49,7 @@ def link_torques(
         if any(len(torque) > budget for torque in torques.values()):
             raise BudgetExceededError
         yield LinkTorques(j, torques, expansion.variables)
-        progress(j + 1, len(wanted))
+        progress("expand", j + 1, len(wanted))
 
 
 def is_exact(system: System) -> bool:

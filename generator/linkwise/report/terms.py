@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
+from linkwise.pipeline import Progress
 from linkwise.report.count import TermCount
 from linkwise.report.laurent import BudgetExceededError
 from linkwise.report.operations import LinkOperations, link_operations
 from linkwise.report.question import Question
-from linkwise.report.survey import Progress, RunningCount, form_of, link_torques
+from linkwise.report.survey import RunningCount, form_of, link_torques
 from linkwise.symbolic.system import System
 
 
@@ -47,14 +48,19 @@ class TermsReport:
         return self.counted == self.wanted
 
 
-def terms_report(system: System, question: Question, budget: int, progress: Progress) -> TermsReport:
-    """Count terms and operations; raises LinkwiseError if nothing asked for fits the budget."""
+def terms_report(
+    system: System, question: Question, budget: int, partial: bool, progress: Progress
+) -> TermsReport:
+    """Count terms and operations; raises LinkwiseError for a robot beyond the budget.
+
+    With `partial` the links that fit are reported, as long as there is one of those asked for.
+    """
     wanted = len(system.links) if question.link is None else question.link + 1
     rows, counted = _rows(system, question, wanted, budget, progress)
-    if not rows or (question.link is not None and counted < wanted):
+    if counted < wanted and not (partial and rows):
         raise LinkwiseError(
-            f"{system.name}: link {system.links[counted].name!r} needs more than {budget} terms; "
-            "raise --budget"
+            f"{system.name}: link {system.links[counted].name!r} needs more than {budget} terms, "
+            f"after {counted} of {wanted} links; raise --budget, or pass --partial to report on those"
         )
     costs = link_operations(system, question.joints(len(system.coordinates)), question)
     return TermsReport(

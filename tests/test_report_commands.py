@@ -1,0 +1,81 @@
+"""The report commands as a user calls them."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def report(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "linkwise", "report", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("reduction", "--dof", "5..3"), "--dof '5..3' is no range"),
+        (("reduction", "--dof", "-1..3"), "--dof '-1..3' is no range"),
+        (("reduction", "--dof", "0..3"), "1 ≤ FIRST ≤ LAST"),
+        (("reduction", "--robot", "puma560", "--dof", "1..7"), "--dof reaches 7, but 6 links move"),
+        (("reduction", "--budget", "10"), "raise --budget"),
+        (("reduction", "--seconds", "nowhere.json"), "nowhere.json: cannot be read"),
+        (("terms", "puma560", "--budget", "100"), "raise --budget"),
+        (("terms", "planar3", "--joint", "7"), "--joint '7' is not there; choose 1..3"),
+        (("terms", "planar3", "--lock", "joint1"), "--lock 'joint1' is not JOINT=VALUE"),
+    ],
+)
+def test_a_users_mistake_is_one_line_and_leaves_no_file(
+    arguments: tuple[str, ...], complaint: str, tmp_path: Path
+) -> None:
+    run = report(*arguments, "--out", str(tmp_path / "out"))
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert run.stderr.count("\n") == 1
+    assert complaint in run.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unwritable_directory_is_refused_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    run = report("reduction", "--out", str(tmp_path / "file" / "out"))
+    assert run.returncode == 2
+    assert run.stderr.count("\n") == 1
+    assert "cannot write the report" in run.stderr
+
+
+def test_reports_are_the_same_bytes_from_run_to_run(tmp_path: Path) -> None:
+    for run in ("a", "b"):
+        assert report("reduction", "--dof", "1..4", "--out", str(tmp_path / run)).returncode == 0
+        assert report("terms", "planar2", "--joint", "all", "--out", str(tmp_path / run)).returncode == 0
+    written = sorted(path.name for path in (tmp_path / "a").iterdir())
+    assert written == sorted(
+        [f"{name}.{kind}" for name in ("reduction", "terms") for kind in ("csv", "json", "md", "png", "svg")]
+        + ["readings.png", "readings.svg"]
+    )
+    for name in written:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+
+
+def test_any_bucket_of_any_torque_can_be_asked_for() -> None:
+    asked = ("--joint", "joint2", "--link", "3", "--coordinate", "3", "--order", "1", "--json")
+    run = report("terms", "planar3", *asked)
+    (torque,) = json.loads(run.stdout)["torques"]
+    assert (torque["joint"], torque["link"]) == (2, 3)
+    assert torque["kept"] == torque["velocity"][2] == 3
+
+
+def test_measured_seconds_stay_in_files_of_their_own_and_draw_again(tmp_path: Path) -> None:
+    first, again = tmp_path / "first", tmp_path / "again"
+    assert report("reduction", "--dof", "1..2", "--measure", "--out", str(first)).returncode == 0
+    timings = json.loads((first / "measured.json").read_text())["timings"]
+    assert [(t["dof"], t["method"]) for t in timings] == [
+        (n, method) for n in (1, 2) for method in ("closed form", "autograd")
+    ]
+    assert all(t["extract"] > 0.0 and 0.0 < t["whole"] < 1e6 for t in timings)
+    stored = str(first / "measured.json")
+    assert report("reduction", "--dof", "1..2", "--seconds", stored, "--out", str(again)).returncode == 0
+    for path in first.iterdir():
+        assert path.read_bytes() == (again / path.name).read_bytes(), path.name

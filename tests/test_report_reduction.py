@@ -1,0 +1,89 @@
+"""The cost-reduction curve against the goldens, its fit, and the polynomials behind it."""
+
+import json
+from pathlib import Path
+
+import pytest
+from linkwise.errors import LinkwiseError
+from linkwise.model import Options, read_robot
+from linkwise.pipeline import silent
+from linkwise.report.fit import fit, held_against
+from linkwise.report.plots import reduction_images
+from linkwise.report.polynomial import count_polynomial
+from linkwise.report.reduction import Point, curve
+from linkwise.report.study import study, verdicts
+from linkwise.report.study_text import page
+from linkwise.symbolic.rigid import link_energies
+from linkwise.symbolic.system import System
+
+GOLDEN = json.loads((Path(__file__).parent / "data" / "term_counts.json").read_text())
+
+
+def planar(n: int) -> System:
+    return link_energies(read_robot(f"planar{n}", Options(parameters="symbolic")))
+
+
+@pytest.fixture(scope="module")
+def points() -> tuple[Point, ...]:
+    return curve(planar(14), 14, 10**6, silent)
+
+
+def test_counts_are_the_goldens(points: tuple[Point, ...]) -> None:
+    ten = points[:10]
+    assert [p.dof for p in ten] == GOLDEN["n"]
+    assert [p.total for p in ten] == GOLDEN["total"]
+    assert [p.kept for p in ten] == GOLDEN["kept"]
+    assert [round(p.reduction, 6) for p in ten] == GOLDEN["reduction"]
+
+
+def test_the_fit_and_the_papers_curve_meet_the_points(points: tuple[Point, ...]) -> None:
+    dof, y = [p.dof for p in points[:10]], [p.reduction for p in points[:10]]
+    free, paper = fit(dof, y), held_against(0.95, 0.44, dof, y)
+    assert free is not None
+    assert (free.a, free.rate) == pytest.approx((0.9432, 0.4508), abs=1e-4)
+    assert free.rmse == pytest.approx(0.0064, abs=1e-4)
+    assert paper.rmse == pytest.approx(0.0074, abs=1e-4)
+    assert paper.largest == pytest.approx(0.0155, abs=1e-4)
+
+
+def test_polynomials_from_eight_counts_foretell_the_next_six(points: tuple[Point, ...]) -> None:
+    total = count_polynomial([p.total for p in points[:8]])
+    kept = count_polynomial([p.kept for p in points[:8]])
+    assert total is not None
+    assert kept is not None
+    assert total.coefficients == (3, 11, 19, 19, 10, 2)
+    assert kept.coefficients == (2, 4, 3, 1)
+    assert [total(p.dof) for p in points[8:]] == [p.total for p in points[8:]]
+    assert [kept(p.dof) for p in points[8:]] == [p.kept for p in points[8:]]
+
+
+def test_no_polynomial_is_claimed_without_counts_to_confirm_it() -> None:
+    assert count_polynomial([1, 2, 4, 8, 16, 32]) is None
+    assert count_polynomial([3, 14, 44, 112, 247, 490, 896]) is None
+
+
+def test_emitted_code_saves_less_than_the_terms_promise(points: tuple[Point, ...]) -> None:
+    ten = points[9]
+    assert ten.operations_reduction < ten.written_reduction < ten.reduction
+    assert ten.bucket.shared < ten.bucket.written
+
+
+def test_the_study_says_where_the_claim_holds() -> None:
+    said = " ".join(verdicts(study("planar arm", planar(14), 1, 10, 14, 10**6, silent)))
+    assert "Holds: the curve" in said
+    assert "Stronger: 5 DoF.** 5.2 redundant" in said
+    assert "Holds: 10 DoF.** 15.9 redundant" in said
+    assert "falls like 10/n^2" in said
+    assert "Weaker in emitted code" in said
+
+
+def test_page_and_plots_are_the_same_bytes_each_time() -> None:
+    first, again = (study("arm", planar(9), 2, 4, 9, 10**6, silent) for _ in range(2))
+    assert page(first) == page(again)
+    assert reduction_images(first) == reduction_images(again)
+    assert b"<dc:date>" not in reduction_images(first)["reduction.svg"]
+
+
+def test_an_arm_beyond_the_budget_says_what_to_ask_for() -> None:
+    with pytest.raises(LinkwiseError, match=r"4 links need more than 100 terms; ask for at most 3"):
+        curve(planar(8), 8, 100, silent)

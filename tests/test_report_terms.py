@@ -1,0 +1,193 @@
+"""Counted terms, held against derivations that share no code with the count."""
+
+import json
+import math
+import random
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import sympy as sp
+from linkwise.errors import LinkwiseError
+from linkwise.graph.derive import Kernel, link_kernel
+from linkwise.graph.expression import FUNCTIONS, Node, reachable
+from linkwise.model import Options, read_robot
+from linkwise.model.robot import Coordinate
+from linkwise.pipeline import silent
+from linkwise.report import laurent
+from linkwise.report.count import count_terms
+from linkwise.report.laurent import Laurent
+from linkwise.report.question import Question
+from linkwise.report.survey import LinkTorques, link_torques
+from linkwise.report.terms import terms_report
+from linkwise.symbolic.rigid import link_energies
+from linkwise.symbolic.system import LinkEnergy, System
+from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
+from sympy.simplify.fu import TR8
+
+GOLDEN = json.loads((Path(__file__).parent / "data" / "term_counts.json").read_text())
+ARITHMETIC = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+}
+
+
+def symbolic(name: str) -> System:
+    return link_energies(read_robot(name, Options(parameters="symbolic")))
+
+
+def spring_pendulum() -> System:
+    """A slide on a spring that carries a pendulum, whose driven pivot adds a term linear in q̇."""
+    x, a = Coordinate("x", "m"), Coordinate("a")
+    m, c, k, length, w, g = sp.symbols("m c k l w g", real=True)
+    kinetic = m / 2 * (x.qd**2 + 2 * length * x.qd * a.qd * sp.cos(a.q) + length**2 * a.qd**2)
+    links = (
+        LinkEnergy("slide", c * x.qd**2 / 2, k * x.q**2 / 2 + k**2 / c * x.q**4 / 4),
+        LinkEnergy("bob", kinetic + w * a.qd * sp.sin(2 * a.q), -m * g * length * sp.cos(a.q)),
+    )
+    values = dict.fromkeys((m, c, k, length, w, g), 1.0)
+    return System("spring_pendulum", (x, a), links, values)
+
+
+def values_at_random(system: System, seed: int) -> dict[str, float]:
+    draw = random.Random(seed)
+    n = len(system.coordinates)
+    names = [f"{kind}{k + 1}" for kind in ("q", "qd", "qdd") for k in range(n)]
+    names += [symbol.name for symbol in system.parameters]
+    return {name: draw.uniform(0.3, 1.7) for name in names}
+
+
+def evaluated_expansion(p: Laurent, found: LinkTorques, system: System, at: dict[str, float]) -> complex:
+    x, n = found.variables, len(system.coordinates)
+    bare = {c.name: at[f"q{k + 1}"] for k, c in enumerate(system.coordinates)}
+    value = [1j] + [complex(math.cos(at[f"q{k + 1}"]), math.sin(at[f"q{k + 1}"])) for k in range(n)]
+    value += [at[f"qd{k + 1}"] for k in range(n)] + [at[f"qdd{k + 1}"] for k in range(n)]
+    value += [bare[name] if name in bare else at[name] for name in x.names]
+    total = 0j
+    for key, c in p.terms.items():
+        powers = zip(value, laurent.exponents(key, x.digits), strict=True)
+        total += c * math.prod(v**e for v, e in powers if e)
+    return total / p.denominator
+
+
+def evaluated_graph(kernel: Kernel, output: Node, at: dict[str, float]) -> float:
+    named = {node: at[symbol.name] for symbol, node in kernel.parameters.items()}
+    value: dict[Node, float] = {}
+    for node in reachable(kernel.graph, [output]):
+        op, a, b = kernel.graph.nodes[node]
+        if op == "const":
+            value[node] = a
+        elif op == "symbol":
+            value[node] = named[node] if node in named else at[a]
+        elif op == "neg":
+            value[node] = -value[a]
+        elif op == "call":
+            value[node] = FUNCTIONS[a](value[b])
+        else:
+            value[node] = ARITHMETIC[op](value[a], value[b])
+    return value[output]
+
+
+@pytest.mark.parametrize(
+    "system", [symbolic("puma560"), symbolic("planar4"), spring_pendulum()], ids=lambda s: s.name
+)
+def test_expanded_torques_equal_the_closed_forms_of_the_graph(system: System) -> None:
+    every = tuple(range(len(system.coordinates)))
+    at = values_at_random(system, 5)
+    for found in link_torques(system, every, 10**6, silent):
+        kernel = link_kernel(system, found.link)
+        for i, torque in found.torques.items():
+            exact = evaluated_graph(kernel, kernel.forms[0].torque[i], at)
+            assert evaluated_expansion(torque, found, system, at) == pytest.approx(exact, rel=1e-9, abs=1e-9)
+
+
+def sympy_counts(n: int) -> tuple[int, int]:
+    """Terms of τ_1, and those with q̈_1, of the planar arm by SymPy's own Lagrange and Fu."""
+    t = dynamicsymbols._t
+    q = dynamicsymbols(f"q1:{n + 1}")
+    length, r, m, inertia = (sp.symbols(f"{name}1:{n + 1}") for name in "lrmI")
+    lagrangian, x, y, angle = sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero
+    for j in range(n):
+        angle += q[j]
+        cx, cy = x + r[j] * sp.cos(angle), y + r[j] * sp.sin(angle)
+        speed = cx.diff(t) ** 2 + cy.diff(t) ** 2
+        lagrangian += m[j] * speed / 2 + inertia[j] * angle.diff(t) ** 2 / 2 - m[j] * sp.Symbol("g") * cy
+        x, y = x + length[j] * sp.cos(angle), y + length[j] * sp.sin(angle)
+    torque = LagrangesMethod(lagrangian, q).form_lagranges_equations()[0]
+    terms = sp.Add.make_args(sp.expand(TR8(sp.expand(torque))))
+    return len(terms), sum(term.has(q[0].diff(t, 2)) for term in terms)
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_counts_equal_those_of_an_independent_derivation(n: int) -> None:
+    row = terms_report(symbolic(f"planar{n}"), Question(), 10**6, False, silent).rows[-1]
+    assert (row.count.total, row.kept) == sympy_counts(n)
+
+
+def test_every_term_is_in_a_bucket_and_off_path_torques_have_none() -> None:
+    report = terms_report(symbolic("puma560"), Question(joint=None), 10**6, False, silent)
+    for row in report.rows:
+        count = row.count
+        if row.link is not None and row.link < row.joint:
+            assert count.total == 0
+        assert sum(count.acceleration) + max(count.velocity) + count.gravity <= count.total
+        assert sum(count.acceleration) + sum(count.velocity) + count.gravity >= count.total
+
+
+def twisted(cosine: float, sine: float) -> System:
+    """planar3 with its last two axes turned about x."""
+    robot = read_robot("planar3", Options(parameters="symbolic"))
+    turn = ((1.0, 0.0, 0.0), (0.0, cosine, -sine), (0.0, sine, cosine))
+    links = [replace(link, joint=replace(link.joint, rotation=turn)) for link in robot.links[1:]]
+    return link_energies(replace(robot, links=(robot.links[0], *links)))
+
+
+def test_rounded_rotations_leave_no_spurious_terms() -> None:
+    exact = terms_report(twisted(0.6, 0.8), Question(), 10**6, False, silent)
+    rounded = terms_report(twisted(math.cos(0.7), math.sin(0.7)), Question(), 10**6, False, silent)
+    assert [row.count for row in rounded.rows] == [row.count for row in exact.rows]
+    assert "rounded" not in exact.form
+    assert "decimals" in rounded.form
+
+
+def test_beyond_the_budget_the_report_says_how_far_it_got() -> None:
+    with pytest.raises(LinkwiseError, match=r"'link5' needs more than 300 terms, after 4 of 6 links"):
+        terms_report(symbolic("puma560"), Question(), 300, False, silent)
+    report = terms_report(symbolic("puma560"), Question(), 300, True, silent)
+    assert not report.complete
+    assert (report.counted, report.wanted) == (4, 6)
+    assert report.rows[-1].count.total == sum(row.count.total for row in report.rows[:-1])
+
+
+def test_a_robot_whose_first_link_exceeds_the_budget_is_refused() -> None:
+    with pytest.raises(LinkwiseError, match=r"planar3: link 'link1' needs more than 1 terms, after 0"):
+        terms_report(symbolic("planar3"), Question(), 1, True, silent)
+
+
+@pytest.mark.parametrize(
+    ("energy", "complaint"),
+    [
+        (sp.exp(sp.Symbol("a", real=True)), "exp"),
+        (sp.cos(sp.Symbol("a", real=True) / 2), "whole combinations"),
+        (1 / (1 + sp.Symbol("k", real=True)), "below a fraction line"),
+        (sp.Symbol("k", real=True) ** 99, "a power above 63"),
+    ],
+)
+def test_an_energy_without_terms_is_refused_by_name(energy: sp.Expr, complaint: str) -> None:
+    a = Coordinate("a")
+    system = System("odd", (a,), (LinkEnergy("arm", a.qd**2, energy * a.q),))
+    with pytest.raises(LinkwiseError, match=f"link 'arm': .*{complaint}"):
+        terms_report(system, Question(), 10**6, False, silent)
+
+
+def test_equal_parameters_on_two_links_are_collected_in_their_sum() -> None:
+    numeric = link_energies(read_robot("planar2", Options(parameters="numeric")))
+    *links, total = terms_report(numeric, Question(), 10**6, False, silent).rows
+    assert total.count.total < sum(row.count.total for row in links)
+
+
+def test_counts_rest_on_expressions_alone() -> None:
+    (found,) = link_torques(symbolic("planar1"), (0,), 100, silent)
+    assert count_terms(found.torques[0], found.variables).total == GOLDEN["total"][0]
