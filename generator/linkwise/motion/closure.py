@@ -27,11 +27,12 @@ class Closure:
     def __or__(self, other: "Closure") -> "Closure":
         """The larger of both, error by error."""
         a, b = asdict(self), asdict(other)
-        return Closure(**{name: max(a[name], b[name]) for name in a})
+        # NumPy's maximum, unlike Python's max, lets no NaN pass unseen.
+        return Closure(**{name: float(np.maximum(a[name], b[name])) for name in a})
 
     def check(self) -> None:
         """Raise LinkwiseError where the parts do not sum to the whole."""
-        worst = max(self.terms_relative, self.links_relative)
+        worst = np.maximum(self.terms_relative, self.links_relative)
         if not worst <= LIMIT:
             raise LinkwiseError(
                 f"the robot's torques do not close (relative error {worst:.2g}); run `linkwise check` on it"
@@ -49,6 +50,5 @@ def residual(parts: list[NDArray[np.float64]], whole: NDArray[np.float64]) -> tu
 
 def relative(pairs: list[tuple[float, float]]) -> tuple[float, float]:
     """Largest error of (error, scale) pairs, absolute and relative to the largest scale."""
-    error = max((pair[0] for pair in pairs), default=0.0)
-    scale = max((pair[1] for pair in pairs), default=0.0)
+    error, scale = np.max(np.array([(0.0, 0.0), *pairs]), axis=0).tolist()
     return error, error / scale if scale else error

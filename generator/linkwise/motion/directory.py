@@ -27,15 +27,24 @@ def whole_directory(target: Path, mark: str) -> Iterator[Path]:
     try:
         yield draft
         draft.chmod(0o755)
-        if target.exists():
-            former = draft.with_name(draft.name + ".former")
-            target.rename(former)
-            draft.rename(target)
-            shutil.rmtree(former)
-        else:
-            draft.rename(target)
+        _swap(draft, target)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def _swap(draft: Path, target: Path) -> None:
+    """Rename `draft` to `target`; a former `target` comes back if that fails."""
+    if not target.exists():
+        draft.rename(target)
+        return
+    former = draft.with_name(draft.name + ".former")
+    target.rename(former)
+    try:
+        draft.rename(target)
+    except OSError:
+        former.rename(target)
+        raise
+    shutil.rmtree(former)
 
 
 def _empty(directory: Path) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.motion.analysis import Analysis
-from linkwise.motion.palette import COLOURS, GRAVITY
+from linkwise.motion.palette import COLOURS, GRAVITY, ON_DARK
 from linkwise.motion.skeleton import poses
 from linkwise.motion.summary import provenance
 
@@ -47,6 +47,7 @@ def page_data(analysis: Analysis) -> str:
         "mean": analysis.totals.mean.tolist(),
         "peak": analysis.totals.peak.tolist(),
         "colours": list(COLOURS),
+        "coloursDark": list(ON_DARK),
         "gravityColour": GRAVITY,
         "skeleton": _skeleton(analysis),
     }
@@ -64,6 +65,7 @@ def _skeleton(analysis: Analysis) -> dict[str, Any] | None:
         "parents": [-1 if body.parent is None else body.parent for body in bodies],
         "links": [body.link for body in bodies],
         "coordinates": [body.coordinate for body in bodies],
+        "up": list(analysis.robot.up),
         "origins": _encode(origins),
         "centres": _encode(centres),
     }

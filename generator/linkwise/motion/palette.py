@@ -11,6 +11,9 @@ COLOURS = (
     "#56B4E9",
     "#8C6D31",
 )
+ON_DARK = ("#FF8B3D", "#3D9BE0", "#2ECC9B", "#E59AC7", "#F5B942", "#9BDCFF", "#C9A66B")
+"""The same, light enough for a dark page."""
+
 GRAVITY = "#7F7F7F"
 DASHES = ("solid", "dashed", "dotted", "dashdot")
 

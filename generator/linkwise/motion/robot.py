@@ -75,6 +75,8 @@ class Robot:
     backend: str
     model: Model
     skeleton: tuple[Body, ...] | None
+    up: tuple[float, float, float]
+    """Against gravity, in the base frame; z for a robot without gravity."""
     manifest_sha256: str
 
 
@@ -90,7 +92,8 @@ def load_robot(directory: Path, backend: str | None = None) -> Robot:
     text = manifest_path.read_bytes()
     try:
         manifest: dict[str, Any] = json.loads(text)
-        name, skeleton = str(manifest["name"]), read_skeleton(manifest.get("skeleton"))
+        name, skeleton = str(manifest["name"]), read_skeleton(manifest["skeleton"])
+        up = _up(manifest["conventions"].get("gravity"))
     except (ValueError, KeyError, TypeError) as error:
         raise LinkwiseError(f"{manifest_path}: damaged ({error}); generate the robot again") from error
     package = _import(directory)
@@ -103,8 +106,16 @@ def load_robot(directory: Path, backend: str | None = None) -> Robot:
         chosen,
         model,
         skeleton,
+        up,
         hashlib.sha256(text).hexdigest(),
     )
+
+
+def _up(gravity: Sequence[float] | None) -> tuple[float, float, float]:
+    if not gravity or not any(gravity):
+        return 0.0, 0.0, 1.0
+    x, y, z = (-float(component) for component in gravity)
+    return x, y, z
 
 
 def _import(directory: Path) -> ModuleType:

@@ -47,7 +47,7 @@ def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> S
         )
     if free and not reading.ignore_extra:
         raise LinkwiseError(
-            f"the robot has no joint {_list(free)}; leave the columns out with --ignore-extra,"
+            f"no joint for column {_list(free)}; leave such columns out with --ignore-extra,"
             " or map them with --map COLUMN=JOINT"
         )
     found = tuple(list(columns).index(column) for column in source.values())

@@ -59,5 +59,5 @@ def provenance(analysis: Analysis) -> str:
     )
     parts += [f"{made.edges} edges", f"{made.convention} convention"]
     if analysis.stride > 1:
-        parts.append(f"every {analysis.stride}th sample shown")
+        parts.append(f"one sample in {analysis.stride} shown")
     return " · ".join(parts)

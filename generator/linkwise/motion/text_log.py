@@ -4,6 +4,7 @@ Rows are numbered as an editor numbers lines, from 1, header included.
 """
 
 import csv
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -100,7 +101,8 @@ def open_delimited(path: Path) -> TextLog:
     """Open a CSV file: one header line; comma, semicolon or tab, whichever the header has."""
     with path.open(encoding="utf-8-sig") as handle:
         header = handle.readline()
-    delimiter = next((mark for mark in ",;\t" if mark in header), ",")
+    unquoted = re.sub(r'"[^"]*"', "", header)
+    delimiter = next((mark for mark in ",;\t" if mark in unquoted), ",")
     columns = tuple(name.strip() for name in _cells(header, delimiter))
     if not any(columns):
         raise LinkwiseError(f"{path}: row 1: no header; name the columns there, the time first")
@@ -149,7 +151,7 @@ def _count(path: Path, facts: dict[str, str], key: str) -> int | None:
 def _cells(line: str, delimiter: str | None) -> list[str]:
     if delimiter is None:
         return line.split()
-    return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter), [])
+    return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True), [])
 
 
 def _is_number(text: str) -> bool:

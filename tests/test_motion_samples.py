@@ -1,0 +1,124 @@
+"""Columns matched to joints, units, time and gaps."""
+
+import numpy as np
+import pytest
+from linkwise.errors import LinkwiseError
+from linkwise.motion.resample import resample
+from linkwise.motion.run import silent
+from linkwise.motion.samples import read_samples
+from linkwise.motion.selection import select
+from linkwise.motion.settings import Reading
+from motion_logs import JOINTS, smooth, write_csv, write_mot
+
+ANGLES = ("rad", "rad", "rad")
+
+
+def read(path, reading=None, units=ANGLES, spool=None):
+    return read_samples(path, JOINTS, units, reading or Reading(), silent, spool)
+
+
+def test_samples_are_the_log(tmp_path):
+    table = smooth(40, 3)
+    path = write_csv(tmp_path / "a.csv", table)
+    for spool in (None, tmp_path):
+        samples = read(path, spool=spool)
+        np.testing.assert_array_equal(samples.time, table[:, 0])
+        np.testing.assert_array_equal(samples.q, table[:, 1:])
+        assert samples.rate == pytest.approx(100, rel=1e-12)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.csv"]
+
+
+def test_degrees_turn_angles_only(tmp_path):
+    table = np.round(smooth(9, 3) * [1, 50, 50, 50], 8)
+    path = write_mot(tmp_path / "a.mot", table, JOINTS)
+    q = read(path, units=("m", "rad", "rad")).q
+    np.testing.assert_array_equal(q[:, 0], table[:, 1])
+    np.testing.assert_allclose(q[:, 1:], np.radians(table[:, 2:]), rtol=1e-15)
+    with pytest.raises(LinkwiseError, match="--units rad contradicts the file's inDegrees=yes"):
+        read(path, Reading(units="rad"))
+
+
+@pytest.mark.parametrize(
+    ("scale", "units", "warning"),
+    [
+        (60, None, "reaches 54 rad, 8.6 turns: if that is degrees, pass --units deg"),
+        (1, "deg", "if that is radians, pass --units rad"),
+        (1, None, None),
+        (60, "deg", None),
+    ],
+)
+def test_unlikely_units_are_doubted(tmp_path, scale, units, warning):
+    path = write_csv(tmp_path / "a.csv", smooth(400, 3) * [1, scale, scale, scale])
+    warnings = read(path, Reading(units=units)).warnings
+    assert [warning in text for text in warnings] == ([True] if warning else [])
+
+
+@pytest.mark.parametrize(
+    ("columns", "reading", "message"),
+    [
+        (("time", "joint1", "joint2"), {}, "no column for joint 'joint3'; name it with --map"),
+        (("time", *JOINTS, "emg"), {}, "no joint for column 'emg'; .* --ignore-extra"),
+        (("stamp", *JOINTS), {}, "no column 'time' .* --time COLUMN"),
+        (("time", *JOINTS, "joint1"), {}, "column 'joint1' stands twice"),
+        (("time", *JOINTS), {"mapping": (("a", "joint1"),)}, "the log has no column 'a'"),
+        (("time", *JOINTS), {"mapping": (("joint1", "x"),)}, "the robot has no joint 'x'"),
+        (("time", *JOINTS[1:]), {"mapping": (("time", "joint1"),)}, "'time' is asked to be"),
+        (("time", *JOINTS), {"time": "t"}, "--time t: no such column"),
+    ],
+)
+def test_columns_that_do_not_fit(columns, reading, message):
+    with pytest.raises(LinkwiseError, match=message):
+        select(columns, JOINTS, Reading(**reading))
+
+
+def test_columns_by_map_time_and_leave():
+    reading = Reading(time="clock", mapping=(("q3", "joint3"),), ignore_extra=True)
+    found = select(("joint2", "q3", "emg", "clock", "joint1"), JOINTS, reading)
+    assert (found.time, found.joints, found.ignored) == (3, (4, 0, 1), ("emg",))
+
+
+@pytest.mark.parametrize(
+    ("row", "time", "message"),
+    [
+        (5, 0.04, r"row 7, time column: time repeats 0.04 s; sort"),
+        (5, 0.01, r"row 7, time column: time runs back to 0.01 s"),
+        (5, 0.053, r"row \d+, time column: a step of .* --resample"),
+        (slice(5, None), None, r"rows 6 to 7, time column: a gap of 1.01 s where steps are 0.01 s"),
+    ],
+)
+def test_time_must_be_even(tmp_path, row, time, message):
+    table = smooth(10, 3)
+    table[row, 0] = table[row, 0] + 1 if time is None else time
+    with pytest.raises(LinkwiseError, match=message):
+        read(write_csv(tmp_path / "a.csv", table))
+
+
+def test_nan_is_named(tmp_path):
+    table = smooth(10, 3)
+    table[4, 2] = np.nan
+    with pytest.raises(LinkwiseError, match=r"a.csv: row 6, column 'joint2': nan is no sample"):
+        read(write_csv(tmp_path / "a.csv", table))
+
+
+def test_rounded_time_is_even_enough(tmp_path):
+    table = smooth(200, 3, rate=60)
+    table[:, 0] = np.round(table[:, 0], 6)
+    assert read(write_csv(tmp_path / "a.csv", table)).rate == pytest.approx(60, rel=1e-6)
+
+
+def test_resampling_follows_the_signal_and_not_the_window(tmp_path):
+    rng = np.random.default_rng(1)
+    time = np.cumsum(0.01 * rng.uniform(0.7, 1.3, 3000))
+    table = np.column_stack([time, np.sin(5 * time), np.cos(3 * time)])
+    whole = resample(table, 100.0, None)
+    np.testing.assert_allclose(whole[:, 1], np.sin(5 * whole[:, 0]), atol=1e-7)
+    np.testing.assert_allclose(np.diff(whole[:, 0]), 0.01, rtol=1e-9)
+    np.testing.assert_allclose(resample(table, 100.0, None, rows=97), whole, atol=1e-12)
+    path = write_csv(tmp_path / "a.csv", table, ("joint1", "joint2"))
+    samples = read_samples(path, JOINTS[:2], ANGLES[:2], Reading(resample=50), silent)
+    np.testing.assert_allclose(samples.q, whole[::2, 1:][: len(samples.q)], atol=1e-12)
+
+
+def test_too_short(tmp_path):
+    with pytest.raises(LinkwiseError, match="1 samples; a movement needs 5"):
+        read(write_csv(tmp_path / "a.csv", smooth(1, 3)))
