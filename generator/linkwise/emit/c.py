@@ -60,19 +60,22 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     robot = {
         **shared,
         "name": name,
-        "upper": name.upper(),
         "n": len(system.coordinates),
         "links": sizes,
-        "parameters": len(system.parameters),
         "total_acceleration": last.at_acceleration + last.acceleration,
         "total_velocity": last.at_velocity + last.velocity,
         "total_gravity": last.at_gravity + last.gravity,
         "total_linear": last.at_linear + last.linear,
-        "largest": max(max(k.acceleration, k.velocity) for k in sizes),
+    }
+    header = {
+        "upper": name.upper(),
+        "parameters": len(system.parameters),
         "types": [("double", "", BLOCK["double"]), ("float", "f", BLOCK["float"])],
     }
-    yield f"c/{name}.h", render("c/robot.h.j2", robot)
-    yield "c/robot.inc", render("c/robot.inc.j2", robot)
+    largest = max(max(k.acceleration, k.velocity) for k in sizes)
+    entries = {"largest": largest, "parameters": list(parameter_names(system).values())}
+    yield f"c/{name}.h", render("c/robot.h.j2", robot | header)
+    yield "c/robot.inc", render("c/robot.inc.j2", robot | entries)
     for kind, suffix in (("double", ""), ("float", "f")):
         view = {**shared, "name": name, "type": kind, "suffix": suffix, "block": BLOCK[kind]}
         yield f"c/{name}_{kind}.c", render("c/robot.c.j2", view)
@@ -130,7 +133,8 @@ def kernel_function(
         )
         for k in range(len(system.coordinates))
     }
-    sources |= {name: f"p[{at}]" for at, name in enumerate(parameter_names(system).values())}
+    # By name: where a parameter stands depends on the robot, and a link's file must not.
+    sources |= {name: f"p[at_{name}]" for name in parameter_names(system).values()}
     inputs = tuple((symbol, source) for symbol, source in sources.items() if symbol in code.symbols)
     places = [(array, at) for array, group in groups.items() for at in range(len(group))]
     outputs = tuple((array, at, text) for (array, at), text in zip(places, code.outputs, strict=True))
