@@ -1,0 +1,42 @@
+"""Packages that tests share: each robot is generated once a session, and imported from where it was written."""
+
+import sysconfig
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from linkwise import Options, generate, read_system, write_package
+from linkwise.check.package import import_package
+
+DATA = Path(__file__).parent / "data"
+PANDA = (
+    Path(sysconfig.get_path("purelib"))
+    / "cmeel.prefix/share/example-robot-data/robots/panda_description/urdf/panda.urdf"
+)
+LOCKED_FINGERS = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}
+OPTIONS = {
+    str(PANDA): Options(lock=LOCKED_FINGERS),
+    "planar3 symbolic": Options("symbolic"),
+}
+
+
+@pytest.fixture(scope="session")
+def directory_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Directory of a robot's package; "planar3 symbolic" keeps its parameters."""
+    made: dict[str, Path] = {}
+
+    def directory(robot: str) -> Path:
+        if robot not in made:
+            system = read_system(robot.removesuffix(" symbolic"), OPTIONS.get(robot))
+            made[robot] = tmp_path_factory.mktemp("package") / system.name
+            write_package(generate(system), made[robot])
+        return made[robot]
+
+    return directory
+
+
+@pytest.fixture(scope="session")
+def package_of(directory_of: Callable[[str], Path]) -> Callable[[str], ModuleType]:
+    """Imported package of a robot."""
+    return lambda robot: import_package(directory_of(robot))

@@ -1,0 +1,30 @@
+"""Value of graph nodes, computed node by node."""
+
+from collections.abc import Iterable, Mapping
+
+from linkwise.graph.expression import FUNCTIONS, Graph, Node, reachable
+
+
+def evaluate(graph: Graph, outputs: Iterable[Node], inputs: Mapping[str, float]) -> list[float]:
+    """Return the numbers that `outputs` are for the given values of the symbols."""
+    outputs, value = list(outputs), {}
+    for node in reachable(graph, outputs):
+        op, a, b = graph.nodes[node]
+        match op:
+            case "const":
+                value[node] = a
+            case "symbol":
+                value[node] = inputs[a]
+            case "neg":
+                value[node] = -value[a]
+            case "call":
+                value[node] = FUNCTIONS[a](value[b])
+            case "add":
+                value[node] = value[a] + value[b]
+            case "sub":
+                value[node] = value[a] - value[b]
+            case "mul":
+                value[node] = value[a] * value[b]
+            case "div":
+                value[node] = value[a] / value[b]
+    return [value[node] for node in outputs]

@@ -1,0 +1,34 @@
+"""The sums over links against MuJoCo's inverse dynamics."""
+
+from collections.abc import Callable
+from types import ModuleType
+
+import numpy as np
+import pytest
+from answers import random_states, relative_error
+
+mujoco = pytest.importorskip("mujoco")
+
+LINK = """<body pos="{at} 0 0"><joint type="hinge" axis="0 0 1"/>
+<inertial pos="0.125 0 0" mass="0.6" diaginertia="0.005 0.005 0.005"/>{inner}</body>"""
+
+
+def table_2_arm() -> str:
+    inner = ""
+    for at in (0.25, 0.25, 0.0):
+        inner = LINK.format(at=at, inner=inner)
+    return f"""<mujoco><option gravity="0 -9.80665 0"/><compiler balanceinertia="false"/>
+    <worldbody>{inner}</worldbody></mujoco>"""
+
+
+def test_torques_sum_to_mujocos_inverse_dynamics(package_of: Callable[[str], ModuleType]) -> None:
+    model = mujoco.MjModel.from_xml_string(table_2_arm())
+    data = mujoco.MjData(model)
+    q, qd, qdd = random_states(3, 200)
+    expected = np.empty_like(q)
+    for s in range(len(q)):
+        data.qpos, data.qvel, data.qacc = q[s], qd[s], qdd[s]
+        mujoco.mj_inverse(model, data)
+        expected[s] = data.qfrc_inverse
+    given = package_of("planar3").load("numpy").inverse_dynamics(q, qd, qdd)
+    assert relative_error(given, expected) <= 1e-12

@@ -1,0 +1,49 @@
+"""Every back end against Pinocchio: its mass and Coriolis matrices, gravity, torques and gradients of each link alone."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from answers import packed, random_states, relative_error
+from conftest import PANDA
+
+pytest.importorskip("pinocchio")
+
+from numeric import oracle_models
+
+STATES = 1000
+LARGEST_ERROR = {"planar3": 1e-12, "puma560": 1e-11, str(PANDA): 1e-10}
+MODELS: dict[str, Callable[[], Any]] = {
+    "planar3": oracle_models.planar3,
+    "puma560": oracle_models.puma560,
+    str(PANDA): lambda: oracle_models.panda(PANDA),
+}
+KNOWN: dict[str, dict[str, Any]] = {}
+
+
+def pinocchio_says(robot: str, joints: tuple[str, ...]) -> dict[str, Any]:
+    if robot not in KNOWN:
+        states = random_states(len(joints), STATES)
+        KNOWN[robot] = oracle_models.decomposition(MODELS[robot](), joints, *states)
+    return KNOWN[robot]
+
+
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd", "c"])
+@pytest.mark.parametrize("robot", MODELS, ids=["planar3", "puma560", "panda"])
+def test_decomposition_of_every_link_is_pinocchios(
+    robot: str,
+    backend: str,
+    directory_of: Callable[[str], Path],
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    package = package_of(robot)
+    dynamics = package.load("numpy")
+    states = random_states(dynamics.n, STATES)
+    expected = pinocchio_says(robot, dynamics.joint_names)
+    given = packed(package, directory_of(robot), backend, *states)
+    for field in expected:
+        rows = getattr(dynamics.layout, "velocity" if field == "position_gradient" else field)
+        error = relative_error(given[field], expected[field][:, *rows.T])
+        assert error <= LARGEST_ERROR[robot], f"{field}: {error:.1e}"

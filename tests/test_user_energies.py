@@ -1,0 +1,108 @@
+"""Link energies that a user writes in SymPy, against equations of motion written by hand."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+import sympy as sp
+from answers import packed, random_states, relative_error
+from conftest import DATA
+
+from linkwise import Coordinate, LinkEnergy, LinkwiseError, energy_system, generate, read_system
+
+CART, TURNTABLE = str(DATA / "cart_pendulum.py"), str(DATA / "turntable.py")
+BACKENDS = ("numpy", "torch", "autograd", "c")
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_cart_with_spring_and_pendulum(
+    backend: str, directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    cart, bob, k, r, g = 2.0, 0.3, 40.0, 0.5, 9.81
+    q, qd, qdd = random_states(2, 100)
+    (x, theta), (_, w), (a, alpha) = q.T, qd.T, qdd.T
+    on_cart_by_cart = cart * a + k * x
+    on_cart_by_bob = bob * (a + r * (alpha * np.cos(theta) - w**2 * np.sin(theta)))
+    on_bob = bob * r * (r * alpha + a * np.cos(theta) + g * np.sin(theta))
+    given = packed(package_of(CART), directory_of(CART), backend, q, qd, qdd)
+    assert relative_error(given["torque"].T, [on_cart_by_cart, on_cart_by_bob, on_bob]) <= 1e-14
+
+
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd"])
+def test_moving_base_closes_and_its_linear_terms_agree_in_both_conventions(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    rate, mass = 1.7, 0.4
+    states = random_states(2, 100)
+    (x, y), (u, v), (a, b) = (state.T for state in states)
+    if backend != "numpy":
+        torch = pytest.importorskip("torch")
+        states = tuple(torch.from_numpy(state) for state in states)
+    dynamics = package_of(TURNTABLE).load(backend)
+
+    quadratic = np.array([-mass * x * v**2, 2 * mass * x * u * v])
+    linear = np.array([-2 * mass * rate * v, 2 * mass * rate * u])
+    rest = np.array([mass * (a - rate**2 * x), mass * ((2 + x**2) * b - rate**2 * y)])
+    tau = np.asarray(dynamics.partial_torque(*states))[..., 0].T
+    assert relative_error(tau, quadratic + linear + rest) <= 1e-14
+
+    closing, gradient = (dynamics.propagation(*states, convention=c) for c in ("closing", "gradient"))
+    velocity = np.asarray(closing.velocity)[:, :, 0].sum(-1).T
+    assert relative_error(velocity, quadratic + linear) <= 1e-14
+    velocity = np.asarray(gradient.velocity)[:, :, 0].sum(-1).T
+    assert relative_error(velocity, 2 * quadratic + linear) <= 1e-14
+
+
+def test_emitted_c_has_the_linear_part_too(
+    directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    from compiled import Compiled
+
+    states = random_states(2, 5)
+    given = Compiled(directory_of(TURNTABLE)).decomposition(*states)
+    expected = package_of(TURNTABLE).load("numpy").packed(*states)
+    assert relative_error(given["linear"], expected.velocity_linear) <= 1e-14
+    assert np.abs(given["linear"]).max() > 1.0
+
+
+def puck(kinetic: sp.Expr, potential: sp.Expr = sp.S.Zero) -> object:
+    return energy_system("puck", [Coordinate("x", "m")], [LinkEnergy("disc", kinetic, potential)])
+
+
+def test_degree_three_in_the_velocities_is_refused() -> None:
+    with pytest.raises(LinkwiseError, match=r"link 'disc': its energies have degree 3 in the velocities"):
+        puck(Coordinate("x", "m").qd ** 3)
+
+
+def test_energy_that_is_no_polynomial_in_the_velocities_is_refused() -> None:
+    with pytest.raises(LinkwiseError, match="link 'disc': its energies are no polynomial in the velocities"):
+        puck(sp.sin(Coordinate("x", "m").qd))
+
+
+def test_unknown_symbol_is_refused_by_name() -> None:
+    with pytest.raises(
+        LinkwiseError, match=r"link 'disc': the symbol mu is neither .* nor among `parameters`"
+    ):
+        puck(sp.Symbol("mu") * Coordinate("x", "m").qd ** 2)
+
+
+def test_unsupported_function_is_refused_by_name() -> None:
+    x = Coordinate("x", "m")
+    system = puck(x.qd**2, sp.gamma(x.q))
+    with pytest.raises(LinkwiseError, match="link 'disc': the function gamma is not supported"):
+        generate(system)  # type: ignore[arg-type]
+
+
+def test_parameters_of_a_python_file_stay_symbols_on_request() -> None:
+    from linkwise import Options
+
+    system = read_system(CART, Options("symbolic"))
+    assert {symbol.name: value for symbol, value in system.parameters.items()} == {
+        "M": 2.0,
+        "m": 0.3,
+        "k": 40.0,
+        "r": 0.5,
+        "g": 9.81,
+    }
