@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 DIGIT = 8
-"""Bits of an exponent."""
+"""Bits of an exponent: a byte, so that a monomial's bytes are its exponents."""
+ZERO_BYTE = 1 << (DIGIT - 1)
+"""Byte of exponent 0 in a lifted key."""
 LIMIT = (1 << (DIGIT - 2)) - 1
 """Highest exponent; a digit holds twice that, so a product can be examined before it overflows."""
 I_SQUARED = 2
@@ -85,14 +87,17 @@ def add(parts: Iterable[Laurent]) -> Laurent:
     if len(summands) < 2:
         return summands[0] if summands else ZERO
     denominator = math.lcm(*(part.denominator for part in summands))
-    total: dict[int, int] = {}
+    summands.sort(key=len, reverse=True)
+    factor = denominator // summands[0].denominator
+    total = {key: factor * c for key, c in summands[0].terms.items()}
     get = total.get
-    for part in summands:
+    for part in summands[1:]:
         factor = denominator // part.denominator
         for key, c in part.terms.items():
             total[key] = get(key, 0) + factor * c
-    kept = {key: c for key, c in total.items() if c}
-    return Laurent(kept, denominator, max(part.bound for part in summands))
+    for key in [key for key, c in total.items() if not c]:
+        del total[key]
+    return Laurent(total, denominator, max(part.bound for part in summands))
 
 
 def multiply(a: Laurent, b: Laurent, budget: int) -> Laurent:
@@ -147,7 +152,9 @@ def bounded(p: Laurent) -> Laurent:
     if p.bound <= LIMIT:
         return p
     digits = max(key.bit_length() for key in p.terms) // DIGIT + 2
-    highest = max(abs(e) for key in p.terms for e in exponents(key, digits))
+    raised = lifted(digits)
+    used = set(b"".join((key + raised).to_bytes(digits, "little") for key in p.terms))
+    highest = max(max(used) - ZERO_BYTE, ZERO_BYTE - min(used))
     if highest > LIMIT:
         raise ExponentError
     return Laurent(p.terms, p.denominator, highest)
@@ -155,16 +162,13 @@ def bounded(p: Laurent) -> Laurent:
 
 def exponents(key: int, digits: int) -> list[int]:
     """Unpack the lowest `digits` exponents of a monomial, the power of i first."""
-    half = 1 << (DIGIT - 1)
-    raised = key + lifted(digits)
-    mask = (1 << DIGIT) - 1
-    return [((raised >> (DIGIT * at)) & mask) - half for at in range(digits)]
+    raised = (key + lifted(digits)) & ((1 << (DIGIT * digits)) - 1)
+    return [byte - ZERO_BYTE for byte in raised.to_bytes(digits, "little")]
 
 
 def lifted(digits: int) -> int:
     """Return what makes every one of `digits` balanced digits non-negative when added to a key."""
-    half = 1 << (DIGIT - 1)
-    return sum(half << (DIGIT * at) for at in range(digits))
+    return int.from_bytes(bytes([ZERO_BYTE]) * digits, "little")
 
 
 def at_digit(at: int) -> int:

@@ -56,7 +56,7 @@ def _reduction(figure: Any, result: Study) -> None:
         zorder=3,
     )
     above.set_ylabel("reduction rate  1 − kept / total")
-    above.set_ylim(0.0, 1.02)
+    above.set_ylim(-0.02, 1.02)
     above.legend(loc="lower right")
     above.set_title(f"{result.robot}: terms of τ₁ that the part with q̈₁ does not need", loc="left")
     below.margins(y=0.15)

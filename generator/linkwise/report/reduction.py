@@ -38,12 +38,17 @@ class Point:
     @property
     def operations_reduction(self) -> float:
         """Share of the emitted operations of τ_1 that need no computing."""
-        return 1.0 - self.bucket.shared / self.torque.shared
+        return _saved(self.bucket.shared, self.torque.shared)
 
     @property
     def written_reduction(self) -> float:
         """The same with every shared expression written out wherever it is used."""
-        return 1.0 - self.bucket.written / self.torque.written
+        return _saved(self.bucket.written, self.torque.written)
+
+
+def _saved(part: int, whole: int) -> float:
+    """1 − part/whole; nothing is saved of a torque that takes no operation."""
+    return 1.0 - part / whole if whole else 0.0
 
 
 def curve(system: System, most: int, budget: int, progress: Progress) -> tuple[Point, ...]:

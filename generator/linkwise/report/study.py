@@ -12,6 +12,8 @@ from linkwise.symbolic.system import System
 
 CLOSE = 0.02
 """RMSE up to which a curve is said to describe the points."""
+PAPER_DOF = 10
+"""Most degrees of freedom that the paper fitted its curve to."""
 PAPER_REDUNDANT = {5: 3, 10: 16}
 """Redundant terms for each kept one that the paper states, by degrees of freedom."""
 
@@ -64,16 +66,21 @@ def verdicts(result: Study) -> Iterator[str]:
 
 
 def _curve_verdict(result: Study) -> str:
-    paper = result.paper
+    """Hold the paper's curve against the joints it was fitted to, and say where it is further out."""
+    inside = [p for p in result.points if p.dof <= PAPER_DOF] or list(result.points)
+    outside = result.points[len(inside) :]
+    paper = held_against(PAPER_A, PAPER_RATE, [p.dof for p in inside], [p.reduction for p in inside])
     verdict = "Holds" if paper.rmse <= CLOSE else "Does not hold here"
     text = (
-        f"**{verdict}: the curve.** {PAPER_A} (1 − exp(−{PAPER_RATE} n)) misses the counted points "
-        f"by at most {paper.largest:.4f} (RMSE {paper.rmse:.4f})"
+        f"**{verdict}: the curve.** {PAPER_A} (1 − exp(−{PAPER_RATE} n)) misses the counted points of "
+        f"n = {inside[0].dof}..{inside[-1].dof} by at most {paper.largest:.4f} (RMSE {paper.rmse:.4f})"
     )
+    if outside:
+        text += f" and the further ones by up to {max(map(abs, result.paper.residuals[len(inside) :])):.4f}"
     if result.fitted is None:
         return text + "."
     return text + (
-        f"; the free fit A = {result.fitted.a:.4f}, λ = {result.fitted.rate:.4f} by at most "
+        f"; the free fit A = {result.fitted.a:.4f}, λ = {result.fitted.rate:.4f} over all by at most "
         f"{result.fitted.largest:.4f} (RMSE {result.fitted.rmse:.4f})."
     )
 
