@@ -148,8 +148,11 @@ def test_rounded_rotations_leave_no_spurious_terms() -> None:
     exact = terms_report(twisted(0.6, 0.8), Question(), 10**6, False, silent)
     rounded = terms_report(twisted(math.cos(0.7), math.sin(0.7)), Question(), 10**6, False, silent)
     assert [row.count for row in rounded.rows] == [row.count for row in exact.rows]
-    assert "rounded" not in exact.form
-    assert "decimals" in rounded.form
+    nearly = terms_report(twisted(5e-12, 1.0), Question(None), 10**6, False, silent)
+    square = terms_report(twisted(0.0, 1.0), Question(None), 10**6, False, silent)
+    assert [row.count for row in nearly.rows] == [row.count for row in square.rows]
+    assert "decimals" in nearly.form
+    assert "exact" in square.form
 
 
 def test_beyond_the_budget_the_report_says_how_far_it_got() -> None:

@@ -41,7 +41,8 @@ def link_torques(
                 lagrangian = laurent.add(parts).pruned(rounding)
                 by = Differentiation(system.coordinates, expansion.variables)
                 path = system.path(j)
-                torques = {i: by.torque(lagrangian, i, path) for i in path if i in joints}
+                chosen = (i for i in path if i in joints)
+                torques = {i: by.torque(lagrangian, i, path).pruned(rounding) for i in chosen}
             except ExponentError as error:
                 raise LinkwiseError(
                     f"a power above {laurent.LIMIT} is more than a term count can hold; lower it"
