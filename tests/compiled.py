@@ -4,6 +4,7 @@ import ctypes
 import re
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,8 @@ def compile_library(directory: Path, target: Path, compiler: str = "gcc") -> Non
 class Compiled:
     """The compiled functions of a package, on arrays (samples, n) of float64 or float32."""
 
-    def __init__(self, directory: Path, compiler: str = "gcc") -> None:
+    def __init__(self, directory: Path, parameters: Sequence[float] = ()) -> None:
+        self.parameters = list(parameters)
         header = next((directory / "c").glob("*.h"))
         self.name = header.stem
         sizes = dict(re.findall(r"([A-Z0-9_]+) = (\d+)", header.read_text()))
@@ -32,14 +34,15 @@ class Compiled:
         self.sizes = {field: int(sizes[f"{prefix}_{key}"]) for field, key in keys.items()}
         with tempfile.TemporaryDirectory() as folder:
             target = Path(folder) / f"{self.name}.so"
-            compile_library(directory, target, compiler)
+            compile_library(directory, target)
             self.library = ctypes.CDLL(str(target))
 
     def _call(self, function: str, motion: tuple[Any, ...], widths: list[int]) -> list[Any]:
         dtype = motion[0].dtype
         suffix, real = ("f", ctypes.c_float) if dtype == np.float32 else ("", ctypes.c_double)
         outputs = [np.full((len(motion[0]), width), np.nan, dtype) for width in widths]
-        arrays = [*(np.ascontiguousarray(m) for m in motion), None, *outputs]
+        p = np.array(self.parameters, dtype) if self.parameters else None
+        arrays = [*(np.ascontiguousarray(m) for m in motion), p, *outputs]
         pointers = [a if a is None else a.ctypes.data_as(ctypes.POINTER(real)) for a in arrays]
         entry = getattr(self.library, f"{self.name}_{function}{suffix}")
         entry.restype = None

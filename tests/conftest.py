@@ -1,4 +1,4 @@
-"""Packages that tests share: each robot is generated once a session, and imported from where it was written."""
+"""Packages that tests share: each robot is generated once a session and imported from its folder."""
 
 import sysconfig
 from collections.abc import Callable

@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import pytest
-
 from linkwise import generate, read_system
 from linkwise.emit import BACKENDS
 

@@ -5,7 +5,6 @@ import random
 
 import pytest
 from evaluation import evaluate
-
 from linkwise.graph.differentiate import derivative, substitute
 from linkwise.graph.expression import FUNCTIONS, Graph, Node
 

@@ -5,7 +5,6 @@ import pytest
 from answers import random_states, relative_error
 from conftest import DATA, LOCKED_FINGERS, PANDA
 from evaluation import evaluate
-
 from linkwise import Options, read_system
 from linkwise.graph.count import count_operations
 from linkwise.graph.derive import link_kernel, lowering

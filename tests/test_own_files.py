@@ -1,7 +1,6 @@
 """A link's own files depend on nothing but its path: a longer robot reuses the work already done."""
 
 import pytest
-
 from linkwise import Options, generate, read_system
 
 

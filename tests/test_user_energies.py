@@ -9,7 +9,6 @@ import pytest
 import sympy as sp
 from answers import packed, random_states, relative_error
 from conftest import DATA
-
 from linkwise import Coordinate, LinkEnergy, LinkwiseError, energy_system, generate, read_system
 
 CART, TURNTABLE = str(DATA / "cart_pendulum.py"), str(DATA / "turntable.py")

@@ -1,4 +1,4 @@
-"""Pinocchio models of the built-in robots, from their published tables and not from linkwise, and of Panda's arm."""
+"""Pinocchio models of the built-in robots, from their published tables, and of Panda's arm."""
 
 import tomllib
 from pathlib import Path
@@ -10,7 +10,7 @@ import pinocchio as pin
 
 
 def planar3() -> Any:
-    """Return the arm of Table 2: l = 0.25 m, r = 0.125 m, m = 0.6 kg, I = 5e-3 kg m² about the centre of mass."""
+    """Return the arm of Table 2; I = 5e-3 kg m² is about the centre of mass."""
     model = pin.Model()
     model.gravity.linear = np.array([0.0, -9.80665, 0.0])
     body = pin.Inertia(0.6, np.array([0.125, 0.0, 0.0]), np.diag([0.0, 5e-3, 5e-3]))

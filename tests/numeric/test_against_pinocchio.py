@@ -1,4 +1,4 @@
-"""Every back end against Pinocchio: its mass and Coriolis matrices, gravity, torques and gradients of each link alone."""
+"""Every back end against Pinocchio: mass and Coriolis matrices, gravity, torques, gradients of each link."""
 
 from collections.abc import Callable
 from pathlib import Path
