@@ -1,12 +1,14 @@
 """The subcommands `analyze` and `motion`."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from linkwise.errors import LinkwiseError
+from linkwise.motion.analysis import Analysis
 from linkwise.motion.settings import (
     Convention,
     Derivative,
@@ -21,6 +23,38 @@ from linkwise.motion.tables import Format
 
 Kind = Literal["recorded", "simulated", "both"]
 
+Log = Annotated[Path, typer.Argument(help="Motion log: .csv, .mot, .sto or .parquet")]
+Package = Annotated[Path, typer.Option(help="Directory of a generated robot")]
+Out = Annotated[Path, typer.Option(help="Directory to write; a former result is replaced")]
+AngleUnits = Annotated[
+    Units | None,
+    typer.Option(help="Unit of the angles, lengths are metres; the file's own, else rad, if not given"),
+]
+Time = Annotated[str | None, typer.Option(help="Column of the time, in s")]
+Map = Annotated[
+    list[str] | None,
+    typer.Option("--map", metavar="COLUMN=JOINT", help="Column of a joint; may be repeated"),
+]
+IgnoreExtra = Annotated[bool, typer.Option("--ignore-extra", help="Leave out columns no joint has")]
+Resample = Annotated[float | None, typer.Option(help="Bring uneven time to this rate, Hz, by splines")]
+How = Annotated[Derivative, typer.Option(help="How velocities and accelerations are made")]
+Window = Annotated[int, typer.Option(help="Savitzky-Golay: samples a window")]
+Degree = Annotated[int, typer.Option(help="Savitzky-Golay: degree of the polynomial")]
+Cutoff = Annotated[
+    float | None, typer.Option(help="Zero-phase Butterworth low-pass, Hz; no filter if not given")
+]
+FilterOrder = Annotated[int, typer.Option(help="The filter's order, of one pass")]
+Pad = Annotated[Padding, typer.Option(help="How the filter continues the log past its ends")]
+Ends = Annotated[Edges, typer.Option(help="First and last samples: one-sided formulas, or cut off")]
+Terms = Annotated[
+    Convention, typer.Option(help="Velocity terms: closing sums to the torque, gradient is Eq. 1")
+]
+TableFormat = Annotated[Format, typer.Option(help="Format of the table")]
+Figures = Annotated[list[str] | None, typer.Option(help="paper, paper:JOINT or shares; may be repeated")]
+Backend = Annotated[str | None, typer.Option(help="Back end; native, else numpy, if not given")]
+Page = Annotated[bool, typer.Option("--page/--no-page", help="Write report.html")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
+
 
 def register(app: typer.Typer) -> None:
     """Add the commands to an application."""
@@ -29,49 +63,27 @@ def register(app: typer.Typer) -> None:
 
 
 def analyze(
-    log: Annotated[Path, typer.Argument(help="Motion log: .csv, .mot, .sto or .parquet.")],
-    robot: Annotated[Path, typer.Option(help="Directory of a generated robot.")],
-    out: Annotated[Path, typer.Option(help="Directory to write; a former result is replaced.")],
-    units: Annotated[
-        Units | None,
-        typer.Option(help="Unit of the angles; lengths are metres. [default: the file's, else rad]"),
-    ] = None,
-    time: Annotated[str | None, typer.Option(help="Column of the time, in s.")] = None,
-    mapping: Annotated[
-        list[str] | None, typer.Option("--map", metavar="COLUMN=JOINT", help="Column of a joint.")
-    ] = None,
-    ignore_extra: Annotated[
-        bool, typer.Option("--ignore-extra", help="Leave out columns that no joint has.")
-    ] = False,
-    resample: Annotated[
-        float | None, typer.Option(help="Bring uneven time to this rate, Hz, by cubic splines.")
-    ] = None,
-    derivative: Annotated[
-        Derivative, typer.Option(help="How velocities and accelerations are made.")
-    ] = "five-point",
-    window: Annotated[int, typer.Option(help="Savitzky-Golay: samples a window.")] = 11,
-    degree: Annotated[int, typer.Option(help="Savitzky-Golay: degree of the polynomial.")] = 4,
-    cutoff: Annotated[
-        float | None, typer.Option(help="Zero-phase Butterworth low-pass, Hz. [default: no filter]")
-    ] = None,
-    filter_order: Annotated[int, typer.Option(help="The filter's order, of one pass.")] = 2,
-    padding: Annotated[Padding, typer.Option(help="How the filter continues the log past its ends.")] = "odd",
-    edges: Annotated[
-        Edges, typer.Option(help="First and last samples: one-sided formulas, or cut off.")
-    ] = "one-sided",
-    convention: Annotated[
-        Convention,
-        typer.Option(help="Velocity terms: closing sums to the torque; gradient is Eq. 1."),
-    ] = "closing",
-    format: Annotated[Format, typer.Option(help="Format of the table.")] = "parquet",
-    figure: Annotated[
-        list[str] | None, typer.Option(help="Figures to draw: paper, paper:JOINT, shares.")
-    ] = None,
-    backend: Annotated[
-        str | None, typer.Option(help="Back end of the robot. [default: native, else numpy]")
-    ] = None,
-    page: Annotated[bool, typer.Option("--page/--no-page", help="Write report.html.")] = True,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the record as JSON.")] = False,
+    log: Log,
+    robot: Package,
+    out: Out,
+    units: AngleUnits = None,
+    time: Time = None,
+    mapping: Map = None,
+    ignore_extra: IgnoreExtra = False,
+    resample: Resample = None,
+    derivative: How = "five-point",
+    window: Window = 11,
+    degree: Degree = 4,
+    cutoff: Cutoff = None,
+    filter_order: FilterOrder = 2,
+    padding: Pad = "odd",
+    edges: Ends = "one-sided",
+    convention: Terms = "closing",
+    format: TableFormat = "parquet",
+    figure: Figures = None,
+    backend: Backend = None,
+    page: Page = True,
+    as_json: Json = False,
 ) -> None:
     """Who loads whom: every torque term of a recorded movement, as a table, figures and a page."""
     from linkwise.motion.files import Wanted, analyze_to
@@ -79,42 +91,23 @@ def analyze(
     from linkwise.motion.robot import load_robot
 
     reading = Reading(units, time, _pairs(mapping or []), ignore_extra, resample)
-    lowpass = None
-    if cutoff is not None:
-        lowpass = Lowpass(cutoff, filter_order, padding)
-    processing = Processing(
-        derivative,
-        window,
-        degree,
-        lowpass,
-        edges,
-        convention,
-    )
+    lowpass = None if cutoff is None else Lowpass(cutoff, filter_order, padding)
+    processing = Processing(derivative, window, degree, lowpass, edges, convention)
     wanted = Wanted(format, tuple(figure or ()), page)
-    loaded = load_robot(robot, backend)
+    package = load_robot(robot, backend)
     with shown_progress() as progress:
-        analysis, files = analyze_to(out, log, loaded, reading, processing, wanted, progress)
+        analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress)
     for warning in analysis.warnings:
         typer.echo(f"warning: {log}: {warning}", err=True)
     if analysis.ignored:
         typer.echo(f"left out: {', '.join(analysis.ignored)}", err=True)
-    if as_json:
-        typer.echo(json.dumps(analysis.record(), ensure_ascii=False))
-        return
-    closure = analysis.closure
-    typer.echo(
-        f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {loaded.backend};"
-        f" terms sum to partial torques within {closure.terms_relative:.1e},"
-        f" these to joint torques within {closure.links_relative:.1e} (relative)"
-    )
-    for file in files:
-        typer.echo(file)
+    typer.echo(json.dumps(analysis.record(), ensure_ascii=False) if as_json else _told(analysis, files))
 
 
 def motion(
-    out: Annotated[Path, typer.Option(help="Directory for recorded.csv and simulated.csv.")],
-    kind: Annotated[Kind, typer.Option(help="Which of the two motions.")] = "both",
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
+    out: Annotated[Path, typer.Option(help="Directory for recorded.csv and simulated.csv")],
+    kind: Annotated[Kind, typer.Option(help="Which of the two motions")] = "both",
+    as_json: Json = False,
 ) -> None:
     """Write the paper's two motions (Fig. 5 and 10) for the arm of Table 2, `planar3`."""
     from linkwise.motion.motions import MOTIONS, RATE, write_csv
@@ -134,6 +127,18 @@ def motion(
         return
     for entry in written:
         typer.echo(f"{entry['file']}: {entry['samples']} samples at {RATE:g} Hz")
+
+
+def _told(analysis: Analysis, files: Sequence[Path]) -> str:
+    closure = analysis.closure
+    return "\n".join(
+        [
+            f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {analysis.robot.backend};"
+            f" terms sum to partial torques within {closure.terms_relative:.1e},"
+            f" these to joint torques within {closure.links_relative:.1e} (relative)",
+            *map(str, files),
+        ]
+    )
 
 
 def _pairs(mapping: list[str]) -> tuple[tuple[str, str], ...]:

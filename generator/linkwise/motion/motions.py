@@ -95,5 +95,7 @@ def write_csv(path: Path, motion: Motion, joints: Sequence[str] = JOINTS) -> int
     time, q = motion.samples()
     lines = [",".join(["time", *joints])]
     lines += [",".join(map(repr, [t, *angles])) for t, angles in zip(time.tolist(), q.tolist(), strict=True)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    draft = path.with_name(f".{path.name}.draft")
+    draft.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    draft.replace(path)
     return len(time)

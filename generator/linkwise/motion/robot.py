@@ -1,5 +1,6 @@
 """A generated robot package, imported from its directory."""
 
+import hashlib
 import importlib.util
 import json
 import sys
@@ -82,8 +83,6 @@ class Robot:
 
 def load_robot(directory: Path, backend: str | None = None) -> Robot:
     """Import the package in `directory`, with `backend` or the fastest that works here."""
-    import hashlib
-
     manifest_path = directory / "manifest.json"
     if not manifest_path.is_file():
         raise LinkwiseError(
@@ -96,7 +95,8 @@ def load_robot(directory: Path, backend: str | None = None) -> Robot:
         up = _up(manifest["conventions"].get("gravity"))
     except (ValueError, KeyError, TypeError) as error:
         raise LinkwiseError(f"{manifest_path}: damaged ({error}); generate the robot again") from error
-    package = _import(directory)
+    digest = hashlib.sha256(text).hexdigest()
+    package = _import(directory, digest)
     chosen, model = _load(directory, package, BACKENDS if backend is None else (backend,))
     return Robot(
         name,
@@ -107,7 +107,7 @@ def load_robot(directory: Path, backend: str | None = None) -> Robot:
         model,
         skeleton,
         up,
-        hashlib.sha256(text).hexdigest(),
+        digest,
     )
 
 
@@ -118,10 +118,10 @@ def _up(gravity: Sequence[float] | None) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _import(directory: Path) -> ModuleType:
-    """Import by path, under a name of its own: the parent need not be on sys.path."""
+def _import(directory: Path, digest: str) -> ModuleType:
+    """Import by path; the name is made of the content, so a package generated anew is read anew."""
     resolved = directory.resolve()
-    name = f"linkwise_robot_{abs(hash(resolved)):x}"
+    name = f"linkwise_robot_{digest[:16]}"
     if name in sys.modules:
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(
