@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 import typer
 from linkwise.errors import LinkwiseError
-from linkwise.motion import analyze, directory
+from linkwise.motion import analyze, directory, progress
 from linkwise.motion import files as files_module
 from linkwise.motion.commands import register
 from linkwise.motion.directory import whole_directory
@@ -168,3 +168,24 @@ def test_a_missing_extra_is_named(monkeypatch, log, call, tmp_path):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(LinkwiseError, match=r"needs pyarrow: pip install linkwise\[motion\]"):
         call("analyze", log, *ROBOT, "--out", tmp_path / "out")
+
+
+def test_progress_in_plain_lines(capsys):
+    with progress.shown_progress() as report:
+        for done in range(0, 1001, 10):
+            report("analysing", done, 1000)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [f"analysing: {percent}%" for percent in range(0, 101, 10)]
+
+
+def test_progress_bar_tells_the_rate(monkeypatch, capsys):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "120")
+    with progress.shown_progress() as report:
+        for done in (100, 500, 1000):
+            report("reading", done, 1000)
+    text = capsys.readouterr().err
+    assert "reading" in text
+    assert "B/s" in text
+    assert "left" in text

@@ -33,6 +33,12 @@ def test_csv_takes_the_delimiter_of_its_header(tmp_path, mark):
     np.testing.assert_array_equal(whole(path, (0, 1)), [[0, 1.5]])
 
 
+def test_empty_cells_at_the_end_and_quoted_delimiters_are_no_more_columns(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text('time,a,note\n0,1,"x, y"\n0.1,2,z,\n', encoding="utf-8")
+    np.testing.assert_array_equal(whole(path, (0, 1)), [[0, 1], [0.1, 2]])
+
+
 def test_opensim_storage(tmp_path):
     table = np.round(smooth(9, 2), 8)
     path = write_mot(tmp_path / "a.mot", table, ("hip", "knee"))
@@ -68,6 +74,7 @@ def test_size_is_reached(tmp_path, monkeypatch):
         (["0,1,2,3", "0.1,1,,3"], r"row 3, column 'joint2': empty; fill the gap"),
         (["0,1,2,3", "0.1,1"], r"row 3: 2 cells where the header names 4; the file is cut off"),
         (["0,1,2,3", "", "0.1,1,2,3"], r"row 3: blank row"),
+        (["0,1,2,3", "0,1,1,5,2,3"], r"row 3: 6 cells where the header names 4; is there a comma"),
     ],
 )
 def test_faulty_cells_are_named_by_row_and_column(tmp_path, lines, message):

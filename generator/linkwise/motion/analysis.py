@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Totals:
     """Over every sample of the movement, a column each: mean of the magnitude, and its largest."""
 
@@ -27,7 +27,7 @@ class Totals:
     peak: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Analysis:
     """Who loads whom: S samples of every torque term, SI units; index order joint, link, cause.
 

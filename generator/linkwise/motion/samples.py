@@ -21,7 +21,7 @@ TOLERANCE = 1e-3
 """How far a time step may be from the mean one, as a share of it; text rounds to less than that."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Samples:
     """Evenly spaced samples: `time` (S,) in s, `q` (S, n) in rad or m, `rate` in Hz."""
 

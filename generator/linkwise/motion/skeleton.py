@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
     """One link's frame on its parent's: `rotation` (3, 3), `translation` and `com` (3,), in m.
 

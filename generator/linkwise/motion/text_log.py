@@ -70,9 +70,17 @@ class TextLog:
             raise self._fault(lines, columns, row) or LinkwiseError(
                 f"{self.path}: rows from {row}: {error}"
             ) from error
-        if len(block) != len(lines):  # loadtxt skips blank lines
-            raise self._fault(lines, columns, row) or LinkwiseError(f"{self.path}: blank rows")
+        # loadtxt skips blank lines, and cells past the columns it was asked for.
+        if len(block) != len(lines) or any(map(self._is_long, lines)):
+            fault = self._fault(lines, columns, row)
+            if fault is not None:
+                raise fault
         return block
+
+    def _is_long(self, line: str) -> bool:
+        if self.delimiter is None:
+            return len(line.split()) > len(self.columns)
+        return line.count(self.delimiter) >= len(self.columns)
 
     def _fault(self, lines: list[str], columns: Sequence[int], row: int) -> LinkwiseError | None:
         """Find the first cell that is no number, slowly: only ever run on a faulty block."""
@@ -85,6 +93,11 @@ class TextLog:
                 return LinkwiseError(
                     f"{where}: {len(cells)} cells where the header names {len(self.columns)};"
                     " the file is cut off or the row is"
+                )
+            if any(cell.strip() for cell in cells[len(self.columns) :]):
+                return LinkwiseError(
+                    f"{where}: {len(cells)} cells where the header names {len(self.columns)};"
+                    " is there a comma within a number?"
                 )
             for column in columns:
                 cell, name = cells[column].strip(), self.columns[column]
