@@ -124,7 +124,9 @@ def _load(package: ModuleType) -> tuple[dict[str, _Answers], list[Result]]:
         try:
             loaded[name] = _Answers(package.load(name))
         except (ImportError, RuntimeError) as error:
-            missing.append(Result(f"{name}: not checked", True, None, " ".join(str(error).split())))
+            # A library that is not installed here is no fault of the package; a part of its own is.
+            lacking = not (getattr(error, "name", None) or "").startswith(package.__name__)
+            missing.append(Result(f"{name}: not checked", lacking, None, " ".join(str(error).split())))
     if not loaded:
         missing.append(Result("back ends", False, None, "none could be loaded; nothing was checked"))
     return loaded, missing

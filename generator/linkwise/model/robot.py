@@ -16,6 +16,18 @@ Mat3: TypeAlias = tuple[Vec3, Vec3, Vec3]
 Rotation: TypeAlias = tuple[tuple[float, float, float], ...]
 
 
+class _Position(sp.Symbol):
+    """Symbols of different classes differ, whatever they are called: a joint may bear any name."""
+
+
+class _Velocity(sp.Symbol):
+    pass
+
+
+class _Acceleration(sp.Symbol):
+    pass
+
+
 @dataclass(frozen=True)
 class Coordinate:
     """A generalized coordinate: its name, and rad for an angle or m for a length."""
@@ -26,17 +38,17 @@ class Coordinate:
     @property
     def q(self) -> sp.Symbol:
         """The coordinate as a SymPy symbol."""
-        return sp.Symbol(self.name, real=True)
+        return _Position(self.name, real=True)
 
     @property
     def qd(self) -> sp.Symbol:
         """Its velocity as a SymPy symbol."""
-        return sp.Symbol(f"d({self.name})/dt", real=True)
+        return _Velocity(f"d({self.name})/dt", real=True)
 
     @property
     def qdd(self) -> sp.Symbol:
         """Its acceleration as a SymPy symbol."""
-        return sp.Symbol(f"d²({self.name})/dt²", real=True)
+        return _Acceleration(f"d²({self.name})/dt²", real=True)
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,10 @@ class _Motion:
     height: Scalar
 
 
+class _Named(sp.Symbol):
+    """Symbol of a definition, which no parameter of the same name equals."""
+
+
 class _Namer:
     """Collects definitions: `name` returns a symbol for anything but a number."""
 
@@ -40,7 +44,7 @@ class _Namer:
         expr = sp.sympify(expr)
         if expr.is_number:
             return expr
-        symbol = sp.Symbol(text, real=True)
+        symbol = _Named(text, real=True)
         self.definitions.append((symbol, expr))
         return symbol
 
@@ -134,7 +138,7 @@ def _turned(namer: _Namer, label: str, angle: sp.Expr, a: Vec3) -> Vec3:
     """Rz(angle)ᵀ a."""
     if a[0] == 0 and a[1] == 0:
         return a
-    s, c = sp.Symbol(f"s{label}", real=True), sp.Symbol(f"c{label}", real=True)
+    s, c = _Named(f"s{label}", real=True), _Named(f"c{label}", real=True)
     if (s, sp.sin(angle)) not in namer.definitions:
         namer.definitions += [(s, sp.sin(angle)), (c, sp.cos(angle))]
     return c * a[0] + s * a[1], c * a[1] - s * a[0], a[2]
