@@ -22,6 +22,9 @@ Unphysical = Annotated[bool, typer.Option("--allow-unphysical", help="Accept bod
 Base = Annotated[str, typer.Option(help="fixed or floating")]
 Root = Annotated[str | None, typer.Option(help="Keep only what hangs on this link")]
 Tip = Annotated[str | None, typer.Option(help="Keep only the chain to this link")]
+FreeMimic = Annotated[
+    bool, typer.Option("--free-mimic", help="Let a mimic joint without a master move by itself")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
 
 
@@ -31,7 +34,8 @@ def _options(
     base: str,
     root: str | None,
     tip: str | None,
-    unphysical: bool,
+    allow_unphysical: bool,
+    free_mimic: bool,
 ) -> Any:
     from linkwise.model import Options
 
@@ -48,7 +52,7 @@ def _options(
             joint = ""
         if not joint or abs(locked[joint]) == float("inf") or locked[joint] != locked[joint]:
             raise LinkwiseError(f"--lock {item!r} is not of the form JOINT=VALUE, such as --lock elbow=0.5")
-    return Options(parameters, locked, base, root, tip, unphysical)  # type: ignore[arg-type]
+    return Options(parameters, locked, base, root, tip, allow_unphysical, free_mimic)  # type: ignore[arg-type]
 
 
 @app.command()
@@ -68,6 +72,7 @@ def generate(
     root: Root = None,
     tip: Tip = None,
     allow_unphysical: Unphysical = False,
+    free_mimic: FreeMimic = False,
 ) -> None:
     """Write the package of a robot."""
     from linkwise import pipeline
@@ -75,7 +80,7 @@ def generate(
     from linkwise.emit.write import write_package
     from linkwise.progress import progress
 
-    options = _options(lock, parameters, base, root, tip, allow_unphysical)
+    options = _options(lock, parameters, base, root, tip, allow_unphysical, free_mimic)
     request = {
         "robot": robot if not Path(robot).is_file() else Path(robot).name,
         "backends": backend or list(BACKENDS),
@@ -85,6 +90,7 @@ def generate(
         "root": root,
         "tip": tip,
         "allow_unphysical": allow_unphysical,
+        "free_mimic": free_mimic,
     }
     system = pipeline.read_system(robot, options)
     with progress() as report:
@@ -124,13 +130,16 @@ def inspect(
     tip: Tip = None,
     parameters: Annotated[str, typer.Option(help="numeric or symbolic")] = "numeric",
     allow_unphysical: Unphysical = False,
+    free_mimic: FreeMimic = False,
     as_json: Json = False,
 ) -> None:
     """Show a robot's joints, links and parameters, and what was merged, locked or ignored."""
     from linkwise import pipeline
     from linkwise.inspection import inspection, table
 
-    system = pipeline.read_system(robot, _options(lock, parameters, base, root, tip, allow_unphysical))
+    system = pipeline.read_system(
+        robot, _options(lock, parameters, base, root, tip, allow_unphysical, free_mimic)
+    )
     data = inspection(system)
     typer.echo(json.dumps(data, indent=1) if as_json else table(data))
 

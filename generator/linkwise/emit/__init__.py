@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from linkwise.emit.autograd import autograd_files
-from linkwise.emit.c import c_files
+from linkwise.emit.c import c_files, packed_sizes
 from linkwise.emit.closed_forms import closed_form_files
 from linkwise.emit.formulas import formula_files
 from linkwise.emit.package import Derivation
@@ -44,6 +44,19 @@ def _numpy(d: Derivation) -> Files:
     yield from closed_form_files(d.system, d.kernels, "numpy")
 
 
+def _native(d: Derivation) -> Files:
+    from linkwise import __version__
+
+    yield from c_files(d)
+    yield from _torch(d)
+    shared = {"version": __version__}
+    build = {**shared, "package": d.package}
+    sizes = {**shared, "sizes": packed_sizes(d.kernels), "n": len(d.system.coordinates)}
+    yield "native_build.py", render("package/native_build.py.j2", build)
+    yield "native_backend.py", render("package/native_backend.py.j2", sizes)
+    yield "native_torch.py", render("package/native_torch.py.j2", shared)
+
+
 BACKENDS = {
     backend.name: backend
     for backend in (
@@ -55,6 +68,7 @@ BACKENDS = {
             "each link's Lagrangian, differentiated by torch",
             _autograd,
         ),
+        Backend("native", "native_backend", "the C code, compiled by this system's compiler", _native),
         Backend("c", "", "closed forms in C99, to compile into a program of your own", c_files),
         Backend("formulas", "", "closed forms to read, for small robots", formula_files),
     )

@@ -52,20 +52,21 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     """Paths inside the package and texts."""
     system, name = derivation.system, derivation.package
     shared = {"version": __version__}
-    for j, kernel in enumerate(derivation.kernels):
-        view = {**shared, "number": j + 1, "functions": list(_functions(system, kernel, j + 1))}
-        yield f"c/link_{j + 1}.inc", render("c/link.inc.j2", view)
+    for number, kernel in enumerate(derivation.kernels, 1):
+        for file, functions in _functions(system, kernel, number):
+            view = {**shared, "number": number, "functions": functions}
+            yield f"c/{file}_{number}.inc", render("c/link.inc.j2", view)
     sizes = list(link_sizes(derivation.kernels))
-    last = sizes[-1]
+    totals = packed_sizes(derivation.kernels)
     robot = {
         **shared,
         "name": name,
         "n": len(system.coordinates),
         "links": sizes,
-        "total_acceleration": last.at_acceleration + last.acceleration,
-        "total_velocity": last.at_velocity + last.velocity,
-        "total_gravity": last.at_gravity + last.gravity,
-        "total_linear": last.at_linear + last.linear,
+        "total_acceleration": totals[0],
+        "total_velocity": totals[1],
+        "total_gravity": totals[2],
+        "total_linear": totals[4],
     }
     header = {
         "upper": name.upper(),
@@ -76,6 +77,8 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     entries = {"largest": largest, "parameters": list(parameter_names(system).values())}
     yield f"c/{name}.h", render("c/robot.h.j2", robot | header)
     yield "c/robot.inc", render("c/robot.inc.j2", robot | entries)
+    for file in ("turn.c", "turn.h"):
+        yield f"c/{file}", render(f"c/{file}.j2", {**shared, "name": name})
     for kind, suffix in (("double", ""), ("float", "f")):
         view = {**shared, "name": name, "type": kind, "suffix": suffix, "block": BLOCK[kind]}
         yield f"c/{name}_{kind}.c", render("c/robot.c.j2", view)
@@ -96,21 +99,41 @@ def link_sizes(kernels: Sequence[Kernel]) -> Iterator[LinkSizes]:
         c2, c1, g, linear = c2 + counts[0], c1 + counts[1], g + counts[2], linear + counts[3]
 
 
-def _functions(system: System, kernel: Kernel, number: int) -> Iterator[KernelFunction]:
+def packed_sizes(kernels: Sequence[Kernel]) -> tuple[int, int, int, int, int]:
+    """Packed values of one sample of the whole robot: c2, c1, g, τ, h1."""
+    *_, last = link_sizes(kernels)
+    gravity = last.at_gravity + last.gravity
+    return (
+        last.at_acceleration + last.acceleration,
+        last.at_velocity + last.velocity,
+        gravity,
+        gravity,
+        last.at_linear + last.linear,
+    )
+
+
+def _functions(
+    system: System, kernel: Kernel, number: int
+) -> Iterator[tuple[str, list[KernelFunction]]]:
+    """Stems of the link's files and the functions in each."""
     forms = kernel.forms[0]
+    torque = {"torque": list(forms.torque.values())}
     decomposition = {
         "acceleration": list(forms.acceleration.values()),
         "velocity": list(forms.velocity.values()),
         "gravity": list(forms.gravity.values()),
-        "torque": list(forms.torque.values()),
+        **torque,
         "linear": forms.linear_block(kernel.graph.zero),
     }
-    for name, groups in (
-        ("decomposition", decomposition),
-        ("torque", {"torque": list(forms.torque.values())}),
-        ("position_gradient", {"gradient": list(forms.position_gradient.values())}),
-    ):
-        yield kernel_function(system, kernel, f"link_{number}_{name}", groups)
+    yield (
+        "link",
+        [
+            kernel_function(system, kernel, f"link_{number}_decomposition", decomposition),
+            kernel_function(system, kernel, f"link_{number}_torque", torque),
+        ],
+    )
+    gradient = {"gradient": list(forms.position_gradient.values())}
+    yield "gradient", [kernel_function(system, kernel, f"gradient_{number}", gradient)]
 
 
 def kernel_function(

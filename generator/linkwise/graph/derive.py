@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import sympy as sp
 
@@ -11,7 +12,8 @@ from linkwise.graph.euler_lagrange import euler_lagrange
 from linkwise.graph.expression import Graph, Node
 from linkwise.graph.forms import Inputs, LinkForms, inputs
 from linkwise.graph.lower import Lowering
-from linkwise.graph.rigid_rule import CommonFrame, Kinematics, rigid_forms
+from linkwise.graph.orientation import CommonAxes, Orientation
+from linkwise.graph.rigid_rule import rigid_forms
 from linkwise.model.robot import Joint
 from linkwise.symbolic.system import LinkEnergy, System
 
@@ -81,40 +83,38 @@ def _energy_kernel(system: System, energy: LinkEnergy, path: tuple[int, ...]) ->
 def _rigid_kernel(
     system: System, links: list[LinkEnergy], tree: Tree, chains: Sequence[Sequence[int]]
 ) -> Kernel:
-    """Try a few common frames and keep the one that costs the fewest operations."""
-    best: tuple[int, CommonFrame, Kernel] | None = None
+    """Try a few common frames and keep the one that costs the fewest operations.
 
-    def attempt(frame: CommonFrame) -> None:
-        nonlocal best
-        lower, x = lowering(system)
-        first = next(e.body for e in links if e.body is not None)
-        kin = Kinematics(lower, tree, first.gravity, frame, x)
-        forms = tuple(
-            rigid_forms(kin, e.body, chain)
-            for e, chain in zip(links, chains, strict=True)
-            if e.body is not None
-        )
-        kernel = Kernel(lower.graph, x, _parameters(system, lower), forms)
-        cost = count_operations(lower.graph, [o for f in forms for o in f.decomposition()]).arithmetic
-        if best is None or cost < best[0]:
-            best = cost, frame, kernel
-
+    First each set of axes, with the origin in the centre of mass and in the frame of the axes; then, for the axes
+    that were best with an origin of the second kind, other frames' origins.
+    """
     longest = max(chains, key=len)
-    for frame in _axes(longest):
-        attempt(frame)
-    assert best is not None
-    chosen = best[1]
-    for origin in _spread([-1, *longest], MAX_ORIGINS):
-        if origin != chosen.origin:
-            attempt(CommonFrame(chosen.axes, chosen.before, origin))
-    return best[2]
+    bodies = [energy.body for energy in links if energy.body is not None]
+
+    def attempt(axes: CommonAxes, origin: int | None) -> tuple[int, CommonAxes, Kernel]:
+        lower, x = lowering(system)
+        turn = Orientation(lower, tree, bodies[0].gravity, axes, x)
+        forms = tuple(
+            rigid_forms(turn, body, chain, origin) for body, chain in zip(bodies, chains, strict=True)
+        )
+        outputs = [node for f in forms for node in f.decomposition()]
+        cost = count_operations(lower.graph, outputs).arithmetic
+        return cost, axes, Kernel(lower.graph, x, _parameters(system, lower), forms)
+
+    candidates = list(_axes(longest))
+    central = min((attempt(axes, None) for axes in candidates), key=itemgetter(0))
+    framed = min((attempt(axes, axes.frame) for axes in candidates), key=itemgetter(0))
+    origins = [f for f in _spread([-1, *longest], MAX_ORIGINS) if f != framed[1].frame]
+    moved = [attempt(framed[1], origin) for origin in origins]
+    return min([central, framed, *moved], key=itemgetter(0))[2]
 
 
-def _axes(chain: Sequence[int]) -> Iterator[CommonFrame]:
-    """Frames to try, each with its own origin: before and behind joints spread over the chain."""
+def _axes(chain: Sequence[int]) -> Iterator[CommonAxes]:
+    """Axes to try: the base's, and those before and behind joints spread over the chain."""
+    yield CommonAxes(-1)
     for f in _spread(chain, MAX_AXES):
-        yield CommonFrame(f, False, f)
-        yield CommonFrame(f, True, f)
+        yield CommonAxes(f)
+        yield CommonAxes(f, before=True)
 
 
 def _spread(items: Sequence[int], most: int) -> list[int]:

@@ -1,6 +1,6 @@
 """Three-vectors and 3×3 matrices whose entries are graph nodes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from linkwise.graph.expression import Graph, Matrix, Node, Vector
 
@@ -50,3 +50,36 @@ def product(g: Graph, a: Matrix, b: Matrix) -> Matrix:
     """a b."""
     columns = [apply(g, a, column) for column in transpose(b)]
     return transpose((columns[0], columns[1], columns[2]))
+
+
+def zero(g: Graph) -> Vector:
+    """Return the zero vector."""
+    return g.zero, g.zero, g.zero
+
+
+def identity(g: Graph) -> Matrix:
+    """Return the unit matrix."""
+    return ((g.one, g.zero, g.zero), (g.zero, g.one, g.zero), (g.zero, g.zero, g.one))
+
+
+def symmetric(entry: Callable[[int, int], Node]) -> Matrix:
+    """Return the matrix with entry(i, k), i ≤ k, on both sides of its diagonal."""
+    e = {(i, k): entry(i, k) for i in range(3) for k in range(i, 3)}
+    return (
+        (e[0, 0], e[0, 1], e[0, 2]),
+        (e[0, 1], e[1, 1], e[1, 2]),
+        (e[0, 2], e[1, 2], e[2, 2]),
+    )
+
+
+def rotated(g: Graph, rotation: Matrix, m: Matrix) -> Matrix:
+    """Return rotation · m · rotationᵀ of a symmetric m."""
+    half = product(g, rotation, m)
+    return symmetric(lambda i, k: dot(g, half[i], rotation[k]))
+
+
+def named(g: Graph, name: str, a: Vector) -> Vector:
+    """Suggest name_x, name_y, name_z as the variables of `a`."""
+    for axis, node in zip("xyz", a, strict=True):
+        g.name(node, f"{name}_{axis}")
+    return a
