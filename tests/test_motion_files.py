@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 import typer
 from linkwise.errors import LinkwiseError
-from linkwise.motion import analyze, directory, progress
+from linkwise.motion import analyze, directory, progress, tables
 from linkwise.motion import files as files_module
 from linkwise.motion.commands import register
 from linkwise.motion.directory import whole_directory
@@ -102,6 +102,8 @@ def test_a_former_result_is_replaced_and_nothing_else(call, log, tmp_path):
         (("--figure", "paper:hip"), "with a joint of joint1"),
         (("--map", "joint1"), "--map joint1: write it as COLUMN=JOINT"),
         (("--backend", "abacus"), "no back end"),
+        (("--window", "9"), "--window and --degree go with --derivative savitzky-golay"),
+        (("--padding", "even"), "--filter-order and --padding go with --cutoff"),
     ],
 )
 def test_mistakes_leave_nothing(call, log, tmp_path, options, message):
@@ -116,6 +118,16 @@ def test_a_fault_on_the_way_leaves_nothing(call, log, tmp_path, monkeypatch):
 
     monkeypatch.setattr(files_module, "report", fail)
     with pytest.raises(LinkwiseError, match="page"):
+        call("analyze", log, *ROBOT, "--out", tmp_path / "out")
+    assert [file.name for file in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_a_full_disk_is_told(call, log, tmp_path, monkeypatch):
+    def fill(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(tables.ParquetTable, "__call__", fill)
+    with pytest.raises(LinkwiseError, match=r"nothing was written: .*No space left on device"):
         call("analyze", log, *ROBOT, "--out", tmp_path / "out")
     assert [file.name for file in tmp_path.iterdir()] == ["log.csv"]
 

@@ -38,13 +38,15 @@ Map = Annotated[
 IgnoreExtra = Annotated[bool, typer.Option("--ignore-extra", help="Leave out columns no joint has")]
 Resample = Annotated[float | None, typer.Option(help="Bring uneven time to this rate, Hz, by splines")]
 How = Annotated[Derivative, typer.Option(help="How velocities and accelerations are made")]
-Window = Annotated[int, typer.Option(help="Savitzky-Golay: samples a window")]
-Degree = Annotated[int, typer.Option(help="Savitzky-Golay: degree of the polynomial")]
+Window = Annotated[int | None, typer.Option(help="Savitzky-Golay: samples a window; 11 if not given")]
+Degree = Annotated[int | None, typer.Option(help="Savitzky-Golay: degree of the fit; 4 if not given")]
 Cutoff = Annotated[
     float | None, typer.Option(help="Zero-phase Butterworth low-pass, Hz; no filter if not given")
 ]
-FilterOrder = Annotated[int, typer.Option(help="The filter's order, of one pass")]
-Pad = Annotated[Padding, typer.Option(help="How the filter continues the log past its ends")]
+FilterOrder = Annotated[int | None, typer.Option(help="The filter's order, of one pass; 2 if not given")]
+Pad = Annotated[
+    Padding | None, typer.Option(help="How the filter continues the log past its ends; odd if not given")
+]
 Ends = Annotated[Edges, typer.Option(help="First and last samples: one-sided formulas, or cut off")]
 Terms = Annotated[
     Convention, typer.Option(help="Velocity terms: closing sums to the torque, gradient is Eq. 1")
@@ -72,11 +74,11 @@ def analyze(
     ignore_extra: IgnoreExtra = False,
     resample: Resample = None,
     derivative: How = "five-point",
-    window: Window = 11,
-    degree: Degree = 4,
+    window: Window = None,
+    degree: Degree = None,
     cutoff: Cutoff = None,
-    filter_order: FilterOrder = 2,
-    padding: Pad = "odd",
+    filter_order: FilterOrder = None,
+    padding: Pad = None,
     edges: Ends = "one-sided",
     convention: Terms = "closing",
     format: TableFormat = "parquet",
@@ -91,8 +93,17 @@ def analyze(
     from linkwise.motion.robot import load_robot
 
     reading = Reading(units, time, _pairs(mapping or []), ignore_extra, resample)
-    lowpass = None if cutoff is None else Lowpass(cutoff, filter_order, padding)
-    processing = Processing(derivative, window, degree, lowpass, edges, convention)
+    lowpass = _lowpass(cutoff, filter_order, padding)
+    if derivative == "five-point" and (window, degree) != (None, None):
+        raise LinkwiseError("--window and --degree go with --derivative savitzky-golay; add it")
+    processing = Processing(
+        derivative,
+        11 if window is None else window,
+        4 if degree is None else degree,
+        lowpass,
+        edges,
+        convention,
+    )
     wanted = Wanted(format, tuple(figure or ()), page)
     package = load_robot(robot, backend)
     with shown_progress() as progress:
@@ -127,6 +138,14 @@ def motion(
         return
     for entry in written:
         typer.echo(f"{entry['file']}: {entry['samples']} samples at {RATE:g} Hz")
+
+
+def _lowpass(cutoff: float | None, order: int | None, padding: Padding | None) -> Lowpass | None:
+    if cutoff is not None:
+        return Lowpass(cutoff, 2 if order is None else order, padding or "odd")
+    if (order, padding) != (None, None):
+        raise LinkwiseError("--filter-order and --padding go with --cutoff; add it")
+    return None
 
 
 def _told(analysis: Analysis, files: Sequence[Path]) -> str:

@@ -28,6 +28,8 @@ def whole_directory(target: Path, mark: str) -> Iterator[Path]:
         yield draft
         draft.chmod(0o755)
         _swap(draft, target)
+    except OSError as error:  # a full disk, above all
+        raise LinkwiseError(f"{target}: nothing was written: {error}") from error
     finally:
         shutil.rmtree(draft, ignore_errors=True)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwise.errors import LinkwiseError, within
+from linkwise.errors import within
 from linkwise.motion.analysis import Analysis
 from linkwise.motion.filtering import lowpass
 from linkwise.motion.robot import Robot, load_robot
@@ -117,6 +117,4 @@ class Keep:
 
 def stride_for(samples: int, columns: int, numbers: int, most: int) -> int:
     """Smallest stride that keeps at most `most` samples and `numbers` numbers in all."""
-    if samples < 1:
-        raise LinkwiseError("no sample to show")
     return max(1, -(-samples // max(2, min(most, numbers // columns))))
