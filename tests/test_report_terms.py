@@ -155,6 +155,15 @@ def test_rounded_rotations_leave_no_spurious_terms() -> None:
     assert "exact" in square.form
 
 
+def test_an_angle_offset_leaves_no_spurious_terms() -> None:
+    a, m = Coordinate("a"), sp.Symbol("m", real=True)
+    sine, cosine = sp.sin(a.q + 0.3), sp.cos(a.q + 0.3)
+    arm = LinkEnergy("arm", m * (sine**2 + cosine**2) * a.qd**2 / 2, m * cosine)
+    report = terms_report(System("offset", (a,), (arm,), {m: 1.0}), Question(), 100, False, silent)
+    # m q̈, and cos 0.3 and sin 0.3 times one wave each.
+    assert report.rows[0].count.total == 3
+
+
 def test_beyond_the_budget_the_report_says_how_far_it_got() -> None:
     with pytest.raises(LinkwiseError, match=r"'link5' needs more than 300 terms, after 4 of 6 links"):
         terms_report(symbolic("puma560"), Question(), 300, False, silent)

@@ -17,7 +17,7 @@ from linkwise.report.laurent import Laurent
 from linkwise.symbolic.system import Definition
 
 ROUNDING = 1e-9
-"""Where a rotation is no exact 0 or ±1, smaller shares of the largest coefficient are rounding."""
+"""Where a fixed angle is no right angle, smaller shares of the largest coefficient are rounding."""
 
 
 class Variables:

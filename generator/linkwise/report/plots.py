@@ -118,7 +118,7 @@ def _terms(figure: Any, report: TermsReport) -> None:
         shade = 0.75 * math.log1p(row.count.total) / darkest
         axes.add_patch(_square(x, y, shade, row.link is None))
         if row.count.total:
-            ink = "white" if shade > 0.45 else style.INK
+            ink = "white" if shade > 0.65 else style.INK
             axes.text(x, y - 0.13, f"{row.count.total:,}", ha="center", va="center", color=ink)
             axes.text(x, y + 0.2, f"({row.kept:,})", ha="center", va="center", color=ink, fontsize=7.5)
     axes.set_xlim(-0.5, len(columns) - 0.5)
@@ -128,7 +128,7 @@ def _terms(figure: Any, report: TermsReport) -> None:
     axes.grid(visible=False)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
-    axes.set_title(f"{report.robot}: terms of $τ_{{ij}}$ (kept: {report.question})", loc="left")
+    axes.set_title(f"{report.robot}: terms of $τ_{{ij}}$ (in brackets: {report.question})", loc="left")
 
 
 def _square(x: int, y: int, shade: float, is_sum: bool) -> Any:

@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import sympy as sp
+
 from linkwise.errors import LinkwiseError, within
 from linkwise.pipeline import Progress
 from linkwise.report import laurent
@@ -10,7 +12,7 @@ from linkwise.report.count import FORM, TermCount, count_terms
 from linkwise.report.expand import ROUNDING, Expansion, Variables
 from linkwise.report.laurent import BudgetExceededError, ExponentError, Laurent
 from linkwise.report.torque import Differentiation
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import LinkEnergy, System
 
 
 @dataclass(frozen=True)
@@ -37,12 +39,7 @@ def link_torques(
         with within(f"link {link.name!r}"):
             try:
                 expansion.define((*link.twist.definitions, *link.height.definitions))
-                parts = expansion(link.kinetic), expansion(link.potential).scaled(-1)
-                lagrangian = laurent.add(parts).pruned(rounding)
-                by = Differentiation(system.coordinates, expansion.variables)
-                path = system.path(j)
-                chosen = (i for i in path if i in joints)
-                torques = {i: by.torque(lagrangian, i, path).pruned(rounding) for i in chosen}
+                torques = _torques(expansion, link, joints, system.path(j))
             except ExponentError as error:
                 raise LinkwiseError(
                     f"a power above {laurent.LIMIT} is more than a term count can hold; lower it"
@@ -53,15 +50,35 @@ def link_torques(
         progress("expand", j + 1, len(wanted))
 
 
+def _torques(
+    expansion: Expansion, link: LinkEnergy, joints: tuple[int, ...], path: tuple[int, ...]
+) -> dict[int, Laurent]:
+    """Torques of a link on those of the joints that move it, by joint."""
+    chosen = [i for i in path if i in joints]
+    if not chosen:
+        return {}
+    parts = expansion(link.kinetic), expansion(link.potential).scaled(-1)
+    lagrangian = laurent.add(parts).pruned(expansion.rounding)
+    by = Differentiation(expansion.coordinates, expansion.variables)
+    return {i: by.torque(lagrangian, i, path).pruned(expansion.rounding) for i in chosen}
+
+
 def is_exact(system: System) -> bool:
-    """Whether every fixed rotation is of 0 and ±1, so that no coefficient is rounded."""
+    """Whether no coefficient is rounded: rotations of 0 and ±1, no angle offsets, no irrational number."""
     links = system.robot.links if system.robot is not None else ()
-    return all(e in (-1.0, 0.0, 1.0) for link in links for row in link.joint.rotation for e in row)
+    straight = all(e in (-1.0, 0.0, 1.0) for link in links for row in link.joint.rotation for e in row)
+    return straight and all(_is_rational(e.kinetic) and _is_rational(e.potential) for e in system.links)
+
+
+def _is_rational(energy: sp.Expr) -> bool:
+    waves, powers = energy.atoms(sp.sin, sp.cos), energy.atoms(sp.Pow)
+    offsets = any(wave.args[0].as_coeff_Add()[0] != 0 for wave in waves)
+    return not (offsets or energy.has(sp.NumberSymbol) or any(p.is_number for p in powers))
 
 
 def form_of(system: System) -> str:
     """Name the canonical form that the counts of `system` are taken in."""
-    rounded = f"fixed rotations as decimals, coefficients below {ROUNDING:g} of the largest dropped"
+    rounded = f"fixed angles as decimals, coefficients below {ROUNDING:g} of the largest dropped"
     return f"{FORM}; {'coefficients exact' if is_exact(system) else rounded}"
 
 
