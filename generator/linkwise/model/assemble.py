@@ -24,6 +24,16 @@ class Options:
     root: str | None = None
     tip: str | None = None
     allow_unphysical: bool = False
+    free_mimic: bool = False
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How an axis moves: ratio · q + offset of a coordinate; without one it stands at the offset."""
+
+    coordinate: int | None
+    ratio: float = 1.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -45,8 +55,12 @@ def assemble(description: Description, options: Options) -> Robot:
     root, connections = depth_first(description)
     if options.base == "floating":
         connections = (Connection("base", "floating", "", root), *connections)
+    if not connections or all(c.type == "fixed" for c in connections):
+        raise LinkwiseError(
+            "no joint moves; give one a moving type, or let the base move with --base floating"
+        )
     axes = [axis for connection in connections for axis in expand(connection, notes)]
-    coordinates, motion = _coordinates(axes, connections, options.lock, notes)
+    coordinates, motion = _coordinates(axes, connections, options, notes)
     links = _links(description, root, connections, axes, motion, notes)
     _check_motion(links, coordinates, options.allow_unphysical, notes)
     notes += [Note("massless", link.name) for link in links if link.massless]
@@ -75,39 +89,48 @@ def _check_bodies(description: Description, allow: bool) -> list[Note]:
 
 
 def _coordinates(
-    axes: list[Axis], connections: tuple[Connection, ...], lock: dict[str, float], notes: list[Note]
-) -> tuple[tuple[Coordinate, ...], dict[str, tuple[int | None, float, float]]]:
-    """Coordinates, and for each axis (coordinate, ratio, offset); a locked axis has no coordinate."""
-    mimics = {c.name: c.mimic for c in connections if c.mimic is not None}
+    axes: list[Axis], connections: tuple[Connection, ...], options: Options, notes: list[Note]
+) -> tuple[tuple[Coordinate, ...], dict[str, Motion]]:
+    """Coordinates, and how each axis moves with them."""
+    lock = options.lock
     known = {axis.name: axis for axis in axes}
     for name in lock:
         if name not in known:
             raise LinkwiseError(f"--lock names no moving joint {name!r}; the joints are {', '.join(known)}")
-    motion: dict[str, tuple[int | None, float, float]] = {}
+    mimics = {c.name: c.mimic for c in connections if c.mimic is not None and c.name in known}
+    masterless = [name for name, mimic in mimics.items() if mimic.master not in known and name not in lock]
+    if masterless and not options.free_mimic:
+        name = masterless[0]
+        raise LinkwiseError(
+            f"joint {name!r} mimics {mimics[name].master!r}, which is no moving joint here"
+            f"{f' ({len(masterless)} joints do so)' if len(masterless) > 1 else ''}; hold it with "
+            f"--lock {name}=0, or let such joints move by themselves with --free-mimic"
+        )
+    for name in masterless:
+        notes.append(
+            Note("freed", name, f"mimics {mimics.pop(name).master!r}, which is no moving joint here")
+        )
+    motion: dict[str, Motion] = {}
     coordinates: list[Coordinate] = []
     for axis in axes:
         if axis.name in lock:
-            motion[axis.name] = None, 0.0, lock[axis.name]
+            motion[axis.name] = Motion(None, 0.0, lock[axis.name])
             notes.append(Note("locked", axis.name, f"at {lock[axis.name]:g} {axis.unit}"))
         elif axis.name not in mimics:
-            motion[axis.name] = len(coordinates), 1.0, 0.0
+            motion[axis.name] = Motion(len(coordinates))
             coordinates.append(Coordinate(axis.name, axis.unit))
     for name, mimic in mimics.items():
-        if name in lock or name not in known:
+        if name in lock:
             continue
-        if mimic.master == name or mimic.master in mimics:
+        if mimic.master in mimics:
             raise LinkwiseError(
                 f"joint {name!r} mimics {mimic.master!r}, which is "
-                f"{'itself' if mimic.master == name else 'a mimic too'}; name the joint that moves, or "
-                f"lock {name!r}"
+                f"{'itself' if mimic.master == name else 'a mimic too'}; name the joint that moves, or hold "
+                f"it with --lock {name}=0"
             )
-        if mimic.master not in motion:
-            raise LinkwiseError(
-                f"joint {name!r} mimics {mimic.master!r}, which is no moving joint here; lock it with "
-                f"--lock {name}=0"
-            )
-        coordinate, _, held = motion[mimic.master]
-        motion[name] = coordinate, mimic.ratio, mimic.offset + mimic.ratio * held
+        master = motion[mimic.master]
+        offset = mimic.offset + mimic.ratio * master.offset
+        motion[name] = Motion(master.coordinate, mimic.ratio, offset)
         notes.append(Note("mimic", name, f"= {mimic.ratio:g} {mimic.master} + {mimic.offset:g}"))
     return tuple(coordinates), motion
 
@@ -117,7 +140,7 @@ def _links(
     root: str,
     connections: tuple[Connection, ...],
     axes: list[Axis],
-    motion: dict[str, tuple[int | None, float, float]],
+    motion: dict[str, Motion],
     notes: list[Note],
 ) -> tuple[Link, ...]:
     """Moving links, each with the bodies that are rigidly connected to it merged."""
@@ -151,7 +174,7 @@ def _links(
 def _step(
     place: _Place,
     axis: Axis,
-    motion: tuple[int | None, float, float],
+    motion: Motion,
     child: str,
     moving: list[tuple[str, int | None, Joint]],
 ) -> _Place:
@@ -159,7 +182,7 @@ def _step(
 
     The new link's frame has z on the axis; a mimic's offset is folded into the fixed part.
     """
-    coordinate, ratio, offset = motion
+    coordinate, ratio, offset = motion.coordinate, motion.ratio, motion.offset
     align = geo.align_z(axis.direction)
     rotation, position = geo.compose(place.rotation, align), place.position
     if axis.kind == "revolute" and offset:

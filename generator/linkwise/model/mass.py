@@ -10,6 +10,10 @@ from linkwise.model.robot import Mat3, Rotation, Scalar, Vec3, is_finite
 TRIANGLE = 1e-6
 """Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
 
+SPECK = 1e-14
+"""m²: moments below mass · (100 nm)² count as zero. The moments of a point mass are zeros that turning and rounding
+leave at 1e-18 or 1e-35, of which no relative slack makes anything; a solid body that small weighs 1e-15 kg."""
+
 Placed = tuple[Body, Rotation, Vec3]
 
 
@@ -39,7 +43,7 @@ def merge(bodies: list[Placed]) -> tuple[Scalar, Vec3, Mat3]:
         d = np.array([a - b for a, b in zip(c, com, strict=True)], dtype=object)
         inertia = inertia + np.array(i, dtype=object) + m * ((d @ d) * np.eye(3, dtype=int) - np.outer(d, d))
     a, b, c = (tuple(inertia[min(i, k)][max(i, k)] for k in range(3)) for i in range(3))
-    return mass, com, (a, b, c)  # type: ignore[return-value]
+    return mass, com, (a, b, c)
 
 
 def _empty(body: Body) -> bool:
@@ -59,12 +63,13 @@ def check_body(body: Body) -> str:
     if float(body.mass) < 0:
         return f"link {body.name!r} has negative mass {float(body.mass):g} kg"
     moments = np.linalg.eigvalsh(np.array(body.inertia, dtype=float))
-    largest = moments[2]
-    if moments[0] < -TRIANGLE * max(largest, 0.0) or largest < 0:
-        return f"link {body.name!r} has an inertia that is not positive (principal moment {moments[0]:.3g} kg·m²)"
-    if largest > (moments[0] + moments[1]) + TRIANGLE * largest:
+    noise = max(SPECK * float(body.mass), np.finfo(float).eps * float(np.abs(moments).max()))
+    low, middle, high = (0.0 if abs(moment) <= noise else float(moment) for moment in moments)
+    if low < -TRIANGLE * high or high < 0:
+        return f"link {body.name!r} has an inertia that is not positive (principal moment {low:.3g} kg·m²)"
+    if high > low + middle + TRIANGLE * high:
         return (
             f"link {body.name!r} has an inertia that breaks the triangle inequality "
-            f"({largest:.4g} > {moments[0]:.4g} + {moments[1]:.4g} kg·m²)"
+            f"({high:.4g} > {low:.4g} + {middle:.4g} kg·m²)"
         )
     return ""

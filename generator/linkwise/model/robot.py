@@ -98,6 +98,7 @@ class Note:
         "cut",
         "expanded",
         "unphysical",
+        "freed",
     ]
     subject: str
     detail: str = ""
@@ -116,7 +117,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         if not self.coordinates:
-            raise LinkwiseError("no joint moves: give at least one revolute or prismatic joint")
+            raise LinkwiseError("no joint moves; free at least one")
         for index, link in enumerate(self.links):
             if link.parent is not None and not 0 <= link.parent < index:
                 raise LinkwiseError(f"link {link.name!r} must follow its parent")

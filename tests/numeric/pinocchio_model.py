@@ -1,0 +1,106 @@
+"""Pinocchio's own reading of a URDF file, asked in linkwise's coordinates."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from linkwise.model.urdf_reader import read_urdf
+
+BASE = {
+    "base_x": pin.JointModelPX,
+    "base_y": pin.JointModelPY,
+    "base_z": pin.JointModelPZ,
+    "base_yaw": pin.JointModelRZ,
+    "base_pitch": pin.JointModelRY,
+    "base_roll": pin.JointModelRX,
+}
+"""A floating base's coordinates: where it is in the world, then its turns about the moved z, y and x."""
+
+
+class Map(NamedTuple):
+    """How one degree of freedom of Pinocchio's moves: ratio · q[coordinate] + offset; None stands still."""
+
+    at: int
+    velocity_at: int
+    circle: bool
+    coordinate: int | None
+    ratio: float = 1.0
+    offset: float = 0.0
+
+
+def base_joint() -> Any:
+    """Return the six joints of a floating base as one joint of Pinocchio's."""
+    joint = pin.JointModelComposite()
+    for part in BASE.values():
+        joint.addJoint(part(), pin.SE3.Identity())
+    return joint
+
+
+class PinocchioModel:
+    """Inverse dynamics of a whole robot or of one link's mass alone.
+
+    Joints are matched by name. Mimic joints are undone here: Pinocchio moves them as joints of their own,
+    and their torque goes to the master times the ratio; one without a master moves by itself.
+    Links are matched by the frame that bears their name.
+    """
+
+    def __init__(
+        self, path: Path, system: Any, floating: bool = False, lock: dict[str, float] | None = None
+    ) -> None:
+        base = (base_joint(),) if floating else ()
+        self.model = pin.buildModelFromUrdf(str(path), *base)
+        self.data = self.model.createData()
+        self.model.gravity.linear = np.array(system.robot.gravity, dtype=float)
+        self.n = len(system.coordinates)
+        self.maps = self._maps(path, system, lock or {})
+        self.alone = {link.name: self._alone(link.name) for link in system.links}
+
+    def _maps(self, path: Path, system: Any, lock: dict[str, float]) -> list[Map]:
+        mimics = {c.name: c.mimic for c in read_urdf(path).connections if c.mimic}
+        index = {c.name: k for k, c in enumerate(system.coordinates)}
+        maps = []
+        for number in range(1, self.model.njoints):
+            name, joint = self.model.names[number], self.model.joints[number]
+            mimic = mimics.get(name)
+            if name == "root_joint":
+                maps += [
+                    Map(joint.idx_q + k, joint.idx_v + k, False, index[part]) for k, part in enumerate(BASE)
+                ]
+                continue
+            where = joint.idx_q, joint.idx_v, joint.nq == 2
+            if name in lock:
+                maps.append(Map(*where, None, offset=lock[name]))
+            elif mimic and mimic.master in index:
+                maps.append(Map(*where, index[mimic.master], mimic.ratio, mimic.offset))
+            else:
+                maps.append(Map(*where, index[name]))
+        return maps
+
+    def _alone(self, link: str) -> Any:
+        """The model with only the mass that moves with `link`."""
+        alone = self.model.copy()
+        joint = self.model.frames[self.model.getFrameId(link, pin.BODY)].parentJoint
+        for other in range(alone.njoints):
+            if other != joint:
+                alone.inertias[other] = pin.Inertia.Zero()
+        return alone
+
+    def torque(self, q: Any, qd: Any, qdd: Any, link: str | None = None) -> Any:
+        """τ of all links, or τ_ij of one."""
+        model = self.model if link is None else self.alone[link]
+        state, rate, change = np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv)
+        for at, v, circle, k, ratio, offset in self.maps:
+            angle = offset if k is None else ratio * q[k] + offset
+            if circle:
+                state[at : at + 2] = np.cos(angle), np.sin(angle)
+            else:
+                state[at] = angle
+            if k is not None:
+                rate[v], change[v] = ratio * qd[k], ratio * qdd[k]
+        full = pin.rnea(model, self.data, state, rate, change)
+        tau = np.zeros(self.n)
+        for _, v, _, k, ratio, _ in self.maps:
+            if k is not None:
+                tau[k] += ratio * full[v]
+        return tau
