@@ -13,6 +13,8 @@ from linkwise.report.terms import TermsReport
 
 STEPS = 200
 """Points of a drawn curve."""
+DARKEST = 0.42
+"""Shade of the largest count, on which dark figures still read well."""
 
 
 @dataclass(frozen=True)
@@ -115,12 +117,11 @@ def _terms(figure: Any, report: TermsReport) -> None:
         if row.link not in columns:
             continue
         x, y = columns.index(row.link), joints.index(row.joint)
-        shade = 0.75 * math.log1p(row.count.total) / darkest
+        shade = DARKEST * math.log1p(row.count.total) / darkest
         axes.add_patch(_square(x, y, shade, row.link is None))
         if row.count.total:
-            ink = "white" if shade > 0.65 else style.INK
-            axes.text(x, y - 0.13, f"{row.count.total:,}", ha="center", va="center", color=ink)
-            axes.text(x, y + 0.2, f"({row.kept:,})", ha="center", va="center", color=ink, fontsize=7.5)
+            axes.text(x, y - 0.13, f"{row.count.total:,}", ha="center", va="center")
+            axes.text(x, y + 0.2, f"({row.kept:,})", ha="center", va="center", fontsize=7.5)
     axes.set_xlim(-0.5, len(columns) - 0.5)
     axes.set_ylim(len(joints) - 0.5, -0.5)
     axes.set_xticks(range(len(columns)), ["all" if j is None else f"link {j + 1}" for j in columns])
