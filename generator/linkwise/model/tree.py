@@ -11,9 +11,8 @@ from linkwise.model.robot import Note, is_finite
 def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
     """Root link and the joints from it, parents first, siblings in the file's order.
 
-    Raises LinkwiseError for names that are empty, double or unknown, two parents, several roots and loops.
+    Raises LinkwiseError for two parents, several roots and loops.
     """
-    _check_names(description)
     parents = Counter(c.child for c in description.connections)
     for link, count in parents.items():
         if count > 1:
@@ -28,7 +27,8 @@ def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
         )
     if len(roots) > 1:
         raise LinkwiseError(
-            f"there are several roots ({', '.join(map(repr, roots))}); connect them, or choose one with --root"
+            f"there are several roots ({', '.join(map(repr, roots))}); connect them, or choose one "
+            "with --root"
         )
     order: list[Connection] = []
     stack = _below(description, roots[0])
@@ -65,13 +65,19 @@ def _check_names(description: Description) -> None:
                 raise LinkwiseError(
                     f"joint {c.name!r} names {link!r} as its {role}, but there is no such link"
                 )
+        if c.mimic and not (is_finite(c.mimic.ratio) and is_finite(c.mimic.offset)):
+            raise LinkwiseError(f"joint {c.name!r} has NaN or infinity in its mimic; give numbers")
         values = [*c.translation, *(entry for row in c.rotation for entry in row)]
         if not all(is_finite(value) for value in values):
             raise LinkwiseError(f"joint {c.name!r} has NaN or infinity in its origin; give numbers")
 
 
 def cut(description: Description, root: str | None, tip: str | None, notes: list[Note]) -> Description:
-    """Keep what hangs on link `root`, and of that only the chain to link `tip`."""
+    """Keep what hangs on link `root`, and of that only the chain to link `tip`.
+
+    Raises LinkwiseError for names that are empty, double or unknown.
+    """
+    _check_names(description)
     known = {body.name for body in description.bodies}
     for flag, link in (("--root", root), ("--tip", tip)):
         if link is not None and link not in known:
