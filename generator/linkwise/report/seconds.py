@@ -83,7 +83,7 @@ def _of_arm(system: System, n: int) -> Iterator[Timing]:
     random = numpy.random.default_rng(n)
     q, qd, qdd = (random.standard_normal((BATCH, n)) for _ in range(3))
     kernels = derive(system)
-    files = generate(system, ["numpy", "torch", "autograd"], name=PACKAGE)
+    files = generate(system, ["numpy", "autograd"], name=PACKAGE)
     files["row.py"] = render("report/row.py.j2", {"functions": list(_row_functions(system, kernels))})
     with tempfile.TemporaryDirectory() as folder:
         package = _imported(files, Path(folder) / PACKAGE)
