@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from linkwise import check_package, generate, read_system, write_package
 
 USE = """
 import sys
@@ -44,3 +45,11 @@ def test_numpy_back_end_needs_numpy_only(directory_of: Callable[[str], Path], tm
     script += "assert 'torch' not in sys.modules and 'sympy' not in sys.modules"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd"])
+def test_package_of_one_back_end_is_whole(backend: str, tmp_path: Path) -> None:
+    write_package(generate(read_system("planar2"), [backend]), tmp_path / "planar2")
+    results = check_package(tmp_path / "planar2", 5)
+    assert any(result.name.startswith(f"{backend}: tau_ij") for result in results)
+    assert all(result.passed for result in results)

@@ -1,0 +1,250 @@
+"""The command line: what each command prints and writes, and what it says to bad input."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import DATA, PANDA
+
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def linkwise(tmp_path: Path) -> Run:
+    def run(*arguments: Any) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "linkwise", *map(str, arguments)]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    return run
+
+
+@pytest.fixture
+def planar2(linkwise: Run, tmp_path: Path) -> Path:
+    done = linkwise("generate", "planar2", "--out", "out", "--backend", "numpy")
+    assert done.returncode == 0, done.stderr
+    return tmp_path / "out/planar2"
+
+
+def test_generate_says_what_it_wrote_in_plain_lines(linkwise: Run, tmp_path: Path) -> None:
+    done = linkwise("generate", "planar2", "--out", "out", "--name", "arm", "--backend", "c")
+    assert done.returncode == 0
+    files = [path for path in (tmp_path / "out/arm").rglob("*") if path.is_file()]
+    assert done.stdout == f"wrote out/arm: 2 joints, 2 links, {len(files)} files\n"
+    assert done.stderr.splitlines() == ["derive: 2 done", "emit: 1 done"]
+
+
+def test_generate_replaces_an_earlier_package_whole(linkwise: Run, planar2: Path) -> None:
+    assert (planar2 / "numpy_forms").is_dir()
+    linkwise("generate", "planar2", "--out", "out", "--backend", "c")
+    assert not (planar2 / "numpy_forms").exists()
+
+
+def test_manifest_tells_how_to_make_the_package_again(planar2: Path) -> None:
+    manifest = json.loads((planar2 / "manifest.json").read_text())
+    assert manifest["schema"] == 1
+    assert manifest["request"]["robot"] == "planar2"
+    assert manifest["request"]["backends"] == ["numpy"]
+    assert [joint["name"] for joint in manifest["joints"]] == ["joint1", "joint2"]
+    assert manifest["links"][1]["path"] == [0, 1]
+    written = {p.relative_to(planar2).as_posix() for p in planar2.rglob("*") if p.is_file()}
+    assert set(manifest["files"]) == written - {"manifest.json"}
+
+
+def test_check_prints_the_largest_error_of_each(linkwise: Run, planar2: Path) -> None:
+    done = linkwise("check", planar2, "--samples", 5)
+    assert done.returncode == 0
+    assert "ok    numpy: tau_ij against Newton-Euler recursion" in done.stdout
+    assert "largest relative error" in done.stdout
+    results = json.loads(linkwise("check", planar2, "--samples", 5, "--json").stdout)
+    assert all(result["passed"] for result in results)
+    assert {"name", "passed", "error", "detail"} == set(results[0])
+
+
+def test_check_catches_a_tampered_file(linkwise: Run, planar2: Path) -> None:
+    (planar2 / "numpy_forms/link_2.py").write_text("# mine now\n")
+    (planar2 / "names.py").unlink()
+    done = linkwise("check", planar2)
+    assert done.returncode == 1
+    assert "FAIL  hashes" in done.stdout
+    assert "names.py is missing; numpy_forms/link_2.py was changed" in done.stdout
+
+
+def test_check_catches_wrong_numbers_under_a_right_hash(linkwise: Run, planar2: Path) -> None:
+    import hashlib
+
+    path = planar2 / "numpy_forms/link_1.py"
+    path.write_text(path.read_text().replace("0.5", "0.6").replace("0.0", "0.1"))
+    manifest = json.loads((planar2 / "manifest.json").read_text())
+    manifest["files"]["numpy_forms/link_1.py"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    (planar2 / "manifest.json").write_text(json.dumps(manifest))
+    done = linkwise("check", planar2, "--samples", 5)
+    assert done.returncode == 1
+    assert "FAIL  numpy: tau_ij against Newton-Euler recursion" in done.stdout
+
+
+def test_inspect_names_what_was_merged_locked_and_ignored(linkwise: Run) -> None:
+    done = linkwise(
+        "inspect", PANDA, "--lock", "panda_finger_joint1=0.01", "--lock", "panda_finger_joint2=0", "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    data = json.loads(done.stdout)
+    assert [joint["name"] for joint in data["joints"]] == [f"panda_joint{k}" for k in range(1, 8)]
+    notes = {(note["kind"], note["subject"]) for note in data["notes"]}
+    assert ("locked", "panda_finger_joint1") in notes
+    assert ("merged", "panda_hand") in notes
+    assert ("ignored", "visual") in notes
+
+
+def test_inspect_prints_a_table(linkwise: Run) -> None:
+    done = linkwise("inspect", "planar3", "--parameters", "symbolic")
+    assert done.stdout.startswith("planar3: 3 joints, 3 links\n")
+    assert "  3  link3  (0.6 kg; joint1, joint2, joint3)" in done.stdout
+    assert "  m_2 = 0.6" in done.stdout
+
+
+def arm(**changes: str) -> str:
+    """A TOML arm of one link with keys replaced."""
+    link = {"name": '"rod"', "mass": "1.0", "inertia": "{ xx = 0.1, yy = 0.1, zz = 0.1 }"}
+    joint = {"name": '"hinge"', "parent": '"base"', "child": '"rod"', "axis": "[0, 0, 1]"}
+    for key, value in changes.items():
+        (joint if key in ("axis", "parent", "child", "type", "xyz") else link)[key] = value
+    tables = (("link", link), ("joint", joint))
+    return "schema = 1\n" + "".join(
+        f"[[{name}]]\n" + "".join(f"{key} = {value}\n" for key, value in table.items())
+        for name, table in tables
+    )
+
+
+SECOND = '[[joint]]\nname = "{name}"\nparent = "{parent}"\nchild = "{child}"\n'
+BAD_FILES = {
+    "malformed.toml": ("schema = = 1", "malformed TOML"),
+    "binary.toml": ("\x00\x01", "malformed TOML"),
+    "unschemed.toml": ('name = "arm"', "write schema = 1 at the top"),
+    "massless.toml": (arm(mass="0", inertia="{}"), "'hinge' moves no mass at all"),
+    "negative.toml": (arm(mass="-2"), "link 'rod' has negative mass -2 kg"),
+    "triangle.toml": (
+        arm(inertia="{ xx = 0.1, yy = 0.1, zz = 0.3 }"),
+        "link 'rod' has an inertia that breaks the triangle inequality",
+    ),
+    "indefinite.toml": (
+        arm(inertia="{ xx = 0.1, yy = 0.1, zz = 0.1, xy = 0.2 }"),
+        "link 'rod' has an inertia that is not positive",
+    ),
+    "axis.toml": (arm(axis="[0, 0, 0]"), "joint 'hinge' has a zero axis"),
+    "nan.toml": (arm(mass="nan"), "link 'rod' has NaN or infinity"),
+    "infinity.toml": (arm(xyz="[inf, 0, 0]"), "joint 'hinge' has NaN or infinity in its origin"),
+    "type.toml": (arm(type='"spherical"'), "joint 'hinge' has the unknown type 'spherical'"),
+    "parent.toml": (arm(parent='"moon"'), "joint 'hinge' names 'moon' as its parent"),
+    "key.toml": (arm(weight="3"), "link 'rod' has the unknown key 'weight'"),
+    "empty.toml": (arm(name='""', child='""'), "a link has an empty name"),
+    "loop.toml": (
+        arm(parent='"rod"') + SECOND.format(name="other", parent="base", child="base"),
+        "loop",
+    ),
+    "two_parents.toml": (
+        arm() + SECOND.format(name="other", parent="base", child="rod"),
+        "link 'rod' has 2 parents",
+    ),
+    "duplicate.toml": (
+        arm() + '[[link]]\nname = "rod"\n',
+        "2 links are named 'rod'",
+    ),
+    "same_joint.toml": (
+        arm() + '[[link]]\nname = "tip"\n' + SECOND.format(name="hinge", parent="rod", child="tip"),
+        "2 joints are named 'hinge'",
+    ),
+    "code.toml": (arm(mass="\"__import__('os').getcwd()\""), "is no formula"),
+    "name.toml": (arm(mass='"m"'), "uses 'm', which is not among the parameters"),
+    "still.toml": (arm(type='"fixed"'), "no joint moves"),
+    "malformed.urdf": ("<robot><link", "malformed XML"),
+    "entities.urdf": (
+        '<!DOCTYPE robot [<!ENTITY a "aaaa">]><robot name="&a;"/>',
+        "malformed XML",
+    ),
+    "root.urdf": ("<model/>", "the root element is <model>"),
+    "childless.urdf": (
+        '<robot name="r"><link name="a"/><joint name="j" type="revolute"><parent link="a"/></joint></robot>',
+        "joint 'j' has no <child",
+    ),
+    "word.urdf": (
+        '<robot name="r"><link name="a"><inertial><mass value="heavy"/></inertial></link></robot>',
+        "link 'a': <mass value='heavy'> needs 1 number",
+    ),
+    "cubic.py": (
+        "from linkwise import *\nx = Coordinate('x')\ncoordinates = [x]\n"
+        "links = [LinkEnergy('a', x.qd**3, 0)]\n",
+        "link 'a': its energies have degree 3 in the velocities",
+    ),
+    "crash.py": ("1 / 0", "running the file failed: ZeroDivisionError"),
+    "nothing.py": ("", "the file must define 'coordinates'"),
+    "picture.png": ("", "unknown kind of file '.png'"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_bad_file_is_one_line_that_names_the_mend(name: str, linkwise: Run, tmp_path: Path) -> None:
+    text, message = BAD_FILES[name]
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    done = linkwise("generate", name, "--out", "out")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.startswith(f"linkwise: error: {name}: ")
+    assert done.stderr.count("\n") == 1
+    assert done.stdout == ""
+    assert not (tmp_path / "out").exists()
+
+
+BAD_ARGUMENTS = {
+    "unknown robot": (("planarx",), "planarx: no such file or built-in robot"),
+    "unknown file": (("arm.toml",), "arm.toml: no such file or built-in robot"),
+    "lock without value": (("planar2", "--lock", "joint1"), "is not of the form JOINT=VALUE"),
+    "lock at nan": (("planar2", "--lock", "joint1=nan"), "is not of the form JOINT=VALUE"),
+    "lock of no joint": (("planar2", "--lock", "elbow=0"), "names no moving joint 'elbow'"),
+    "back end": (("planar2", "--backend", "fortran"), "no back end 'fortran'; choose among numpy"),
+    "name": (("planar2", "--name", "../arm"), "'../arm' is no module name"),
+    "keyword": (("planar2", "--name", "class"), "'class' is no module name"),
+    "parameters": (("planar2", "--parameters", "some"), "choose numeric or symbolic"),
+    "base": (("planar2", "--base", "moving"), "choose fixed or floating"),
+    "tip": (("planar2", "--tip", "hand"), "--tip names no link 'hand'"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_ARGUMENTS)
+def test_bad_argument_is_one_line_that_names_the_mend(case: str, linkwise: Run, tmp_path: Path) -> None:
+    arguments, message = BAD_ARGUMENTS[case]
+    done = linkwise("generate", *arguments, "--out", "out")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_unphysical_body_passes_on_request(linkwise: Run, tmp_path: Path) -> None:
+    (tmp_path / "negative.toml").write_text(arm(mass="-2"))
+    arguments = ("generate", "negative.toml", "--out", "out", "--backend", "numpy", "--allow-unphysical")
+    assert linkwise(*arguments).returncode == 0
+
+
+def test_generate_never_replaces_what_is_no_package(linkwise: Run, tmp_path: Path) -> None:
+    (tmp_path / "out/planar2").mkdir(parents=True)
+    (tmp_path / "out/planar2/thesis.txt").write_text("mine")
+    done = linkwise("generate", "planar2", "--out", "out", "--backend", "c")
+    assert done.returncode == 2
+    assert "exists and is no generated package" in done.stderr
+    assert (tmp_path / "out/planar2/thesis.txt").read_text() == "mine"
+
+
+def test_check_of_no_package_says_so(linkwise: Run, tmp_path: Path) -> None:
+    done = linkwise("check", tmp_path)
+    assert done.returncode == 2
+    assert "holds no manifest.json" in done.stderr
+
+
+def test_energies_take_no_lock(linkwise: Run) -> None:
+    done = linkwise("inspect", DATA / "turntable.py", "--lock", "x=0")
+    assert done.returncode == 2
+    assert "energies in Python take no --lock" in done.stderr
