@@ -1,6 +1,6 @@
 """linkwise: which joint's movement loads which joint, through which link.
 
-system = linkwise.read_system("planar3")        # or a .toml, .urdf or .py file, or linkwise.energy_system(...)
+system = linkwise.read_system("planar3")     # or a .toml, .urdf or .py file, or linkwise.energy_system(...)
 files = linkwise.generate(system)               # {path: text} of an importable package
 """
 

@@ -1,4 +1,4 @@
-"""The way of the data: description -> energies -> graph -> text -> package. No I/O but reading the description."""
+"""The way of the data: description -> energies -> graph -> text -> package. It only reads the description."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -24,7 +24,7 @@ def silent(stage: str, done: int, total: int) -> None:
 
 
 def read_system(spec: str | Path, options: Options | None = None) -> System:
-    """Coordinates and link energies of a built-in robot, a TOML or URDF file, or a Python file of energies."""
+    """Coordinates and link energies of a built-in robot, a robot's file, or a Python file of energies."""
     options = options or Options()
     if Path(spec).suffix == ".py" and Path(spec).is_file():
         with within(str(spec)):

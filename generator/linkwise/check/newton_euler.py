@@ -36,21 +36,19 @@ class NewtonEuler:
             back: int | None = at
             while back is not None:
                 upper, (_, origin, _, _, _, _, axis) = self.bodies[back], motion[back]
-                if upper["kind"] == "revolute":
-                    about = moment + np.cross(com - origin, force)
-                else:
-                    about = force
+                turns = upper["kind"] == "revolute"
+                about = moment + np.cross(com - origin, force) if turns else force
                 tau[:, upper["coordinate"], j] += upper["ratio"] * np.einsum("si,si->s", axis, about)
                 back = upper["parent"]
         return tau
 
     def _forward(self, q: Array, qd: Array, qdd: Array, gravity: Array) -> list[tuple[Array, ...]]:
-        """For each body: rotation, origin, ω, α, centre of mass, its acceleration minus gravity, joint axis."""
+        """For each body: rotation, origin, ω, α, centre of mass, its acceleration − gravity, joint axis."""
         samples = len(q)
         zero = np.zeros((samples, 3))
         ground = (np.broadcast_to(np.eye(3), (samples, 3, 3)), zero, zero, zero, zero - gravity)
         origins: list[tuple[Array, ...]] = []
-        motion = []
+        motion: list[tuple[Array, ...]] = []
         for body in self.bodies:
             up = ground if body["parent"] is None else origins[body["parent"]]
             rotation, position, omega, alpha, a = up

@@ -15,7 +15,7 @@ Files = Iterator[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Backend:
-    """How a back end's files are made; `module` is what `load` imports, empty for files that nothing loads."""
+    """How a back end's files are made; `module` is what `load` imports, empty where nothing loads."""
 
     name: str
     module: str
@@ -57,7 +57,7 @@ def _native(d: Derivation) -> Files:
     yield "native_torch.py", render("package/native_torch.py.j2", shared)
 
 
-BACKENDS = {
+BACKENDS: dict[str, Backend] = {
     backend.name: backend
     for backend in (
         Backend("numpy", "numpy_backend", "closed forms on NumPy arrays", _numpy),

@@ -101,7 +101,7 @@ def fetched(system: System, code: Code, subscript: str = "[{}]") -> tuple[str, .
         lines += [f"{prefix}{k + 1} = {prefix}{subscript.format(k)}" for k in used]
     for symbol, name in parameter_names(system).items():
         if name in code.symbols:
-            lines.append(f"{name} = p[{ascii(symbol.name)}]")
+            lines.append(f"{name} = p[{symbol.name!a}]")
     return tuple(lines)
 
 

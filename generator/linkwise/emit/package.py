@@ -122,7 +122,7 @@ def _floats(system: System) -> Iterator[float]:
 
 
 def skeleton(system: System) -> list[dict[str, Any]] | None:
-    """Return where the links are, numbers only, for drawing and for checking; None for a user's own energies."""
+    """Return where the links are, numbers only, to draw and to check; None for a user's own energies."""
     if system.robot is None:
         return None
     return [

@@ -1,5 +1,7 @@
 """One node to text, in the syntax of each target language."""
 
+from typing import ClassVar
+
 from linkwise.graph.expression import Entry
 
 ATOM, PRODUCT, SUM = 3, 2, 1
@@ -56,7 +58,7 @@ class Printer:
 class PythonPrinter(Printer):
     """Calls into an array library, such as `np` or `torch`."""
 
-    RENAMED = {"np": {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}}
+    RENAMED: ClassVar = {"np": {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}}
 
     def __init__(self, library: str) -> None:
         self.library = library

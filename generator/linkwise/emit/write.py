@@ -9,15 +9,13 @@ from linkwise.errors import LinkwiseError
 
 
 def write_package(files: Mapping[str, str], directory: Path) -> None:
-    """Write files below `directory`, replacing an earlier package there; a failure leaves the old one as it was.
+    """Write files below `directory`, replacing an earlier package there; a failure leaves the old one.
 
     Raises LinkwiseError when the place is not writable or holds something that is no generated package.
     """
-    if directory.exists() and not (directory / "manifest.json").is_file():
-        if not directory.is_dir() or any(directory.iterdir()):
-            raise LinkwiseError(
-                f"{directory} exists and is no generated package; choose another --out or --name"
-            )
+    package = (directory / "manifest.json").is_file()
+    if directory.exists() and not package and (not directory.is_dir() or any(directory.iterdir())):
+        raise LinkwiseError(f"{directory} exists and is no generated package; choose another --out or --name")
     try:
         directory.parent.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(prefix=f".{directory.name}-", dir=directory.parent))

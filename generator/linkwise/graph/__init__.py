@@ -1,0 +1,1 @@
+"""The expression graph: lowering from SymPy, derivatives, the rigid-link rule, operation counts."""

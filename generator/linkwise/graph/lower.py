@@ -36,7 +36,7 @@ class Lowering:
 
     def _lower(self, expr: sp.Expr) -> Node:
         g = self.graph
-        if expr.is_Symbol:
+        if isinstance(expr, sp.Symbol):
             if expr not in self.symbols:
                 raise LinkwiseError(
                     f"the symbol {expr.name!r} is neither a coordinate, its velocity nor a parameter; "

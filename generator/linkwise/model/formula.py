@@ -22,7 +22,7 @@ MAX_POWER = 8
 
 
 def parse_formula(text: str, parameters: Mapping[str, float]) -> Scalar:
-    """Number or expression that `text` says: numbers, parameters, pi, + − * / **, sin, cos, sqrt of numbers."""
+    """Number or expression that `text` says: numbers, parameters, pi, + - * / **, sin, cos, sqrt."""
     if len(text) > MAX_LENGTH:
         raise LinkwiseError(
             f"the formula {text[:20]!r}… is longer than {MAX_LENGTH} characters; name a parameter"

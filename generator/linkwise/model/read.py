@@ -17,7 +17,7 @@ MAX_PLANAR = 200
 
 
 def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
-    """Robot from a built-in name, a .toml or a .urdf file; raises LinkwiseError naming the file and the mend."""
+    """Robot from a built-in name or a file; raises LinkwiseError naming the file and the mend."""
     options = options or Options()
     with within(str(spec)):
         if match := re.fullmatch(r"planar([1-9]\d{0,2})", str(spec)):

@@ -1,0 +1,1 @@
+"""Link energies in SymPy, and the systems made of them."""

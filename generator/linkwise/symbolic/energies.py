@@ -21,8 +21,8 @@ def energy_system(
 ) -> System:
     """System from link energies, checked: every symbol known, degree at most 2 in the velocities.
 
-    `parameters` gives each other symbol its value; they become numbers unless `symbolic`. Velocity terms of the
-    potential count as kinetic, terms of the kinetic energy without velocities as potential.
+    `parameters` gives each other symbol its value; they become numbers unless `symbolic`. Velocity terms of
+    the potential count as kinetic, terms of the kinetic energy without velocities as potential.
 
     Raises LinkwiseError naming the link.
     """
@@ -36,7 +36,7 @@ def energy_system(
 
 
 def read_energies(path: Path, symbolic: bool = False) -> System:
-    """Run a Python file that defines `coordinates`, `links` and, if needed, `parameters`; see `energy_system`."""
+    """Run a Python file that defines `coordinates`, `links` and perhaps `parameters`, as `energy_system`."""
     try:
         scope: dict[str, Any] = runpy.run_path(str(path))
     except LinkwiseError:
@@ -89,7 +89,8 @@ def _checked(
     known = {c.q for c in coordinates} | set(velocities) | set(values)
     for symbol in sorted((kinetic - potential).free_symbols - known, key=str):
         raise LinkwiseError(
-            f"the symbol {symbol} is neither a coordinate (use its .q and .qd) nor among `parameters`; add it there"
+            f"the symbol {symbol} is neither a coordinate (use its .q and .qd) nor among `parameters`; "
+            "add it there"
         )
     if not symbolic:
         numbers = {symbol: sp.Float(float(value), 17) for symbol, value in values.items()}

@@ -30,7 +30,7 @@ class _Motion:
     height: Scalar
 
 
-class _Named(sp.Symbol):
+class _Named(sp.Symbol):  # type: ignore[misc]
     """Symbol of a definition, which no parameter of the same name equals."""
 
 
@@ -110,7 +110,7 @@ def _step(
     angle, rate = joint.ratio * coordinate.q, joint.ratio * coordinate.qd
     if joint.ratio == 1.0:
         angle, rate = coordinate.q, coordinate.qd
-    axis = tuple(row[2] for row in joint.rotation)
+    axis = joint.rotation[0][2], joint.rotation[1][2], joint.rotation[2][2]
     p = joint.translation
     if joint.kind == "prismatic":
         p = _map(lambda t, z: t + _times(z, angle), p, axis)

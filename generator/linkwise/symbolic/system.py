@@ -39,8 +39,8 @@ class LinkEnergy:
     """One link's kinetic and potential energy in J; L_j = kinetic − potential.
 
     `kinetic` may use the symbols of `twist`, `potential` those of `height`: named steps that continue the
-    exports of link `parent`, so that a long chain never has to be written out. Energies written by a user need
-    none. `body` is there for a rigid link only.
+    exports of link `parent`, so that a long chain never has to be written out. Energies written by a user
+    need none. `body` is there for a rigid link only.
     """
 
     name: str
