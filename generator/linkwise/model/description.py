@@ -13,7 +13,7 @@ IDENTITY: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Body:
     """A link as the file has it; inertia about the centre of mass, in the link's axes.
 
-    `unphysical` holds the file's own reason for an inertia that no rigid body has; empty means it must have one.
+    `unphysical` holds the file's own reason for an inertia that no rigid body has (empty: none).
     """
 
     name: str
@@ -34,7 +34,10 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Connection:
-    """A joint as the file has it: any type, any axis; axis in the joint's frame."""
+    """A joint as the file has it: any type, any axis; axis in the joint's frame.
+
+    Damping (N·m·s/rad or N·s/m) and friction (N·m or N) are reported only.
+    """
 
     name: str
     type: str
@@ -44,6 +47,8 @@ class Connection:
     translation: Vec3 = ZERO3
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     mimic: Mimic | None = None
+    damping: float = 0.0
+    friction: float = 0.0
 
 
 @dataclass(frozen=True)

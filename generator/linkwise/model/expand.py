@@ -4,20 +4,22 @@ from dataclasses import dataclass
 from typing import Literal
 
 from linkwise.errors import LinkwiseError
+from linkwise.model import geometry as geo
 from linkwise.model.description import Connection
-from linkwise.model.geometry import align_z
 from linkwise.model.robot import Note, is_finite
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 Vector = tuple[float, float, float]
-SINGLE = {
+Kind = Literal["revolute", "prismatic"]
+SINGLE: dict[str, Kind] = {
     "revolute": "revolute",
     "continuous": "revolute",
     "hinge": "revolute",
     "prismatic": "prismatic",
 }
-BALL = (("yaw", "revolute", Z), ("pitch", "revolute", Y), ("roll", "revolute", X))
-FLOATING = (("x", "prismatic", X), ("y", "prismatic", Y), ("z", "prismatic", Z), *BALL)
+Part = tuple[str, Kind, Vector]
+BALL: tuple[Part, ...] = (("yaw", "revolute", Z), ("pitch", "revolute", Y), ("roll", "revolute", X))
+FLOATING: tuple[Part, ...] = (("x", "prismatic", X), ("y", "prismatic", Y), ("z", "prismatic", Z), *BALL)
 KNOWN = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating", "ball")
 
 
@@ -26,9 +28,8 @@ class Axis:
     """One degree of freedom of a file's joint; `last` carries the child link."""
 
     name: str
-    connection: str
     suffix: str
-    kind: Literal["revolute", "prismatic"]
+    kind: Kind
     direction: Vector
     last: bool
 
@@ -39,47 +40,36 @@ class Axis:
 
 
 def expand(connection: Connection, notes: list[Note]) -> list[Axis]:
-    """Return the axes of a joint, none for a fixed one; raises LinkwiseError for an unknown type or zero axis.
+    """Return the axes of a joint, none for a fixed one; raises LinkwiseError for an unknown type.
 
-    A floating joint is x, y, z of its parent's frame, then yaw, pitch, roll about the moved z, y, x: the order of
-    rpy. A ball is its last three. A planar joint slides in the plane normal to its axis, then turns about it.
+    A floating joint is x, y, z of its parent's frame, then yaw, pitch, roll about the moved z, y, x: the
+    order of rpy. A ball is its last three. A planar joint slides in the plane normal to its axis, then
+    turns about it.
     """
     if connection.type == "fixed":
         return []
     if connection.type in SINGLE:
-        kind: Literal["revolute", "prismatic"] = SINGLE[connection.type]  # type: ignore[assignment]
-        return [Axis(connection.name, connection.name, "", kind, _unit(connection), True)]
-    if connection.type in ("floating", "ball"):
-        parts = FLOATING if connection.type == "floating" else BALL
-    elif connection.type == "planar":
-        columns = tuple(zip(*align_z(_unit(connection)), strict=True))
-        parts = (
-            ("x", "prismatic", columns[0]),
-            ("y", "prismatic", columns[1]),
-            ("yaw", "revolute", columns[2]),
-        )
-    else:
-        raise LinkwiseError(
-            f"joint {connection.name!r} has the unknown type {connection.type!r}; use one of {', '.join(KNOWN)}"
-        )
-    notes.append(
-        Note(
-            "expanded",
-            connection.name,
-            f"{connection.type}: " + ", ".join(part[0] for part in parts),
-        )
-    )
+        return [Axis(connection.name, "", SINGLE[connection.type], _unit(connection), True)]
+    parts = _parts(connection)
+    names = ", ".join(suffix for suffix, _, _ in parts)
+    notes.append(Note("expanded", connection.name, f"{connection.type}: {names}"))
     return [
-        Axis(
-            f"{connection.name}_{suffix}",
-            connection.name,
-            suffix,
-            kind,
-            direction,
-            index == len(parts) - 1,
-        )  # type: ignore[arg-type]
+        Axis(f"{connection.name}_{suffix}", suffix, kind, direction, index == len(parts) - 1)
         for index, (suffix, kind, direction) in enumerate(parts)
     ]
+
+
+def _parts(connection: Connection) -> tuple[Part, ...]:
+    if connection.type == "floating":
+        return FLOATING
+    if connection.type == "ball":
+        return BALL
+    if connection.type == "planar":
+        x, y, z = geo.transpose(geo.align_z(_unit(connection)))
+        return ("x", "prismatic", x), ("y", "prismatic", y), ("yaw", "revolute", z)
+    raise LinkwiseError(
+        f"joint {connection.name!r} has the unknown type {connection.type!r}; use one of {', '.join(KNOWN)}"
+    )
 
 
 def _unit(connection: Connection) -> Vector:

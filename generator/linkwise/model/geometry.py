@@ -1,7 +1,7 @@
 """Rotations and rigid transforms over numbers and symbols."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from linkwise.model.robot import Mat3, Rotation, Scalar, Vec3
 
@@ -23,7 +23,8 @@ def rotate(rotation: Rotation, a: Sequence[Scalar]) -> Vec3:
 
 def transpose(rotation: Rotation) -> Rotation:
     """Return the transpose."""
-    return tuple(zip(*rotation, strict=True))
+    a, b, c = zip(*rotation, strict=True)
+    return a, b, c
 
 
 def compose(a: Rotation, b: Rotation) -> Rotation:
@@ -92,12 +93,15 @@ def align_z(axis: Sequence[float]) -> Rotation:
 
 def snap(rows: Sequence[Sequence[float]]) -> Rotation:
     """Round entries within 1e-12 of −1, 0 or 1; ±90° turns then leave no 6e-17 behind."""
-    return tuple(
-        tuple(float(round(e)) + 0.0 if abs(e - round(e)) < SNAP else float(e) for e in row) for row in rows
-    )
+    return tuple(_row(row) for row in rows)
 
 
-def _sum(terms) -> Scalar:  # type: ignore[no-untyped-def]
+def _row(row: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = (float(round(e)) + 0.0 if abs(e - round(e)) < SNAP else float(e) for e in row)
+    return x, y, z
+
+
+def _sum(terms: Iterable[Scalar]) -> Scalar:
     total: Scalar = 0.0
     for term in terms:
         if isinstance(term, float) and term == 0.0:

@@ -11,8 +11,8 @@ TRIANGLE = 1e-6
 """Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
 
 SPECK = 1e-14
-"""m²: moments below mass · (100 nm)² count as zero. The moments of a point mass are zeros that turning and rounding
-leave at 1e-18 or 1e-35, of which no relative slack makes anything; a solid body that small weighs 1e-15 kg."""
+"""m²: moments below mass · (100 nm)² count as zero. The moments of a point mass are zeros that turning
+and rounding leave at 1e-18 or 1e-35, where no relative slack helps; a solid body so small weighs 1e-15 kg."""
 
 Placed = tuple[Body, Rotation, Vec3]
 

@@ -54,8 +54,8 @@ def numeric(description: Description) -> Description:
 def promoted(robot: Robot) -> Robot:
     """Return the robot with a named parameter for each number of its lengths, masses and inertias.
 
-    Zeros stay: they are the robot's structure, such as an arm's being planar. Names are m, c_x, I_xy of the link
-    and p_x of its joint, followed by the link's name.
+    Zeros stay: they are the robot's structure, such as an arm's being planar. Names are m, c_x, I_xy of the
+    link and p_x of its joint, followed by the link's name.
     """
     values = dict(robot.parameters)
 

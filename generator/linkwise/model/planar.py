@@ -13,7 +13,8 @@ def planar(n: int) -> Description:
 
     Link j has length l_j, centre of mass r_j along it, mass m_j and moment I_j about its centre of mass.
     """
-    bodies, connections, parameters = [Body("base")], [], []
+    bodies, connections = [Body("base")], list[Connection]()
+    parameters: list[tuple[str, float]] = []
     for j in range(1, n + 1):
         values = {f"l_{j}": LENGTH, f"r_{j}": CENTRE, f"m_{j}": MASS, f"I_{j}": INERTIA}
         r, m, moment = (sp.Symbol(name, real=True) for name in list(values)[1:])

@@ -6,13 +6,21 @@ from pathlib import Path
 
 from linkwise.errors import LinkwiseError, within
 from linkwise.model.assemble import Options, assemble
+from linkwise.model.description import Description
+from linkwise.model.mjcf_reader import read_mjcf
 from linkwise.model.planar import planar
 from linkwise.model.robot import Robot
 from linkwise.model.toml_reader import read_toml
-from linkwise.model.urdf_reader import read_urdf
+from linkwise.model.urdf_reader import read_urdf, root_tag
+
+
+def read_xml(path: Path) -> Description:
+    """Read MJCF where the root element says so, else URDF."""
+    return read_mjcf(path) if root_tag(path) == "mujoco" else read_urdf(path)
+
 
 BUILT_IN = ("planar3", "planarN (any N from 1)", "puma560")
-READERS = {".toml": read_toml, ".urdf": read_urdf, ".xml": read_urdf}
+READERS = {".toml": read_toml, ".urdf": read_urdf, ".xml": read_xml, ".mjcf": read_mjcf}
 MAX_PLANAR = 200
 
 

@@ -1,6 +1,7 @@
 """A rigid-body robot: links moved by one-coordinate joints, checked once when it is built."""
 
 import math
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -16,15 +17,15 @@ Mat3: TypeAlias = tuple[Vec3, Vec3, Vec3]
 Rotation: TypeAlias = tuple[tuple[float, float, float], ...]
 
 
-class _Position(sp.Symbol):
+class _Position(sp.Symbol):  # type: ignore[misc]
     """Symbols of different classes differ, whatever they are called: a joint may bear any name."""
 
 
-class _Velocity(sp.Symbol):
+class _Velocity(sp.Symbol):  # type: ignore[misc]
     pass
 
 
-class _Acceleration(sp.Symbol):
+class _Acceleration(sp.Symbol):  # type: ignore[misc]
     pass
 
 
@@ -55,8 +56,9 @@ class Coordinate:
 class Joint:
     """One degree of freedom between a parent link's frame and a link's frame.
 
-    The link's frame has its z axis on the joint's axis. With q the coordinate, a revolute joint places it at
-    `translation`, turned by `rotation` · Rz(ratio·q); a prismatic one at `translation` + `rotation` z ratio·q.
+    The link's frame has its z axis on the joint's axis. With q the coordinate, a revolute joint places it
+    at `translation`, turned by `rotation` · Rz(ratio·q); a prismatic one at `translation` + `rotation` z
+    ratio·q.
     """
 
     name: str
@@ -99,6 +101,8 @@ class Note:
         "expanded",
         "unphysical",
         "freed",
+        "damping",
+        "friction",
     ]
     subject: str
     detail: str = ""
@@ -125,10 +129,10 @@ class Robot:
             ("joint", [c.name for c in self.coordinates]),
             ("link", [link.name for link in self.links]),
         ):
-            for name in names:
+            for name, count in Counter(names).items():
                 if not name.strip():
                     raise LinkwiseError(f"a {what} has an empty name; name it")
-                if names.count(name) > 1:
+                if count > 1:
                     raise LinkwiseError(f"two {what}s are named {name!r}; rename one")
 
     def chain(self, link: int) -> tuple[int, ...]:

@@ -55,7 +55,7 @@ class _Table:
         x, y, z = self.vector(key, default)
         if not all(isinstance(item, float) for item in (x, y, z)):
             raise LinkwiseError(f"{self.place}: {key!r} takes numbers only, parameters cannot turn a frame")
-        return x, y, z  # type: ignore[return-value]
+        return x, y, z
 
 
 def read_toml(path: Path) -> Description:

@@ -12,32 +12,49 @@ from linkwise.model import geometry as geo
 from linkwise.model.description import Body, Connection, Description, Mimic
 from linkwise.model.robot import Note, Rotation
 
-UNUSED = (
-    "limit",
-    "dynamics",
-    "safety_controller",
-    "calibration",
-    "visual",
-    "collision",
-    "transmission",
-    "gazebo",
-)
+USED = {
+    "robot": {"link", "joint"},
+    "link": {"inertial"},
+    "joint": {"parent", "child", "origin", "axis", "mimic", "dynamics"},
+}
+"""What the dynamics use of each element; every other kind of child is noted as ignored."""
 
 
 def read_urdf(path: Path) -> Description:
     """Read a robot; raises LinkwiseError naming the element and the mend."""
-    try:
-        robot = fromstring(path.read_bytes())
-    except (ParseError, DefusedXmlException, UnicodeDecodeError, ValueError) as error:
-        raise LinkwiseError(f"malformed XML: {error}") from None
+    robot = _parse(path)
     if robot.tag != "robot":
         raise LinkwiseError(f"the root element is <{robot.tag}>; a URDF file has <robot>")
+    links, joints = robot.findall("link"), robot.findall("joint")
+    if not links:
+        raise LinkwiseError("<robot> is empty: the file has no <link>; give one that describes a robot")
     notes: list[Note] = []
-    bodies = tuple(_body(element) for element in robot.findall("link"))
-    connections = tuple(_connection(element, notes) for element in robot.findall("joint"))
-    counts = Counter(element.tag for element in robot.iter() if element.tag in UNUSED)
-    notes += [Note("ignored", tag, f"{count} ×") for tag, count in sorted(counts.items())]
+    bodies = tuple(_body(element) for element in links)
+    connections = tuple(_connection(element, notes) for element in joints)
+    notes += _ignored([robot, *links, *joints], connections)
     return Description(robot.get("name") or path.stem, bodies, connections, notes=tuple(notes))
+
+
+def root_tag(path: Path) -> str:
+    """Return the root element's name; raises LinkwiseError for malformed XML."""
+    return str(_parse(path).tag)
+
+
+def _parse(path: Path) -> Element:
+    try:
+        root: Element = fromstring(path.read_bytes())
+    except (ParseError, DefusedXmlException, UnicodeDecodeError, ValueError) as error:
+        raise LinkwiseError(f"malformed XML: {error}") from None
+    return root
+
+
+def _ignored(elements: list[Element], connections: tuple[Connection, ...]) -> list[Note]:
+    counts = Counter(
+        str(child.tag) for element in elements for child in element if child.tag not in USED[element.tag]
+    )
+    counts["damping"] = sum(c.damping != 0.0 for c in connections)
+    counts["friction"] = sum(c.friction != 0.0 for c in connections)
+    return [Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()) if count]
 
 
 def _numbers(element: Element, key: str, default: str, count: int, place: str) -> tuple[float, ...]:
@@ -86,27 +103,34 @@ def _body(element: Element) -> Body:
 def _connection(element: Element, notes: list[Note]) -> Connection:
     name = element.get("name", "")
     place = f"joint {name!r}"
-    ends = []
-    for role in ("parent", "child"):
-        end = element.find(role)
-        if end is None or not end.get("link"):
-            raise LinkwiseError(f"{place} has no <{role} link=…>; name the link")
-        ends.append(end.get("link", ""))
     raw, translation = _origin(element, place)
     rotation: Rotation = geo.snap(raw)
     if rotation != tuple(map(tuple, raw)):
         notes.append(Note("snapped", name, "rotation entries within 1e-12 of -1, 0, 1"))
     axis = element.find("axis")
     x, y, z = _numbers(axis, "xyz", "1 0 0", 3, place) if axis is not None else (1.0, 0.0, 0.0)
+    losses = element.find("dynamics")
+    if losses is None:
+        losses = Element("dynamics")
     return Connection(
         name,
         element.get("type", ""),
-        *ends,
+        _end(element, "parent", place),
+        _end(element, "child", place),
         rotation,
         translation,
         (x, y, z),
         _mimic(element, place),
+        _numbers(losses, "damping", "0", 1, place)[0],
+        _numbers(losses, "friction", "0", 1, place)[0],
     )
+
+
+def _end(element: Element, role: str, place: str) -> str:
+    end = element.find(role)
+    if end is None or not end.get("link"):
+        raise LinkwiseError(f"{place} has no <{role} link=…>; name the link")
+    return end.get("link", "")
 
 
 def _mimic(element: Element, place: str) -> Mimic | None:

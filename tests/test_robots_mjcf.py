@@ -1,0 +1,120 @@
+"""MJCF through MuJoCo's compiler, against MuJoCo's own inverse dynamics."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from answers import random_states, relative_error
+from linkwise import LinkwiseError, Options, generate, read_system, write_package
+from linkwise.check.package import import_package
+
+mujoco = pytest.importorskip("mujoco")
+
+MODEL = """<mujoco model="crane">
+<compiler angle="radian"/><option gravity="1 -2 -9"><flag contact="disable" constraint="disable"/></option>
+<worldbody><geom type="plane" size="1 1 1"/>
+  <body name="mast" pos="0.1 0 0.5" euler="0 1.5707963267948966 0">
+    <joint name="lift" type="slide" axis="1 0.5 0" ref="0.2" damping="{loss}"/>
+    <joint name="swing" type="hinge" axis="0 1 1" pos="0.1 0.2 0.3" ref="-0.4"/>
+    <geom type="box" size="0.1 0.2 0.3" pos="0.1 0 0" euler="0.3 0.2 0.1" mass="3"/>
+    <body pos="0 0 0.7" quat="0.9 0.1 0.3 0.2"><geom size="0.1" mass="0.5"/>
+      <body name="hook" pos="0.2 0 0"><joint name="neck" type="{kind}" pos="0 0.1 0"/>
+        <inertial pos="0.1 0 0.05" mass="1.5" fullinertia="0.02 0.03 0.04 0.001 0.002 -0.003"/>
+        <body pos="0 0 0.4"><joint axis="1 0 0" frictionloss="{loss}"/><geom size="0.05" mass="0.2"/></body>
+      </body>
+    </body>
+  </body>
+  {more}
+</worldbody>{actuator}</mujoco>"""
+FREE = """<body name="drone" pos="1 2 3" euler="0.1 0.2 0.3"><freejoint name="fly"/>
+  <geom type="box" size="0.1 0.2 0.05" pos="0.02 0 0.1" mass="0.8"/>
+  <body name="rotor" pos="0.1 0 0"><joint name="spin" axis="0 0 1"/><geom size="0.1" pos="0.1 0 0" mass="0.1"/></body>
+</body>"""
+
+
+def write(folder: Path, kind: str = "hinge", more: str = "", loss: float = 0.0, actuator: str = "") -> Path:
+    path = folder / "crane.xml"
+    path.write_text(MODEL.format(kind=kind, more=more, loss=loss, actuator=actuator))
+    return path
+
+
+def rates(angles: Any, turning: Any) -> tuple[Any, Any]:
+    """E with ω = E (yaw, pitch, roll)' in the turned frame, R = Rz Ry Rx, and its time derivative."""
+    (_, b, c), (_, db, dc) = angles, turning
+    sb, cb, sc, cc = np.sin(b), np.cos(b), np.sin(c), np.cos(c)
+    e = np.array([[-sb, 0, 1], [cb * sc, cc, 0], [cb * cc, -sc, 0]])
+    de = np.array(
+        [
+            [-cb * db, 0, 0],
+            [-sb * sc * db + cb * cc * dc, -sc * dc, 0],
+            [-sb * cc * db - cb * sc * dc, -cc * dc, 0],
+        ]
+    )
+    return e, de
+
+
+def quaternion(angles: Any) -> Any:
+    """Quaternion of Rz(yaw) Ry(pitch) Rx(roll)."""
+    turn = np.array([1.0, 0, 0, 0])
+    for angle, axis in zip(angles, np.eye(3)[::-1], strict=True):
+        step, result = np.array([np.cos(angle / 2), *(np.sin(angle / 2) * axis)]), np.empty(4)
+        mujoco.mju_mulQuat(result, turn, step)
+        turn = result
+    return turn
+
+
+def mujocos_torque(path: Path, names: tuple[str, ...], q: Any, qd: Any, qdd: Any) -> Any:
+    """Torques of MuJoCo's inverse dynamics in linkwise's coordinates, which stand in the order of its dofs."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    jacobian = np.eye(len(names))
+    bias = np.zeros(len(names))
+    qpos: list[float] = []
+    for k, name in enumerate(names):
+        if name.endswith("_yaw"):
+            turn = slice(k, k + 3)
+            jacobian[turn, turn], derivative = rates(q[turn], qd[turn])
+            bias[turn] = derivative @ qd[turn]
+            qpos += [*quaternion(q[turn])]
+        elif not name.endswith(("_pitch", "_roll")):
+            qpos.append(q[k])
+    data.qpos, data.qvel, data.qacc = qpos, jacobian @ qd, jacobian @ qdd + bias
+    mujoco.mj_inverse(model, data)
+    return jacobian.T @ data.qfrc_inverse
+
+
+@pytest.mark.parametrize(("kind", "more"), [("hinge", ""), ("ball", ""), ("slide", FREE)])
+def test_torques_sum_to_mujocos_inverse_dynamics(kind: str, more: str, tmp_path: Path) -> None:
+    path = write(tmp_path, kind, more)
+    write_package(generate(read_system(path), ["numpy"]), tmp_path / "crane")
+    dynamics = import_package(tmp_path / "crane").load("numpy")
+    states = random_states(dynamics.n, 50)
+    expected = [mujocos_torque(path, dynamics.joint_names, *state) for state in zip(*states, strict=True)]
+    assert relative_error(dynamics.inverse_dynamics(*states), expected) <= 1e-12
+
+
+def test_what_is_not_used_is_named(tmp_path: Path) -> None:
+    path = write(tmp_path, loss=0.3, actuator='<actuator><motor joint="swing"/></actuator>')
+    notes = read_system(path, Options(joint_friction=True)).robot.notes
+    ignored = {note.subject: note.detail for note in notes if note.kind == "ignored"}
+    assert ignored == {"actuator": "1 ×", "damping": "1 ×", "friction": "1 ×", "geom": "4 ×"}
+    losses = [
+        (note.kind, note.subject, note.detail) for note in notes if note.kind in ("damping", "friction")
+    ]
+    assert losses == [("damping", "lift", "0.3 N·s/m"), ("friction", "body4_joint", "0.3 N·m")]
+    assert ("snapped", "mast") in {(note.kind, note.subject) for note in notes}
+
+
+def test_what_mujoco_refuses_is_told_in_its_words(tmp_path: Path) -> None:
+    path = tmp_path / "bad.xml"
+    path.write_text('<mujoco><worldbody><body><joint type="screw"/></body></worldbody></mujoco>')
+    with pytest.raises(LinkwiseError, match=r"bad\.xml: MuJoCo cannot compile it: .*screw|invalid keyword"):
+        read_system(path)
+
+
+def test_without_mujoco_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(LinkwiseError, match=r"pip install linkwise\[mjcf\]"):
+        read_system(write(tmp_path))
