@@ -1,6 +1,7 @@
 """The emitted C, compiled strictly and called through the functions of its header."""
 
 import ctypes
+import json
 import re
 import subprocess
 import tempfile
@@ -26,9 +27,9 @@ class Compiled:
 
     def __init__(self, directory: Path, parameters: Sequence[float] = ()) -> None:
         self.parameters = list(parameters)
-        header = next((directory / "c").glob("*.h"))
-        self.name = header.stem
-        sizes = dict(re.findall(r"([A-Z0-9_]+) = (\d+)", header.read_text()))
+        self.name = json.loads((directory / "manifest.json").read_text())["name"]
+        header = (directory / "c" / f"{self.name}.h").read_text()
+        sizes = dict(re.findall(r"([A-Z0-9_]+) = (\d+)", header))
         prefix = self.name.upper()
         keys = {"acceleration": "C2", "velocity": "C1", "gravity": "G", "torque": "G", "linear": "H1"}
         self.sizes = {field: int(sizes[f"{prefix}_{key}"]) for field, key in keys.items()}
