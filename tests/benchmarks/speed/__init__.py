@@ -1,0 +1,1 @@
+"""Parts of bench_speed.py: what is timed, and against what."""

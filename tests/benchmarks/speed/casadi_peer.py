@@ -1,0 +1,101 @@
+"""CasADi: automatic differentiation of each link's energy, cse, generated C, one sample at a time."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from speed.package import PEERS, Package, build_flags, compiler, run
+
+
+@dataclass(frozen=True)
+class CasadiPeer:
+    """Nanoseconds a sample, operations, seconds to derive and compile, largest difference from ours."""
+
+    ns: float
+    operations: int
+    derive_seconds: float
+    compile_seconds: float
+    difference: float
+
+
+def measure(package: Package, work: Path) -> CasadiPeer:
+    """Derive, check, compile, time."""
+    import casadi as ca
+
+    start = time.perf_counter()
+    function = ca.Function("decomposition", *decomposition(package))
+    derived = time.perf_counter() - start
+    n = package.sizes["JOINTS"]
+    motion = np.random.default_rng(1).uniform(-2, 2, (3, n))
+    packed = package.module().load("numpy").packed(*motion)
+    theirs = np.array(function(*motion)).ravel()
+    difference = np.abs(np.concatenate(packed[:4]) - theirs).max()
+    source, program = work / f"casadi_{package.name}.c", work / f"casadi_{package.name}"
+    code = ca.CodeGenerator(source.name, {"casadi_int": "long long int"})
+    code.add(function)
+    code.generate(f"{work}/")
+    start = time.perf_counter()
+    sources = [str(source), str(PEERS / "one.c")]
+    run([compiler() or "cc", "-std=c99", *build_flags(), *sources, "-lm", "-o", str(program)])
+    compiled = time.perf_counter() - start
+    ns = float(run([str(program), str(n), str(package.outputs)]).split()[1])
+    return CasadiPeer(ns, function.n_instructions(), derived, compiled, float(difference))
+
+
+def decomposition(package: Package) -> tuple[list[object], list[object]]:
+    """Inputs and the packed outputs: c2, c1, g, tau."""
+    import casadi as ca
+
+    n = package.sizes["JOINTS"]
+    q, qd, qdd = (ca.SX.sym(name, n) for name in ("q", "qd", "qdd"))
+    c2, c1, g, tau = [], [], [], []
+    for (kinetic, potential), link in zip(energies(package, q, qd), package.manifest["links"], strict=True):
+        path = link["path"]
+        mass = ca.hessian(kinetic, qd)[0]
+        velocity = ca.jtimes(ca.gradient(kinetic, qd), q, qd) - ca.gradient(kinetic, q)
+        closing = ca.jacobian(velocity, qd) / 2
+        gravity = ca.gradient(potential, q)
+        torque = mass @ qdd + velocity + gravity
+        c2 += [mass[i, k] for a, i in enumerate(path) for k in path[a:]]
+        c1 += [closing[i, k] for i in path for k in path]
+        g += [gravity[i] for i in path]
+        tau += [torque[i] for i in path]
+    return [q, qd, qdd], ca.cse([ca.vertcat(*c2, *c1, *g, *tau)])
+
+
+def energies(package: Package, q: object, qd: object) -> list[tuple[object, object]]:
+    """Kinetic and potential energy of each link, from the manifest's skeleton."""
+    import casadi as ca
+
+    gravity = ca.DM(package.manifest["conventions"]["gravity"])
+    frames: list[tuple[object, ...]] = []
+    found = []
+    axis = ca.DM([0, 0, 1])
+    for link in package.manifest["skeleton"]:
+        rest = ca.DM.eye(3), ca.DM.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3)
+        turn, place, spin, speed = rest if link["parent"] is None else frames[link["parent"]]
+        arm = ca.DM(link["translation"])
+        rotation = ca.sparsify(ca.DM(link["rotation"]))
+        x, xd = q[link["coordinate"]], qd[link["coordinate"]]
+        here = place + turn @ arm
+        if link["kind"] == "revolute":
+            s, c = ca.sin(x), ca.cos(x)
+            about = ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
+            local = rotation @ about
+            rate = local.T @ spin + axis * xd
+            moved = local.T @ (speed + ca.cross(spin, arm))
+        else:
+            local = rotation
+            here = here + turn @ rotation @ axis * x
+            rate = rotation.T @ spin
+            moved = rotation.T @ (speed + ca.cross(spin, arm + rotation @ axis * x)) + axis * xd
+        turn = turn @ local
+        frames.append((turn, here, rate, moved))
+        com, inertia, m = ca.DM(link["com"]), ca.DM(link["inertia"]), link["mass"]
+        v = moved + ca.cross(rate, com)
+        found.append(
+            ((m * ca.dot(v, v) + ca.dot(rate, inertia @ rate)) / 2, -m * ca.dot(gravity, here + turn @ com))
+        )
+    return found

@@ -1,0 +1,99 @@
+"""Generating a robot's package and compiling its C: what it costs, and what comes out."""
+
+import importlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from speed.cases import Case
+
+PEERS = Path(__file__).parent.parent / "peers"
+
+
+@dataclass(frozen=True)
+class Package:
+    """A generated package, its manifest and the library that its own loader compiled."""
+
+    name: str
+    directory: Path
+    manifest: dict[str, Any]
+    library: Path
+    sizes: dict[str, int]
+    generate_seconds: float
+    compile_seconds: float
+    code_bytes: int
+
+    @property
+    def operations(self) -> int:
+        """Additions and multiplications of all links."""
+        return sum(link["operations"] for link in self.manifest["links"])
+
+    @property
+    def outputs(self) -> int:
+        """Values of one sample."""
+        return sum(self.sizes[what] for what in ("C2", "C1", "G", "G", "H1"))
+
+    def module(self) -> ModuleType:
+        """Return the package itself."""
+        return importlib.import_module(self.name)
+
+
+def prepare(case: Case, work: Path) -> Package:
+    """Generate with all back ends in a process of its own, then compile into an empty cache."""
+    command = [sys.executable, "-m", "linkwise", "generate", case.robot(work), *case.options]
+    start = time.perf_counter()
+    subprocess.run([*command, "--name", case.name, "--out", str(work)], check=True, capture_output=True)
+    generated = time.perf_counter() - start
+    if str(work) not in sys.path:
+        sys.path.insert(0, str(work))
+    cache = work / "cache" / case.name
+    shutil.rmtree(cache, ignore_errors=True)
+    os.environ["LINKWISE_CACHE"] = str(cache)
+    build = importlib.import_module(f"{case.name}.native_build")
+    start = time.perf_counter()
+    library = build.library()
+    compiled = time.perf_counter() - start
+    directory = work / case.name
+    header = (directory / "c" / f"{case.name}.h").read_text(encoding="utf-8")
+    sizes = {key: int(value) for key, value in re.findall(rf"{case.name.upper()}_(\w+) = (\d+)", header)}
+    manifest = json.loads((directory / "manifest.json").read_text(encoding="utf-8"))
+    return Package(case.name, directory, manifest, library, sizes, generated, compiled, code_size(library))
+
+
+def code_size(library: Path) -> int:
+    """Bytes of machine code and constants."""
+    if not shutil.which("size"):
+        return library.stat().st_size
+    lines = subprocess.run(["size", str(library)], check=True, capture_output=True, text=True).stdout
+    return int(lines.splitlines()[1].split()[0])
+
+
+def build_flags() -> tuple[str, ...]:
+    """What peers in C are compiled with."""
+    return ("-O3", "-march=native")
+
+
+def compiler() -> str | None:
+    """Return a C compiler's name."""
+    return next((c for c in ("cc", "gcc", "clang") if shutil.which(c)), None)
+
+
+def run(command: list[str], given: str | None = None) -> str:
+    """Run a program and return what it prints; its complaint goes into the error."""
+    done = subprocess.run(command, input=given, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"{Path(command[0]).name} failed ({done.returncode}): {done.stderr[:500]}")
+    return done.stdout
+
+
+def pairs(text: str) -> dict[str, float]:
+    """Read "name value" lines."""
+    return {key: float(value) for key, value in (line.split() for line in text.splitlines())}

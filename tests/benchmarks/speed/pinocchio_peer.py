@@ -1,0 +1,142 @@
+"""Pinocchio beside us: rnea() of the robot, and the full decomposition by its best recipe."""
+
+import shutil
+import sysconfig
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from speed.package import PEERS, Package, build_flags, run
+
+BOOST = (
+    "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
+    "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30",
+    "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
+    "-DBOOST_FUSION_INVOKE_MAX_ARITY=12",
+)
+"""As Pinocchio's own CMake files have it: its joint types are more than Boost's lists hold by default."""
+
+
+@dataclass(frozen=True)
+class Peer:
+    """Nanoseconds for one sample, how they were measured, and the largest difference from our torques."""
+
+    how: str
+    rnea: float
+    decomposition: float
+    difference: float
+
+
+def headers() -> list[Path] | None:
+    """Directories with Pinocchio's, Boost's and Eigen's headers, if all are there."""
+    packages = Path(sysconfig.get_paths()["purelib"])
+    prefix = packages / "cmeel.prefix" / "include"
+    eigen = [
+        prefix / "eigen3",
+        packages / "casadi" / "include" / "eigen3",
+        Path("/usr/include/eigen3"),
+        Path("/usr/local/include/eigen3"),
+    ]
+    found = next((path for path in eigen if (path / "Eigen" / "Core").exists()), None)
+    if found is None or not (prefix / "pinocchio").is_dir() or not (prefix / "boost").is_dir():
+        return None
+    return [prefix, found]
+
+
+def binary(work: Path) -> Path | None:
+    """Compile the C++ program; None where a compiler or headers are missing."""
+    include = headers()
+    compiler = next((c for c in ("c++", "g++", "clang++") if shutil.which(c)), None)
+    if include is None or compiler is None:
+        return None
+    program = work / "pinocchio_peer"
+    source = PEERS / "pinocchio.cpp"
+    if not program.exists() or program.stat().st_mtime < source.stat().st_mtime:
+        flags = ["-std=c++17", *build_flags(), *BOOST, "-DNDEBUG", "-w", *(f"-I{path}" for path in include)]
+        try:
+            run([compiler, *flags, str(source), "-o", str(program)])
+        except RuntimeError as error:
+            print(f"Pinocchio from Python, as its C++ did not compile: {str(error)[:200]}")
+            return None
+    return program
+
+
+def measure(package: Package, work: Path) -> Peer:
+    """Time Pinocchio on this robot, in C++ if possible."""
+    program = binary(work)
+    n = package.sizes["JOINTS"]
+    ours = package.module().load("numpy").packed_torque(*np.tile(0.1 * np.arange(1, n + 1), (3, 1)))
+    if program is None:
+        return from_python(package, ours)
+    rnea, decomposition, tau = run([str(program)], description(package)).splitlines()
+    difference = np.abs(np.array(tau.split()[1:], dtype=float) - ours).max()
+    return Peer("C++", float(rnea.split()[1]), float(decomposition.split()[1]), float(difference))
+
+
+def description(package: Package) -> str:
+    """The robot as peers/pinocchio.cpp reads it."""
+    links = package.manifest["skeleton"]
+    lines = [" ".join(map(repr, [len(links), *package.manifest["conventions"]["gravity"]]))]
+    for k, link in enumerate(links):
+        if link["coordinate"] != k or link["ratio"] != 1.0:
+            raise ValueError(f"{package.name}: the peer knows only one joint of its own for each link")
+        numbers = [*np.ravel(link["rotation"]), *link["translation"], link["mass"], *link["com"]]
+        parent = -1 if link["parent"] is None else link["parent"]
+        text = " ".join(repr(float(x)) for x in [*numbers, *np.ravel(link["inertia"])])
+        lines.append(f"{parent} {link['kind']} {text}")
+    return "\n".join([*lines, ""])
+
+
+def chain(package: Package, links: list[int], only: int | None) -> Any:
+    """Pinocchio's model of these links' joints; with the inertia of one link, or of all."""
+    import pinocchio as pin
+
+    model, index = pin.Model(), {}
+    for j in links:
+        link = package.manifest["skeleton"][j]
+        joint = pin.JointModelPZ() if link["kind"] == "prismatic" else pin.JointModelRZ()
+        place = pin.SE3(np.array(link["rotation"]), np.array(link["translation"]))
+        index[j] = model.addJoint(index.get(link["parent"], 0), joint, place, str(j))
+        if only in (None, j):
+            body = pin.Inertia(link["mass"], np.array(link["com"]), np.array(link["inertia"]))
+            model.appendBodyToJoint(index[j], body, pin.SE3.Identity())
+    model.gravity.linear = np.array(package.manifest["conventions"]["gravity"])
+    return model
+
+
+def from_python(package: Package, ours: Any) -> Peer:
+    """The same recipe through Pinocchio's Python."""
+    import pinocchio as pin
+
+    paths = [link["path"] for link in package.manifest["links"]]
+    whole = chain(package, list(range(len(paths))), None)
+    chains = [chain(package, path, j) for j, path in enumerate(paths)]
+    data, parts = whole.createData(), [(m, m.createData()) for m in chains]
+    x = 0.1 * np.arange(1, whole.nv + 1)
+    motions = [x[path] for path in paths]
+
+    def decomposition() -> None:
+        for (model, store), y in zip(parts, motions, strict=True):
+            pin.rnea(model, store, y, y, y)
+            pin.crba(model, store, y)
+            pin.computeCoriolisMatrix(model, store, y, y)
+            pin.computeGeneralizedGravity(model, store, y)
+
+    tau = np.concatenate([pin.rnea(*part, y, y, y) for part, y in zip(parts, motions, strict=True)])
+    rnea = least(lambda: pin.rnea(whole, data, x, x, x))
+    return Peer("Python", rnea, least(decomposition), float(np.abs(tau - ours).max()))
+
+
+def least(call: Callable[[], Any]) -> float:
+    """Least nanoseconds a call of 25 times 50 calls."""
+    found = []
+    for _ in range(25):
+        start = time.perf_counter_ns()
+        for _ in range(50):
+            call()
+        found.append((time.perf_counter_ns() - start) / 50)
+    return min(found)

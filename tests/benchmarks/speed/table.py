@@ -1,0 +1,132 @@
+"""The table, in Markdown."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from speed.emitted import TYPES, Figure
+from speed.results import Results
+from speed.targets import Target, targets
+
+
+def markdown(results: Results) -> str:
+    """All sections."""
+    parts = [
+        ", ".join(f"{key} {value}" for key, value in results.machine.items()),
+        "## Packages",
+        table(PACKAGE_HEAD, packages(results)),
+        "## Emitted C, nanoseconds a sample",
+        table(
+            ["robot", "type", "layout", "threads", *BATCHES, "of arithmetic", "of memory"], emitted(results)
+        ),
+        f"Limits, one thread: {results.limits['flops']:.0f} GFlop/s in float64,"
+        f" {results.limits['flopsf']:.0f} in float32, additions and"
+        " multiplications apart; of memory: of filling an array of the same bytes."
+        " Shares at the largest batch, of arithmetic also at 1,024.",
+        "## Back ends from Python, nanoseconds a sample",
+        table(["robot", "back end", "type", "threads", *BATCHES], backends(results)),
+        "## Peers, float64, one thread, nanoseconds a sample",
+        table(PEER_HEAD, peers(results)),
+        "## Targets",
+        table(["target", "measured", "wanted", ""], (row(target) for target in targets(results))),
+        *[f"Note: {note}" for note in results.notes],
+    ]
+    return "\n\n".join(parts)
+
+
+PACKAGE_HEAD = ["robot", "joints", "outputs", "operations", "generate s", "compile s", "code kB"]
+PEER_HEAD = [
+    "robot", "Pinocchio through", "rnea", "its full decomposition", "CasADi C", "ours, one", "ours, 1,024",
+    "Pinocchio/ours", "one sample", "largest difference",
+]  # fmt: skip
+BATCHES = ["1", "1,024", "largest"]
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Columns as wide as their widest cell."""
+    cells = [list(head), *map(list, rows)]
+    widths = [max(len(line[c]) for line in cells) for c in range(len(head))]
+    lines = [
+        "| " + " | ".join(t.ljust(w) for t, w in zip(line, widths, strict=True)) + " |" for line in cells
+    ]
+    return "\n".join([lines[0], "|" + "|".join("-" * (w + 2) for w in widths) + "|", *lines[1:]])
+
+
+def packages(results: Results) -> Iterator[list[str]]:
+    """One row a robot."""
+    for p in results.packages:
+        yield [
+            p["robot"], str(p["joints"]), f"{p['outputs']:,}", f"{p['operations']:,}",
+            f"{p['generate_seconds']:.1f}", f"{p['compile_seconds']:.1f}", f"{p['code_bytes'] / 1000:,.0f}",
+        ]  # fmt: skip
+
+
+def emitted(results: Results) -> Iterator[list[str]]:
+    """One row a robot, number type, layout and number of threads."""
+    for p in results.packages:
+        for dtype in TYPES:
+            for layout in ("rows", "blocks"):
+                for threads in (1, 2):
+                    by_batch = results.find(p["robot"], "C", dtype, layout, threads)
+                    key = (p["robot"], "C", dtype, layout)
+                    figures = [Figure(*key, b, threads, ns) for b, ns in by_batch.items() if b > 1]
+                    if figures:
+                        shares = [f"{results.arithmetic_share(f):.0%}" for f in figures]
+                        yield [
+                            p["robot"], dtype, layout, str(threads), *cells(by_batch),
+                            ", ".join(shares), f"{results.memory_share(figures[-1]):.0%}",
+                        ]  # fmt: skip
+
+
+def backends(results: Results) -> Iterator[list[str]]:
+    """One row a robot, back end, number type and number of threads."""
+    seen = dict.fromkeys(
+        (f.robot, f.through, f.dtype, f.threads) for f in results.figures if f.through != "C"
+    )
+    for robot, backend, dtype, threads in seen:
+        by_batch = results.find(robot, backend, dtype, "rows", threads)
+        yield [robot, backend, dtype, str(threads), *cells(by_batch)]
+
+
+def cells(by_batch: dict[int, float]) -> list[str]:
+    """Figures for one sample, for 1,024, and for more; the last names its batch if it isn't 65,536."""
+    more = max((b for b in by_batch if b > 1024), default=0)
+    return [
+        number(by_batch.get(1)),
+        number(by_batch.get(1024)),
+        number(by_batch.get(more)) + (f" ({more:,})" if more not in (0, 65536) else ""),
+    ]
+
+
+def peers(results: Results) -> Iterator[list[str]]:
+    """One row a robot."""
+    for p in results.packages:
+        robot = p["robot"]
+        one = results.find(robot, "C", "float64", "rows").get(1)
+        batch = results.find(robot, "C", "float64", "blocks").get(1024)
+        pin, casadi = results.pinocchio.get(robot), results.casadi.get(robot)
+        whole = pin.decomposition if pin else None
+        yield [
+            robot, pin.how if pin else "-", number(pin.rnea if pin else None), number(whole),
+            number(casadi.ns if casadi else None), number(one), number(batch),
+            times(whole, batch), times(whole, one),
+            f"{max(x.difference for x in (pin, casadi) if x):.1e}" if pin or casadi else "-",
+        ]  # fmt: skip
+
+
+def number(ns: float | None) -> str:
+    """Nanoseconds for reading: three digits at least."""
+    if ns is None:
+        return "-"
+    return f"{ns:,.0f}" if ns >= 100 else f"{ns:.1f}"
+
+
+def times(theirs: float | None, ours: float | None) -> str:
+    """How many times faster we are."""
+    return f"{theirs / ours:,.0f}×" if theirs and ours else "-"
+
+
+def row(target: Target) -> list[str]:
+    """One target as a row."""
+    sign = "≤" if target.at_most else "≥"
+    measured = "-" if target.measured is None else f"{target.measured:,.4g} {target.unit}"
+    verdict = "not measured" if target.met is None else "met" if target.met else "NOT MET"
+    return [target.what, measured, f"{sign} {target.wanted:,g} {target.unit}", verdict]
