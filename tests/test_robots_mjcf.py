@@ -30,7 +30,8 @@ MODEL = """<mujoco model="crane">
 </worldbody>{actuator}</mujoco>"""
 FREE = """<body name="drone" pos="1 2 3" euler="0.1 0.2 0.3"><freejoint name="fly"/>
   <geom type="box" size="0.1 0.2 0.05" pos="0.02 0 0.1" mass="0.8"/>
-  <body name="rotor" pos="0.1 0 0"><joint name="spin" axis="0 0 1"/><geom size="0.1" pos="0.1 0 0" mass="0.1"/></body>
+  <body name="rotor" pos="0.1 0 0"><joint name="spin" axis="0 0 1"/>
+    <geom size="0.1" pos="0.1 0 0" mass="0.1"/></body>
 </body>"""
 
 
@@ -66,7 +67,7 @@ def quaternion(angles: Any) -> Any:
 
 
 def mujocos_torque(path: Path, names: tuple[str, ...], q: Any, qd: Any, qdd: Any) -> Any:
-    """Torques of MuJoCo's inverse dynamics in linkwise's coordinates, which stand in the order of its dofs."""
+    """Torques of MuJoCo's inverse dynamics in linkwise's coordinates, in the order of its dofs."""
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     jacobian = np.eye(len(names))

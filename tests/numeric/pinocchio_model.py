@@ -54,7 +54,7 @@ class PinocchioModel:
         self.model.gravity.linear = np.array(system.robot.gravity, dtype=float)
         self.n = len(system.coordinates)
         self.maps = self._maps(path, system, lock or {})
-        self.alone = {link.name: self._alone(link.name) for link in system.links}
+        self.alone = {link.name: self._alone(link.name, lock or {}) for link in system.links}
 
     def _maps(self, path: Path, system: Any, lock: dict[str, float]) -> list[Map]:
         mimics = {c.name: c.mimic for c in read_urdf(path).connections if c.mimic}
@@ -77,13 +77,17 @@ class PinocchioModel:
                 maps.append(Map(*where, index[name]))
         return maps
 
-    def _alone(self, link: str) -> Any:
-        """The model with only the mass that moves with `link`."""
+    def _alone(self, link: str, lock: dict[str, float]) -> Any:
+        """The model with only the mass that moves with `link`, what hangs on it by locked joints included."""
         alone = self.model.copy()
-        joint = self.model.frames[self.model.getFrameId(link, pin.BODY)].parentJoint
-        for other in range(alone.njoints):
-            if other != joint:
-                alone.inertias[other] = pin.Inertia.Zero()
+        still = {self.model.getJointId(name) for name in lock}
+        moves_with = list(range(alone.njoints))
+        for joint in sorted(still):
+            moves_with[joint] = moves_with[alone.parents[joint]]
+        own = moves_with[self.model.frames[self.model.getFrameId(link, pin.BODY)].parentJoint]
+        for joint in range(alone.njoints):
+            if moves_with[joint] != own:
+                alone.inertias[joint] = pin.Inertia.Zero()
         return alone
 
     def torque(self, q: Any, qd: Any, qdd: Any, link: str | None = None) -> Any:

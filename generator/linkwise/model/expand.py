@@ -1,5 +1,6 @@
 """Joint types as chains of revolute and prismatic axes."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -76,7 +77,7 @@ def _unit(connection: Connection) -> Vector:
     x, y, z = connection.axis
     if not all(is_finite(a) for a in connection.axis):
         raise LinkwiseError(f"joint {connection.name!r} has NaN or infinity in its axis; give numbers")
-    length = (x * x + y * y + z * z) ** 0.5
+    length = math.hypot(x, y, z)
     if length < 1e-9:
         raise LinkwiseError(f"joint {connection.name!r} has a zero axis; give its direction, such as 0 0 1")
     return x / length, y / length, z / length

@@ -50,7 +50,9 @@ def rotate_inertia(rotation: Rotation, inertia: Mat3) -> Mat3:
 
 
 def from_rpy(roll: float, pitch: float, yaw: float) -> list[list[float]]:
-    """Return Rz(yaw) Ry(pitch) Rx(roll), as URDF defines rpy; not snapped."""
+    """Return Rz(yaw) Ry(pitch) Rx(roll), as URDF defines rpy; not snapped. All NaN for an infinite angle."""
+    if not all(map(math.isfinite, (roll, pitch, yaw))):
+        return [[math.nan] * 3] * 3
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     cy, sy = math.cos(yaw), math.sin(yaw)
     return [
@@ -97,8 +99,14 @@ def snap(rows: Sequence[Sequence[float]]) -> Rotation:
 
 
 def _row(row: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = (float(round(e)) + 0.0 if abs(e - round(e)) < SNAP else float(e) for e in row)
+    x, y, z = (_near_whole(e) for e in row)
     return x, y, z
+
+
+def _near_whole(e: float) -> float:
+    if not math.isfinite(e):
+        return e
+    return float(round(e)) + 0.0 if abs(e - round(e)) < SNAP else float(e)
 
 
 def _sum(terms: Iterable[Scalar]) -> Scalar:
