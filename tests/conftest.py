@@ -1,7 +1,8 @@
 """Packages that tests share: each robot is generated once a session and imported from its folder."""
 
+import shutil
 import sysconfig
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -19,6 +20,15 @@ OPTIONS = {
     str(PANDA): Options(lock=LOCKED_FINGERS),
     "planar3 symbolic": Options("symbolic"),
 }
+needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Compiled packages go into a directory of the session, not the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LINKWISE_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 @pytest.fixture(scope="session")

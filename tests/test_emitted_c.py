@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from answers import random_states, relative_error
 from compiled import Compiled, compile_library
-from conftest import DATA
+from conftest import DATA, needs_compiler
 
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+pytestmark = needs_compiler
 ROBOTS = ["planar3", "planar3 symbolic", "puma560", str(DATA / "turntable.py")]
 
 

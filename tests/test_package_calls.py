@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 from answers import random_states, relative_error
+from conftest import needs_compiler
 
 torch = pytest.importorskip("torch")
 
-BACKENDS = ("numpy", "torch", "autograd")
+BACKENDS = ("numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler))
 TORCH = ("torch", "autograd")
 
 
 def states_of(backend: str, *shape: int, dtype: str = "float64") -> tuple[Any, ...]:
     arrays = np.random.default_rng(1).uniform(-2.0, 2.0, (3, *shape)).astype(dtype)
-    return tuple(arrays) if backend == "numpy" else tuple(torch.from_numpy(arrays))
+    return tuple(arrays) if backend in ("numpy", "native") else tuple(torch.from_numpy(arrays))
 
 
 @pytest.mark.parametrize("batch", [(), (1,), (5,), (2, 3), (0,)])

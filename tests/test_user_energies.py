@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import sympy as sp
 from answers import packed, random_states, relative_error
-from conftest import DATA
+from conftest import DATA, needs_compiler
 from linkwise import Coordinate, LinkEnergy, LinkwiseError, energy_system, generate, read_system
 
 CART, TURNTABLE = str(DATA / "cart_pendulum.py"), str(DATA / "turntable.py")
-BACKENDS = ("numpy", "torch", "autograd", "c")
+BACKENDS = ("numpy", "torch", "autograd", *(pytest.param(b, marks=needs_compiler) for b in ("c", "native")))
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
@@ -54,6 +54,7 @@ def test_moving_base_closes_and_its_linear_terms_agree_in_both_conventions(
     assert relative_error(velocity, 2 * quadratic + linear) <= 1e-14
 
 
+@needs_compiler
 def test_emitted_c_has_the_linear_part_too(
     directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from answers import packed, random_states, relative_error
-from conftest import PANDA
+from conftest import PANDA, needs_compiler
 
 pytest.importorskip("pinocchio")
 
@@ -30,7 +30,10 @@ def pinocchio_says(robot: str, joints: tuple[str, ...]) -> dict[str, Any]:
     return KNOWN[robot]
 
 
-@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd", "c"])
+@pytest.mark.parametrize(
+    "backend",
+    ["numpy", "torch", "autograd", *(pytest.param(b, marks=needs_compiler) for b in ("c", "native"))],
+)
 @pytest.mark.parametrize("robot", MODELS, ids=["planar3", "puma560", "panda"])
 def test_decomposition_of_every_link_is_pinocchios(
     robot: str,
