@@ -10,8 +10,9 @@ from linkwise import Options, generate, read_system, write_package
 from linkwise.check.package import import_package
 from urdf_text import chain, joint, link, mimic, robot
 
-pin = pytest.importorskip("pinocchio")
+pytest.importorskip("pinocchio")
 
+import pinocchio as pin
 from numeric.pinocchio_model import PinocchioModel
 
 AB, BC, CD = (joint(a + b, a, b) for a, b in ("ab", "bc", "cd"))

@@ -1,0 +1,114 @@
+"""The table and the plot of the corpus."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+HEAD = (
+    "| robot | joints | links | merged | mimic | massless | s | MB | operations | outputs | error of sums | "
+    "error of each link |\n|---|" + "---|" * 11
+)
+LIMIT = 1e-9
+"""Largest error allowed, relative."""
+
+
+def line(row: dict[str, Any]) -> str:
+    """One row of the Markdown table."""
+    flags = "".join(
+        f" --{key.replace('_', '-')}" + ("" if value is True else f" {value}")
+        for key, value in row["options"].items()
+    )
+    name = Path(row["file"]).stem + flags
+    if "seconds" not in row:
+        reason = row.get("refused") or f"CRASHED: {row.get('crashed')}"
+        return f"| {name} | {reason} |" + " |" * 10
+    return (
+        f"| {name} | {row['joints']} | {row['links']} | {row['merged']} | {row['mimic']} | "
+        f"{row['massless']} | {row['seconds']:.1f} | {row['megabytes']:.0f} | {row['operations']} | "
+        f"{row['outputs']} | {row['error_sum']:.0e} | {row['error_link']:.0e} |"
+    )
+
+
+def summary(rows: list[dict[str, Any]]) -> str:
+    """What the corpus shows, in a few lines."""
+    files = {row["file"] for row in rows}
+    made = [row for row in rows if "seconds" in row]
+    right = [row for row in made if max(row["error_sum"], row["error_link"]) <= LIMIT]
+    plain = {row["file"] for row in right if not row["options"]}
+    helped = {row["file"] for row in right} - plain
+    never = sorted(Path(name).stem for name in files - plain - helped)
+    if not made:
+        return f"{len(files)} files, none generates."
+    worst = [max(row[key] for row in made) for key in ("error_sum", "error_link")]
+    slowest, largest = (max(made, key=lambda row: row[key]) for key in ("seconds", "megabytes"))
+    return (
+        f"{len(files)} files: {len(plain)} generate as they are, {len(helped)} with the option that the "
+        f"refusal names, {len(never)} never{f' ({chr(44).join(never)})' if never else ''}. "
+        f"Largest errors: {worst[0]:.0e} of the sums, {worst[1]:.0e} of a link's own torque. "
+        f"Slowest: {Path(slowest['file']).stem}, {slowest['seconds']:.1f} s; most memory: "
+        f"{Path(largest['file']).stem}, {largest['megabytes']:.0f} MB. {growth(made)}"
+    )
+
+
+def growth(made: list[dict[str, Any]]) -> str:
+    """How operations grow with outputs, from robots that have enough of both."""
+    pairs = [(row["outputs"], row["operations"]) for row in made if row["outputs"] >= 10]
+    if len({outputs for outputs, _ in pairs}) < 2:
+        return ""
+    slope = np.polyfit(*np.log(np.array(pairs, dtype=float).T), 1)[0]
+    most = max(operations / outputs for outputs, operations in pairs)
+    return f"Operations grow like outputs^{slope:.2f}; at most {most:.1f} operations an output."
+
+
+def plot(rows: list[dict[str, Any]], out: Path) -> None:
+    """Operations against outputs, both logarithmic, with lines of slope 1."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    made = [row for row in rows if "seconds" in row]
+    x, y = (np.array([row[key] for row in made], dtype=float) for key in ("outputs", "operations"))
+    names = [Path(row["file"]).stem for row in made]
+    figure, axes = plt.subplots(figsize=(7.0, 5.0), layout="constrained")
+    span = np.array([x.min() / 1.5, x.max() * 2.0])
+    for ratio in (1, 10):
+        axes.plot(span, ratio * span, color="0.75", linewidth=1, zorder=1)
+        axes.annotate(
+            f"{ratio} operation{'s' * (ratio > 1)} an output",
+            (span[0], ratio * span[0]),
+            xytext=(4, 4),
+            textcoords="offset points",
+            color="0.45",
+            fontsize=8,
+            rotation=0,
+        )
+    axes.scatter(x, y, s=22, color="#1f5fa8", alpha=0.6, linewidth=0, zorder=2)
+    for name in ("tiago_dual", "human", "panda", "iris", "TwoDofs", "talos_full_v2", "solo12", "ur10_robot"):
+        if name in names:
+            at = names.index(name)
+            axes.annotate(name, (x[at], y[at]), xytext=(6, -9), textcoords="offset points", fontsize=8)
+    axes.set(
+        xscale="log", yscale="log", xlabel="outputs: entries of c2, c1, g and τ that are not always zero"
+    )
+    axes.set_ylabel("operations (+ − × /, sin, cos)")
+    axes.set_title("Operations grow no faster than outputs", loc="left", fontsize=11)
+    axes.spines[["top", "right"]].set_visible(False)
+    for kind in ("svg", "png"):
+        figure.savefig(
+            out / f"operations.{kind}", dpi=150, metadata={"Date": None} if kind == "svg" else None
+        )
+    plt.close(figure)
+
+
+def write(rows: list[dict[str, Any]], out: Path) -> str:
+    """Write corpus.json, corpus.md and the plot; return the summary."""
+    out.mkdir(parents=True, exist_ok=True)
+    text = summary(rows)
+    (out / "corpus.json").write_text(json.dumps(rows, indent=1) + "\n")
+    (out / "corpus.md").write_text("\n".join([text, "", HEAD, *map(line, rows)]) + "\n")
+    if any("seconds" in row for row in rows):
+        plot(rows, out)
+    return text
