@@ -17,7 +17,7 @@ class Lowering:
 
     def __init__(self, graph: Graph, symbols: Mapping[sp.Symbol, Node]) -> None:
         self.graph = graph
-        self.symbols = dict(symbols)
+        self.symbols: dict[sp.Symbol, Node] = dict(symbols)
         self._done: dict[sp.Expr, Node] = {}
 
     def define(self, definitions: Iterable[Definition]) -> None:
@@ -42,7 +42,8 @@ class Lowering:
                     f"the symbol {expr.name!r} is neither a coordinate, its velocity nor a parameter; "
                     "give it a value among the parameters"
                 )
-            return self.symbols[expr]
+            node: Node = self.symbols[expr]
+            return node
         if expr.is_number:
             return g.const(float(expr))
         if expr.is_Add:

@@ -14,8 +14,8 @@ from linkwise.model.robot import Joint, Scalar
 class CommonAxes:
     """The axes that vectors are written in: those of a frame of the tree.
 
-    Frame −1 is the base, frame f the one of the f-th link; `before` means just before the turn of its joint, which
-    the joint's own axis does not feel.
+    Frame −1 is the base, frame f the one of the f-th link; `before` means just before the turn of its joint,
+    which the joint's own axis does not feel.
     """
 
     frame: int
@@ -25,9 +25,9 @@ class CommonAxes:
 class Orientation:
     """Rotations, joint axes and angular motion in common axes, shared by every link of a kernel.
 
-    `tree` lists (parent, joint), parents first; parent −1 is the base. Dictionaries are keyed by frame, lists by
-    joint: z the axis times the joint's ratio (0 for a prismatic one), zd = ω × z and zdd = α × z + ω × zd with the
-    angular velocity ω and acceleration α before the joint, slide the direction of a prismatic joint.
+    `tree` lists (parent, joint), parents first; parent −1 is the base. Dictionaries are keyed by frame, lists
+    by joint: z the axis times the joint's ratio (0 for a prismatic one), zd = ω × z and zdd = α × z + ω × zd
+    with the angular velocity ω and acceleration α before the joint, slide the direction of a prismatic joint.
     """
 
     def __init__(
