@@ -13,6 +13,10 @@ HEAD = (
 LIMIT = 1e-9
 """Largest error allowed, relative."""
 
+LARGE, SMALL = 500, 10
+"""Outputs from which growth is measured."""
+LABELLED = ("tiago_dual", "human", "panda", "iris", "TwoDofs", "talos_full_v2", "solo12")
+
 
 def line(row: dict[str, Any]) -> str:
     """One row of the Markdown table."""
@@ -52,14 +56,25 @@ def summary(rows: list[dict[str, Any]]) -> str:
     )
 
 
-def growth(made: list[dict[str, Any]]) -> str:
-    """How operations grow with outputs, from robots that have enough of both."""
-    pairs = [(row["outputs"], row["operations"]) for row in made if row["outputs"] >= 10]
+def slope(made: list[dict[str, Any]], least: int) -> float:
+    """Exponent p of operations ~ outputs^p among robots with at least so many outputs."""
+    pairs = [(row["outputs"], row["operations"]) for row in made if row["outputs"] >= least]
     if len({outputs for outputs, _ in pairs}) < 2:
-        return ""
-    slope = np.polyfit(*np.log(np.array(pairs, dtype=float).T), 1)[0]
-    most = max(operations / outputs for outputs, operations in pairs)
-    return f"Operations grow like outputs^{slope:.2f}; at most {most:.1f} operations an output."
+        return float("nan")
+    return float(np.polyfit(*np.log(np.array(pairs, dtype=float).T), 1)[0])
+
+
+def most_per_output(made: list[dict[str, Any]]) -> float:
+    return float(max(row["operations"] / row["outputs"] for row in made))
+
+
+def growth(made: list[dict[str, Any]]) -> str:
+    """How operations grow with outputs; small arms have few a piece, for their axes are aligned."""
+    return (
+        f"No robot needs more than {most_per_output(made):.1f} operations an output; they grow like "
+        f"outputs^{slope(made, LARGE):.2f} from {LARGE} outputs on (outputs^{slope(made, SMALL):.2f} "
+        f"from {SMALL} on)."
+    )
 
 
 def plot(rows: list[dict[str, Any]], out: Path) -> None:
@@ -73,20 +88,9 @@ def plot(rows: list[dict[str, Any]], out: Path) -> None:
     x, y = (np.array([row[key] for row in made], dtype=float) for key in ("outputs", "operations"))
     names = [Path(row["file"]).stem for row in made]
     figure, axes = plt.subplots(figsize=(7.0, 5.0), layout="constrained")
-    span = np.array([x.min() / 1.5, x.max() * 2.0])
-    for ratio in (1, 10):
-        axes.plot(span, ratio * span, color="0.75", linewidth=1, zorder=1)
-        axes.annotate(
-            f"{ratio} operation{'s' * (ratio > 1)} an output",
-            (span[0], ratio * span[0]),
-            xytext=(4, 4),
-            textcoords="offset points",
-            color="0.45",
-            fontsize=8,
-            rotation=0,
-        )
+    _lines(axes, x, most_per_output(made))
     axes.scatter(x, y, s=22, color="#1f5fa8", alpha=0.6, linewidth=0, zorder=2)
-    for name in ("tiago_dual", "human", "panda", "iris", "TwoDofs", "talos_full_v2", "solo12", "ur10_robot"):
+    for name in LABELLED:
         if name in names:
             at = names.index(name)
             axes.annotate(name, (x[at], y[at]), xytext=(6, -9), textcoords="offset points", fontsize=8)
@@ -94,13 +98,31 @@ def plot(rows: list[dict[str, Any]], out: Path) -> None:
         xscale="log", yscale="log", xlabel="outputs: entries of c2, c1, g and τ that are not always zero"
     )
     axes.set_ylabel("operations (+ − × /, sin, cos)")
-    axes.set_title("Operations grow no faster than outputs", loc="left", fontsize=11)
+    title = f"{len(made)} robots: operations ~ outputs^{slope(made, LARGE):.2f} from {LARGE} outputs on"
+    axes.set_title(title, loc="left", fontsize=11)
     axes.spines[["top", "right"]].set_visible(False)
     for kind in ("svg", "png"):
         figure.savefig(
             out / f"operations.{kind}", dpi=150, metadata={"Date": None} if kind == "svg" else None
         )
     plt.close(figure)
+
+
+def _lines(axes: Any, x: Any, most: float) -> None:
+    """One operation an output, and the most that any robot needs: lines of slope 1."""
+    span = np.array([x.min() / 1.5, x.max() * 2.0])
+    middle = span.prod() ** 0.5
+    for ratio, side in ((1.0, "left"), (most, "right")):
+        axes.plot(span, ratio * span, color="0.75", linewidth=1, zorder=1)
+        axes.annotate(
+            f"{ratio:.3g} operation{'s' * (ratio > 1)} an output",
+            (middle, ratio * middle),
+            xytext=(8, -12) if side == "left" else (-8, 6),
+            textcoords="offset points",
+            horizontalalignment=side,
+            color="0.4",
+            fontsize=8,
+        )
 
 
 def write(rows: list[dict[str, Any]], out: Path) -> str:

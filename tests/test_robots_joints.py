@@ -55,6 +55,7 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "floating base": (chain(AB, BC), {"base": "floating"}),
     "floating tree": (TREE, {"base": "floating"}),
+    "with run-time parameters": (TREE, {"base": "floating", "parameters": "symbolic"}),
 }
 
 

@@ -30,22 +30,20 @@ def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
             f"there are several roots ({', '.join(map(repr, roots))}); connect them, or choose one "
             "with --root"
         )
+    below: dict[str, list[Connection]] = {}
+    for c in reversed(description.connections):
+        below.setdefault(c.parent, []).append(c)
     order: list[Connection] = []
-    stack = _below(description, roots[0])
+    stack = below.get(roots[0], [])[:]
     while stack:
-        connection = stack.pop()
-        order.append(connection)
-        stack += _below(description, connection.child)
+        order.append(stack.pop())
+        stack += below.get(order[-1].child, [])
     if len(order) != len(description.connections):
         lost = sorted({c.child for c in description.connections} - {c.child for c in order})
         raise LinkwiseError(
             f"link {lost[0]!r} cannot be reached from the root {roots[0]!r}: its joints form a loop"
         )
     return roots[0], tuple(order)
-
-
-def _below(description: Description, link: str) -> list[Connection]:
-    return [c for c in reversed(description.connections) if c.parent == link]
 
 
 def _check_names(description: Description) -> None:
