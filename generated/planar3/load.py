@@ -3,7 +3,7 @@
 from .dynamics import Dynamics
 from .names import PARAMETERS
 
-BACKENDS = ('numpy', 'torch', 'autograd')
+BACKENDS = ('numpy', 'torch', 'autograd', 'native')
 
 
 def load(backend='numpy', parameters=None):
@@ -12,6 +12,7 @@ def load(backend='numpy', parameters=None):
     numpy: closed forms on NumPy arrays
     torch: closed forms on torch tensors
     autograd: each link's Lagrangian, differentiated by torch
+    native: the C code, compiled by this system's compiler
 
     parameters: mapping of names in `PARAMETERS` to values that replace the built-in ones: numbers, arrays or, for
     the torch back ends, tensors, through which gradients flow.
@@ -35,6 +36,10 @@ def load(backend='numpy', parameters=None):
         return Dynamics(create(values))
     if backend == "autograd":
         from .autograd_backend import create
+
+        return Dynamics(create(values))
+    if backend == "native":
+        from .native_backend import create
 
         return Dynamics(create(values))
     raise AssertionError(backend)

@@ -2,12 +2,15 @@
 
 import numpy as np
 
-from . import numpy_forms
+
+FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
 
 
 def create(parameters):
     """Return the back end for the given parameter values."""
-    return NumpyBackend(parameters)
+    from . import numpy_forms
+
+    return NumpyBackend(parameters, numpy_forms.LINKS)
 
 
 class NumpyBackend:
@@ -15,14 +18,19 @@ class NumpyBackend:
 
     name = "numpy"
 
-    def __init__(self, parameters):
+    def __init__(self, parameters, links):
+        self.links = links
         self.parameters = {k: np.asarray(v, dtype=float) for k, v in parameters.items()}
 
     def arrays(self, named, n):
         """Check and broadcast the motion to a common shape (..., n)."""
         arrays = {name: np.asarray(value) for name, value in named.items()}
+        first, *rest = arrays.values()
+        if first.dtype in FLOATS and first.shape[-1:] == (n,):
+            if all(a.shape == first.shape and a.dtype == first.dtype for a in rest):
+                return [first, *rest]
         for name, a in arrays.items():
-            if a.dtype not in (np.float32, np.float64):
+            if a.dtype not in FLOATS:
                 raise TypeError(f"{name} has dtype {a.dtype}; give float32 or float64")
         return np.broadcast_arrays(*same_kind(arrays, n).values())
 
@@ -48,7 +56,7 @@ class NumpyBackend:
 
     def _each(self, function, q, qd, qdd):
         p = {k: v.astype(q.dtype) for k, v in self.parameters.items()}
-        return [getattr(link, function)(q, qd, qdd, p) for link in numpy_forms.LINKS]
+        return [getattr(link, function)(q, qd, qdd, p) for link in self.links]
 
     def decomposition(self, q, qd, qdd):
         """c2, c1, g, tau and linear part of c1, packed."""

@@ -3,12 +3,13 @@
 import torch
 
 from .numpy_backend import same_kind
-from . import torch_forms
 
 
 def create(parameters):
     """Return the back end for the given parameter values."""
-    return TorchBackend(parameters)
+    from . import torch_forms
+
+    return TorchBackend(parameters, torch_forms.LINKS)
 
 
 class TorchBackend:
@@ -16,7 +17,8 @@ class TorchBackend:
 
     name = "torch"
 
-    def __init__(self, parameters):
+    def __init__(self, parameters, links=()):
+        self.links = links
         self.parameters = {
             k: v if torch.is_tensor(v) else torch.as_tensor(v, dtype=torch.float64) for k, v in parameters.items()
         }
@@ -34,11 +36,13 @@ class TorchBackend:
 
     def constant(self, values, like):
         """A table of the package as a tensor for computing with `like`."""
-        return torch.as_tensor(values, dtype=like.dtype, device=like.device)
+        with torch.inference_mode(False):  # it is kept, and a later call may need its gradient
+            return torch.as_tensor(values, dtype=like.dtype, device=like.device)
 
     def index(self, values, like):
         """A table of positions."""
-        return torch.as_tensor(values, dtype=torch.long, device=like.device)
+        with torch.inference_mode(False):  # it is kept, and a later call may need its gradient
+            return torch.as_tensor(values, dtype=torch.long, device=like.device)
 
     def asarray(self, value, like):
         """Anything array-like, as the back end's array."""
@@ -54,7 +58,7 @@ class TorchBackend:
 
     def _each(self, function, q, qd, qdd):
         p = {k: v.to(q) for k, v in self.parameters.items()}
-        return [getattr(link, function)(q, qd, qdd, p) for link in torch_forms.LINKS]
+        return [getattr(link, function)(q, qd, qdd, p) for link in self.links]
 
     def decomposition(self, q, qd, qdd):
         """c2, c1, g, tau and linear part of c1, packed."""

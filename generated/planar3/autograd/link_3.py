@@ -22,7 +22,7 @@ def twist(q, qd, p):
     c3 = torch.cos(q3)
     w3_z = qd3 + w2_z
     t1 = v2_y + 0.25 * w2_z
-    v3_x = v2_x * c3 + s3 * t1
+    v3_x = s3 * t1 + v2_x * c3
     v3_y = c3 * t1 - v2_x * s3
     return (w3_z, v3_x, v3_y)
 

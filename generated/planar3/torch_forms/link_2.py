@@ -19,30 +19,31 @@ def decomposition(q, qd, qdd, p):
     qd2 = qd[..., 1]
     qdd1 = qdd[..., 0]
     qdd2 = qdd[..., 1]
-    t1 = torch.cos(q1)
-    t2 = torch.sin(q2)
-    t3 = torch.cos(q2)
-    t4 = 9.80665 * torch.sin(q1)
-    t5 = 9.80665 * t1
-    v1_y = 0.25 * qd1
-    t6 = t5 + 0.25 * qdd1
+    t1 = torch.sin(q1)
+    t2 = torch.cos(q1)
+    t3 = torch.sin(q2)
+    t4 = torch.cos(q2)
     w2_z = qd1 + qd2
-    t7 = qdd1 + qdd2
-    f2_2_y = 0.075 * t3
-    t8 = 0.075 * t2
-    n2_2_z = 0.005 + 0.125 * t3 * f2_2_y + 0.125 * t2 * t8
+    t5 = qdd1 + qdd2
+    t6 = 0.125 * t4
+    t7 = 0.125 * t3
+    f2_2_y = 0.075 * t4
+    t8 = 0.075 * t3
+    v1_y = 0.25 * qd1
+    n2_2_z = 0.005 + t6 * f2_2_y + t7 * t8
     t9 = w2_z * t8
-    n1_1_z = v1_y * t8
-    t10 = t5 * f2_2_y - t4 * t8
-    t11 = t6 * f2_2_y - (t4 + qd2 * v1_y) * t8 + t7 * n2_2_z + w2_z * n1_1_z
-    n2_1_z = n2_2_z + 0.01875 * t3
+    n1_1_z = t8 * v1_y
+    t10 = 9.80665 * t2 + 0.25 * qdd1
+    t11 = t6 * (5.88399 * t2) - t7 * (5.88399 * t1)
+    t12 = f2_2_y * t10 - t8 * (9.80665 * t1 + qd2 * v1_y) + t5 * n2_2_z + w2_z * n1_1_z
+    n2_1_z = n2_2_z + 0.01875 * t4
     f2_1_y = f2_2_y + 0.15
-    t12 = 0.25 * t9
+    t13 = 0.25 * t9
     return (
         pack(q, (n2_1_z + 0.25 * f2_1_y, n2_1_z, n2_2_z,)),
-        pack(q, (n1_1_z - t12, -t12, n1_1_z, 0.0,)),
-        pack(q, (t10 + 1.4709975 * t1, t10,)),
-        pack(q, (t11 + 0.25 * (0.6 * t6 + t7 * f2_2_y - w2_z * t9), t11,)),
+        pack(q, (n1_1_z - t13, -t13, n1_1_z, 0.0,)),
+        pack(q, (t11 + 1.4709975 * t2, t11,)),
+        pack(q, (t12 + 0.25 * (0.6 * t10 + t5 * f2_2_y - w2_z * t9), t12,)),
         pack(q, ()),
     )
 
@@ -57,16 +58,16 @@ def torque(q, qd, qdd, p):
     qdd2 = qdd[..., 1]
     t1 = torch.sin(q2)
     t2 = torch.cos(q2)
-    v1_y = 0.25 * qd1
-    t3 = 9.80665 * torch.cos(q1) + 0.25 * qdd1
     w2_z = qd1 + qd2
-    t4 = qdd1 + qdd2
+    t3 = qdd1 + qdd2
     f2_2_y = 0.075 * t2
-    t5 = 0.075 * t1
-    n2_2_z = 0.005 + 0.125 * t2 * f2_2_y + 0.125 * t1 * t5
-    n1_1_z = v1_y * t5
-    t6 = t3 * f2_2_y - (9.80665 * torch.sin(q1) + qd2 * v1_y) * t5 + t4 * n2_2_z + w2_z * n1_1_z
-    return pack(q, (t6 + 0.25 * (0.6 * t3 + t4 * f2_2_y - w2_z * (w2_z * t5)), t6,))
+    t4 = 0.075 * t1
+    v1_y = 0.25 * qd1
+    n2_2_z = 0.005 + 0.125 * t2 * f2_2_y + 0.125 * t1 * t4
+    n1_1_z = t4 * v1_y
+    t5 = 9.80665 * torch.cos(q1) + 0.25 * qdd1
+    t6 = f2_2_y * t5 - t4 * (9.80665 * torch.sin(q1) + qd2 * v1_y) + t3 * n2_2_z + w2_z * n1_1_z
+    return pack(q, (t6 + 0.25 * (0.6 * t5 + t3 * f2_2_y - w2_z * (w2_z * t4)), t6,))
 
 
 def position_gradient(q, qd, qdd, p):
@@ -80,17 +81,17 @@ def position_gradient(q, qd, qdd, p):
     t1 = torch.sin(q1)
     t2 = 9.80665 * t1
     t3 = 9.80665 * torch.cos(q1)
-    v1_y = 0.25 * qd1
-    t4 = qd1 * v1_y - t2
     w2_z = qd1 + qd2
     f2_2_y = 0.075 * torch.cos(q2)
-    t5 = 0.075 * torch.sin(q2)
-    t6 = 0.6 * (t2 + qd2 * v1_y) - (qdd1 + qdd2) * t5 - w2_z * (0.15 * qd1 + w2_z * f2_2_y)
-    t7 = t2 * f2_2_y + t3 * t5
-    t8 = t4 * f2_2_y - (t3 + 0.25 * qdd1) * t5
+    t4 = 0.075 * torch.sin(q2)
+    v1_y = 0.25 * qd1
+    t5 = qd1 * v1_y - t2
+    t6 = 0.6 * (t2 + qd2 * v1_y) - (qdd1 + qdd2) * t4 - w2_z * (0.15 * qd1 + w2_z * f2_2_y)
+    t7 = t2 * f2_2_y + t3 * t4
+    t8 = f2_2_y * t5 - t4 * (t3 + 0.25 * qdd1)
     return pack(q, (
             0.25 * (t6 - 5.88399 * t1) - (t7 + 0.25 * t6),
-            t8 + 0.25 * (t6 + 0.6 * t4),
+            t8 + 0.25 * (t6 + 0.6 * t5),
             -t7,
             t8,
         ))

@@ -172,8 +172,8 @@ class Recording:
 
 
 def variable(a):
-    """A tensor that can be differentiated by: itself if it already can, else a fresh leaf."""
-    return a if a.requires_grad else a.detach().requires_grad_()
+    """A tensor of its own to differentiate by: the same values may also be a direction, which must stay fixed."""
+    return a.view_as(a) if a.requires_grad else a.detach().requires_grad_()
 
 
 def gradient(value, inputs, keep):
