@@ -18,9 +18,9 @@ from pathlib import Path
 SOURCES = Path(__file__).parent / "c"
 NAME = "planar3"
 
-# What each file is compiled with beside FLAGS. Only in turn.c may the compiler put a vector library's sines in place.
-UNITS = {f"{NAME}_double.c": (), f"{NAME}_float.c": (), "turn.c": ("-ffast-math",)}
-FLAGS = ("-std=c99", "-O3", "-fPIC")
+FLAGS = ("-std=c99", "-O2", "-ftree-vectorize", "-fno-tree-slp-vectorize", "-fPIC")
+# Only here may the compiler put a vector library's sines in place.
+TURN = ("turn.c", ("-O3", "-ffast-math"))
 TUNING = {
     "x86_64": ("-march=native", "-mprefer-vector-width=512"),
     "AMD64": ("-march=native", "-mprefer-vector-width=512"),
@@ -29,16 +29,18 @@ TUNING = {
 }
 
 
-def library():
-    """Path of the compiled library, built if it isn't there; raises RuntimeError when it cannot be."""
+def library(part):
+    """Path of the library compiled from c/NAME_part.c, built if it isn't there; raises RuntimeError if it cannot be.
+
+    part: double, float, gradient_double or gradient_float; what nobody asks for isn't compiled.
+    """
     compiler = find_compiler()
     flags = (*FLAGS, *TUNING.get(platform.machine(), ()))
-    cache = cache_directory()
-    target = cache / f"{NAME}-{fingerprint(compiler, flags)}.so"
+    target = cache_directory() / f"{NAME}-{part}-{fingerprint(compiler, flags)}.so"
     if not target.exists():
         with locked(target.with_suffix(".lock")):
             if not target.exists():
-                build(compiler, flags, target)
+                build(compiler, flags, ((f"{NAME}_{part}.c", ()), TURN), target)
     return target
 
 
@@ -72,7 +74,7 @@ def fingerprint(compiler, flags):
     for path in sorted(SOURCES.iterdir()):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     version = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
-    digest.update(repr((compiler, flags, UNITS, version, platform.machine(), processor())).encode())
+    digest.update(repr((compiler, flags, TURN, version, platform.machine(), processor())).encode())
     return digest.hexdigest()[:20]
 
 
@@ -95,16 +97,16 @@ def locked(path):
         yield
 
 
-def build(compiler, flags, target):
+def build(compiler, flags, units, target):
     """Compile the units side by side, link them, and move the library into place in one step."""
     with tempfile.TemporaryDirectory(dir=target.parent) as folder:
         running = []
-        for unit, extra in UNITS.items():
+        for unit, extra in units:
             command = [*compiler, *flags, *extra, "-c", str(SOURCES / unit), "-o", f"{folder}/{unit}.o"]
             running.append((command, subprocess.Popen(command, stderr=subprocess.PIPE, text=True)))
         for command, process in running:
             finished(command, process.communicate()[1], process.returncode)
-        objects = [f"{folder}/{unit}.o" for unit in UNITS]
+        objects = [f"{folder}/{unit}.o" for unit, _ in units]
         command = [*compiler, "-shared", *objects, "-lm", "-o", f"{folder}/library.so"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         finished(command, done.stderr, done.returncode)

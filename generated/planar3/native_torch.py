@@ -46,7 +46,8 @@ class TorchSide(TorchBackend):
     def _run(self, call, q, qd, qdd):
         p = torch.stack([self.parameters[name].to(q).reshape(()) for name in PARAMETERS]) if PARAMETERS else q.new_empty(0)
         if torch.is_grad_enabled() and any(t.requires_grad for t in (q, qd, qdd, p)):
-            return OPERATORS[call](q, qd, qdd, p)
+            results = OPERATORS[call](q, qd, qdd, p)
+            return results if isinstance(results, tuple) else (results,)
         return compute(call, q, qd, qdd, self.native)
 
 
@@ -62,6 +63,11 @@ def values(p):
     return dict(zip(PARAMETERS, p.unbind(), strict=True)) if PARAMETERS else {}
 
 
+def unpacked(results):
+    """An operator with one result returns it bare."""
+    return results if len(results) > 1 else results[0]
+
+
 def define(call, count):
     """Register one C function as an operator with a gradient."""
     from .native_backend import SIZES, NativeBackend
@@ -69,10 +75,10 @@ def define(call, count):
     sizes = {"decomposition": SIZES, "torque": SIZES[3:4], "position_gradient": SIZES[1:2]}[call]
 
     def forward(q, qd, qdd, p):
-        return compute(call, q, qd, qdd, NativeBackend(values(p.detach())))
+        return unpacked(compute(call, q, qd, qdd, NativeBackend(values(p.detach()))))
 
     def fake(q, qd, qdd, p):
-        return tuple(q.new_empty((*q.shape[:-1], size)) for size in sizes)
+        return unpacked(tuple(q.new_empty((*q.shape[:-1], size)) for size in sizes))
 
     def setup(ctx, inputs, output):
         ctx.save_for_backward(*inputs)

@@ -24,18 +24,19 @@ def create(parameters):
     return NativeBackend(parameters)
 
 
+CALLS = {"decomposition": ("", 5), "torque": ("", 1), "position_gradient": ("gradient_", 1)}
+"""For each C function the library that holds it, and how many arrays it fills."""
+
+
 @cache
-def compiled():
-    """The library and its functions by (name, dtype)."""
-    loaded = ctypes.CDLL(str(library()))
-    functions = {}
-    for call, outputs in (("decomposition", 5), ("torque", 1), ("position_gradient", 1)):
-        for kind, suffix in (("f8", ""), ("f4", "f")):
-            function = getattr(loaded, f"{NAME}_{call}{suffix}")
-            function.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * (4 + outputs)
-            function.restype = None
-            functions[call, np.dtype(kind)] = function
-    return functions
+def compiled(call, kind):
+    """C function of a call for a dtype; the first one from a library compiles it."""
+    part, outputs = CALLS[call]
+    name, suffix = {"f8": ("double", ""), "f4": ("float", "f")}[kind.str[1:]]
+    function = getattr(ctypes.CDLL(str(library(part + name))), f"{NAME}_{call}{suffix}")
+    function.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * (4 + outputs)
+    function.restype = None
+    return function
 
 
 @cache
@@ -50,12 +51,13 @@ class NativeBackend(NumpyBackend):
     name = "native"
 
     def __init__(self, parameters):
-        self.functions = compiled()
+        compiled("decomposition", np.dtype("f8"))
         self.threads = os.cpu_count() or 1
         self.tensor_parameters = parameters
         super().__init__({k: _plain(v) for k, v in parameters.items()}, ())
         values = [float(self.parameters[name]) for name in PARAMETERS]
         self.values = {np.dtype(kind): np.array(values, dtype=kind) for kind in ("f4", "f8")}
+        self.calls = {}
 
     def arrays(self, named, n):
         """Check and broadcast the motion to a common shape (..., n)."""
@@ -104,34 +106,39 @@ class NativeBackend(NumpyBackend):
 
     def run(self, call, sizes, q, qd, qdd):
         """Run a C function over arrays of one shape (..., n); returns arrays (..., size), views of one buffer."""
-        kind = q.dtype
-        q, qd, qdd = (a if a.flags.c_contiguous else np.ascontiguousarray(a) for a in (q, qd, qdd))
+        kind, shape = q.dtype, q.shape[:-1]
         count = q.size // COLUMNS
         buffer = np.empty(count * sum(sizes), kind)
-        function, p = self.functions[call, kind], _address(self.values[kind])
-        rows = [(_address(a), COLUMNS * kind.itemsize) for a in (q, qd, qdd)]
-        at, outputs = _address(buffer), []
+        motion = [a if a.flags.c_contiguous else np.ascontiguousarray(a) for a in (q, qd, qdd)]
+        inputs = [_address(a) for a in motion]
+        results, outputs, at, start = [], [], 0, _address(buffer)
         for size in sizes:
-            outputs.append((at, size * kind.itemsize))
-            at += count * size * kind.itemsize
-
-        def part(first, samples):
-            ins, outs = ([a + first * step for a, step in group] for group in (rows, outputs))
-            function(samples, *ins, p, *outs)
-
+            end = at + count * size
+            results.append(buffer[at:end].reshape(*shape, size) if shape else buffer[at:end])
+            outputs.append(start + at * kind.itemsize)
+            at = end
+        if (call, kind) not in self.calls:
+            self.calls[call, kind] = compiled(call, kind), _address(self.values[kind])
+        function, p = self.calls[call, kind]
         parts = min(self.threads, count // PER_THREAD)
         if parts > 1:
-            # Multiples of 16 samples fill blocks of either type.
-            share = -(-count // parts // 16) * 16
-            starts = range(0, count, share)
-            list(pool(self.threads).map(lambda s: part(s, min(share, count - s)), starts))
+            self._split(parts, function, p, count, kind.itemsize, inputs, zip(outputs, sizes, strict=True))
         elif count:
-            part(0, count)
-        shape, at, results = q.shape[:-1], 0, []
-        for size in sizes:
-            results.append(buffer[at : at + count * size].reshape(*shape, size))
-            at += count * size
+            function(count, *inputs, p, *outputs)
         return results
+
+    def _split(self, parts, function, p, count, itemsize, inputs, outputs):
+        """Run over shares of the samples at the same time; shares of 16 fill blocks of either type."""
+        rows = [(address, COLUMNS * itemsize) for address in inputs]
+        columns = [(address, size * itemsize) for address, size in outputs]
+        share = -(-count // parts // 16) * 16
+
+        def run(first):
+            samples = min(share, count - first)
+            ins, outs = ([at + first * step for at, step in group] for group in (rows, columns))
+            function(samples, *ins, p, *outs)
+
+        list(pool(self.threads).map(run, range(0, count, share)))
 
     def _torch(self):
         from .native_torch import TorchSide

@@ -35,230 +35,230 @@ def decomposition(q, qd, qdd, p):
     t3 = torch.sin(q3)
     t4 = torch.cos(q3)
     t5 = torch.sin(q4)
-    z2_z = torch.cos(q4)
+    z2_y = torch.cos(q4)
     t6 = torch.sin(q5)
-    t7 = torch.cos(q5)
-    t8 = torch.sin(q6)
-    t9 = torch.cos(q6)
-    t10 = z2_z * t7
-    t11 = z2_z * t6
-    z2_x = t5 * t7
-    t12 = t5 * t6
-    t13 = t4 * t10 - t3 * t6
-    t14 = t4 * t11 + t3 * t7
-    t15 = t4 * t5
-    t16 = t1 * t13 + t2 * (t3 * t10 + t4 * t6)
-    t17 = t2 * (t4 * t7 - t3 * t11) - t1 * t14
-    z1_z = t1 * t15 + t2 * (t3 * t5)
-    t18 = qd1 * t16
-    t19 = qd1 * t17
-    w1_z = qd1 * z1_z
-    zd2_x = t12 * w1_z - z2_z * t19
-    zd2_y = z2_x * w1_z + z2_z * t18
-    zd2_z = t12 * t18 + z2_x * t19
-    w2_x = qd2 * z2_x - t18
-    t20 = t19 + qd2 * t12
-    w2_z = w1_z + qd2 * z2_z
-    zd3_x = t12 * w2_z - z2_z * t20
+    z4_z = torch.cos(q5)
+    t7 = torch.sin(q6)
+    t8 = torch.cos(q6)
+    t9 = z2_y * z4_z
+    t10 = z2_y * t6
+    z2_x = t5 * z4_z
+    z2_z = t5 * t6
+    t11 = t4 * t9 - t3 * t6
+    t12 = t4 * t5
+    t13 = t4 * t10 + t3 * z4_z
+    t14 = t1 * t11 + t2 * (t3 * t9 + t4 * t6)
+    z1_y = t1 * t12 + t2 * (t3 * t5)
+    t15 = t1 * t13 + t2 * (t3 * t10 - t4 * z4_z)
+    t16 = qd1 * t14
+    w1_y = qd1 * z1_y
+    t17 = qd1 * t15
+    zd2_x = z2_z * w1_y + z2_y * t17
+    zd2_y = z2_z * t16 - z2_x * t17
+    t18 = z2_y * t16 + z2_x * w1_y
+    w2_x = qd2 * z2_x - t16
+    w2_y = w1_y + qd2 * z2_y
+    w2_z = qd2 * z2_z - t17
+    zd3_x = z2_z * w2_y - z2_y * w2_z
     zd3_y = z2_x * w2_z - z2_z * w2_x
-    zd3_z = z2_x * t20 - t12 * w2_x
+    zd3_z = z2_y * w2_x - z2_x * w2_y
     w3_x = w2_x + qd3 * z2_x
-    t21 = t20 + qd3 * t12
+    w3_y = w2_y + qd3 * z2_y
     w3_z = w2_z + qd3 * z2_z
-    zd4_x = t7 * w3_z
-    t22 = t6 * w3_z
-    t23 = t7 * w3_x + t6 * t21
+    zd4_x = z4_z * w3_y
+    t19 = t6 * w3_z + z4_z * w3_x
+    zd4_z = t6 * w3_y
     w4_x = w3_x - qd4 * t6
-    t24 = t21 + qd4 * t7
-    t25 = qd4 * zd4_x + qd3 * zd3_x + qd2 * zd2_x + qdd2 * z2_x - qdd1 * t16 + qdd3 * z2_x - qdd4 * t6
-    t26 = qd3 * zd3_y + qd2 * zd2_y - (qdd1 * t17 + qdd2 * t12) - qdd3 * t12 - qdd4 * t7 - qd4 * t22
-    w5_z = qd5 + w3_z
-    t27 = qd6 + t24
-    t28 = t25 - qd5 * t24 + qd6 * w5_z
-    t29 = qdd5 + qd3 * zd3_z + qd2 * zd2_z + qdd1 * z1_z + qdd2 * z2_z + qdd3 * z2_z - qd4 * t23 - qd6 * w4_x
-    t30 = 2.943 * t16
-    t31 = 2.943 * t17
-    t32 = 2.943 * z1_z
-    t33 = 0.006089999999999999 * t10 + 0.12993 * t6
-    t34 = 0.006089999999999999 * t5
-    t35 = 0.0096 - (0.006089999999999999 * t11 - 0.12993 * t7)
-    t36 = t33 - (0.12954 * t13 - 0.02802 * z2_x)
-    t37 = t35 - (0.02802 * t12 - 0.12954 * t14)
-    t38 = 0.12954 * t15 + 0.02802 * z2_z - t34
-    t39 = t36 - 0.07304999999999999 * z2_x
-    t40 = t37 + 0.07304999999999999 * t12
-    t41 = t38 - 0.07304999999999999 * z2_z
-    s1_x = z1_z * t40 + t17 * t41
-    t42 = t16 * t41 + z1_z * t39
-    s1_z = t16 * t40 - t17 * t39
-    s2_x = z2_z * t37 + t12 * t38
-    s2_y = z2_x * t38 - z2_z * t36
-    t43 = t12 * t36 + z2_x * t37
-    s3_x = z2_z * t35 - t12 * t34
-    t44 = z2_x * t34 + z2_z * t33
-    t45 = t12 * t33 + z2_x * t35
-    s4_z = 0.0096 * t6
-    v2_y = qd3 * t44
-    t46 = qd4 * s4_z
-    t47 = 0.0096 * qd5
-    t48 = qd3 * s3_x + t47
-    v2_z = qd3 * t45 - t46
-    t49 = qd2 * s2_x + t48
-    v1_y = v2_y - qd2 * s2_y
-    v1_z = qd2 * t43 + v2_z
-    t50 = qd1 * s1_x + t49
-    v0_y = qd1 * t42 + v1_y
-    v0_z = v1_z - qd1 * s1_z
-    t51 = 1.9999999999999998e-05 * t9
-    t52 = 1.9999999999999998e-05 * t8
-    t53 = t9 * t51 + t8 * t52
-    t54 = t8 * t51 - t9 * t52
-    n2_5_z = 0.00016999999999999999 - t53
-    t55 = t27 * t54
-    t56 = w4_x * t54
-    t57 = t56 - w5_z * t53
-    t58 = t27 * t53
-    t59 = 0.00013 * w5_z
-    t60 = 0.00013 * w4_x
-    t61 = w5_z * t54
-    t62 = w4_x * t53 - t61
-    sd1_x = z1_z * v0_y + t17 * v0_z
-    sd1_y = z1_z * t50 - t16 * v0_z
-    sd1_z = t17 * t50 + t16 * v0_y
-    sd2_x = t19 * t43 - w1_z * s2_y + z2_z * v1_y + t12 * v1_z
-    sd2_y = w1_z * s2_x - t18 * t43 + z2_x * v1_z + z2_z * t49
-    sd2_z = t19 * s2_x - t18 * s2_y + t12 * t49 - z2_x * v1_y
-    sd3_x = t20 * t45 + w2_z * t44 + z2_z * v2_y + t12 * v2_z
-    sd3_y = w2_z * s3_x + w2_x * t45 + z2_x * v2_z + z2_z * t48
-    sd3_z = t20 * s3_x - w2_x * t44 + t12 * t48 - z2_x * v2_y
-    sd4_z = t7 * t47
-    t63 = t21 * s4_z + t7 * t46
-    sd4_y = t6 * t46 - w3_x * s4_z
-    t64 = qdd3 * s3_x + qdd2 * s2_x + qdd1 * s1_x + qd1 * sd1_x - t30 + qd2 * sd2_x + qd3 * sd3_x - qd4 * t63
-    t65 = qdd2 * s2_y + qd1 * sd1_y - t31 - qdd1 * t42 + qd2 * sd2_y + qd3 * sd3_y - qdd3 * t44 + qd4 * sd4_y
-    t66 = qdd1 * s1_z + t32 + qd1 * sd1_z + qd2 * sd2_z - qdd2 * t43 + qd3 * sd3_z - qdd3 * t45 + qd4 * sd4_z
-    sd5_z = 0.0096 * t24
-    sd5_y = t47 + 0.0096 * w3_z
-    t67 = t64 + 0.0096 * qdd5
-    t68 = t65 + qd5 * sd5_y
-    t69 = qdd4 * s4_z + t66 + qd5 * sd5_z
-    t70 = t28 * n2_5_z - t29 * t54 + w4_x * t55 - t27 * t59 + w5_z * t58
-    t71 = 3.9999999999999996e-05 * (t26 - qd5 * w4_x - qdd6) + w4_x * t57 + w5_z * t62
-    t72 = t29 * n2_5_z - t28 * t54 + t27 * t60 - w4_x * t58 - w5_z * t55
-    t73 = 3.9999999999999996e-05 * t17
-    n2_1_z = t16 * t54 + z1_z * n2_5_z
-    n1_1_x = z1_z * t58 - (t16 * t55 + t17 * t59)
-    n1_1_y = z1_z * t62 - t16 * t57
-    n1_1_z = t16 * t58 + t17 * t60 - z1_z * t55
-    t74 = z2_x * n1_1_x - t12 * n1_1_y + z2_z * n1_1_z
-    t75 = z2_x * t70 - t12 * t71 + z2_z * t72
-    n2_2_x = z2_x * n2_5_z - z2_z * t54
-    t76 = 3.9999999999999996e-05 * t12
-    n2_2_z = z2_z * n2_5_z - z2_x * t54
-    t77 = z2_x * t55 - t12 * t59 + z2_z * t58
-    t78 = z2_x * t57 + z2_z * t62
-    t79 = t12 * t60 - z2_x * t58 - z2_z * t55
-    n1_2_x = zd2_x * n2_5_z - zd2_z * t54 + t77
-    n1_2_y = 3.9999999999999996e-05 * zd2_y + t78
-    n1_2_z = zd2_z * n2_5_z - zd2_x * t54 + t79
-    t80 = t17 * t76 - t16 * n2_2_x + z1_z * n2_2_z
-    t81 = z2_x * n2_2_x + t12 * t76 + z2_z * n2_2_z
-    t82 = z2_x * n1_2_x - t12 * n1_2_y + z2_z * n1_2_z
-    n1_3_x = t77 + zd3_x * n2_5_z - zd3_z * t54
-    n1_3_y = t78 + 3.9999999999999996e-05 * zd3_y
-    n1_3_z = t79 + zd3_z * n2_5_z - zd3_x * t54
-    t83 = z2_x * n1_3_x - t12 * n1_3_y + z2_z * n1_3_z
-    t84 = t6 * n2_5_z
-    t85 = 3.9999999999999996e-05 * t7
-    n2_4_z = t6 * t54
-    n1_4_x = zd4_x * n2_5_z + t23 * t54 - (t6 * t55 + t7 * t59)
-    t86 = 3.9999999999999996e-05 * t22 + t6 * t57
-    n1_4_z = t6 * t58 + t7 * t60 - (zd4_x * t54 + t23 * n2_5_z)
-    t87 = t12 * t85 - z2_x * t84 + z2_z * n2_4_z
-    t88 = z2_x * n1_4_x + t12 * t86 + z2_z * n1_4_z
-    n1_5_x = t58 - t24 * n2_5_z
-    n1_5_y = t62 - 3.9999999999999996e-05 * w4_x
-    n1_5_z = t24 * t54 - t55
-    t89 = z2_x * n1_5_x - t12 * n1_5_y + z2_z * n1_5_z
-    n1_6_x = t56 + w5_z * n2_5_z - t59
-    n1_6_z = t60 - (t61 + w4_x * n2_5_z)
+    w4_z = w3_z + qd4 * z4_z
+    t20 = qd4 * zd4_x + qd3 * zd3_x + qd2 * zd2_x + qdd2 * z2_x - qdd1 * t14 + qdd3 * z2_x - qdd4 * t6
+    t21 = qd4 * zd4_z + qd3 * zd3_z + qdd2 * z2_z - qdd1 * t15 - qd2 * t18 + qdd3 * z2_z + qdd4 * z4_z
+    w5_y = qd5 + w3_y
+    w6_z = qd6 + w4_z
+    t22 = t20 - qd5 * w4_z + qd6 * w5_y
+    t23 = qdd5 + qd3 * zd3_y + qd2 * zd2_y + qdd1 * z1_y + qdd2 * z2_y + qdd3 * z2_y - qd4 * t19 - qd6 * w4_x
+    t24 = 2.943 * t14
+    t25 = 2.943 * z1_y
+    t26 = 2.943 * t15
+    t27 = 0.006089999999999999 * t9 + 0.12993 * t6
+    t28 = 0.006089999999999999 * t5
+    t29 = -0.0096 - (0.12993 * z4_z - 0.006089999999999999 * t10)
+    t30 = t27 - (0.12954 * t11 - 0.02802 * z2_x)
+    t31 = 0.12954 * t12 + 0.02802 * z2_y - t28
+    t32 = t29 - (0.12954 * t13 - 0.02802 * z2_z)
+    t33 = t30 - 0.07304999999999999 * z2_x
+    t34 = t31 - 0.07304999999999999 * z2_y
+    t35 = t32 - 0.07304999999999999 * z2_z
+    t36 = t15 * t34 + z1_y * t35
+    s1_y = t15 * t33 - t14 * t35
+    s1_z = z1_y * t33 + t14 * t34
+    s2_x = z2_z * t31 - z2_y * t32
+    s2_y = z2_x * t32 - z2_z * t30
+    s2_z = z2_y * t30 - z2_x * t31
+    t37 = z2_z * t28 + z2_y * t29
+    s3_y = z2_x * t29 - z2_z * t27
+    s3_z = z2_y * t27 + z2_x * t28
+    s4_y = 0.0096 * t6
+    t38 = qd3 * s3_z
+    t39 = qd4 * s4_y
+    t40 = 0.0096 * qd5
+    v2_x = qd3 * t37 - t40
+    t41 = qd3 * s3_y + t39
+    v1_x = v2_x - qd2 * s2_x
+    t42 = qd2 * s2_y + t41
+    t43 = qd2 * s2_z + t38
+    v0_x = qd1 * t36 + v1_x
+    t44 = qd1 * s1_y + t42
+    t45 = qd1 * s1_z + t43
+    t46 = 1.9999999999999998e-05 * t8
+    t47 = 1.9999999999999998e-05 * t7
+    t48 = t8 * t46 + t7 * t47
+    t49 = t7 * t46 - t8 * t47
+    n2_5_y = 0.00016999999999999999 - t48
+    t50 = w6_z * t49
+    t51 = w6_z * t48
+    t52 = w4_x * t49
+    t53 = w5_y * t48 - t52
+    t54 = w5_y * t49
+    t55 = t54 - w4_x * t48
+    t56 = 0.00013 * w5_y
+    t57 = 0.00013 * w4_x
+    sd1_x = t15 * t44 + z1_y * t45
+    sd1_y = t14 * t45 + t15 * v0_x
+    sd1_z = z1_y * v0_x - t14 * t44
+    sd2_x = w1_y * s2_z + t17 * s2_y + z2_y * t43 - z2_z * t42
+    sd2_y = t16 * s2_z - t17 * s2_x - (z2_x * t43 + z2_z * v1_x)
+    sd2_z = z2_y * v1_x + z2_x * t42 - (t16 * s2_y + w1_y * s2_x)
+    sd3_x = w2_y * s3_z - w2_z * s3_y + z2_y * t38 - z2_z * t41
+    t58 = w2_z * t37 + w2_x * s3_z + z2_x * t38 + z2_z * v2_x
+    sd3_z = w2_x * s3_y + w2_y * t37 + z2_y * v2_x + z2_x * t41
+    sd4_y = z4_z * t40
+    t59 = w3_z * s4_y + z4_z * t39
+    sd4_z = w3_x * s4_y - t6 * t39
+    t60 = qdd2 * s2_x + qd1 * sd1_x - t24 - qdd1 * t36 + qd2 * sd2_x + qd3 * sd3_x - qdd3 * t37 - qd4 * t59
+    t61 = qdd3 * s3_y + qdd2 * s2_y + qdd1 * s1_y + t25 + qd1 * sd1_y + qd2 * sd2_y - qd3 * t58 + qd4 * sd4_y
+    t62 = qdd3 * s3_z + qdd2 * s2_z + qdd1 * s1_z + qd1 * sd1_z - t26 + qd2 * sd2_z + qd3 * sd3_z + qd4 * sd4_z
+    sd5_y = 0.0096 * w4_z
+    t63 = t40 + 0.0096 * w3_y
+    t64 = t60 + 0.0096 * qdd5
+    t65 = qdd4 * s4_y + t61 + qd5 * sd5_y
+    t66 = t62 - qd5 * t63
+    t67 = t22 * n2_5_y - t23 * t49 + w4_x * t50 + w5_y * t51 - w6_z * t56
+    t68 = t23 * n2_5_y - t22 * t49 + w6_z * t57 - (w4_x * t51 + w5_y * t50)
+    t69 = 3.9999999999999996e-05 * (qdd6 + t21 + qd5 * w4_x) + w4_x * t53 + w5_y * t55
+    n2_1_y = t14 * t49 + z1_y * n2_5_y
+    t70 = 3.9999999999999996e-05 * t15
+    n1_1_x = z1_y * t51 - t14 * t50 + t15 * t56
+    n1_1_y = t14 * t51 - z1_y * t50 - t15 * t57
+    n1_1_z = z1_y * t55 - t14 * t53
+    t71 = z2_x * n1_1_x + z2_y * n1_1_y + z2_z * n1_1_z
+    t72 = z2_x * t67 + z2_y * t68 + z2_z * t69
+    n2_2_x = z2_x * n2_5_y - z2_y * t49
+    n2_2_y = z2_y * n2_5_y - z2_x * t49
+    n2_2_z = 3.9999999999999996e-05 * z2_z
+    t73 = z2_x * t50 + z2_y * t51 - z2_z * t56
+    t74 = z2_z * t57 - (z2_x * t51 + z2_y * t50)
+    t75 = z2_x * t53 + z2_y * t55
+    n1_2_x = zd2_x * n2_5_y - zd2_y * t49 + t73
+    n1_2_y = zd2_y * n2_5_y - zd2_x * t49 + t74
+    n1_2_z = t75 - 3.9999999999999996e-05 * t18
+    t76 = z1_y * n2_2_y - t14 * n2_2_x - t15 * n2_2_z
+    t77 = z2_x * n2_2_x + z2_y * n2_2_y + z2_z * n2_2_z
+    t78 = z2_x * n1_2_x + z2_y * n1_2_y + z2_z * n1_2_z
+    n1_3_x = t73 + zd3_x * n2_5_y - zd3_y * t49
+    n1_3_y = t74 + zd3_y * n2_5_y - zd3_x * t49
+    n1_3_z = t75 + 3.9999999999999996e-05 * zd3_z
+    t79 = z2_x * n1_3_x + z2_y * n1_3_y + z2_z * n1_3_z
+    t80 = t6 * n2_5_y
+    n2_4_y = t6 * t49
+    n2_4_z = 3.9999999999999996e-05 * z4_z
+    n1_4_x = zd4_x * n2_5_y + t19 * t49 - (t6 * t50 + z4_z * t56)
+    n1_4_y = t6 * t51 + z4_z * t57 - (zd4_x * t49 + t19 * n2_5_y)
+    n1_4_z = 3.9999999999999996e-05 * zd4_z - t6 * t53
+    t81 = z2_y * n2_4_y - z2_x * t80 + z2_z * n2_4_z
+    t82 = z2_x * n1_4_x + z2_y * n1_4_y + z2_z * n1_4_z
+    n1_5_x = t51 - w4_z * n2_5_y
+    n1_5_y = w4_z * t49 - t50
+    n1_5_z = t55 + 3.9999999999999996e-05 * w4_x
+    t83 = z2_x * n1_5_x + z2_y * n1_5_y + z2_z * n1_5_z
+    n1_6_x = t52 + w5_y * n2_5_y - t56
+    n1_6_y = t57 - (t54 + w4_x * n2_5_y)
     return (
         pack(q, (
-            t16 * (t16 * n2_5_z + z1_z * t54) + t17 * t73 + z1_z * n2_1_z + s1_x * s1_x + t42 * t42 + s1_z * s1_z,
-            t80 + s1_x * s2_x - t42 * s2_y - s1_z * t43,
-            t80 + s1_x * s3_x + t42 * t44 - s1_z * t45,
-            t16 * t84 + t17 * t85 + z1_z * n2_4_z + s1_z * s4_z,
-            n2_1_z + 0.0096 * s1_x,
-            t73,
-            t81 + s2_x * s2_x + s2_y * s2_y + t43 * t43,
-            t81 + s2_x * s3_x - s2_y * t44 + t43 * t45,
-            t87 - t43 * s4_z,
-            n2_2_z + 0.0096 * s2_x,
-            t76,
-            t81 + s3_x * s3_x + t44 * t44 + t45 * t45,
-            t87 - t45 * s4_z,
-            n2_2_z + 0.0096 * s3_x,
-            t76,
-            t6 * t84 + t7 * t85 + s4_z * s4_z,
+            t14 * (t14 * n2_5_y + z1_y * t49) + z1_y * n2_1_y + t15 * t70 + t36 * t36 + s1_y * s1_y + s1_z * s1_z,
+            t76 + s1_y * s2_y - t36 * s2_x + s1_z * s2_z,
+            t76 + t36 * t37 + s1_y * s3_y + s1_z * s3_z,
+            t14 * t80 + z1_y * n2_4_y - t15 * n2_4_z + s1_y * s4_y,
+            n2_1_y - 0.0096 * t36,
+            -t70,
+            t77 + s2_x * s2_x + s2_y * s2_y + s2_z * s2_z,
+            t77 + s2_y * s3_y - s2_x * t37 + s2_z * s3_z,
+            t81 + s2_y * s4_y,
+            n2_2_y + 0.0096 * s2_x,
+            n2_2_z,
+            t77 + t37 * t37 + s3_y * s3_y + s3_z * s3_z,
+            t81 + s3_y * s4_y,
+            n2_2_y - 0.0096 * t37,
+            n2_2_z,
+            t6 * t80 + z4_z * n2_4_z + s4_y * s4_y,
+            n2_4_y,
             n2_4_z,
-            t85,
-            n2_5_z + 9.215999999999998e-05,
+            n2_5_y + 9.215999999999998e-05,
             0.0,
             3.9999999999999996e-05,
         )),
         pack(q, (
-            z1_z * n1_1_z - (t16 * n1_1_x + t17 * n1_1_y) + s1_x * sd1_x - t42 * sd1_y + s1_z * sd1_z,
-            z1_z * n1_2_z - (t16 * n1_2_x + t17 * n1_2_y) + s1_x * sd2_x - t42 * sd2_y + s1_z * sd2_z,
-            z1_z * n1_3_z - (t16 * n1_3_x + t17 * n1_3_y) + s1_x * sd3_x - t42 * sd3_y + s1_z * sd3_z,
-            t17 * t86 - t16 * n1_4_x + z1_z * n1_4_z + s1_z * sd4_z - (s1_x * t63 + t42 * sd4_y),
-            z1_z * n1_5_z - (t16 * n1_5_x + t17 * n1_5_y) + s1_z * sd5_z - t42 * sd5_y,
-            z1_z * n1_6_z - t16 * n1_6_x,
-            t74 + s2_x * sd1_x + s2_y * sd1_y - t43 * sd1_z,
-            t82 + s2_x * sd2_x + s2_y * sd2_y - t43 * sd2_z,
-            t83 + s2_x * sd3_x + s2_y * sd3_y - t43 * sd3_z,
-            t88 + s2_y * sd4_y - s2_x * t63 - t43 * sd4_z,
-            t89 + s2_y * sd5_y - t43 * sd5_z,
-            z2_x * n1_6_x + z2_z * n1_6_z,
-            t74 + s3_x * sd1_x - t44 * sd1_y - t45 * sd1_z,
-            t82 + s3_x * sd2_x - t44 * sd2_y - t45 * sd2_z,
-            t83 + s3_x * sd3_x - t44 * sd3_y - t45 * sd3_z,
-            t88 - (s3_x * t63 + t44 * sd4_y + t45 * sd4_z),
-            t89 - (t44 * sd5_y + t45 * sd5_z),
-            z2_x * n1_6_x + z2_z * n1_6_z,
-            s4_z * sd1_z - (t6 * n1_1_x + t7 * n1_1_y),
-            s4_z * sd2_z - (t6 * n1_2_x + t7 * n1_2_y),
-            s4_z * sd3_z - (t6 * n1_3_x + t7 * n1_3_y),
-            t7 * t86 - t6 * n1_4_x + s4_z * sd4_z,
-            s4_z * sd5_z - (t6 * n1_5_x + t7 * n1_5_y),
+            z1_y * n1_1_y - t14 * n1_1_x - t15 * n1_1_z + s1_y * sd1_y - t36 * sd1_x + s1_z * sd1_z,
+            z1_y * n1_2_y - t14 * n1_2_x - t15 * n1_2_z + s1_y * sd2_y - t36 * sd2_x + s1_z * sd2_z,
+            z1_y * n1_3_y - t14 * n1_3_x - t15 * n1_3_z + s1_z * sd3_z - (t36 * sd3_x + s1_y * t58),
+            z1_y * n1_4_y - t14 * n1_4_x - t15 * n1_4_z + t36 * t59 + s1_y * sd4_y + s1_z * sd4_z,
+            z1_y * n1_5_y - t14 * n1_5_x - t15 * n1_5_z + s1_y * sd5_y - s1_z * t63,
+            z1_y * n1_6_y - t14 * n1_6_x,
+            t71 + s2_x * sd1_x + s2_y * sd1_y + s2_z * sd1_z,
+            t78 + s2_x * sd2_x + s2_y * sd2_y + s2_z * sd2_z,
+            t79 + s2_x * sd3_x - s2_y * t58 + s2_z * sd3_z,
+            t82 + s2_y * sd4_y - s2_x * t59 + s2_z * sd4_z,
+            t83 + s2_y * sd5_y - s2_z * t63,
+            z2_x * n1_6_x + z2_y * n1_6_y,
+            t71 + s3_y * sd1_y - t37 * sd1_x + s3_z * sd1_z,
+            t78 + s3_y * sd2_y - t37 * sd2_x + s3_z * sd2_z,
+            t79 + s3_z * sd3_z - (t37 * sd3_x + s3_y * t58),
+            t82 + t37 * t59 + s3_y * sd4_y + s3_z * sd4_z,
+            t83 + s3_y * sd5_y - s3_z * t63,
+            z2_x * n1_6_x + z2_y * n1_6_y,
+            z4_z * n1_1_z - t6 * n1_1_x + s4_y * sd1_y,
+            z4_z * n1_2_z - t6 * n1_2_x + s4_y * sd2_y,
+            z4_z * n1_3_z - t6 * n1_3_x - s4_y * t58,
+            z4_z * n1_4_z - t6 * n1_4_x + s4_y * sd4_y,
+            z4_z * n1_5_z - t6 * n1_5_x + s4_y * sd5_y,
             -t6 * n1_6_x,
-            n1_1_z + 0.0096 * sd1_x,
-            n1_2_z + 0.0096 * sd2_x,
-            n1_3_z + 0.0096 * sd3_x,
-            n1_4_z - 0.0096 * t63,
+            n1_1_y + 0.0096 * sd1_x,
+            n1_2_y + 0.0096 * sd2_x,
+            n1_3_y + 0.0096 * sd3_x,
+            n1_4_y - 0.0096 * t59,
+            n1_5_y,
+            n1_6_y,
+            n1_1_z,
+            n1_2_z,
+            n1_3_z,
+            n1_4_z,
             n1_5_z,
-            n1_6_z,
-            -n1_1_y,
-            -n1_2_y,
-            -n1_3_y,
-            t86,
-            -n1_5_y,
             0.0,
         )),
         pack(q, (
-            t31 * t42 - t30 * s1_x + t32 * s1_z,
-            -(t30 * s2_x + t31 * s2_y + t32 * t43),
-            t31 * t44 - t30 * s3_x - t32 * t45,
-            t32 * s4_z,
-            -0.028252799999999998 * t16,
+            t24 * t36 + t25 * s1_y - t26 * s1_z,
+            t25 * s2_y - t24 * s2_x - t26 * s2_z,
+            t24 * t37 + t25 * s3_y - t26 * s3_z,
+            t25 * s4_y,
+            -0.028252799999999998 * t14,
             0.0,
         )),
         pack(q, (
-            z1_z * t72 - (t16 * t70 + t17 * t71) + s1_x * t67 - t42 * t68 + s1_z * t69,
-            t75 + s2_x * t67 + s2_y * t68 - t43 * t69,
-            t75 + s3_x * t67 - t44 * t68 - t45 * t69,
-            s4_z * t69 - (t6 * t70 + t7 * t71),
-            t72 + 0.0096 * t67,
-            -t71,
+            z1_y * t68 - t14 * t67 - t15 * t69 + s1_y * t65 - t36 * t64 + s1_z * t66,
+            t72 + s2_x * t64 + s2_y * t65 + s2_z * t66,
+            t72 + s3_y * t65 - t37 * t64 + s3_z * t66,
+            z4_z * t69 - t6 * t67 + s4_y * t65,
+            t68 + 0.0096 * t64,
+            t69,
         )),
         pack(q, ()),
     )
@@ -288,113 +288,111 @@ def torque(q, qd, qdd, p):
     t3 = torch.sin(q3)
     t4 = torch.cos(q3)
     t5 = torch.sin(q4)
-    z2_z = torch.cos(q4)
+    z2_y = torch.cos(q4)
     t6 = torch.sin(q5)
-    t7 = torch.cos(q5)
-    t8 = torch.sin(q6)
-    t9 = torch.cos(q6)
-    t10 = z2_z * t7
-    t11 = z2_z * t6
-    z2_x = t5 * t7
-    t12 = t5 * t6
-    t13 = t4 * t10 - t3 * t6
-    t14 = t4 * t11 + t3 * t7
-    t15 = t4 * t5
-    t16 = t1 * t13 + t2 * (t3 * t10 + t4 * t6)
-    t17 = t2 * (t4 * t7 - t3 * t11) - t1 * t14
-    z1_z = t1 * t15 + t2 * (t3 * t5)
-    t18 = qd1 * t16
-    t19 = qd1 * t17
-    w1_z = qd1 * z1_z
-    zd2_x = t12 * w1_z - z2_z * t19
-    zd2_y = z2_x * w1_z + z2_z * t18
-    zd2_z = t12 * t18 + z2_x * t19
-    w2_x = qd2 * z2_x - t18
-    t20 = t19 + qd2 * t12
-    w2_z = w1_z + qd2 * z2_z
-    zd3_x = t12 * w2_z - z2_z * t20
+    z4_z = torch.cos(q5)
+    t7 = torch.sin(q6)
+    t8 = torch.cos(q6)
+    t9 = z2_y * z4_z
+    t10 = z2_y * t6
+    z2_x = t5 * z4_z
+    z2_z = t5 * t6
+    t11 = t4 * t9 - t3 * t6
+    t12 = t4 * t5
+    t13 = t4 * t10 + t3 * z4_z
+    t14 = t1 * t11 + t2 * (t3 * t9 + t4 * t6)
+    z1_y = t1 * t12 + t2 * (t3 * t5)
+    t15 = t1 * t13 + t2 * (t3 * t10 - t4 * z4_z)
+    t16 = qd1 * t14
+    w1_y = qd1 * z1_y
+    t17 = qd1 * t15
+    zd2_x = z2_z * w1_y + z2_y * t17
+    zd2_y = z2_z * t16 - z2_x * t17
+    w2_x = qd2 * z2_x - t16
+    w2_y = w1_y + qd2 * z2_y
+    w2_z = qd2 * z2_z - t17
+    zd3_x = z2_z * w2_y - z2_y * w2_z
     zd3_y = z2_x * w2_z - z2_z * w2_x
-    zd3_z = z2_x * t20 - t12 * w2_x
+    zd3_z = z2_y * w2_x - z2_x * w2_y
     w3_x = w2_x + qd3 * z2_x
-    t21 = t20 + qd3 * t12
+    w3_y = w2_y + qd3 * z2_y
     w3_z = w2_z + qd3 * z2_z
-    zd4_x = t7 * w3_z
+    zd4_x = z4_z * w3_y
+    zd4_z = t6 * w3_y
     w4_x = w3_x - qd4 * t6
-    t22 = t21 + qd4 * t7
-    t23 = qd4 * zd4_x + qd3 * zd3_x + qd2 * zd2_x + qdd2 * z2_x - qdd1 * t16 + qdd3 * z2_x - qdd4 * t6
-    t24 = qd3 * zd3_y + qd2 * zd2_y - (qdd1 * t17 + qdd2 * t12) - qdd3 * t12 - qdd4 * t7 - qd4 * (t6 * w3_z)
-    t25 = qd3 * zd3_z + qd2 * zd2_z + qdd1 * z1_z + qdd2 * z2_z + qdd3 * z2_z - qd4 * (t7 * w3_x + t6 * t21)
-    w5_z = qd5 + w3_z
-    t26 = qd6 + t22
-    t27 = t23 - qd5 * t22 + qd6 * w5_z
-    t28 = qdd5 + t25 - qd6 * w4_x
-    t29 = 0.006089999999999999 * t10 + 0.12993 * t6
-    t30 = 0.006089999999999999 * t5
-    t31 = 0.0096 - (0.006089999999999999 * t11 - 0.12993 * t7)
-    t32 = t29 - (0.12954 * t13 - 0.02802 * z2_x)
-    t33 = t31 - (0.02802 * t12 - 0.12954 * t14)
-    t34 = 0.12954 * t15 + 0.02802 * z2_z - t30
-    t35 = t32 - 0.07304999999999999 * z2_x
-    t36 = t33 + 0.07304999999999999 * t12
-    t37 = t34 - 0.07304999999999999 * z2_z
-    s1_x = z1_z * t36 + t17 * t37
-    t38 = t16 * t37 + z1_z * t35
-    s1_z = t16 * t36 - t17 * t35
-    s2_x = z2_z * t33 + t12 * t34
-    s2_y = z2_x * t34 - z2_z * t32
-    t39 = t12 * t32 + z2_x * t33
-    s3_x = z2_z * t31 - t12 * t30
-    t40 = z2_x * t30 + z2_z * t29
-    t41 = t12 * t29 + z2_x * t31
-    s4_z = 0.0096 * t6
-    v2_y = qd3 * t40
-    t42 = qd4 * s4_z
-    t43 = 0.0096 * qd5
-    t44 = qd3 * s3_x + t43
-    v2_z = qd3 * t41 - t42
-    t45 = qd2 * s2_x + t44
-    v1_y = v2_y - qd2 * s2_y
-    v1_z = qd2 * t39 + v2_z
-    t46 = qd1 * s1_x + t45
-    v0_y = qd1 * t38 + v1_y
-    v0_z = v1_z - qd1 * s1_z
-    t47 = 1.9999999999999998e-05 * t9
-    t48 = 1.9999999999999998e-05 * t8
-    t49 = t9 * t47 + t8 * t48
-    t50 = t8 * t47 - t9 * t48
-    n2_5_z = 0.00016999999999999999 - t49
-    t51 = t26 * t50
-    t52 = t26 * t49
-    sd1_x = z1_z * v0_y + t17 * v0_z
-    sd1_y = z1_z * t46 - t16 * v0_z
-    sd1_z = t17 * t46 + t16 * v0_y
-    sd2_x = t19 * t39 - w1_z * s2_y + z2_z * v1_y + t12 * v1_z
-    sd2_y = w1_z * s2_x - t18 * t39 + z2_x * v1_z + z2_z * t45
-    sd2_z = t19 * s2_x - t18 * s2_y + t12 * t45 - z2_x * v1_y
-    sd3_x = t20 * t41 + w2_z * t40 + z2_z * v2_y + t12 * v2_z
-    sd3_y = w2_z * s3_x + w2_x * t41 + z2_x * v2_z + z2_z * t44
-    sd3_z = t20 * s3_x - w2_x * t40 + t12 * t44 - z2_x * v2_y
-    t53 = qdd3 * s3_x + qdd2 * s2_x + qdd1 * s1_x + qd1 * sd1_x - 2.943 * t16 + qd2 * sd2_x + qd3 * sd3_x
-    t54 = qdd2 * s2_y + qd1 * sd1_y - 2.943 * t17 - qdd1 * t38 + qd2 * sd2_y + qd3 * sd3_y - qdd3 * t40
-    t55 = qdd1 * s1_z + 2.943 * z1_z + qd1 * sd1_z + qd2 * sd2_z - qdd2 * t39 + qd3 * sd3_z - qdd3 * t41
-    sd4_z = t7 * t43
-    sd4_y = t6 * t42 - w3_x * s4_z
-    sd5_z = 0.0096 * t22
-    sd5_y = t43 + 0.0096 * w3_z
-    t56 = t53 - qd4 * (t21 * s4_z + t7 * t42) + 0.0096 * qdd5
-    t57 = t54 + qd4 * sd4_y + qd5 * sd5_y
-    t58 = qdd4 * s4_z + t55 + qd4 * sd4_z + qd5 * sd5_z
-    t59 = t27 * n2_5_z - t28 * t50 + w4_x * t51 - t26 * (0.00013 * w5_z) + w5_z * t52
-    t60 = 3.9999999999999996e-05 * (t24 - qd5 * w4_x - qdd6) + w4_x * (w4_x * t50 - w5_z * t49) + w5_z * (w4_x * t49 - w5_z * t50)
-    t61 = t28 * n2_5_z - t27 * t50 + t26 * (0.00013 * w4_x) - w4_x * t52 - w5_z * t51
-    t62 = z2_x * t59 - t12 * t60 + z2_z * t61
+    w4_z = w3_z + qd4 * z4_z
+    t18 = qd4 * zd4_x + qd3 * zd3_x + qd2 * zd2_x + qdd2 * z2_x - qdd1 * t14 + qdd3 * z2_x - qdd4 * t6
+    t19 = qd3 * zd3_y + qd2 * zd2_y + qdd1 * z1_y + qdd2 * z2_y + qdd3 * z2_y - qd4 * (t6 * w3_z + z4_z * w3_x)
+    t20 = qd3 * zd3_z + qdd2 * z2_z - qdd1 * t15 - qd2 * (z2_y * t16 + z2_x * w1_y) + qdd3 * z2_z + qdd4 * z4_z
+    w5_y = qd5 + w3_y
+    w6_z = qd6 + w4_z
+    t21 = t18 - qd5 * w4_z + qd6 * w5_y
+    t22 = qdd5 + t19 - qd6 * w4_x
+    t23 = 0.006089999999999999 * t9 + 0.12993 * t6
+    t24 = 0.006089999999999999 * t5
+    t25 = -0.0096 - (0.12993 * z4_z - 0.006089999999999999 * t10)
+    t26 = t23 - (0.12954 * t11 - 0.02802 * z2_x)
+    t27 = 0.12954 * t12 + 0.02802 * z2_y - t24
+    t28 = t25 - (0.12954 * t13 - 0.02802 * z2_z)
+    t29 = t26 - 0.07304999999999999 * z2_x
+    t30 = t27 - 0.07304999999999999 * z2_y
+    t31 = t28 - 0.07304999999999999 * z2_z
+    t32 = t15 * t30 + z1_y * t31
+    s1_y = t15 * t29 - t14 * t31
+    s1_z = z1_y * t29 + t14 * t30
+    s2_x = z2_z * t27 - z2_y * t28
+    s2_y = z2_x * t28 - z2_z * t26
+    s2_z = z2_y * t26 - z2_x * t27
+    t33 = z2_z * t24 + z2_y * t25
+    s3_y = z2_x * t25 - z2_z * t23
+    s3_z = z2_y * t23 + z2_x * t24
+    s4_y = 0.0096 * t6
+    t34 = qd3 * s3_z
+    t35 = qd4 * s4_y
+    t36 = 0.0096 * qd5
+    v2_x = qd3 * t33 - t36
+    t37 = qd3 * s3_y + t35
+    v1_x = v2_x - qd2 * s2_x
+    t38 = qd2 * s2_y + t37
+    t39 = qd2 * s2_z + t34
+    v0_x = qd1 * t32 + v1_x
+    t40 = qd1 * s1_y + t38
+    t41 = qd1 * s1_z + t39
+    t42 = 1.9999999999999998e-05 * t8
+    t43 = 1.9999999999999998e-05 * t7
+    t44 = t8 * t42 + t7 * t43
+    t45 = t7 * t42 - t8 * t43
+    n2_5_y = 0.00016999999999999999 - t44
+    t46 = w6_z * t45
+    t47 = w6_z * t44
+    sd1_x = t15 * t40 + z1_y * t41
+    sd1_y = t14 * t41 + t15 * v0_x
+    sd1_z = z1_y * v0_x - t14 * t40
+    sd2_x = w1_y * s2_z + t17 * s2_y + z2_y * t39 - z2_z * t38
+    sd2_y = t16 * s2_z - t17 * s2_x - (z2_x * t39 + z2_z * v1_x)
+    sd2_z = z2_y * v1_x + z2_x * t38 - (t16 * s2_y + w1_y * s2_x)
+    sd3_x = w2_y * s3_z - w2_z * s3_y + z2_y * t34 - z2_z * t37
+    sd3_z = w2_x * s3_y + w2_y * t33 + z2_y * v2_x + z2_x * t37
+    t48 = qdd2 * s2_x + qd1 * sd1_x - 2.943 * t14 - qdd1 * t32 + qd2 * sd2_x + qd3 * sd3_x - qdd3 * t33
+    t49 = qdd2 * s2_y + qdd1 * s1_y + 2.943 * z1_y + qd1 * sd1_y + qd2 * sd2_y - qd3 * (w2_z * t33 + w2_x * s3_z + z2_x * t34 + z2_z * v2_x)
+    t50 = qdd3 * s3_z + qdd2 * s2_z + qdd1 * s1_z + qd1 * sd1_z - 2.943 * t15 + qd2 * sd2_z + qd3 * sd3_z
+    sd4_y = z4_z * t36
+    sd4_z = w3_x * s4_y - t6 * t35
+    sd5_y = 0.0096 * w4_z
+    t51 = t48 - qd4 * (w3_z * s4_y + z4_z * t35) + 0.0096 * qdd5
+    t52 = qdd4 * s4_y + qdd3 * s3_y + t49 + qd4 * sd4_y + qd5 * sd5_y
+    t53 = t50 + qd4 * sd4_z - qd5 * (t36 + 0.0096 * w3_y)
+    t54 = t21 * n2_5_y - t22 * t45 + w4_x * t46 + w5_y * t47 - w6_z * (0.00013 * w5_y)
+    t55 = t22 * n2_5_y - t21 * t45 + w6_z * (0.00013 * w4_x) - (w4_x * t47 + w5_y * t46)
+    t56 = 3.9999999999999996e-05 * (qdd6 + qd4 * zd4_z + t20 + qd5 * w4_x) + w4_x * (w5_y * t44 - w4_x * t45) + w5_y * (w5_y * t45 - w4_x * t44)
+    t57 = z2_x * t54 + z2_y * t55 + z2_z * t56
     return pack(q, (
-            z1_z * t61 - (t16 * t59 + t17 * t60) + s1_x * t56 - t38 * t57 + s1_z * t58,
-            t62 + s2_x * t56 + s2_y * t57 - t39 * t58,
-            t62 + s3_x * t56 - t40 * t57 - t41 * t58,
-            s4_z * t58 - (t6 * t59 + t7 * t60),
-            t61 + 0.0096 * t56,
-            -t60,
+            z1_y * t55 - t14 * t54 - t15 * t56 + s1_y * t52 - t32 * t51 + s1_z * t53,
+            t57 + s2_x * t51 + s2_y * t52 + s2_z * t53,
+            t57 + s3_y * t52 - t33 * t51 + s3_z * t53,
+            z4_z * t56 - t6 * t54 + s4_y * t52,
+            t55 + 0.0096 * t51,
+            t56,
         ))
 
 
@@ -422,241 +420,241 @@ def position_gradient(q, qd, qdd, p):
     t3 = torch.sin(q3)
     t4 = torch.cos(q3)
     t5 = torch.sin(q4)
-    z2_z = torch.cos(q4)
+    z2_y = torch.cos(q4)
     t6 = torch.sin(q5)
-    t7 = torch.cos(q5)
-    t8 = torch.sin(q6)
-    t9 = torch.cos(q6)
-    t10 = z2_z * t7
-    t11 = z2_z * t6
-    z2_x = t5 * t7
-    t12 = t5 * t6
-    t13 = t4 * t10 - t3 * t6
-    t14 = t4 * t11 + t3 * t7
-    t15 = t4 * t5
-    t16 = t1 * t13 + t2 * (t3 * t10 + t4 * t6)
-    t17 = t2 * (t4 * t7 - t3 * t11) - t1 * t14
-    z1_z = t1 * t15 + t2 * (t3 * t5)
-    t18 = qd1 * t16
-    t19 = qd1 * t17
-    w1_z = qd1 * z1_z
-    t20 = qdd1 * t16
-    t21 = qdd1 * t17
-    t22 = qdd1 * z1_z
-    zd2_x = t12 * w1_z - z2_z * t19
-    zd2_y = z2_x * w1_z + z2_z * t18
-    zd2_z = t12 * t18 + z2_x * t19
-    t23 = t12 * t22 - z2_z * t21 - (t19 * zd2_z + w1_z * zd2_y)
-    t24 = t12 * t20 + z2_x * t21 + t19 * zd2_x - t18 * zd2_y
-    w2_x = qd2 * z2_x - t18
-    t25 = t19 + qd2 * t12
-    w2_z = w1_z + qd2 * z2_z
-    t26 = qd2 * zd2_x + qdd2 * z2_x - t20
-    t27 = qd2 * zd2_y - (t21 + qdd2 * t12)
-    t28 = qd2 * zd2_z + t22 + qdd2 * z2_z
-    zd3_x = t12 * w2_z - z2_z * t25
+    z4_z = torch.cos(q5)
+    t7 = torch.sin(q6)
+    t8 = torch.cos(q6)
+    t9 = z2_y * z4_z
+    t10 = z2_y * t6
+    z2_x = t5 * z4_z
+    z2_z = t5 * t6
+    t11 = t4 * t9 - t3 * t6
+    t12 = t4 * t5
+    t13 = t4 * t10 + t3 * z4_z
+    t14 = t1 * t11 + t2 * (t3 * t9 + t4 * t6)
+    z1_y = t1 * t12 + t2 * (t3 * t5)
+    t15 = t1 * t13 + t2 * (t3 * t10 - t4 * z4_z)
+    t16 = qd1 * t14
+    w1_y = qd1 * z1_y
+    t17 = qd1 * t15
+    t18 = qdd1 * t14
+    t19 = qdd1 * z1_y
+    t20 = qdd1 * t15
+    zd2_x = z2_z * w1_y + z2_y * t17
+    zd2_y = z2_z * t16 - z2_x * t17
+    t21 = z2_y * t16 + z2_x * w1_y
+    t22 = z2_z * t19 + z2_y * t20 + t17 * zd2_y - w1_y * t21
+    t23 = z2_z * t18 - z2_x * t20 - (t17 * zd2_x + t16 * t21)
+    w2_x = qd2 * z2_x - t16
+    w2_y = w1_y + qd2 * z2_y
+    w2_z = qd2 * z2_z - t17
+    t24 = qd2 * zd2_x + qdd2 * z2_x - t18
+    t25 = qd2 * zd2_y + t19 + qdd2 * z2_y
+    t26 = qdd2 * z2_z - t20 - qd2 * t21
+    zd3_x = z2_z * w2_y - z2_y * w2_z
     zd3_y = z2_x * w2_z - z2_z * w2_x
-    zd3_z = z2_x * t25 - t12 * w2_x
-    t29 = z2_z * t27 + t12 * t28 - (t25 * zd3_z + w2_z * zd3_y)
-    t30 = w2_x * zd3_y + t25 * zd3_x - (t12 * t26 + z2_x * t27)
+    zd3_z = z2_y * w2_x - z2_x * w2_y
+    t27 = z2_z * t25 - z2_y * t26 + w2_y * zd3_z - w2_z * zd3_y
+    t28 = z2_x * t26 - z2_z * t24 + w2_z * zd3_x - w2_x * zd3_z
     w3_x = w2_x + qd3 * z2_x
-    t31 = t25 + qd3 * t12
+    w3_y = w2_y + qd3 * z2_y
     w3_z = w2_z + qd3 * z2_z
-    t32 = qd3 * zd3_x + t26 + qdd3 * z2_x
-    t33 = qd3 * zd3_y + t27 - qdd3 * t12
-    t34 = qd3 * zd3_z + t28 + qdd3 * z2_z
-    zd4_x = t7 * w3_z
-    t35 = t6 * w3_z
-    t36 = t7 * w3_x + t6 * t31
-    t37 = t7 * t34 + t31 * t36 + w3_z * t35
-    t38 = t6 * t33 - t7 * t32 + t31 * zd4_x - w3_x * t35
+    t29 = qd3 * zd3_x + t24 + qdd3 * z2_x
+    t30 = qd3 * zd3_y + t25 + qdd3 * z2_y
+    t31 = qd3 * zd3_z + t26 + qdd3 * z2_z
+    zd4_x = z4_z * w3_y
+    t32 = t6 * w3_z + z4_z * w3_x
+    zd4_z = t6 * w3_y
+    t33 = z4_z * t30 + w3_y * zd4_z + w3_z * t32
+    t34 = w3_z * zd4_x - w3_x * zd4_z - (t6 * t31 + z4_z * t29)
     w4_x = w3_x - qd4 * t6
-    t39 = t31 + qd4 * t7
-    t40 = qd4 * zd4_x + t32 - qdd4 * t6
-    t41 = t33 - qdd4 * t7 - qd4 * t35
-    t42 = t34 - qd4 * t36
-    t43 = w4_x * w4_x
-    t44 = t43 + t39 * t39
-    t45 = t41 + w3_z * w4_x
-    w5_z = qd5 + w3_z
-    t46 = t40 - qd5 * t39
-    t47 = qdd5 + t42
-    t48 = t47 + w4_x * t39
-    t49 = t39 * w5_z - t46
-    t50 = qd6 + t39
-    t51 = t46 + qd6 * w5_z
-    t52 = t47 - qd6 * w4_x
-    t53 = 2.943 * t16
-    t54 = 2.943 * t17
-    t55 = 2.943 * z1_z
-    t56 = 0.006089999999999999 * t10 + 0.12993 * t6
-    t57 = 0.006089999999999999 * t5
-    t58 = 0.0096 - (0.006089999999999999 * t11 - 0.12993 * t7)
-    t59 = t56 - (0.12954 * t13 - 0.02802 * z2_x)
-    t60 = t58 - (0.02802 * t12 - 0.12954 * t14)
-    t61 = 0.12954 * t15 + 0.02802 * z2_z - t57
-    t62 = t59 - 0.07304999999999999 * z2_x
-    t63 = t60 + 0.07304999999999999 * t12
-    t64 = t61 - 0.07304999999999999 * z2_z
-    s1_x = z1_z * t63 + t17 * t64
-    t65 = t16 * t64 + z1_z * t62
-    s1_z = t16 * t63 - t17 * t62
-    s2_x = z2_z * t60 + t12 * t61
-    s2_y = z2_x * t61 - z2_z * t59
-    t66 = t12 * t59 + z2_x * t60
-    s3_x = z2_z * t58 - t12 * t57
-    t67 = z2_x * t57 + z2_z * t56
-    t68 = t12 * t56 + z2_x * t58
-    s4_z = 0.0096 * t6
-    v2_y = qd3 * t67
-    t69 = qd4 * s4_z
-    t70 = 0.0096 * qd5
-    t71 = qd3 * s3_x + t70
-    v2_z = qd3 * t68 - t69
-    t72 = qd2 * s2_x + t71
-    v1_y = v2_y - qd2 * s2_y
-    v1_z = qd2 * t66 + v2_z
-    t73 = qd1 * s1_x + t72
-    v0_y = qd1 * t65 + v1_y
-    v0_z = v1_z - qd1 * s1_z
-    t74 = 1.9999999999999998e-05 * t9
-    t75 = 1.9999999999999998e-05 * t8
-    t76 = t9 * t74 + t8 * t75
-    t77 = t8 * t74 - t9 * t75
-    n2_5_z = 0.00016999999999999999 - t76
-    t78 = t50 * t77
-    t79 = w4_x * t77 - w5_z * t76
-    t80 = t50 * t76
-    t81 = 0.00013 * w5_z
-    t82 = 0.00013 * w4_x
-    t83 = w4_x * t76 - w5_z * t77
-    sd1_x = z1_z * v0_y + t17 * v0_z
-    sd1_y = z1_z * t73 - t16 * v0_z
-    sd1_z = t17 * t73 + t16 * v0_y
-    t84 = t17 * t55 - z1_z * t54
-    t85 = z1_z * t53 - t16 * t55
-    t86 = t17 * t53 - t16 * t54
-    t87 = qdd1 * s1_x + qd1 * sd1_x - t53
-    t88 = qd1 * sd1_y - t54 - qdd1 * t65
-    t89 = qdd1 * s1_z + t55 + qd1 * sd1_z
-    sd2_x = t19 * t66 - w1_z * s2_y + z2_z * v1_y + t12 * v1_z
-    sd2_y = w1_z * s2_x - t18 * t66 + z2_x * v1_z + z2_z * t72
-    sd2_z = t19 * s2_x - t18 * s2_y + t12 * t72 - z2_x * v1_y
-    t90 = t21 * t66 - t22 * s2_y + z2_z * t88 + t12 * t89 + zd2_z * v1_y - zd2_y * v1_z - (t19 * sd2_z + w1_z * sd2_y)
-    t91 = t22 * s2_x - t20 * t66 + z2_x * t89 - z2_z * t87 + w1_z * sd2_x + t18 * sd2_z + zd2_x * v1_z + zd2_z * t72
-    t92 = t21 * s2_x - t20 * s2_y - (t12 * t87 + z2_x * t88) + t19 * sd2_x - t18 * sd2_y - (zd2_y * t72 + zd2_x * v1_y)
-    t93 = qdd2 * s2_x + t87 + qd2 * sd2_x
-    t94 = qdd2 * s2_y + t88 + qd2 * sd2_y
-    t95 = t89 + qd2 * sd2_z - qdd2 * t66
-    sd3_x = t25 * t68 + w2_z * t67 + z2_z * v2_y + t12 * v2_z
-    sd3_y = w2_z * s3_x + w2_x * t68 + z2_x * v2_z + z2_z * t71
-    sd3_z = t25 * s3_x - w2_x * t67 + t12 * t71 - z2_x * v2_y
-    t96 = t28 * t67 - t27 * t68 + z2_z * t94 + t12 * t95 + zd3_z * v2_y - zd3_y * v2_z - (t25 * sd3_z + w2_z * sd3_y)
-    t97 = t28 * s3_x + t26 * t68 + z2_x * t95 - z2_z * t93 + w2_z * sd3_x - w2_x * sd3_z + zd3_x * v2_z + zd3_z * t71
-    t98 = w2_x * sd3_y + t25 * sd3_x - (zd3_y * t71 + zd3_x * v2_y) - (t26 * t67 + t27 * s3_x + t12 * t93 + z2_x * t94)
-    t99 = qdd3 * s3_x + t93 + qd3 * sd3_x
-    t100 = t94 + qd3 * sd3_y - qdd3 * t67
-    t101 = t95 + qd3 * sd3_z - qdd3 * t68
-    sd4_z = t7 * t70
-    t102 = t31 * s4_z + t7 * t69
-    sd4_y = t6 * t69 - w3_x * s4_z
-    t103 = t33 * s4_z + t7 * t101 - (t31 * sd4_z + w3_z * sd4_y + t35 * t69)
-    t104 = t99 - qd4 * t102
-    t105 = t100 + qd4 * sd4_y
-    sd5_z = 0.0096 * t39
-    sd5_y = t70 + 0.0096 * w3_z
-    t106 = w4_x * sd5_y + w4_x * t70 - 0.0096 * t41
-    t107 = t104 + 0.0096 * qdd5
-    t108 = t105 + qd5 * sd5_y
-    t109 = qdd4 * s4_z + t101 + qd4 * sd4_z + qd5 * sd5_z
-    t110 = w4_x * t78
-    t111 = w5_z * t80
-    t112 = w4_x * t80
-    t113 = w5_z * t78
-    t114 = t51 * n2_5_z - t52 * t77 + t110 - t50 * t81 + t111
-    t115 = 3.9999999999999996e-05 * (t41 - qd5 * w4_x - qdd6) + w4_x * t79 + w5_z * t83
-    t116 = t52 * n2_5_z - t51 * t77 + t50 * t82 - t112 - t113
-    t117 = t16 * (t17 * t116 + z1_z * t115 + t65 * t109 + s1_z * t108) - t17 * (z1_z * t114 + t16 * t116 + s1_z * t107 - s1_x * t109)
-    t118 = s1_x * (t84 - (t17 * t109 + z1_z * t108)) - t65 * (t85 + z1_z * t107 + t16 * t109) + s1_z * (t86 + t17 * t107 - t16 * t108)
-    t119 = t23 * n2_5_z - t24 * t77 + 2.0 * (zd2_x * t78 + zd2_y * t81 + zd2_z * t80)
-    t120 = 3.9999999999999996e-05 * (z2_x * t22 + z2_z * t20 + w1_z * zd2_x + t18 * zd2_z) + 2.0 * (zd2_x * t79 + zd2_z * t83)
-    t121 = t24 * n2_5_z - t23 * t77 - 2.0 * (zd2_x * t80 + zd2_y * t82 + zd2_z * t78)
-    t122 = t12 * t116 + z2_z * t115
-    t123 = z2_z * t114 - z2_x * t116
-    t124 = z2_x * t115 + t12 * t114
-    t125 = t12 * t109 + z2_z * t108
-    t126 = z2_z * t107 - z2_x * t109
-    t127 = z2_x * t108 + t12 * t107
-    t128 = t119 + s2_y * t109 + t66 * t108 - t122
-    t129 = t120 + t123 - (t66 * t107 + s2_x * t109)
-    t130 = t121 + t124 + s2_x * t108 - s2_y * t107
-    t131 = t90 - t125
-    t132 = t91 + t126
-    t133 = t92 + t127
-    t134 = t29 * n2_5_z - t30 * t77 + 2.0 * (zd3_x * t78 + zd3_y * t81 + zd3_z * t80)
-    t135 = 3.9999999999999996e-05 * (z2_x * t28 - z2_z * t26 + w2_z * zd3_x - w2_x * zd3_z) + 2.0 * (zd3_x * t79 + zd3_z * t83)
-    t136 = t30 * n2_5_z - t29 * t77 - 2.0 * (zd3_x * t80 + zd3_y * t82 + zd3_z * t78)
-    t137 = t134 + t68 * t108 - t67 * t109 - t122
-    t138 = t135 + t123 - (t68 * t107 + s3_x * t109)
-    t139 = t136 + t124 + s3_x * t108 + t67 * t107
-    t140 = t96 - t125
-    t141 = t97 + t126
-    t142 = t98 + t127
-    t143 = z2_x * t137 - t12 * t138 + z2_z * t139
-    t144 = 3.9999999999999996e-05 * (w3_z * zd4_x + w3_x * t36 - t6 * t34) + 2.0 * (zd4_x * t79 - t36 * t83)
-    t145 = t38 * n2_5_z - t37 * t77 + 2.0 * (t35 * t82 - zd4_x * t80 + t36 * t78)
-    t146 = t37 * n2_5_z - t38 * t77 + 2.0 * (zd4_x * t78 - t35 * t81 - t36 * t80) - (t7 * t116 + s4_z * t108)
-    t147 = t144 + t6 * t116 + s4_z * t107
-    t148 = t145 + t7 * t114 - t6 * t115
-    t149 = t103 - t7 * t109
-    t150 = t6 * t109 - (t32 * s4_z + t6 * t101 + w3_z * t102 + w3_x * sd4_z + zd4_x * t69 + t36 * t70)
-    t151 = t6 * t100 - t7 * t99 + w3_x * sd4_y - t31 * t102 + t35 * t70 + t7 * t107 - t6 * t108
-    t152 = z2_x * t146 - t12 * t147 + z2_z * t148
-    t153 = 3.9999999999999996e-05 * (t40 + w3_z * t39) + 2.0 * (t39 * t79)
-    t154 = t45 * n2_5_z + t44 * t77 - 2.0 * (t39 * t78 + w4_x * t81) - t115
-    t155 = t114 - 0.0096 * t109 - t153
-    t156 = 2.0 * (t39 * t80 + w4_x * t82) - (t45 * t77 + t44 * n2_5_z) + 0.0096 * t108
-    t157 = t105 - (t39 * sd5_z + w3_z * sd5_y) - t108
-    t158 = 0.0096 * t42 - t104 - w4_x * sd5_z + t107
-    t159 = z2_x * t154 - t12 * t155 + z2_z * t156
-    t160 = 3.9999999999999996e-05 * (t43 + w5_z * w5_z) + 2.0 * (w5_z * t79 - w4_x * t83)
-    t161 = t48 * n2_5_z - t49 * t77 + 2.0 * (t113 - t112) - t116
-    t162 = t114 + t49 * n2_5_z - t48 * t77 + 2.0 * (t110 - t111)
+    w4_z = w3_z + qd4 * z4_z
+    t35 = qd4 * zd4_x + t29 - qdd4 * t6
+    t36 = t30 - qd4 * t32
+    t37 = qd4 * zd4_z + t31 + qdd4 * z4_z
+    t38 = w4_x * w4_x
+    t39 = w4_z * w4_z + t38
+    t40 = w3_y * w4_x - t37
+    w5_y = qd5 + w3_y
+    t41 = t35 - qd5 * w4_z
+    t42 = qdd5 + t36
+    t43 = t42 + w4_x * w4_z
+    t44 = w4_z * w5_y - t41
+    w6_z = qd6 + w4_z
+    t45 = t41 + qd6 * w5_y
+    t46 = t42 - qd6 * w4_x
+    t47 = 2.943 * t14
+    t48 = 2.943 * z1_y
+    t49 = 2.943 * t15
+    t50 = 0.006089999999999999 * t9 + 0.12993 * t6
+    t51 = 0.006089999999999999 * t5
+    t52 = -0.0096 - (0.12993 * z4_z - 0.006089999999999999 * t10)
+    t53 = t50 - (0.12954 * t11 - 0.02802 * z2_x)
+    t54 = 0.12954 * t12 + 0.02802 * z2_y - t51
+    t55 = t52 - (0.12954 * t13 - 0.02802 * z2_z)
+    t56 = t53 - 0.07304999999999999 * z2_x
+    t57 = t54 - 0.07304999999999999 * z2_y
+    t58 = t55 - 0.07304999999999999 * z2_z
+    t59 = t15 * t57 + z1_y * t58
+    s1_y = t15 * t56 - t14 * t58
+    s1_z = z1_y * t56 + t14 * t57
+    s2_x = z2_z * t54 - z2_y * t55
+    s2_y = z2_x * t55 - z2_z * t53
+    s2_z = z2_y * t53 - z2_x * t54
+    t60 = z2_z * t51 + z2_y * t52
+    s3_y = z2_x * t52 - z2_z * t50
+    s3_z = z2_y * t50 + z2_x * t51
+    s4_y = 0.0096 * t6
+    t61 = qd3 * s3_z
+    t62 = qd4 * s4_y
+    t63 = 0.0096 * qd5
+    v2_x = qd3 * t60 - t63
+    t64 = qd3 * s3_y + t62
+    v1_x = v2_x - qd2 * s2_x
+    t65 = qd2 * s2_y + t64
+    t66 = qd2 * s2_z + t61
+    v0_x = qd1 * t59 + v1_x
+    t67 = qd1 * s1_y + t65
+    t68 = qd1 * s1_z + t66
+    t69 = 1.9999999999999998e-05 * t8
+    t70 = 1.9999999999999998e-05 * t7
+    t71 = t8 * t69 + t7 * t70
+    t72 = t7 * t69 - t8 * t70
+    n2_5_y = 0.00016999999999999999 - t71
+    t73 = w6_z * t72
+    t74 = w6_z * t71
+    t75 = w5_y * t71 - w4_x * t72
+    t76 = w5_y * t72 - w4_x * t71
+    t77 = 0.00013 * w5_y
+    t78 = 0.00013 * w4_x
+    sd1_x = t15 * t67 + z1_y * t68
+    sd1_y = t14 * t68 + t15 * v0_x
+    sd1_z = z1_y * v0_x - t14 * t67
+    t79 = z1_y * t49 - t15 * t48
+    t80 = t14 * t49 - t15 * t47
+    t81 = t14 * t48 - z1_y * t47
+    t82 = qd1 * sd1_x - t47 - qdd1 * t59
+    t83 = qdd1 * s1_y + t48 + qd1 * sd1_y
+    t84 = qdd1 * s1_z + qd1 * sd1_z - t49
+    sd2_x = w1_y * s2_z + t17 * s2_y + z2_y * t66 - z2_z * t65
+    sd2_y = t16 * s2_z - t17 * s2_x - (z2_x * t66 + z2_z * v1_x)
+    sd2_z = z2_y * v1_x + z2_x * t65 - (t16 * s2_y + w1_y * s2_x)
+    t85 = t19 * s2_z + t20 * s2_y + z2_z * t83 - z2_y * t84 + w1_y * sd2_z + t17 * sd2_y + t21 * t65 + zd2_y * t66
+    t86 = t18 * s2_z - t20 * s2_x + z2_x * t84 - z2_z * t82 + t16 * sd2_z - t17 * sd2_x + t21 * v1_x - zd2_x * t66
+    t87 = z2_y * t82 - z2_x * t83 - (t18 * s2_y + t19 * s2_x) + zd2_y * v1_x + zd2_x * t65 - (t16 * sd2_y + w1_y * sd2_x)
+    t88 = qdd2 * s2_x + t82 + qd2 * sd2_x
+    t89 = qdd2 * s2_y + t83 + qd2 * sd2_y
+    t90 = qdd2 * s2_z + t84 + qd2 * sd2_z
+    sd3_x = w2_y * s3_z - w2_z * s3_y + z2_y * t61 - z2_z * t64
+    t91 = w2_z * t60 + w2_x * s3_z + z2_x * t61 + z2_z * v2_x
+    sd3_z = w2_x * s3_y + w2_y * t60 + z2_y * v2_x + z2_x * t64
+    t92 = t25 * s3_z - t26 * s3_y + z2_z * t89 - z2_y * t90 + w2_y * sd3_z + w2_z * t91 + zd3_y * t61 - zd3_z * t64
+    t93 = z2_x * t90 - z2_z * t88 - (t26 * t60 + t24 * s3_z) + w2_z * sd3_x - w2_x * sd3_z - (zd3_x * t61 + zd3_z * v2_x)
+    t94 = t24 * s3_y + t25 * t60 + z2_y * t88 - z2_x * t89 + zd3_y * v2_x + zd3_x * t64 - (w2_x * t91 + w2_y * sd3_x)
+    t95 = t88 + qd3 * sd3_x - qdd3 * t60
+    t96 = qdd3 * s3_y + t89 - qd3 * t91
+    t97 = qdd3 * s3_z + t90 + qd3 * sd3_z
+    sd4_y = z4_z * t63
+    t98 = w3_z * s4_y + z4_z * t62
+    sd4_z = w3_x * s4_y - t6 * t62
+    t99 = z4_z * t96 - t31 * s4_y + w3_y * sd4_z - w3_z * sd4_y - zd4_z * t62
+    t100 = t95 - qd4 * t98
+    t101 = t97 + qd4 * sd4_z
+    sd5_y = 0.0096 * w4_z
+    t102 = t63 + 0.0096 * w3_y
+    t103 = 0.0096 * t37 + w4_x * t102 + w4_x * t63
+    t104 = t100 + 0.0096 * qdd5
+    t105 = qdd4 * s4_y + t96 + qd4 * sd4_y + qd5 * sd5_y
+    t106 = t101 - qd5 * t102
+    t107 = w4_x * t73
+    t108 = w5_y * t74
+    t109 = w4_x * t74
+    t110 = w5_y * t73
+    t111 = t45 * n2_5_y - t46 * t72 + t107 + t108 - w6_z * t77
+    t112 = t46 * n2_5_y - t45 * t72 + w6_z * t78 - (t109 + t110)
+    t113 = 3.9999999999999996e-05 * (qdd6 + t37 + qd5 * w4_x) + w4_x * t75 + w5_y * t76
+    t114 = z1_y * (t14 * t113 - t15 * t111 + s1_z * t104 + t59 * t106) - t14 * (z1_y * t113 + t15 * t112 + s1_y * t106 - s1_z * t105)
+    t115 = s1_y * (t80 + t14 * t106 - t15 * t104) - t59 * (t79 + z1_y * t106 + t15 * t105) + s1_z * (t81 - (t14 * t105 + z1_y * t104))
+    t116 = t22 * n2_5_y - t23 * t72 + 2.0 * (zd2_x * t73 + zd2_y * t74 + t21 * t77)
+    t117 = t23 * n2_5_y - t22 * t72 - 2.0 * (zd2_x * t74 + zd2_y * t73 + t21 * t78)
+    t118 = 2.0 * (zd2_x * t75 + zd2_y * t76) - 3.9999999999999996e-05 * (z2_y * t18 + z2_x * t19 + t16 * zd2_y + w1_y * zd2_x)
+    t119 = z2_y * t113 - z2_z * t112
+    t120 = z2_z * t111 - z2_x * t113
+    t121 = z2_x * t112 - z2_y * t111
+    t122 = z2_y * t106 - z2_z * t105
+    t123 = z2_z * t104 - z2_x * t106
+    t124 = z2_x * t105 - z2_y * t104
+    t125 = t116 + t119 + s2_y * t106 - s2_z * t105
+    t126 = t117 + t120 + s2_z * t104 - s2_x * t106
+    t127 = t118 + t121 + s2_x * t105 - s2_y * t104
+    t128 = t85 + t122
+    t129 = t86 + t123
+    t130 = t87 + t124
+    t131 = t27 * n2_5_y - t28 * t72 + 2.0 * (zd3_x * t73 + zd3_y * t74 - zd3_z * t77)
+    t132 = t28 * n2_5_y - t27 * t72 + 2.0 * (zd3_z * t78 - (zd3_x * t74 + zd3_y * t73))
+    t133 = 3.9999999999999996e-05 * (z2_y * t24 - z2_x * t25 + w2_x * zd3_y - w2_y * zd3_x) + 2.0 * (zd3_x * t75 + zd3_y * t76)
+    t134 = t131 + t119 + s3_y * t106 - s3_z * t105
+    t135 = t132 + t120 + s3_z * t104 + t60 * t106
+    t136 = t133 + t121 - (t60 * t105 + s3_y * t104)
+    t137 = t92 + t122
+    t138 = t93 + t123
+    t139 = t94 + t124
+    t140 = z2_x * t134 + z2_y * t135 + z2_z * t136
+    t141 = t34 * n2_5_y - t33 * t72 + 2.0 * (t32 * t73 - zd4_x * t74 + zd4_z * t78)
+    t142 = 3.9999999999999996e-05 * (t6 * t30 - (w3_x * t32 + w3_y * zd4_x)) + 2.0 * (zd4_x * t75 - t32 * t76)
+    t143 = t33 * n2_5_y - t34 * t72 + 2.0 * (zd4_x * t73 - t32 * t74 - zd4_z * t77) + s4_y * t106 - z4_z * t112
+    t144 = t141 + z4_z * t111 + t6 * t113
+    t145 = t142 - (t6 * t112 + s4_y * t104)
+    t146 = t99 - z4_z * t105
+    t147 = zd4_z * t63 - (w3_z * t98 + w3_x * sd4_z) - (t6 * t97 + z4_z * t95) + z4_z * t104 + t6 * t106
+    t148 = t29 * s4_y + t6 * t96 + w3_x * sd4_y + w3_y * t98 + t32 * t63 + zd4_x * t62 - t6 * t105
+    t149 = z2_x * t143 + z2_y * t144 + z2_z * t145
+    t150 = 3.9999999999999996e-05 * (t35 + w3_y * w4_z) - 2.0 * (w4_z * t75)
+    t151 = t113 + t40 * n2_5_y + t39 * t72 - 2.0 * (w4_z * t73 + w4_x * t77)
+    t152 = 2.0 * (w4_z * t74 + w4_x * t78) - (t40 * t72 + t39 * n2_5_y) - 0.0096 * t106
+    t153 = t150 + 0.0096 * t105 - t111
+    t154 = t106 - (t101 + w3_y * t102 + w4_z * sd5_y)
+    t155 = t100 - 0.0096 * t36 + w4_x * sd5_y - t104
+    t156 = z2_x * t151 + z2_y * t152 + z2_z * t153
+    t157 = 2.0 * (w5_y * t75 - w4_x * t76) - 3.9999999999999996e-05 * (t38 + w5_y * w5_y)
+    t158 = t43 * n2_5_y - t44 * t72 + 2.0 * (t110 - t109) - t112
+    t159 = t111 + t44 * n2_5_y - t43 * t72 + 2.0 * (t107 - t108)
     return pack(q, (
-            t117 + z1_z * (t17 * t114 - t16 * t115 + s1_x * t108 + t65 * t107) + t118,
-            z1_z * t130 - (t16 * t128 + t17 * t129) + s1_x * t131 - t65 * t132 + s1_z * t133,
-            z1_z * t139 - (t16 * t137 + t17 * t138) + s1_x * t140 - t65 * t141 + s1_z * t142,
-            z1_z * t148 - (t16 * t146 + t17 * t147) + s1_x * t149 - t65 * t150 + s1_z * t151,
-            z1_z * t156 - (t16 * t154 + t17 * t155) + s1_x * t157 - t65 * t158 + s1_z * t106,
-            z1_z * t162 - (t16 * t161 + t17 * t160),
-            s2_x * t84 + s2_y * t85 - t66 * t86,
-            z2_x * t128 - t12 * t129 + z2_z * t130 + s2_x * t131 + s2_y * t132 - t66 * t133,
-            t143 + s2_x * t140 + s2_y * t141 - t66 * t142,
-            t152 + s2_x * t149 + s2_y * t150 - t66 * t151,
-            t159 + s2_x * t157 + s2_y * t158 - t66 * t106,
-            z2_x * t161 - t12 * t160 + z2_z * t162,
-            s3_x * t84 - t67 * t85 - t68 * t86,
-            z2_x * t119 - t12 * t120 + z2_z * t121 + s3_x * t90 - t67 * t91 - t68 * t92,
-            t143 + s3_x * t140 - t67 * t141 - t68 * t142,
-            t152 + s3_x * t149 - t67 * t150 - t68 * t151,
-            t159 + s3_x * t157 - t67 * t158 - t68 * t106,
-            z2_x * t161 - t12 * t160 + z2_z * t162,
-            s4_z * t86,
-            s4_z * t92 - (t6 * t119 + t7 * t120),
-            s4_z * t98 - (t6 * t134 + t7 * t135),
-            s4_z * t151 - (t6 * t146 + t7 * t147),
-            s4_z * t106 - (t6 * t154 + t7 * t155),
-            -(t6 * t161 + t7 * t160),
-            0.0096 * t84,
-            t121 + 0.0096 * t90,
-            t136 + 0.0096 * t96,
-            t145 + 0.0096 * t103,
-            t156 + 0.0096 * t157,
-            t162,
+            t114 + t15 * (t14 * t112 + z1_y * t111 + t59 * t105 + s1_y * t104) + t115,
+            z1_y * t126 - t14 * t125 - t15 * t127 + s1_y * t129 - t59 * t128 + s1_z * t130,
+            z1_y * t135 - t14 * t134 - t15 * t136 + s1_y * t138 - t59 * t137 + s1_z * t139,
+            z1_y * t144 - t14 * t143 - t15 * t145 + s1_y * t147 - t59 * t146 + s1_z * t148,
+            z1_y * t152 - t14 * t151 - t15 * t153 + s1_y * t103 - t59 * t154 + s1_z * t155,
+            z1_y * t159 - t14 * t158 - t15 * t157,
+            s2_x * t79 + s2_y * t80 + s2_z * t81,
+            z2_x * t125 + z2_y * t126 + z2_z * t127 + s2_x * t128 + s2_y * t129 + s2_z * t130,
+            t140 + s2_x * t137 + s2_y * t138 + s2_z * t139,
+            t149 + s2_x * t146 + s2_y * t147 + s2_z * t148,
+            t156 + s2_x * t154 + s2_y * t103 + s2_z * t155,
+            z2_x * t158 + z2_y * t159 + z2_z * t157,
+            s3_y * t80 - t60 * t79 + s3_z * t81,
+            z2_x * t116 + z2_y * t117 + z2_z * t118 + s3_y * t86 - t60 * t85 + s3_z * t87,
+            t140 + s3_y * t138 - t60 * t137 + s3_z * t139,
+            t149 + s3_y * t147 - t60 * t146 + s3_z * t148,
+            t156 + s3_y * t103 - t60 * t154 + s3_z * t155,
+            z2_x * t158 + z2_y * t159 + z2_z * t157,
+            s4_y * t80,
+            z4_z * t118 - t6 * t116 + s4_y * t86,
+            z4_z * t133 - t6 * t131 + s4_y * t93,
+            z4_z * t145 - t6 * t143 + s4_y * t147,
+            z4_z * t153 - t6 * t151 + s4_y * t103,
+            z4_z * t157 - t6 * t158,
+            0.0096 * t79,
+            t117 + 0.0096 * t85,
+            t132 + 0.0096 * t92,
+            t141 + 0.0096 * t99,
+            t152 + 0.0096 * t154,
+            t159,
             0.0,
-            -t120,
-            -t135,
-            -t144,
-            t153,
-            -t160,
+            t118,
+            t133,
+            t142,
+            t150,
+            t157,
         ))

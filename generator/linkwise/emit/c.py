@@ -1,19 +1,18 @@
 """Closed forms in C99: kernels over a block of samples, one file a link, and entry points over them.
 
-A kernel's text doesn't say how wide its block or its numbers are: the files that include it do, so that one text
-serves one sample and many, float and double, and a link's file stays the same in a longer robot.
+A kernel's text doesn't say how wide its block or its numbers are: the files that include it do, so that one
+text serves one sample and many, float and double, and a link's file stays the same in a longer robot.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise import __version__
-from linkwise.emit.code import straight_line
+from linkwise.emit.code import Code, straight_line
 from linkwise.emit.package import Derivation
 from linkwise.emit.printer import CPrinter
 from linkwise.emit.render import render
 from linkwise.graph.derive import Kernel, parameter_names
-from linkwise.graph.differentiate import substitute
 from linkwise.graph.expression import Node
 from linkwise.symbolic.system import System
 
@@ -23,13 +22,12 @@ BLOCK = {"double": 8, "float": 16}
 
 @dataclass(frozen=True)
 class KernelFunction:
-    """One C function over a block; outputs are (array, position, expression)."""
+    """One C function over a block: the lines that fetch its inputs, and those that compute and store."""
 
     name: str
     arrays: tuple[str, ...]
     inputs: tuple[tuple[str, str], ...]
-    assignments: tuple[tuple[str, str], ...]
-    outputs: tuple[tuple[str, int, str], ...]
+    statements: tuple[str, ...]
     unused: tuple[str, ...]
 
 
@@ -57,31 +55,28 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
             view = {**shared, "number": number, "functions": functions}
             yield f"c/{file}_{number}.inc", render("c/link.inc.j2", view)
     sizes = list(link_sizes(derivation.kernels))
-    totals = packed_sizes(derivation.kernels)
-    robot = {
-        **shared,
-        "name": name,
-        "n": len(system.coordinates),
-        "links": sizes,
-        "total_acceleration": totals[0],
-        "total_velocity": totals[1],
-        "total_gravity": totals[2],
-        "total_linear": totals[4],
-    }
+    c2, c1, g, _, h1 = packed_sizes(derivation.kernels)
+    totals = {"n": len(system.coordinates), "c2": c2, "c1": c1, "g": g, "h1": h1}
+    largest = max(max(k.acceleration, k.velocity) for k in sizes)
+    links = {**shared, "links": sizes, "largest": largest}
     header = {
+        "name": name,
         "upper": name.upper(),
+        "links": range(1, len(sizes) + 1),
         "parameters": len(system.parameters),
         "types": [("double", "", BLOCK["double"]), ("float", "f", BLOCK["float"])],
     }
-    largest = max(max(k.acceleration, k.velocity) for k in sizes)
-    entries = {"largest": largest, "parameters": list(parameter_names(system).values())}
-    yield f"c/{name}.h", render("c/robot.h.j2", robot | header)
-    yield "c/robot.inc", render("c/robot.inc.j2", robot | entries)
+    parameters = {"parameters": list(parameter_names(system).values())}
+    yield f"c/{name}.h", render("c/robot.h.j2", shared | totals | header)
+    yield "c/blocks.inc", render("c/blocks.inc.j2", shared | totals | parameters)
+    yield "c/robot.inc", render("c/robot.inc.j2", links)
+    yield "c/gradient.inc", render("c/gradient.inc.j2", links)
     for file in ("turn.c", "turn.h"):
         yield f"c/{file}", render(f"c/{file}.j2", {**shared, "name": name})
     for kind, suffix in (("double", ""), ("float", "f")):
-        view = {**shared, "name": name, "type": kind, "suffix": suffix, "block": BLOCK[kind]}
-        yield f"c/{name}_{kind}.c", render("c/robot.c.j2", view)
+        for part, stem in (("robot", name), ("gradient", f"{name}_gradient")):
+            view = {"name": name, "type": kind, "suffix": suffix, "block": BLOCK[kind], "part": part}
+            yield f"c/{stem}_{kind}.c", render("c/robot.c.j2", shared | view)
 
 
 def link_sizes(kernels: Sequence[Kernel]) -> Iterator[LinkSizes]:
@@ -112,9 +107,7 @@ def packed_sizes(kernels: Sequence[Kernel]) -> tuple[int, int, int, int, int]:
     )
 
 
-def _functions(
-    system: System, kernel: Kernel, number: int
-) -> Iterator[tuple[str, list[KernelFunction]]]:
+def _functions(system: System, kernel: Kernel, number: int) -> Iterator[tuple[str, list[KernelFunction]]]:
     """Stems of the link's files and the functions in each."""
     forms = kernel.forms[0]
     torque = {"torque": list(forms.torque.values())}
@@ -141,10 +134,9 @@ def kernel_function(
 ) -> KernelFunction:
     """C function whose output arrays are `groups`; sines and cosines of the coordinates are inputs."""
     g = kernel.graph
-    sines = {g.call(f, q): f"{f[0]}{k + 1}" for k, q in enumerate(kernel.inputs.q) for f in ("sin", "cos")}
-    given = {node: g.symbol(symbol) for node, symbol in sines.items()}
-    nodes = [substitute(g, node, given) for group in groups.values() for node in group]
-    code = straight_line(g, nodes, CPrinter())
+    given = {g.call(f, q): f"{f[0]}{k + 1}" for k, q in enumerate(kernel.inputs.q) for f in ("sin", "cos")}
+    nodes = [node for group in groups.values() for node in group]
+    code = straight_line(g, nodes, CPrinter(), given)
     sources = {
         f"{prefix}{k + 1}": f"{array}[{k} * W + b]"
         for prefix, array in (
@@ -160,8 +152,18 @@ def kernel_function(
     sources |= {name: f"p[at_{name}]" for name in parameter_names(system).values()}
     inputs = tuple((symbol, source) for symbol, source in sources.items() if symbol in code.symbols)
     places = [(array, at) for array, group in groups.items() for at in range(len(group))]
-    outputs = tuple((array, at, text) for (array, at), text in zip(places, code.outputs, strict=True))
     used = {source.split("[")[0] for _, source in inputs}
     unused = [a for a in ("q", "qd", "qdd", "sine", "cosine", "p") if a not in used]
     unused += [array for array, group in groups.items() if not group]
-    return KernelFunction(name, tuple(groups), inputs, code.assignments, outputs, tuple(unused))
+    return KernelFunction(name, tuple(groups), inputs, tuple(_statements(code, places)), tuple(unused))
+
+
+def _statements(code: Code, places: Sequence[tuple[str, int]]) -> Iterator[str]:
+    """Assignments, and each output stored as soon as it can be: fewer values are then alive at a time."""
+    waiting: dict[int, list[str]] = {}
+    for (array, at), text, ready in zip(places, code.outputs, code.ready, strict=True):
+        waiting.setdefault(ready, []).append(f"{array}[{at} * W + b] = {text};")
+    yield from waiting.get(0, ())
+    for number, (variable, text) in enumerate(code.assignments, 1):
+        yield f"const real {variable} = {text};"
+        yield from waiting.get(number, ())

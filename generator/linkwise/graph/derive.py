@@ -17,7 +17,7 @@ from linkwise.graph.rigid_rule import rigid_forms
 from linkwise.model.robot import Joint
 from linkwise.symbolic.system import LinkEnergy, System
 
-MAX_AXES, MAX_ORIGINS = 7, 5
+MAX_AXES, MAX_ORIGINS = 4, 3
 
 Tree = Sequence[tuple[int, Joint]]
 
@@ -85,21 +85,25 @@ def _rigid_kernel(
 ) -> Kernel:
     """Try a few common frames and keep the one that costs the fewest operations.
 
-    First each set of axes, with the origin in the centre of mass and in the frame of the axes; then, for the axes
-    that were best with an origin of the second kind, other frames' origins.
+    First each set of axes, with the origin in the centre of mass and in the frame of the axes; then, for the
+    axes that were best with an origin of the second kind, other frames' origins.
     """
     longest = max(chains, key=len)
     bodies = [energy.body for energy in links if energy.body is not None]
 
-    def attempt(axes: CommonAxes, origin: int | None) -> tuple[int, CommonAxes, Kernel]:
+    def build(axes: CommonAxes, origin: int | None, gradient: bool) -> Kernel:
         lower, x = lowering(system)
         turn = Orientation(lower, tree, bodies[0].gravity, axes, x)
         forms = tuple(
-            rigid_forms(turn, body, chain, origin) for body, chain in zip(bodies, chains, strict=True)
+            rigid_forms(turn, body, chain, origin, gradient)
+            for body, chain in zip(bodies, chains, strict=True)
         )
-        outputs = [node for f in forms for node in f.decomposition()]
-        cost = count_operations(lower.graph, outputs).arithmetic
-        return cost, axes, Kernel(lower.graph, x, _parameters(system, lower), forms)
+        return Kernel(lower.graph, x, _parameters(system, lower), forms)
+
+    def attempt(axes: CommonAxes, origin: int | None) -> tuple[int, CommonAxes, int | None]:
+        kernel = build(axes, origin, gradient=False)
+        outputs = [node for forms in kernel.forms for node in forms.decomposition()]
+        return count_operations(kernel.graph, outputs).arithmetic, axes, origin
 
     candidates = list(_axes(longest))
     # About the centre of mass lengths are taken times √m, which a negative mass has not.
@@ -108,7 +112,8 @@ def _rigid_kernel(
     framed = min((attempt(axes, axes.frame) for axes in candidates), key=itemgetter(0))
     origins = [f for f in _spread([-1, *longest], MAX_ORIGINS) if f != framed[1].frame]
     moved = [attempt(framed[1], origin) for origin in origins]
-    return min([*central, framed, *moved], key=itemgetter(0))[2]
+    _, axes, origin = min([*central, framed, *moved], key=itemgetter(0))
+    return build(axes, origin, gradient=True)
 
 
 def _axes(chain: Sequence[int]) -> Iterator[CommonAxes]:

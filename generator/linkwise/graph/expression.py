@@ -1,13 +1,13 @@
 """A hash-consed expression graph: equal expressions are one node.
 
 A node is an index into `Graph.nodes`; an entry is `(op, a, b)`. Operands of `add`, `sub`, `mul`, `div` and
-`neg` are nodes; a `const` holds its value, a `symbol` its name, and a `call` its function's name and argument.
+`neg` are nodes; a `const` holds its value, a `symbol` its name, a `call` its function's name and argument.
 Construction folds constants, drops zeros and ones, and pulls signs outward, so that x − y and y − x, or
 (−x)·y and x·y, share their work.
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from typing import Any
 
 Node = int
@@ -208,13 +208,15 @@ def operands(entry: Entry) -> tuple[Node, ...]:
     return (a, b)
 
 
-def reachable(graph: Graph, outputs: Iterable[Node]) -> list[Node]:
-    """Every node that `outputs` need, operands before users."""
-    needed = set()
+def reachable(graph: Graph, outputs: Iterable[Node], given: Container[Node] = ()) -> list[Node]:
+    """Every node that `outputs` need, operands before users; what only `given` nodes need is left out."""
+    nodes = graph.nodes
+    needed: set[Node] = set()
     stack = list(outputs)
     while stack:
         node = stack.pop()
         if node not in needed:
             needed.add(node)
-            stack.extend(operands(graph.nodes[node]))
+            if node not in given:
+                stack.extend(operands(nodes[node]))
     return sorted(needed)

@@ -1,22 +1,22 @@
 """The rigid-link rule: every coefficient of a rigid link, without differentiating anything.
 
-All vectors are in one common frame with origin o. Coordinate k's axis is S_k = (z_k, s_k) with s_k = (p_k − o) × z_k,
-p_k a point on the axis (prismatic: z = 0, s the direction); V_k = (ω, v) is the twist before joint k, Ṡ_k = V_k × S_k.
-A link with mass m, first moment h, inertia I about o and second moment E = ½ tr(I) − I has P = m v + ω × h and
-B = −[ω]× E − v hᵀ + (h·v) 1, and the wrenches (N, f)
+All vectors are in one common frame with origin o. Coordinate k's axis is S_k = (z_k, s_k) with
+s_k = (p_k − o) × z_k, p_k a point on the axis (prismatic: z = 0, s the direction); V_k = (ω, v) is the twist
+before joint k, Ṡ_k = V_k × S_k. A link with mass m, first moment h, inertia I about o and second moment
+E = ½ tr(I) − I has P = m v + ω × h and B = −[ω]× E − v hᵀ + (h·v) 1, and the wrenches (N, f)
 
     c2_k:  N = h × s_k + I z_k                f = m s_k + z_k × h
     c1_k:  N = h × ṡ_k + I ż_k + B z_k        f = m ṡ_k + ż_k × h + z_k × P
     τ:     the same two with the acceleration and twist of the link, minus gravity (g: gravity alone)
     c_ijk = z_i · N + s_i · f.
 
-The position gradient follows from how a link's wrench F turns with joint k (A_k: acceleration, gravity included,
-before joint k):
+The position gradient follows from how a link's wrench F turns with joint k (A_k: acceleration, gravity
+included, before joint k):
     c0_ijk = S_i · (I S̈_k + 2 B Ṡ_k) + [k at or after i] S_i · (S_k ×* F),   S̈_k = A_k × S_k + V_k × Ṡ_k.
 
-The common frame is free, and two choices pay. With o where axes of the path meet, their s vanish. With o in the
-link's centre of mass, moving along with it, h, v and P vanish; lengths in units of 1/√m make m one as well. Which is
-cheaper is found by counting.
+The common frame is free, and two choices pay. With o where axes of the path meet, their s vanish. With o in
+the link's centre of mass, moving along with it, h, v and P vanish; lengths in units of 1/√m make m one too.
+Which is cheaper is found by counting.
 """
 
 from collections.abc import Sequence
@@ -42,11 +42,12 @@ class _Screw:
 
 
 def rigid_forms(
-    turn: Orientation, body: RigidBody, chain: Sequence[int], origin: int | None
+    turn: Orientation, body: RigidBody, chain: Sequence[int], origin: int | None, gradient: bool = True
 ) -> LinkForms:
     """Closed forms of the link at the end of `chain`, the indices of its path in the tree of `turn`.
 
-    `origin` is the frame in whose origin the common frame stands; None: in the link's centre of mass.
+    `origin` is the frame in whose origin the common frame stands; None: in the link's centre of mass. Without
+    `gradient` the position gradient is left out.
     """
     g = turn.g
     link = _Link(turn, body, chain, origin)
@@ -60,14 +61,15 @@ def rigid_forms(
         gravity[k] = g.add(gravity[k], pair_product(g, screw.s, link.weight))
         torque[k] = g.add(torque[k], pair_product(g, screw.s, link.wrench))
         inertial, coriolis = link.inertial(screw), link.coriolis(screw)
-        after, before = link.turned(screw)
+        after, before = link.turned(screw) if gradient else (None, None)
         for number, other in enumerate(link.screws):
             i = other.coordinate
             if i <= k:
                 c2[i, k] = g.add(c2[i, k], pair_product(g, other.s, inertial))
             c1[i, k] = g.add(c1[i, k], pair_product(g, other.s, coriolis))
             row = before if number <= at else after
-            c0[i, k] = g.add(c0[i, k], pair_product(g, other.s, row))
+            if row is not None:
+                c0[i, k] = g.add(c0[i, k], pair_product(g, other.s, row))
     return LinkForms(path, c2, c1, gravity, torque, c0)
 
 
@@ -134,7 +136,7 @@ class _Link:
         return turn.z[f], vec.named(g, f"s{f + 1}", s)
 
     def _twists(self, axes: list[Spatial]) -> list[Spatial]:
-        """Twist before each joint, then the link's; v is zero at the base, or at the link if o moves with it."""
+        """Twist before each joint, then the link's; v is zero at the base, or the link if o moves."""
         g, turn = self.g, self.turn
         omegas = [turn.omega[turn.tree[f][0]] for f in self.chain] + [turn.omega[self.chain[-1]]]
         rates = [turn.x.qd[turn.tree[f][1].coordinate] for f in self.chain]
@@ -206,14 +208,16 @@ class _Link:
 
     def coriolis(self, screw: _Screw) -> Spatial:
         """Wrench of c1 for the screw's coordinate."""
-        return self._named("1", screw, spatial_add(self.g, self.accelerated(screw.sd), self._bent(screw.s[0])))
+        return self._named(
+            "1", screw, spatial_add(self.g, self.accelerated(screw.sd), self._bent(screw.s[0]))
+        )
 
     def _named(self, order: str, screw: _Screw, wrench: Spatial) -> Spatial:
         label = f"{order}_{screw.coordinate + 1}"
         return vec.named(self.g, f"n{label}", wrench[0]), vec.named(self.g, f"f{label}", wrench[1])
 
     def turned(self, screw: _Screw) -> tuple[Spatial, Spatial]:
-        """Change of the wrench with the screw's coordinate, as felt by joints behind it, and by it and before."""
+        """Change of the wrench with the screw's coordinate, for joints behind it, and for it and before."""
         g = self.g
         bent = self._bent(screw.sd[0])
         after = spatial_add(g, self.accelerated(screw.sdd), spatial_add(g, bent, bent))
