@@ -70,10 +70,12 @@ def most_per_output(made: list[dict[str, Any]]) -> float:
 
 def growth(made: list[dict[str, Any]]) -> str:
     """How operations grow with outputs; small arms have few a piece, for their axes are aligned."""
+    bound = f"No robot needs more than {most_per_output(made):.1f} operations an output"
+    if np.isnan(slope(made, LARGE)):
+        return f"{bound}."
     return (
-        f"No robot needs more than {most_per_output(made):.1f} operations an output; they grow like "
-        f"outputs^{slope(made, LARGE):.2f} from {LARGE} outputs on (outputs^{slope(made, SMALL):.2f} "
-        f"from {SMALL} on)."
+        f"{bound}; they grow like outputs^{slope(made, LARGE):.2f} from {LARGE} outputs on "
+        f"(outputs^{slope(made, SMALL):.2f} from {SMALL} on)."
     )
 
 
@@ -98,7 +100,7 @@ def plot(rows: list[dict[str, Any]], out: Path) -> None:
         xscale="log", yscale="log", xlabel="outputs: entries of c2, c1, g and τ that are not always zero"
     )
     axes.set_ylabel("operations (+ − × /, sin, cos)")
-    title = f"{len(made)} robots: operations ~ outputs^{slope(made, LARGE):.2f} from {LARGE} outputs on"
+    title = f"{len(made)} packages: operations ~ outputs^{slope(made, LARGE):.2f} from {LARGE} outputs on"
     axes.set_title(title, loc="left", fontsize=11)
     axes.spines[["top", "right"]].set_visible(False)
     for kind in ("svg", "png"):
