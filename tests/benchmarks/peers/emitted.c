@@ -1,5 +1,6 @@
 /* Times a generated robot's C: nanoseconds a sample of the full decomposition.
    Compiled with -DROBOT=name -DUPPER=NAME -DREAL=double -DSUFFIX= (or float, f) and the header by -include.
+   Each figure is the least of many short spells, so that other work on the machine falls between them.
    Arguments: seconds for a figure, then batch sizes. Prints "layout batch threads nanoseconds" lines. */
 #define _GNU_SOURCE
 #include <pthread.h>
@@ -14,13 +15,13 @@
 #define CALL(function) GLUE(ROBOT, function, SUFFIX)
 #define SIZE(what) GLUE(UPPER, what, )
 enum { N = SIZE(_JOINTS), C2 = SIZE(_C2), C1 = SIZE(_C1), G = SIZE(_G), H1 = SIZE(_H1) };
-enum { W = GLUE(UPPER, _BLOCK, WIDTH), THREADS = 2, REPEATS = 15 };
+enum { W = GLUE(UPPER, _BLOCK, WIDTH), THREADS = 2 };
 typedef REAL real;
 
 struct work {
     int blocks;
     size_t count;
-    long rounds;
+    long rounds, repeats;
     double start, end;
     real *q, *qd, *qdd, *c2, *c1, *g, *tau, *h1;
     pthread_barrier_t *gate;
@@ -59,7 +60,7 @@ static void call(const struct work *w)
 static void *loop(void *data)
 {
     struct work *w = data;
-    for (int repeat = 0; repeat < REPEATS; ++repeat) {
+    for (long repeat = 0; repeat < w->repeats; ++repeat) {
         pthread_barrier_wait(w->gate);
         w->start = now();
         for (long round = 0; round < w->rounds; ++round)
@@ -88,7 +89,7 @@ static double best(struct work whole, int threads)
         w->c2 += from * C2, w->c1 += from * C1, w->g += from * G, w->tau += from * G, w->h1 += from * H1;
         pthread_create(&id[t], NULL, loop, w);
     }
-    for (int repeat = 0; repeat < REPEATS; ++repeat) {
+    for (long repeat = 0; repeat < whole.repeats; ++repeat) {
         pthread_barrier_wait(&gate);
         pthread_barrier_wait(&gate);
         double start = part[0].start, end = part[0].end;
@@ -107,7 +108,7 @@ static double best(struct work whole, int threads)
 
 int main(int count, char **arguments)
 {
-    const double budget = 1e9 * strtod(arguments[1], NULL) / REPEATS;
+    const double budget = 1e9 * strtod(arguments[1], NULL), spell = 4e5;
     size_t largest = 1;
     for (int a = 2; a < count; ++a) {
         const size_t batch = strtoul(arguments[a], NULL, 10);
@@ -132,7 +133,9 @@ int main(int count, char **arguments)
                 call(&w);
                 const double start = now();
                 call(&w);
-                w.rounds = (long)(budget / (now() - start)) + 1;
+                const double took = now() - start;
+                w.rounds = (long)(spell / took) + 1;
+                w.repeats = (long)(budget / ((double)w.rounds * took)) + 15;
                 printf("%s %zu %d %.5g\n", w.blocks ? "blocks" : "rows", w.count, threads,
                     best(w, threads) / (double)w.count);
             }

@@ -10,7 +10,7 @@
 int decomposition(const casadi_real **in, casadi_real **out, long long *integers, casadi_real *work, int memory);
 int decomposition_work(long long *in, long long *out, long long *integers, long long *work);
 
-enum { SAMPLES = 1024, REPEATS = 25 };
+enum { SAMPLES = 128, REPEATS = 500 };
 
 static double now(void)
 {

@@ -40,7 +40,7 @@ template <typename Scalar_, int Options_> struct Joints {
 using RobotModel = ModelTpl<double, 0, Joints>;
 using RobotData = DataTpl<double, 0, Joints>;
 using Vectors = std::vector<Eigen::VectorXd>;
-constexpr int SAMPLES = 64;
+constexpr int SAMPLES = 32;
 
 struct Part {
     int parent;
@@ -111,13 +111,14 @@ static Chain build(const std::vector<Part> &parts, const std::vector<int> &links
 template <class Call> static double best(Call call)
 {
     using clock = std::chrono::steady_clock;
-    double least = 1e300;
-    for (int repeat = 0; repeat < 25; ++repeat) {
+    double least = 1e300, spent = 0;
+    for (int repeat = 0; repeat < 25 || spent < 3e8; ++repeat) {
         const auto start = clock::now();
         for (int s = 0; s < SAMPLES; ++s)
             call(s);
         const std::chrono::duration<double, std::nano> took = clock::now() - start;
         least = std::min(least, took.count() / SAMPLES);
+        spent += took.count();
     }
     return least;
 }

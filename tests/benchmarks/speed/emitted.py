@@ -34,13 +34,14 @@ def measure(package: Package, work: Path, largest: int, seconds: float) -> list[
     """Time both layouts in both number types, alone and with two threads."""
     figures = []
     for dtype, (real, suffix, width) in TYPES.items():
+        library = package.libraries[real]
         program = work / f"{package.name}_{dtype}"
         run(
             [
                 compiler() or "cc", "-std=c99", *build_flags(), f"-DROBOT={package.name}",
                 f"-DUPPER={package.name.upper()}", f"-DREAL={real}", f"-DSUFFIX={suffix}",
                 f"-DWIDTH={suffix.upper()}", "-include", str(package.directory / "c" / f"{package.name}.h"),
-                str(PEERS / "emitted.c"), str(package.library), f"-Wl,-rpath,{package.library.parent}",
+                str(PEERS / "emitted.c"), str(library), f"-Wl,-rpath,{library.parent}",
                 "-lpthread", "-lm", "-o", str(program),
             ]
         )  # fmt: skip

@@ -20,15 +20,15 @@ PEERS = Path(__file__).parent.parent / "peers"
 
 @dataclass(frozen=True)
 class Package:
-    """A generated package, its manifest and the library that its own loader compiled."""
+    """A generated package, its manifest and the libraries that its own loader compiled, by number type."""
 
     name: str
     directory: Path
     manifest: dict[str, Any]
-    library: Path
+    libraries: dict[str, Path]
     sizes: dict[str, int]
     generate_seconds: float
-    compile_seconds: float
+    compile_seconds: dict[str, float]
     code_bytes: int
 
     @property
@@ -58,14 +58,17 @@ def prepare(case: Case, work: Path) -> Package:
     shutil.rmtree(cache, ignore_errors=True)
     os.environ["LINKWISE_CACHE"] = str(cache)
     build = importlib.import_module(f"{case.name}.native_build")
-    start = time.perf_counter()
-    library = build.library()
-    compiled = time.perf_counter() - start
+    libraries, compiled = {}, {}
+    for real in ("double", "float"):
+        start = time.perf_counter()
+        libraries[real] = build.library(real)
+        compiled[real] = time.perf_counter() - start
     directory = work / case.name
     header = (directory / "c" / f"{case.name}.h").read_text(encoding="utf-8")
     sizes = {key: int(value) for key, value in re.findall(rf"{case.name.upper()}_(\w+) = (\d+)", header)}
     manifest = json.loads((directory / "manifest.json").read_text(encoding="utf-8"))
-    return Package(case.name, directory, manifest, library, sizes, generated, compiled, code_size(library))
+    size = code_size(libraries["double"])
+    return Package(case.name, directory, manifest, libraries, sizes, generated, compiled, size)
 
 
 def code_size(library: Path) -> int:

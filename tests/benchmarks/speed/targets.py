@@ -66,7 +66,7 @@ def targets(results: Results) -> Iterator[Target]:
     ):
         facts = next((p for p in results.packages if p["robot"] == robot), {})
         if seconds:
-            took = facts["generate_seconds"] + facts["compile_seconds"] if facts else None
+            took = facts["generate_seconds"] + facts["compile_seconds"]["double"] if facts else None
             yield Target(f"{robot}, generate and compile", took, seconds, "s")
         yield Target(f"{robot}, operations", facts.get("operations"), most, "operations")
 
