@@ -17,6 +17,10 @@ demo: $(READY)
 	$(BIN)/linkwise check out/planar3
 	$(BIN)/linkwise check out/puma560
 	$(BIN)/python tests/demo.py out
+	$(BIN)/linkwise motion --out out/motions
+	$(BIN)/linkwise analyze out/motions/recorded.csv --robot out/planar3 --out out/recorded --cutoff 4 --figure paper --figure shares
+	$(BIN)/linkwise analyze out/motions/simulated.csv --robot out/planar3 --out out/simulated --figure paper --figure shares
+	@echo "Fig. 5-9: out/recorded/paper.png   Fig. 10-14: out/simulated/paper.png   page: out/simulated/report.html"
 
 generate: $(READY)
 	$(BIN)/linkwise generate planar3 --out generated
@@ -29,6 +33,22 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+# The paper's cost-reduction figure.
+report: $(READY)
+	$(BIN)/linkwise report reduction --out out/report
+
+# Every real robot at hand, beside Pinocchio: minutes.
+corpus: $(READY)
+	$(BIN)/python tests/corpus.py --out out/corpus
+
+# Speed beside Pinocchio and CasADi, reports and motions at length: minutes, on a quiet machine.
+bench: $(READY)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[bench]'
+	$(BIN)/python tests/benchmarks/bench_speed.py --out out/bench
+	$(BIN)/python tests/benchmarks/growth.py --out out/bench
+	$(BIN)/python tests/benchmarks/bench_report.py
+	$(BIN)/python tests/benchmarks/bench_motion.py million out/planar3
 
 clean:
 	rm -rf out $(VENV)

@@ -183,7 +183,7 @@ def test_a_missing_extra_is_named(monkeypatch, log, call, tmp_path):
 
 
 def test_progress_in_plain_lines(capsys):
-    with progress.shown_progress() as report:
+    with progress.progress() as report:
         for done in range(0, 1001, 10):
             report("analysing", done, 1000)
     lines = capsys.readouterr().err.splitlines()
@@ -194,7 +194,7 @@ def test_progress_bar_tells_the_rate(monkeypatch, capsys):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "120")
-    with progress.shown_progress() as report:
+    with progress.progress({"reading": "B"}) as report:
         for done in (100, 500, 1000):
             report("reading", done, 1000)
     text = capsys.readouterr().err

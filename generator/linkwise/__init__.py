@@ -10,16 +10,22 @@ from linkwise.check import check_package
 from linkwise.emit.write import write_package
 from linkwise.errors import LinkwiseError
 from linkwise.model import Coordinate, Options, read_robot
+from linkwise.motion import Analysis, Lowpass, Processing, Reading, analyze
 from linkwise.pipeline import generate, read_system
 from linkwise.symbolic.energies import energy_system
 from linkwise.symbolic.system import LinkEnergy, System
 
 __all__ = [
+    "Analysis",
     "Coordinate",
     "LinkEnergy",
     "LinkwiseError",
+    "Lowpass",
     "Options",
+    "Processing",
+    "Reading",
     "System",
+    "analyze",
     "check_package",
     "energy_system",
     "generate",

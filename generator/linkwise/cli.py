@@ -16,7 +16,12 @@ app = typer.Typer(
     help="Which joint's movement loads which joint, through which link.",
 )
 
-Robot = Annotated[str, typer.Argument(help="planar3, planarN, puma560, or a .toml, .urdf or .py file")]
+Robot = Annotated[
+    str,
+    typer.Argument(
+        help="planar3, planarN, puma560, or a .toml, .urdf, .xml (URDF or MJCF), .mjcf or .py file"
+    ),
+]
 Lock = Annotated[list[str] | None, typer.Option(help="Hold a joint: JOINT=VALUE; may be repeated")]
 Unphysical = Annotated[bool, typer.Option("--allow-unphysical", help="Accept bodies that cannot exist")]
 Base = Annotated[str, typer.Option(help="fixed or floating")]
@@ -36,6 +41,7 @@ def _options(
     tip: str | None,
     allow_unphysical: bool,
     free_mimic: bool,
+    joint_friction: bool = False,
 ) -> Any:
     from linkwise.model import Options
 
@@ -52,7 +58,8 @@ def _options(
             joint = ""
         if not joint or abs(locked[joint]) == float("inf") or locked[joint] != locked[joint]:
             raise LinkwiseError(f"--lock {item!r} is not of the form JOINT=VALUE, such as --lock elbow=0.5")
-    return Options(parameters, locked, base, root, tip, allow_unphysical, free_mimic)  # type: ignore[arg-type]
+    flags = allow_unphysical, free_mimic, joint_friction
+    return Options(parameters, locked, base, root, tip, *flags)  # type: ignore[arg-type]
 
 
 @app.command()
@@ -131,6 +138,12 @@ def inspect(
     parameters: Annotated[str, typer.Option(help="numeric or symbolic")] = "numeric",
     allow_unphysical: Unphysical = False,
     free_mimic: FreeMimic = False,
+    joint_friction: Annotated[
+        bool,
+        typer.Option(
+            "--joint-friction", help="Also list the joints' damping and friction, which no torque holds"
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Show a robot's joints, links and parameters, and what was merged, locked or ignored."""
@@ -138,7 +151,7 @@ def inspect(
     from linkwise.inspection import inspection, table
 
     system = pipeline.read_system(
-        robot, _options(lock, parameters, base, root, tip, allow_unphysical, free_mimic)
+        robot, _options(lock, parameters, base, root, tip, allow_unphysical, free_mimic, joint_friction)
     )
     data = inspection(system)
     typer.echo(json.dumps(data, indent=1) if as_json else table(data))

@@ -1,6 +1,6 @@
 """The way of the data: description -> energies -> graph -> text -> package. It only reads the description."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +11,10 @@ from linkwise.graph.count import count_operations
 from linkwise.graph.derive import Kernel, link_kernel
 from linkwise.model import Options, read_robot
 from linkwise.model.robot import Robot
+from linkwise.progress import Progress, silent
 from linkwise.symbolic.energies import read_energies
 from linkwise.symbolic.rigid import link_energies
 from linkwise.symbolic.system import System
-
-Progress = Callable[[str, int, int], None]
-"""Called with a stage's name, the steps done and the steps in all."""
-
-
-def silent(stage: str, done: int, total: int) -> None:
-    """Report no progress."""
 
 
 def read_system(spec: str | Path, options: Options | None = None) -> System:
@@ -82,6 +76,3 @@ def _chosen(backends: Iterable[str]) -> tuple[str, ...]:
         if name not in BACKENDS:
             raise LinkwiseError(f"no back end {name!r}; choose among {', '.join(BACKENDS)}")
     return tuple(name for name in BACKENDS if name in names)
-
-
-__all__ = ["Progress", "derive", "generate", "read_system", "silent"]

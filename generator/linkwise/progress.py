@@ -1,35 +1,63 @@
-"""A progress bar on a terminal, plain lines elsewhere."""
+"""Progress of long work on stderr: a bar with rate and time left on a terminal, plain lines elsewhere."""
 
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
+from rich.text import Text
+
+Progress = Callable[[str, int, int], None]
+"""Called with a stage, how much of it is done, and its whole."""
+
+
+def silent(stage: str, done: int, whole: int) -> None:
+    """Report no progress."""
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Yield a function (stage, done, total) that shows how far the work is, on stderr."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-
-        def line(stage: str, done: int, total: int) -> None:
-            if done == total:
-                console.print(f"{stage}: {total} done", highlight=False)
-
-        yield line
+def progress(units: Mapping[str, str] | None = None) -> Iterator[Progress]:
+    """Yield what to report progress to; `units` says in what a stage's rate is shown, steps by default."""
+    if not sys.stderr.isatty():
+        yield _lines()
         return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed}/{task.total}"),
-    )
-    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console) as bar:
+    columns = (TextColumn("{task.description:<10}"), BarColumn(), TextColumn("{task.percentage:>3.0f}%"))
+    rate = _Rate(units or {})
+    with Bar(*columns, rate, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True)) as bar:
         tasks: dict[str, int] = {}
 
-        def advance(stage: str, done: int, total: int) -> None:
+        def update(stage: str, done: int, whole: int) -> None:
             if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=total)
+                tasks[stage] = bar.add_task(stage, total=whole)
             bar.update(tasks[stage], completed=done)  # type: ignore[arg-type]
 
-        yield advance
+        yield update
+
+
+class _Rate(ProgressColumn):
+    """Units a second."""
+
+    def __init__(self, units: Mapping[str, str]) -> None:
+        super().__init__()
+        self.units = units
+
+    def render(self, task: Task) -> Text:
+        """Rate so far."""
+        unit = f"{self.units.get(task.description, 'steps')}/s"
+        speed = task.finished_speed or task.speed
+        return Text(f"{speed:>12,.0f} {unit:<9}" if speed else " " * 22)
+
+
+def _lines() -> Progress:
+    """A line for each tenth of a stage, but the ends alone where it has few steps."""
+    last: dict[str, int] = {}
+
+    def update(stage: str, done: int, whole: int) -> None:
+        tenth = 10 * done // whole if whole else 10
+        if tenth > last.get(stage, -1) and (tenth == 10 or whole > 100):
+            last[stage] = tenth
+            print(f"{stage}: {10 * tenth}%", file=sys.stderr)
+
+    return update

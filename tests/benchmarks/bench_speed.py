@@ -55,7 +55,7 @@ def facts(package: Package) -> dict[str, object]:
         "outputs": package.outputs,
         "operations": package.operations,
         "generate_seconds": round(package.generate_seconds, 2),
-        "compile_seconds": round(package.compile_seconds, 2),
+        "compile_seconds": {real: round(took, 2) for real, took in package.compile_seconds.items()},
         "code_bytes": package.code_bytes,
     }
 

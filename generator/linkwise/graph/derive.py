@@ -106,9 +106,7 @@ def _rigid_kernel(
         return count_operations(kernel.graph, outputs).arithmetic, axes, origin
 
     candidates = list(_axes(longest))
-    # About the centre of mass lengths are taken times √m, which a negative mass has not.
-    negative = any(isinstance(body.mass, float) and body.mass < 0 for body in bodies)
-    central = [] if negative else [attempt(axes, None) for axes in candidates]
+    central = [attempt(axes, None) for axes in candidates]
     framed = min((attempt(axes, axes.frame) for axes in candidates), key=itemgetter(0))
     origins = [f for f in _spread([-1, *longest], MAX_ORIGINS) if f != framed[1].frame]
     moved = [attempt(framed[1], origin) for origin in origins]

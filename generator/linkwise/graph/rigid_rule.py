@@ -15,8 +15,8 @@ included, before joint k):
     c0_ijk = S_i · (I S̈_k + 2 B Ṡ_k) + [k at or after i] S_i · (S_k ×* F),   S̈_k = A_k × S_k + V_k × Ṡ_k.
 
 The common frame is free, and two choices pay. With o where axes of the path meet, their s vanish. With o in
-the link's centre of mass, moving along with it, h, v and P vanish; lengths in units of 1/√m make m one too.
-Which is cheaper is found by counting.
+the link's centre of mass, moving along with it, h, v and P vanish; lengths in units of 1/√m make m one too,
+where it is a number. Which is cheaper is found by counting.
 """
 
 from collections.abc import Sequence
@@ -80,8 +80,11 @@ class _Link:
         g = self.g = turn.g
         self.turn, self.chain, self.central = turn, chain, origin is None
         mass = turn.lower(body.mass)
-        self.length = g.call("sqrt", mass) if self.central else g.one
-        self.m = g.one if self.central else mass
+        # √m of a run-time parameter would have no gradient at 0, and a negative mass has none at all.
+        value = g.value(mass)
+        scaled = self.central and value is not None and value >= 0.0
+        self.length = g.call("sqrt", mass) if scaled else g.one
+        self.m = g.one if scaled else mass
         gravity = vec.scale(g, self.length, turn.gravity)
         com = vec.apply(g, turn.rotations[chain[-1]], self._scaled(tuple(turn.lower(c) for c in body.com)))
         if origin is None:

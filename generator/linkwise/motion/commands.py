@@ -89,8 +89,8 @@ def analyze(
 ) -> None:
     """Who loads whom: every torque term of a recorded movement, as a table, figures and a page."""
     from linkwise.motion.files import Wanted, analyze_to
-    from linkwise.motion.progress import shown_progress
     from linkwise.motion.robot import load_robot
+    from linkwise.progress import progress as shown_progress
 
     reading = Reading(units, time, _pairs(mapping or []), ignore_extra, resample)
     lowpass = _lowpass(cutoff, filter_order, padding)
@@ -106,7 +106,7 @@ def analyze(
     )
     wanted = Wanted(format, tuple(figure or ()), page)
     package = load_robot(robot, backend)
-    with shown_progress() as progress:
+    with shown_progress({"reading": "B", "analysing": "samples"}) as progress:
         analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress)
     for warning in analysis.warnings:
         typer.echo(f"warning: {log}: {warning}", err=True)

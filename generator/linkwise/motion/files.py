@@ -11,9 +11,9 @@ from linkwise.motion.figures import check_name, draw
 from linkwise.motion.page import NUMBERS, SAMPLES, report
 from linkwise.motion.robot import Robot
 from linkwise.motion.run import Array, Keep, prepare, stride_for
-from linkwise.motion.samples import Progress
 from linkwise.motion.settings import Processing, Reading, record
 from linkwise.motion.tables import Format, open_table
+from linkwise.progress import Progress
 
 RECORD = "analysis.json"
 """The record, and the mark by which a directory is known to hold a former result."""

@@ -10,16 +10,13 @@ from linkwise.errors import within
 from linkwise.motion.analysis import Analysis
 from linkwise.motion.filtering import lowpass
 from linkwise.motion.robot import Robot, load_robot
-from linkwise.motion.samples import Progress, Samples, read_samples
+from linkwise.motion.samples import Samples, read_samples
 from linkwise.motion.settings import Processing, Reading
 from linkwise.motion.stream import Run, Sink, run, span_of
 from linkwise.motion.terms import Terms
+from linkwise.progress import Progress, silent
 
 Array = NDArray[np.float64]
-
-
-def silent(stage: str, done: int, whole: int) -> None:
-    """Show no progress."""
 
 
 def analyze(

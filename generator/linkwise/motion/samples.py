@@ -1,6 +1,5 @@
 """A log brought to evenly spaced joint coordinates in SI units, checked row by row."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,9 +12,7 @@ from linkwise.motion.resample import resample
 from linkwise.motion.selection import Selection, select
 from linkwise.motion.settings import Reading
 from linkwise.motion.spool import Spool
-
-Progress = Callable[[str, int, int], None]
-"""Called with a stage, how much of it is done, and its whole."""
+from linkwise.progress import Progress
 
 TOLERANCE = 1e-3
 """How far a time step may be from the mean one, as a share of it; text rounds to less than that."""

@@ -11,9 +11,10 @@ from linkwise.errors import LinkwiseError
 from linkwise.motion.analysis import Totals
 from linkwise.motion.closure import Closure
 from linkwise.motion.differentiate import derivatives
-from linkwise.motion.samples import Progress, Samples
+from linkwise.motion.samples import Samples
 from linkwise.motion.settings import Processing
 from linkwise.motion.terms import Terms
+from linkwise.progress import Progress
 
 Array = NDArray[np.float64]
 Sink = Callable[[Array], None]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
-from linkwise.pipeline import Progress
+from linkwise.progress import Progress
 from linkwise.report.laurent import BudgetExceededError
 from linkwise.report.operations import NO_OPERATIONS, Operations, link_operations
 from linkwise.report.question import Question

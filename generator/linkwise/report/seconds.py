@@ -18,7 +18,8 @@ from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
 from linkwise.graph.derive import Kernel
 from linkwise.graph.expression import Node
-from linkwise.pipeline import Progress, derive, generate
+from linkwise.pipeline import derive, generate
+from linkwise.progress import Progress
 from linkwise.report.extras import report_extra
 from linkwise.symbolic.system import System
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from linkwise.pipeline import Progress
+from linkwise.progress import Progress
 from linkwise.report.fit import PAPER_A, PAPER_RATE, Saturation, fit, held_against
 from linkwise.report.polynomial import CountPolynomial, count_polynomial
 from linkwise.report.reduction import Point, curve

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from linkwise.errors import LinkwiseError, within
-from linkwise.pipeline import Progress
+from linkwise.progress import Progress
 from linkwise.report import laurent
 from linkwise.report.count import FORM, TermCount, count_terms
 from linkwise.report.expand import ROUNDING, Expansion, Variables

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
-from linkwise.pipeline import Progress
+from linkwise.progress import Progress
 from linkwise.report.count import TermCount
 from linkwise.report.laurent import BudgetExceededError
 from linkwise.report.operations import LinkOperations, link_operations
