@@ -9,8 +9,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import typer
+from linkwise import progress
 from linkwise.errors import LinkwiseError
-from linkwise.motion import analyze, directory, progress, tables
+from linkwise.motion import analyze, directory, tables
 from linkwise.motion import files as files_module
 from linkwise.motion.commands import register
 from linkwise.motion.directory import whole_directory
