@@ -15,8 +15,8 @@ SIZES = (10, 14, 6, 6, 0)
 """Packed values of one sample: c2, c1, g, tau, h1."""
 
 COLUMNS = 3
-PER_THREAD = 512
-"""Samples below which another thread costs more than it saves."""
+PER_THREAD = 1 << 20
+"""Bytes of results below which another thread costs more than it saves."""
 
 
 def create(parameters):
@@ -108,7 +108,7 @@ class NativeBackend(NumpyBackend):
         """Run a C function over arrays of one shape (..., n); returns arrays (..., size), views of one buffer."""
         kind, shape = q.dtype, q.shape[:-1]
         count = q.size // COLUMNS
-        buffer = np.empty(count * sum(sizes), kind)
+        buffer = _aligned(count * sum(sizes), kind)
         motion = [a if a.flags.c_contiguous else np.ascontiguousarray(a) for a in (q, qd, qdd)]
         inputs = [_address(a) for a in motion]
         results, outputs, at, start = [], [], 0, _address(buffer)
@@ -120,7 +120,7 @@ class NativeBackend(NumpyBackend):
         if (call, kind) not in self.calls:
             self.calls[call, kind] = compiled(call, kind), _address(self.values[kind])
         function, p = self.calls[call, kind]
-        parts = min(self.threads, count // PER_THREAD)
+        parts = min(self.threads, buffer.nbytes // PER_THREAD)
         if parts > 1:
             self._split(parts, function, p, count, kind.itemsize, inputs, zip(outputs, sizes, strict=True))
         elif count:
@@ -138,7 +138,11 @@ class NativeBackend(NumpyBackend):
             ins, outs = ([at + first * step for at, step in group] for group in (rows, columns))
             function(samples, *ins, p, *outs)
 
-        list(pool(self.threads).map(run, range(0, count, share)))
+        first, *others = range(0, count, share)
+        waiting = [pool(self.threads).submit(run, start) for start in others]
+        run(first)
+        for future in waiting:
+            future.result()
 
     def _torch(self):
         from .native_torch import TorchSide
@@ -146,6 +150,16 @@ class NativeBackend(NumpyBackend):
         if not hasattr(self, "_torch_side"):
             self._torch_side = TorchSide(self)
         return self._torch_side
+
+
+def _aligned(size, kind):
+    """Empty array; a large one starts on a cache line, so that C can write whole lines."""
+    if size < 4096:
+        return np.empty(size, kind)
+    spare = 64 // kind.itemsize
+    buffer = np.empty(size + spare, kind)
+    start = -_address(buffer) % 64 // kind.itemsize
+    return buffer[start : start + size]
 
 
 def _address(array):

@@ -3,6 +3,7 @@
 #include "turn.h"
 
 #include <math.h>
+#include <string.h>
 
 #define real double
 #define R(x) x

@@ -109,19 +109,6 @@ def decomposition(q, qd, qdd, p):
     v0_x = qd1 * t36 + v1_x
     t44 = qd1 * s1_y + t42
     t45 = qd1 * s1_z + t43
-    t46 = 1.9999999999999998e-05 * t8
-    t47 = 1.9999999999999998e-05 * t7
-    t48 = t8 * t46 + t7 * t47
-    t49 = t7 * t46 - t8 * t47
-    n2_5_y = 0.00016999999999999999 - t48
-    t50 = w6_z * t49
-    t51 = w6_z * t48
-    t52 = w4_x * t49
-    t53 = w5_y * t48 - t52
-    t54 = w5_y * t49
-    t55 = t54 - w4_x * t48
-    t56 = 0.00013 * w5_y
-    t57 = 0.00013 * w4_x
     sd1_x = t15 * t44 + z1_y * t45
     sd1_y = t14 * t45 + t15 * v0_x
     sd1_z = z1_y * v0_x - t14 * t44
@@ -129,62 +116,75 @@ def decomposition(q, qd, qdd, p):
     sd2_y = t16 * s2_z - t17 * s2_x - (z2_x * t43 + z2_z * v1_x)
     sd2_z = z2_y * v1_x + z2_x * t42 - (t16 * s2_y + w1_y * s2_x)
     sd3_x = w2_y * s3_z - w2_z * s3_y + z2_y * t38 - z2_z * t41
-    t58 = w2_z * t37 + w2_x * s3_z + z2_x * t38 + z2_z * v2_x
+    t46 = w2_z * t37 + w2_x * s3_z + z2_x * t38 + z2_z * v2_x
     sd3_z = w2_x * s3_y + w2_y * t37 + z2_y * v2_x + z2_x * t41
     sd4_y = z4_z * t40
-    t59 = w3_z * s4_y + z4_z * t39
+    t47 = w3_z * s4_y + z4_z * t39
     sd4_z = w3_x * s4_y - t6 * t39
-    t60 = qdd2 * s2_x + qd1 * sd1_x - t24 - qdd1 * t36 + qd2 * sd2_x + qd3 * sd3_x - qdd3 * t37 - qd4 * t59
-    t61 = qdd3 * s3_y + qdd2 * s2_y + qdd1 * s1_y + t25 + qd1 * sd1_y + qd2 * sd2_y - qd3 * t58 + qd4 * sd4_y
-    t62 = qdd3 * s3_z + qdd2 * s2_z + qdd1 * s1_z + qd1 * sd1_z - t26 + qd2 * sd2_z + qd3 * sd3_z + qd4 * sd4_z
     sd5_y = 0.0096 * w4_z
-    t63 = t40 + 0.0096 * w3_y
-    t64 = t60 + 0.0096 * qdd5
-    t65 = qdd4 * s4_y + t61 + qd5 * sd5_y
-    t66 = t62 - qd5 * t63
-    t67 = t22 * n2_5_y - t23 * t49 + w4_x * t50 + w5_y * t51 - w6_z * t56
-    t68 = t23 * n2_5_y - t22 * t49 + w6_z * t57 - (w4_x * t51 + w5_y * t50)
-    t69 = 3.9999999999999996e-05 * (qdd6 + t21 + qd5 * w4_x) + w4_x * t53 + w5_y * t55
-    n2_1_y = t14 * t49 + z1_y * n2_5_y
+    t48 = t40 + 0.0096 * w3_y
+    t49 = 1.9999999999999998e-05 * t8
+    t50 = 1.9999999999999998e-05 * t7
+    t51 = t8 * t49 + t7 * t50
+    t52 = t7 * t49 - t8 * t50
+    n2_5_y = 0.00016999999999999999 - t51
+    t53 = w6_z * t52
+    t54 = w6_z * t51
+    t55 = w4_x * t52
+    t56 = w5_y * t51 - t55
+    t57 = w5_y * t52
+    t58 = t57 - w4_x * t51
+    t59 = 0.00013 * w5_y
+    t60 = 0.00013 * w4_x
+    t61 = qdd2 * s2_x + qd1 * sd1_x - t24 - qdd1 * t36 + qd2 * sd2_x + qd3 * sd3_x - qdd3 * t37 - qd4 * t47
+    t62 = qdd3 * s3_y + qdd2 * s2_y + qdd1 * s1_y + t25 + qd1 * sd1_y + qd2 * sd2_y - qd3 * t46 + qd4 * sd4_y
+    t63 = qdd3 * s3_z + qdd2 * s2_z + qdd1 * s1_z + qd1 * sd1_z - t26 + qd2 * sd2_z + qd3 * sd3_z + qd4 * sd4_z
+    t64 = t61 + 0.0096 * qdd5
+    t65 = qdd4 * s4_y + t62 + qd5 * sd5_y
+    t66 = t63 - qd5 * t48
+    t67 = t22 * n2_5_y - t23 * t52 + w4_x * t53 + w5_y * t54 - w6_z * t59
+    t68 = t23 * n2_5_y - t22 * t52 + w6_z * t60 - (w4_x * t54 + w5_y * t53)
+    t69 = 3.9999999999999996e-05 * (qdd6 + t21 + qd5 * w4_x) + w4_x * t56 + w5_y * t58
+    n2_1_y = t14 * t52 + z1_y * n2_5_y
     t70 = 3.9999999999999996e-05 * t15
-    n1_1_x = z1_y * t51 - t14 * t50 + t15 * t56
-    n1_1_y = t14 * t51 - z1_y * t50 - t15 * t57
-    n1_1_z = z1_y * t55 - t14 * t53
+    n1_1_x = z1_y * t54 - t14 * t53 + t15 * t59
+    n1_1_y = t14 * t54 - z1_y * t53 - t15 * t60
+    n1_1_z = z1_y * t58 - t14 * t56
     t71 = z2_x * n1_1_x + z2_y * n1_1_y + z2_z * n1_1_z
     t72 = z2_x * t67 + z2_y * t68 + z2_z * t69
-    n2_2_x = z2_x * n2_5_y - z2_y * t49
-    n2_2_y = z2_y * n2_5_y - z2_x * t49
+    n2_2_x = z2_x * n2_5_y - z2_y * t52
+    n2_2_y = z2_y * n2_5_y - z2_x * t52
     n2_2_z = 3.9999999999999996e-05 * z2_z
-    t73 = z2_x * t50 + z2_y * t51 - z2_z * t56
-    t74 = z2_z * t57 - (z2_x * t51 + z2_y * t50)
-    t75 = z2_x * t53 + z2_y * t55
-    n1_2_x = zd2_x * n2_5_y - zd2_y * t49 + t73
-    n1_2_y = zd2_y * n2_5_y - zd2_x * t49 + t74
+    t73 = z2_x * t53 + z2_y * t54 - z2_z * t59
+    t74 = z2_z * t60 - (z2_x * t54 + z2_y * t53)
+    t75 = z2_x * t56 + z2_y * t58
+    n1_2_x = zd2_x * n2_5_y - zd2_y * t52 + t73
+    n1_2_y = zd2_y * n2_5_y - zd2_x * t52 + t74
     n1_2_z = t75 - 3.9999999999999996e-05 * t18
     t76 = z1_y * n2_2_y - t14 * n2_2_x - t15 * n2_2_z
     t77 = z2_x * n2_2_x + z2_y * n2_2_y + z2_z * n2_2_z
     t78 = z2_x * n1_2_x + z2_y * n1_2_y + z2_z * n1_2_z
-    n1_3_x = t73 + zd3_x * n2_5_y - zd3_y * t49
-    n1_3_y = t74 + zd3_y * n2_5_y - zd3_x * t49
+    n1_3_x = t73 + zd3_x * n2_5_y - zd3_y * t52
+    n1_3_y = t74 + zd3_y * n2_5_y - zd3_x * t52
     n1_3_z = t75 + 3.9999999999999996e-05 * zd3_z
     t79 = z2_x * n1_3_x + z2_y * n1_3_y + z2_z * n1_3_z
     t80 = t6 * n2_5_y
-    n2_4_y = t6 * t49
+    n2_4_y = t6 * t52
     n2_4_z = 3.9999999999999996e-05 * z4_z
-    n1_4_x = zd4_x * n2_5_y + t19 * t49 - (t6 * t50 + z4_z * t56)
-    n1_4_y = t6 * t51 + z4_z * t57 - (zd4_x * t49 + t19 * n2_5_y)
-    n1_4_z = 3.9999999999999996e-05 * zd4_z - t6 * t53
+    n1_4_x = zd4_x * n2_5_y + t19 * t52 - (t6 * t53 + z4_z * t59)
+    n1_4_y = t6 * t54 + z4_z * t60 - (zd4_x * t52 + t19 * n2_5_y)
+    n1_4_z = 3.9999999999999996e-05 * zd4_z - t6 * t56
     t81 = z2_y * n2_4_y - z2_x * t80 + z2_z * n2_4_z
     t82 = z2_x * n1_4_x + z2_y * n1_4_y + z2_z * n1_4_z
-    n1_5_x = t51 - w4_z * n2_5_y
-    n1_5_y = w4_z * t49 - t50
-    n1_5_z = t55 + 3.9999999999999996e-05 * w4_x
+    n1_5_x = t54 - w4_z * n2_5_y
+    n1_5_y = w4_z * t52 - t53
+    n1_5_z = t58 + 3.9999999999999996e-05 * w4_x
     t83 = z2_x * n1_5_x + z2_y * n1_5_y + z2_z * n1_5_z
-    n1_6_x = t52 + w5_y * n2_5_y - t56
-    n1_6_y = t57 - (t54 + w4_x * n2_5_y)
+    n1_6_x = t55 + w5_y * n2_5_y - t59
+    n1_6_y = t60 - (t57 + w4_x * n2_5_y)
     return (
         pack(q, (
-            t14 * (t14 * n2_5_y + z1_y * t49) + z1_y * n2_1_y + t15 * t70 + t36 * t36 + s1_y * s1_y + s1_z * s1_z,
+            t14 * (t14 * n2_5_y + z1_y * t52) + z1_y * n2_1_y + t15 * t70 + t36 * t36 + s1_y * s1_y + s1_z * s1_z,
             t76 + s1_y * s2_y - t36 * s2_x + s1_z * s2_z,
             t76 + t36 * t37 + s1_y * s3_y + s1_z * s3_z,
             t14 * t80 + z1_y * n2_4_y - t15 * n2_4_z + s1_y * s4_y,
@@ -209,32 +209,32 @@ def decomposition(q, qd, qdd, p):
         pack(q, (
             z1_y * n1_1_y - t14 * n1_1_x - t15 * n1_1_z + s1_y * sd1_y - t36 * sd1_x + s1_z * sd1_z,
             z1_y * n1_2_y - t14 * n1_2_x - t15 * n1_2_z + s1_y * sd2_y - t36 * sd2_x + s1_z * sd2_z,
-            z1_y * n1_3_y - t14 * n1_3_x - t15 * n1_3_z + s1_z * sd3_z - (t36 * sd3_x + s1_y * t58),
-            z1_y * n1_4_y - t14 * n1_4_x - t15 * n1_4_z + t36 * t59 + s1_y * sd4_y + s1_z * sd4_z,
-            z1_y * n1_5_y - t14 * n1_5_x - t15 * n1_5_z + s1_y * sd5_y - s1_z * t63,
+            z1_y * n1_3_y - t14 * n1_3_x - t15 * n1_3_z + s1_z * sd3_z - (t36 * sd3_x + s1_y * t46),
+            z1_y * n1_4_y - t14 * n1_4_x - t15 * n1_4_z + t36 * t47 + s1_y * sd4_y + s1_z * sd4_z,
+            z1_y * n1_5_y - t14 * n1_5_x - t15 * n1_5_z + s1_y * sd5_y - s1_z * t48,
             z1_y * n1_6_y - t14 * n1_6_x,
             t71 + s2_x * sd1_x + s2_y * sd1_y + s2_z * sd1_z,
             t78 + s2_x * sd2_x + s2_y * sd2_y + s2_z * sd2_z,
-            t79 + s2_x * sd3_x - s2_y * t58 + s2_z * sd3_z,
-            t82 + s2_y * sd4_y - s2_x * t59 + s2_z * sd4_z,
-            t83 + s2_y * sd5_y - s2_z * t63,
+            t79 + s2_x * sd3_x - s2_y * t46 + s2_z * sd3_z,
+            t82 + s2_y * sd4_y - s2_x * t47 + s2_z * sd4_z,
+            t83 + s2_y * sd5_y - s2_z * t48,
             z2_x * n1_6_x + z2_y * n1_6_y,
             t71 + s3_y * sd1_y - t37 * sd1_x + s3_z * sd1_z,
             t78 + s3_y * sd2_y - t37 * sd2_x + s3_z * sd2_z,
-            t79 + s3_z * sd3_z - (t37 * sd3_x + s3_y * t58),
-            t82 + t37 * t59 + s3_y * sd4_y + s3_z * sd4_z,
-            t83 + s3_y * sd5_y - s3_z * t63,
+            t79 + s3_z * sd3_z - (t37 * sd3_x + s3_y * t46),
+            t82 + t37 * t47 + s3_y * sd4_y + s3_z * sd4_z,
+            t83 + s3_y * sd5_y - s3_z * t48,
             z2_x * n1_6_x + z2_y * n1_6_y,
             z4_z * n1_1_z - t6 * n1_1_x + s4_y * sd1_y,
             z4_z * n1_2_z - t6 * n1_2_x + s4_y * sd2_y,
-            z4_z * n1_3_z - t6 * n1_3_x - s4_y * t58,
+            z4_z * n1_3_z - t6 * n1_3_x - s4_y * t46,
             z4_z * n1_4_z - t6 * n1_4_x + s4_y * sd4_y,
             z4_z * n1_5_z - t6 * n1_5_x + s4_y * sd5_y,
             -t6 * n1_6_x,
             n1_1_y + 0.0096 * sd1_x,
             n1_2_y + 0.0096 * sd2_x,
             n1_3_y + 0.0096 * sd3_x,
-            n1_4_y - 0.0096 * t59,
+            n1_4_y - 0.0096 * t47,
             n1_5_y,
             n1_6_y,
             n1_1_z,
@@ -358,13 +358,6 @@ def torque(q, qd, qdd, p):
     v0_x = qd1 * t32 + v1_x
     t40 = qd1 * s1_y + t38
     t41 = qd1 * s1_z + t39
-    t42 = 1.9999999999999998e-05 * t8
-    t43 = 1.9999999999999998e-05 * t7
-    t44 = t8 * t42 + t7 * t43
-    t45 = t7 * t42 - t8 * t43
-    n2_5_y = 0.00016999999999999999 - t44
-    t46 = w6_z * t45
-    t47 = w6_z * t44
     sd1_x = t15 * t40 + z1_y * t41
     sd1_y = t14 * t41 + t15 * v0_x
     sd1_z = z1_y * v0_x - t14 * t40
@@ -373,12 +366,19 @@ def torque(q, qd, qdd, p):
     sd2_z = z2_y * v1_x + z2_x * t38 - (t16 * s2_y + w1_y * s2_x)
     sd3_x = w2_y * s3_z - w2_z * s3_y + z2_y * t34 - z2_z * t37
     sd3_z = w2_x * s3_y + w2_y * t33 + z2_y * v2_x + z2_x * t37
-    t48 = qdd2 * s2_x + qd1 * sd1_x - 2.943 * t14 - qdd1 * t32 + qd2 * sd2_x + qd3 * sd3_x - qdd3 * t33
-    t49 = qdd2 * s2_y + qdd1 * s1_y + 2.943 * z1_y + qd1 * sd1_y + qd2 * sd2_y - qd3 * (w2_z * t33 + w2_x * s3_z + z2_x * t34 + z2_z * v2_x)
-    t50 = qdd3 * s3_z + qdd2 * s2_z + qdd1 * s1_z + qd1 * sd1_z - 2.943 * t15 + qd2 * sd2_z + qd3 * sd3_z
     sd4_y = z4_z * t36
     sd4_z = w3_x * s4_y - t6 * t35
     sd5_y = 0.0096 * w4_z
+    t42 = 1.9999999999999998e-05 * t8
+    t43 = 1.9999999999999998e-05 * t7
+    t44 = t8 * t42 + t7 * t43
+    t45 = t7 * t42 - t8 * t43
+    n2_5_y = 0.00016999999999999999 - t44
+    t46 = w6_z * t45
+    t47 = w6_z * t44
+    t48 = qdd2 * s2_x + qd1 * sd1_x - 2.943 * t14 - qdd1 * t32 + qd2 * sd2_x + qd3 * sd3_x - qdd3 * t33
+    t49 = qdd2 * s2_y + qdd1 * s1_y + 2.943 * z1_y + qd1 * sd1_y + qd2 * sd2_y - qd3 * (w2_z * t33 + w2_x * s3_z + z2_x * t34 + z2_z * v2_x)
+    t50 = qdd3 * s3_z + qdd2 * s2_z + qdd1 * s1_z + qd1 * sd1_z - 2.943 * t15 + qd2 * sd2_z + qd3 * sd3_z
     t51 = t48 - qd4 * (w3_z * s4_y + z4_z * t35) + 0.0096 * qdd5
     t52 = qdd4 * s4_y + qdd3 * s3_y + t49 + qd4 * sd4_y + qd5 * sd5_y
     t53 = t50 + qd4 * sd4_z - qd5 * (t36 + 0.0096 * w3_y)
@@ -517,68 +517,68 @@ def position_gradient(q, qd, qdd, p):
     v0_x = qd1 * t59 + v1_x
     t67 = qd1 * s1_y + t65
     t68 = qd1 * s1_z + t66
-    t69 = 1.9999999999999998e-05 * t8
-    t70 = 1.9999999999999998e-05 * t7
-    t71 = t8 * t69 + t7 * t70
-    t72 = t7 * t69 - t8 * t70
-    n2_5_y = 0.00016999999999999999 - t71
-    t73 = w6_z * t72
-    t74 = w6_z * t71
-    t75 = w5_y * t71 - w4_x * t72
-    t76 = w5_y * t72 - w4_x * t71
-    t77 = 0.00013 * w5_y
-    t78 = 0.00013 * w4_x
     sd1_x = t15 * t67 + z1_y * t68
     sd1_y = t14 * t68 + t15 * v0_x
     sd1_z = z1_y * v0_x - t14 * t67
-    t79 = z1_y * t49 - t15 * t48
-    t80 = t14 * t49 - t15 * t47
-    t81 = t14 * t48 - z1_y * t47
-    t82 = qd1 * sd1_x - t47 - qdd1 * t59
-    t83 = qdd1 * s1_y + t48 + qd1 * sd1_y
-    t84 = qdd1 * s1_z + qd1 * sd1_z - t49
     sd2_x = w1_y * s2_z + t17 * s2_y + z2_y * t66 - z2_z * t65
     sd2_y = t16 * s2_z - t17 * s2_x - (z2_x * t66 + z2_z * v1_x)
     sd2_z = z2_y * v1_x + z2_x * t65 - (t16 * s2_y + w1_y * s2_x)
-    t85 = t19 * s2_z + t20 * s2_y + z2_z * t83 - z2_y * t84 + w1_y * sd2_z + t17 * sd2_y + t21 * t65 + zd2_y * t66
-    t86 = t18 * s2_z - t20 * s2_x + z2_x * t84 - z2_z * t82 + t16 * sd2_z - t17 * sd2_x + t21 * v1_x - zd2_x * t66
-    t87 = z2_y * t82 - z2_x * t83 - (t18 * s2_y + t19 * s2_x) + zd2_y * v1_x + zd2_x * t65 - (t16 * sd2_y + w1_y * sd2_x)
-    t88 = qdd2 * s2_x + t82 + qd2 * sd2_x
-    t89 = qdd2 * s2_y + t83 + qd2 * sd2_y
-    t90 = qdd2 * s2_z + t84 + qd2 * sd2_z
     sd3_x = w2_y * s3_z - w2_z * s3_y + z2_y * t61 - z2_z * t64
-    t91 = w2_z * t60 + w2_x * s3_z + z2_x * t61 + z2_z * v2_x
+    t69 = w2_z * t60 + w2_x * s3_z + z2_x * t61 + z2_z * v2_x
     sd3_z = w2_x * s3_y + w2_y * t60 + z2_y * v2_x + z2_x * t64
-    t92 = t25 * s3_z - t26 * s3_y + z2_z * t89 - z2_y * t90 + w2_y * sd3_z + w2_z * t91 + zd3_y * t61 - zd3_z * t64
-    t93 = z2_x * t90 - z2_z * t88 - (t26 * t60 + t24 * s3_z) + w2_z * sd3_x - w2_x * sd3_z - (zd3_x * t61 + zd3_z * v2_x)
-    t94 = t24 * s3_y + t25 * t60 + z2_y * t88 - z2_x * t89 + zd3_y * v2_x + zd3_x * t64 - (w2_x * t91 + w2_y * sd3_x)
-    t95 = t88 + qd3 * sd3_x - qdd3 * t60
-    t96 = qdd3 * s3_y + t89 - qd3 * t91
-    t97 = qdd3 * s3_z + t90 + qd3 * sd3_z
     sd4_y = z4_z * t63
-    t98 = w3_z * s4_y + z4_z * t62
+    t70 = w3_z * s4_y + z4_z * t62
     sd4_z = w3_x * s4_y - t6 * t62
-    t99 = z4_z * t96 - t31 * s4_y + w3_y * sd4_z - w3_z * sd4_y - zd4_z * t62
-    t100 = t95 - qd4 * t98
-    t101 = t97 + qd4 * sd4_z
     sd5_y = 0.0096 * w4_z
-    t102 = t63 + 0.0096 * w3_y
-    t103 = 0.0096 * t37 + w4_x * t102 + w4_x * t63
-    t104 = t100 + 0.0096 * qdd5
-    t105 = qdd4 * s4_y + t96 + qd4 * sd4_y + qd5 * sd5_y
-    t106 = t101 - qd5 * t102
-    t107 = w4_x * t73
-    t108 = w5_y * t74
-    t109 = w4_x * t74
-    t110 = w5_y * t73
-    t111 = t45 * n2_5_y - t46 * t72 + t107 + t108 - w6_z * t77
-    t112 = t46 * n2_5_y - t45 * t72 + w6_z * t78 - (t109 + t110)
-    t113 = 3.9999999999999996e-05 * (qdd6 + t37 + qd5 * w4_x) + w4_x * t75 + w5_y * t76
+    t71 = t63 + 0.0096 * w3_y
+    t72 = 1.9999999999999998e-05 * t8
+    t73 = 1.9999999999999998e-05 * t7
+    t74 = t8 * t72 + t7 * t73
+    t75 = t7 * t72 - t8 * t73
+    n2_5_y = 0.00016999999999999999 - t74
+    t76 = w6_z * t75
+    t77 = w6_z * t74
+    t78 = w5_y * t74 - w4_x * t75
+    t79 = w5_y * t75 - w4_x * t74
+    t80 = 0.00013 * w5_y
+    t81 = 0.00013 * w4_x
+    t82 = z1_y * t49 - t15 * t48
+    t83 = t14 * t49 - t15 * t47
+    t84 = t14 * t48 - z1_y * t47
+    t85 = qd1 * sd1_x - t47 - qdd1 * t59
+    t86 = qdd1 * s1_y + t48 + qd1 * sd1_y
+    t87 = qdd1 * s1_z + qd1 * sd1_z - t49
+    t88 = t19 * s2_z + t20 * s2_y + z2_z * t86 - z2_y * t87 + w1_y * sd2_z + t17 * sd2_y + t21 * t65 + zd2_y * t66
+    t89 = t18 * s2_z - t20 * s2_x + z2_x * t87 - z2_z * t85 + t16 * sd2_z - t17 * sd2_x + t21 * v1_x - zd2_x * t66
+    t90 = z2_y * t85 - z2_x * t86 - (t18 * s2_y + t19 * s2_x) + zd2_y * v1_x + zd2_x * t65 - (t16 * sd2_y + w1_y * sd2_x)
+    t91 = qdd2 * s2_x + t85 + qd2 * sd2_x
+    t92 = qdd2 * s2_y + t86 + qd2 * sd2_y
+    t93 = qdd2 * s2_z + t87 + qd2 * sd2_z
+    t94 = t25 * s3_z - t26 * s3_y + z2_z * t92 - z2_y * t93 + w2_y * sd3_z + w2_z * t69 + zd3_y * t61 - zd3_z * t64
+    t95 = z2_x * t93 - z2_z * t91 - (t26 * t60 + t24 * s3_z) + w2_z * sd3_x - w2_x * sd3_z - (zd3_x * t61 + zd3_z * v2_x)
+    t96 = t24 * s3_y + t25 * t60 + z2_y * t91 - z2_x * t92 + zd3_y * v2_x + zd3_x * t64 - (w2_x * t69 + w2_y * sd3_x)
+    t97 = t91 + qd3 * sd3_x - qdd3 * t60
+    t98 = qdd3 * s3_y + t92 - qd3 * t69
+    t99 = qdd3 * s3_z + t93 + qd3 * sd3_z
+    t100 = z4_z * t98 - t31 * s4_y + w3_y * sd4_z - w3_z * sd4_y - zd4_z * t62
+    t101 = t97 - qd4 * t70
+    t102 = t99 + qd4 * sd4_z
+    t103 = 0.0096 * t37 + w4_x * t71 + w4_x * t63
+    t104 = t101 + 0.0096 * qdd5
+    t105 = qdd4 * s4_y + t98 + qd4 * sd4_y + qd5 * sd5_y
+    t106 = t102 - qd5 * t71
+    t107 = w4_x * t76
+    t108 = w5_y * t77
+    t109 = w4_x * t77
+    t110 = w5_y * t76
+    t111 = t45 * n2_5_y - t46 * t75 + t107 + t108 - w6_z * t80
+    t112 = t46 * n2_5_y - t45 * t75 + w6_z * t81 - (t109 + t110)
+    t113 = 3.9999999999999996e-05 * (qdd6 + t37 + qd5 * w4_x) + w4_x * t78 + w5_y * t79
     t114 = z1_y * (t14 * t113 - t15 * t111 + s1_z * t104 + t59 * t106) - t14 * (z1_y * t113 + t15 * t112 + s1_y * t106 - s1_z * t105)
-    t115 = s1_y * (t80 + t14 * t106 - t15 * t104) - t59 * (t79 + z1_y * t106 + t15 * t105) + s1_z * (t81 - (t14 * t105 + z1_y * t104))
-    t116 = t22 * n2_5_y - t23 * t72 + 2.0 * (zd2_x * t73 + zd2_y * t74 + t21 * t77)
-    t117 = t23 * n2_5_y - t22 * t72 - 2.0 * (zd2_x * t74 + zd2_y * t73 + t21 * t78)
-    t118 = 2.0 * (zd2_x * t75 + zd2_y * t76) - 3.9999999999999996e-05 * (z2_y * t18 + z2_x * t19 + t16 * zd2_y + w1_y * zd2_x)
+    t115 = s1_y * (t83 + t14 * t106 - t15 * t104) - t59 * (t82 + z1_y * t106 + t15 * t105) + s1_z * (t84 - (t14 * t105 + z1_y * t104))
+    t116 = t22 * n2_5_y - t23 * t75 + 2.0 * (zd2_x * t76 + zd2_y * t77 + t21 * t80)
+    t117 = t23 * n2_5_y - t22 * t75 - 2.0 * (zd2_x * t77 + zd2_y * t76 + t21 * t81)
+    t118 = 2.0 * (zd2_x * t78 + zd2_y * t79) - 3.9999999999999996e-05 * (z2_y * t18 + z2_x * t19 + t16 * zd2_y + w1_y * zd2_x)
     t119 = z2_y * t113 - z2_z * t112
     t120 = z2_z * t111 - z2_x * t113
     t121 = z2_x * t112 - z2_y * t111
@@ -588,38 +588,38 @@ def position_gradient(q, qd, qdd, p):
     t125 = t116 + t119 + s2_y * t106 - s2_z * t105
     t126 = t117 + t120 + s2_z * t104 - s2_x * t106
     t127 = t118 + t121 + s2_x * t105 - s2_y * t104
-    t128 = t85 + t122
-    t129 = t86 + t123
-    t130 = t87 + t124
-    t131 = t27 * n2_5_y - t28 * t72 + 2.0 * (zd3_x * t73 + zd3_y * t74 - zd3_z * t77)
-    t132 = t28 * n2_5_y - t27 * t72 + 2.0 * (zd3_z * t78 - (zd3_x * t74 + zd3_y * t73))
-    t133 = 3.9999999999999996e-05 * (z2_y * t24 - z2_x * t25 + w2_x * zd3_y - w2_y * zd3_x) + 2.0 * (zd3_x * t75 + zd3_y * t76)
+    t128 = t88 + t122
+    t129 = t89 + t123
+    t130 = t90 + t124
+    t131 = t27 * n2_5_y - t28 * t75 + 2.0 * (zd3_x * t76 + zd3_y * t77 - zd3_z * t80)
+    t132 = t28 * n2_5_y - t27 * t75 + 2.0 * (zd3_z * t81 - (zd3_x * t77 + zd3_y * t76))
+    t133 = 3.9999999999999996e-05 * (z2_y * t24 - z2_x * t25 + w2_x * zd3_y - w2_y * zd3_x) + 2.0 * (zd3_x * t78 + zd3_y * t79)
     t134 = t131 + t119 + s3_y * t106 - s3_z * t105
     t135 = t132 + t120 + s3_z * t104 + t60 * t106
     t136 = t133 + t121 - (t60 * t105 + s3_y * t104)
-    t137 = t92 + t122
-    t138 = t93 + t123
-    t139 = t94 + t124
+    t137 = t94 + t122
+    t138 = t95 + t123
+    t139 = t96 + t124
     t140 = z2_x * t134 + z2_y * t135 + z2_z * t136
-    t141 = t34 * n2_5_y - t33 * t72 + 2.0 * (t32 * t73 - zd4_x * t74 + zd4_z * t78)
-    t142 = 3.9999999999999996e-05 * (t6 * t30 - (w3_x * t32 + w3_y * zd4_x)) + 2.0 * (zd4_x * t75 - t32 * t76)
-    t143 = t33 * n2_5_y - t34 * t72 + 2.0 * (zd4_x * t73 - t32 * t74 - zd4_z * t77) + s4_y * t106 - z4_z * t112
+    t141 = t34 * n2_5_y - t33 * t75 + 2.0 * (t32 * t76 - zd4_x * t77 + zd4_z * t81)
+    t142 = 3.9999999999999996e-05 * (t6 * t30 - (w3_x * t32 + w3_y * zd4_x)) + 2.0 * (zd4_x * t78 - t32 * t79)
+    t143 = t33 * n2_5_y - t34 * t75 + 2.0 * (zd4_x * t76 - t32 * t77 - zd4_z * t80) + s4_y * t106 - z4_z * t112
     t144 = t141 + z4_z * t111 + t6 * t113
     t145 = t142 - (t6 * t112 + s4_y * t104)
-    t146 = t99 - z4_z * t105
-    t147 = zd4_z * t63 - (w3_z * t98 + w3_x * sd4_z) - (t6 * t97 + z4_z * t95) + z4_z * t104 + t6 * t106
-    t148 = t29 * s4_y + t6 * t96 + w3_x * sd4_y + w3_y * t98 + t32 * t63 + zd4_x * t62 - t6 * t105
+    t146 = t100 - z4_z * t105
+    t147 = zd4_z * t63 - (w3_z * t70 + w3_x * sd4_z) - (t6 * t99 + z4_z * t97) + z4_z * t104 + t6 * t106
+    t148 = t29 * s4_y + t6 * t98 + w3_x * sd4_y + w3_y * t70 + t32 * t63 + zd4_x * t62 - t6 * t105
     t149 = z2_x * t143 + z2_y * t144 + z2_z * t145
-    t150 = 3.9999999999999996e-05 * (t35 + w3_y * w4_z) - 2.0 * (w4_z * t75)
-    t151 = t113 + t40 * n2_5_y + t39 * t72 - 2.0 * (w4_z * t73 + w4_x * t77)
-    t152 = 2.0 * (w4_z * t74 + w4_x * t78) - (t40 * t72 + t39 * n2_5_y) - 0.0096 * t106
+    t150 = 3.9999999999999996e-05 * (t35 + w3_y * w4_z) - 2.0 * (w4_z * t78)
+    t151 = t113 + t40 * n2_5_y + t39 * t75 - 2.0 * (w4_z * t76 + w4_x * t80)
+    t152 = 2.0 * (w4_z * t77 + w4_x * t81) - (t40 * t75 + t39 * n2_5_y) - 0.0096 * t106
     t153 = t150 + 0.0096 * t105 - t111
-    t154 = t106 - (t101 + w3_y * t102 + w4_z * sd5_y)
-    t155 = t100 - 0.0096 * t36 + w4_x * sd5_y - t104
+    t154 = t106 - (t102 + w3_y * t71 + w4_z * sd5_y)
+    t155 = t101 - 0.0096 * t36 + w4_x * sd5_y - t104
     t156 = z2_x * t151 + z2_y * t152 + z2_z * t153
-    t157 = 2.0 * (w5_y * t75 - w4_x * t76) - 3.9999999999999996e-05 * (t38 + w5_y * w5_y)
-    t158 = t43 * n2_5_y - t44 * t72 + 2.0 * (t110 - t109) - t112
-    t159 = t111 + t44 * n2_5_y - t43 * t72 + 2.0 * (t107 - t108)
+    t157 = 2.0 * (w5_y * t78 - w4_x * t79) - 3.9999999999999996e-05 * (t38 + w5_y * w5_y)
+    t158 = t43 * n2_5_y - t44 * t75 + 2.0 * (t110 - t109) - t112
+    t159 = t111 + t44 * n2_5_y - t43 * t75 + 2.0 * (t107 - t108)
     return pack(q, (
             t114 + t15 * (t14 * t112 + z1_y * t111 + t59 * t105 + s1_y * t104) + t115,
             z1_y * t126 - t14 * t125 - t15 * t127 + s1_y * t129 - t59 * t128 + s1_z * t130,
@@ -627,28 +627,28 @@ def position_gradient(q, qd, qdd, p):
             z1_y * t144 - t14 * t143 - t15 * t145 + s1_y * t147 - t59 * t146 + s1_z * t148,
             z1_y * t152 - t14 * t151 - t15 * t153 + s1_y * t103 - t59 * t154 + s1_z * t155,
             z1_y * t159 - t14 * t158 - t15 * t157,
-            s2_x * t79 + s2_y * t80 + s2_z * t81,
+            s2_x * t82 + s2_y * t83 + s2_z * t84,
             z2_x * t125 + z2_y * t126 + z2_z * t127 + s2_x * t128 + s2_y * t129 + s2_z * t130,
             t140 + s2_x * t137 + s2_y * t138 + s2_z * t139,
             t149 + s2_x * t146 + s2_y * t147 + s2_z * t148,
             t156 + s2_x * t154 + s2_y * t103 + s2_z * t155,
             z2_x * t158 + z2_y * t159 + z2_z * t157,
-            s3_y * t80 - t60 * t79 + s3_z * t81,
-            z2_x * t116 + z2_y * t117 + z2_z * t118 + s3_y * t86 - t60 * t85 + s3_z * t87,
+            s3_y * t83 - t60 * t82 + s3_z * t84,
+            z2_x * t116 + z2_y * t117 + z2_z * t118 + s3_y * t89 - t60 * t88 + s3_z * t90,
             t140 + s3_y * t138 - t60 * t137 + s3_z * t139,
             t149 + s3_y * t147 - t60 * t146 + s3_z * t148,
             t156 + s3_y * t103 - t60 * t154 + s3_z * t155,
             z2_x * t158 + z2_y * t159 + z2_z * t157,
-            s4_y * t80,
-            z4_z * t118 - t6 * t116 + s4_y * t86,
-            z4_z * t133 - t6 * t131 + s4_y * t93,
+            s4_y * t83,
+            z4_z * t118 - t6 * t116 + s4_y * t89,
+            z4_z * t133 - t6 * t131 + s4_y * t95,
             z4_z * t145 - t6 * t143 + s4_y * t147,
             z4_z * t153 - t6 * t151 + s4_y * t103,
             z4_z * t157 - t6 * t158,
-            0.0096 * t79,
-            t117 + 0.0096 * t85,
-            t132 + 0.0096 * t92,
-            t141 + 0.0096 * t99,
+            0.0096 * t82,
+            t117 + 0.0096 * t88,
+            t132 + 0.0096 * t94,
+            t141 + 0.0096 * t100,
             t152 + 0.0096 * t154,
             t159,
             0.0,

@@ -19,6 +19,9 @@ from linkwise.symbolic.system import System
 BLOCK = {"double": 8, "float": 16}
 """Samples in a block: one cache line of each quantity."""
 
+GROUP = 384
+"""Values that wait in blocks at a time: 24 KiB, half of a usual first-level cache."""
+
 
 @dataclass(frozen=True)
 class KernelFunction:
@@ -46,6 +49,24 @@ class LinkSizes:
     at_linear: int
 
 
+@dataclass(frozen=True)
+class LinkGroup:
+    """Consecutive links whose results, block by block, stay in the cache until they turn into rows together.
+
+    The fields beside `links` are those of LinkSizes, for the whole group.
+    """
+
+    links: tuple[LinkSizes, ...]
+    acceleration: int
+    velocity: int
+    gravity: int
+    linear: int
+    at_acceleration: int
+    at_velocity: int
+    at_gravity: int
+    at_linear: int
+
+
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     """Paths inside the package and texts."""
     system, name = derivation.system, derivation.package
@@ -57,8 +78,11 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     sizes = list(link_sizes(derivation.kernels))
     c2, c1, g, _, h1 = packed_sizes(derivation.kernels)
     totals = {"n": len(system.coordinates), "c2": c2, "c1": c1, "g": g, "h1": h1}
-    largest = max(max(k.acceleration, k.velocity) for k in sizes)
-    links = {**shared, "links": sizes, "largest": largest}
+    groups = list(link_groups(sizes))
+    kinds = ("acceleration", "velocity", "gravity", "linear")
+    room = {kind: max(1, *(getattr(group, kind) for group in groups)) for kind in kinds}
+    robot = {**shared, "links": sizes, "groups": groups, "room": room, "largest": max(room.values())}
+    gradient = {**shared, "links": sizes, "largest": max(k.velocity for k in sizes)}
     header = {
         "name": name,
         "upper": name.upper(),
@@ -69,8 +93,8 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     parameters = {"parameters": list(parameter_names(system).values())}
     yield f"c/{name}.h", render("c/robot.h.j2", shared | totals | header)
     yield "c/blocks.inc", render("c/blocks.inc.j2", shared | totals | parameters)
-    yield "c/robot.inc", render("c/robot.inc.j2", links)
-    yield "c/gradient.inc", render("c/gradient.inc.j2", links)
+    yield "c/robot.inc", render("c/robot.inc.j2", robot)
+    yield "c/gradient.inc", render("c/gradient.inc.j2", gradient)
     for file in ("turn.c", "turn.h"):
         yield f"c/{file}", render(f"c/{file}.j2", {**shared, "name": name})
     for kind, suffix in (("double", ""), ("float", "f")):
@@ -92,6 +116,28 @@ def link_sizes(kernels: Sequence[Kernel]) -> Iterator[LinkSizes]:
         )
         yield LinkSizes(number, *counts, c2, c1, g, linear)
         c2, c1, g, linear = c2 + counts[0], c1 + counts[1], g + counts[2], linear + counts[3]
+
+
+def link_groups(sizes: Sequence[LinkSizes]) -> Iterator[LinkGroup]:
+    """Groups of at most GROUP values; a link that is larger is one by itself."""
+    links: list[LinkSizes] = []
+    for link in sizes:
+        if links and sum(map(_values, links)) + _values(link) > GROUP:
+            yield _group(links)
+            links = []
+        links.append(link)
+    yield _group(links)
+
+
+def _values(k: LinkSizes) -> int:
+    return k.acceleration + k.velocity + 2 * k.gravity + k.linear
+
+
+def _group(links: Sequence[LinkSizes]) -> LinkGroup:
+    kinds = ("acceleration", "velocity", "gravity", "linear")
+    counts = {kind: sum(getattr(k, kind) for k in links) for kind in kinds}
+    starts = {f"at_{kind}": getattr(links[0], f"at_{kind}") for kind in kinds}
+    return LinkGroup(tuple(links), **counts, **starts)
 
 
 def packed_sizes(kernels: Sequence[Kernel]) -> tuple[int, int, int, int, int]:

@@ -13,7 +13,8 @@ from linkwise.graph.expression import Graph, Node
 from linkwise.graph.forms import Inputs, LinkForms, inputs
 from linkwise.graph.lower import Lowering
 from linkwise.graph.orientation import CommonAxes, Orientation
-from linkwise.graph.rigid_rule import rigid_forms
+from linkwise.graph.principal import principal_axes
+from linkwise.graph.rigid_rule import Origin, rigid_forms
 from linkwise.model.robot import Joint
 from linkwise.symbolic.system import LinkEnergy, System
 
@@ -85,13 +86,13 @@ def _rigid_kernel(
 ) -> Kernel:
     """Try a few common frames and keep the one that costs the fewest operations.
 
-    First each set of axes, with the origin in the centre of mass and in the frame of the axes; then, for the
-    axes that were best with an origin of the second kind, other frames' origins.
+    First each set of axes, with the origin in the centre of mass and in the frame of the axes; then variants
+    of what was best: other frames' origins, and velocities by points.
     """
     longest = max(chains, key=len)
     bodies = [energy.body for energy in links if energy.body is not None]
 
-    def build(axes: CommonAxes, origin: int | None, gradient: bool) -> Kernel:
+    def build(axes: CommonAxes, origin: Origin, gradient: bool) -> Kernel:
         lower, x = lowering(system)
         turn = Orientation(lower, tree, bodies[0].gravity, axes, x)
         forms = tuple(
@@ -100,17 +101,19 @@ def _rigid_kernel(
         )
         return Kernel(lower.graph, x, _parameters(system, lower), forms)
 
-    def attempt(axes: CommonAxes, origin: int | None) -> tuple[int, CommonAxes, int | None]:
+    def attempt(axes: CommonAxes, origin: Origin) -> tuple[int, CommonAxes, Origin]:
         kernel = build(axes, origin, gradient=False)
         outputs = [node for forms in kernel.forms for node in forms.decomposition()]
         return count_operations(kernel.graph, outputs).arithmetic, axes, origin
 
     candidates = list(_axes(longest))
-    central = [attempt(axes, None) for axes in candidates]
-    framed = min((attempt(axes, axes.frame) for axes in candidates), key=itemgetter(0))
-    origins = [f for f in _spread([-1, *longest], MAX_ORIGINS) if f != framed[1].frame]
-    moved = [attempt(framed[1], origin) for origin in origins]
-    _, axes, origin = min([*central, framed, *moved], key=itemgetter(0))
+    own = [CommonAxes(longest[-1], turned=principal)] if (principal := principal_axes(bodies[-1])) else []
+    central = min((attempt(axes, Origin()) for axes in [*candidates, *own]), key=itemgetter(0))
+    framed = min((attempt(axes, Origin(axes.frame)) for axes in candidates), key=itemgetter(0))
+    variants = [(central[1], Origin(by_points=True))]
+    frames = [f for f in _spread([-1, *longest], MAX_ORIGINS) if f != framed[1].frame]
+    variants += [(framed[1], Origin(f)) for f in frames]
+    _, axes, origin = min([central, framed, *(attempt(*v) for v in variants)], key=itemgetter(0))
     return build(axes, origin, gradient=True)
 
 

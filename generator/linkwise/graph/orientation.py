@@ -7,7 +7,7 @@ from linkwise.graph import vector as vec
 from linkwise.graph.expression import Matrix, Vector
 from linkwise.graph.forms import Inputs
 from linkwise.graph.lower import Lowering
-from linkwise.model.robot import Joint, Scalar
+from linkwise.model.robot import Joint, Rotation, Scalar
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class CommonAxes:
 
     frame: int
     before: bool = False
+    turned: Rotation | None = None
 
 
 class Orientation:
@@ -39,7 +40,7 @@ class Orientation:
         x: Inputs,
     ) -> None:
         self.g, self.lower, self.x, self.tree = lower.graph, lower, x, tree
-        self._fixed = [self._matrix(joint) for _, joint in tree]
+        self._fixed = [self._constant(joint.rotation) for _, joint in tree]
         self._turns = [self._turn(joint) for _, joint in tree]
         self.rotations = self._orient(axes)
         gx, gy, gz = (lower(a) for a in gravity)
@@ -54,8 +55,8 @@ class Orientation:
         for f in range(len(tree)):
             self._advance(f)
 
-    def _matrix(self, joint: Joint) -> Matrix:
-        a, b, c = ((self.g.const(r[0]), self.g.const(r[1]), self.g.const(r[2])) for r in joint.rotation)
+    def _constant(self, rotation: Rotation) -> Matrix:
+        a, b, c = ((self.g.const(r[0]), self.g.const(r[1]), self.g.const(r[2])) for r in rotation)
         return a, b, c
 
     def _turn(self, joint: Joint) -> Matrix:
@@ -70,7 +71,8 @@ class Orientation:
     def _orient(self, axes: CommonAxes) -> dict[int, Matrix]:
         """Orientation of every frame, walking the tree away from the common one both ways."""
         g, at = self.g, axes.frame
-        rotations = {at: self._turns[at] if axes.before else vec.identity(g)}
+        start = self._constant(axes.turned) if axes.turned else vec.identity(g)
+        rotations = {at: self._turns[at] if axes.before else start}
         unturned = vec.identity(g) if axes.before else None
         while at >= 0:
             parent = self.tree[at][0]

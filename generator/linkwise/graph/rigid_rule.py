@@ -29,6 +29,19 @@ from linkwise.graph.orientation import Orientation
 from linkwise.symbolic.system import RigidBody
 
 Spatial = tuple[Vector, Vector]
+ROUNDING = 1e-14
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The common frame's origin o: a frame of the tree, at rest, or with None the centre of mass, moving.
+
+    `by_points` finds each ṡ of a moving o from the velocity of a point on the axis relative to it: cheaper
+    where axes keep their direction.
+    """
+
+    frame: int | None = None
+    by_points: bool = False
 
 
 @dataclass(frozen=True)
@@ -42,12 +55,11 @@ class _Screw:
 
 
 def rigid_forms(
-    turn: Orientation, body: RigidBody, chain: Sequence[int], origin: int | None, gradient: bool = True
+    turn: Orientation, body: RigidBody, chain: Sequence[int], origin: Origin, gradient: bool = True
 ) -> LinkForms:
     """Closed forms of the link at the end of `chain`, the indices of its path in the tree of `turn`.
 
-    `origin` is the frame in whose origin the common frame stands; None: in the link's centre of mass. Without
-    `gradient` the position gradient is left out.
+    Without `gradient` the position gradient is left out.
     """
     g = turn.g
     link = _Link(turn, body, chain, origin)
@@ -74,11 +86,11 @@ def rigid_forms(
 
 
 class _Link:
-    """A link's screws and wrenches; `origin` is the frame whose origin is o, None for the centre of mass."""
+    """A link's screws and wrenches about one origin."""
 
-    def __init__(self, turn: Orientation, body: RigidBody, chain: Sequence[int], origin: int | None) -> None:
+    def __init__(self, turn: Orientation, body: RigidBody, chain: Sequence[int], origin: Origin) -> None:
         g = self.g = turn.g
-        self.turn, self.chain, self.central = turn, chain, origin is None
+        self.turn, self.chain, self.central = turn, chain, origin.frame is None
         mass = turn.lower(body.mass)
         # √m of a run-time parameter would have no gradient at 0, and a negative mass has none at all.
         value = g.value(mass)
@@ -87,18 +99,23 @@ class _Link:
         self.m = g.one if scaled else mass
         gravity = vec.scale(g, self.length, turn.gravity)
         com = vec.apply(g, turn.rotations[chain[-1]], self._scaled(tuple(turn.lower(c) for c in body.com)))
-        if origin is None:
+        self._steps: dict[int, Vector] = {}
+        if origin.frame is None:
             places = self._places(chain[-1], vec.sub(g, vec.zero(g), com))
             self.com = vec.zero(g)
         else:
-            places = self._places(origin, vec.zero(g))
+            places = self._places(origin.frame, vec.zero(g))
             self.com = vec.add(g, places[chain[-1]], com)
         self.h = vec.scale(g, self.m, self.com)
         axes = [self._axis(f, places[f]) for f in chain]
-        twists = self._twists(axes)
+        if origin.by_points:
+            twists, rates = self._point_motion(axes, places)
+        else:
+            twists = self._twists(axes)
+            rates = [motion_cross(g, twist, axis)[1] for twist, axis in zip(twists, axes, strict=False)]
         self.omega, self.v = twists[-1]
         self._moments(body)
-        self.screws = self._screws(axes, twists, gravity)
+        self.screws = self._screws(axes, rates, twists, gravity)
         force = vec.sub(g, vec.zero(g), vec.scale(g, self.m, gravity))
         self.weight: Spatial = (vec.cross(g, self.com, force), force)
         inertial = self.accelerated((turn.alpha[chain[-1]], self.acceleration))
@@ -111,24 +128,23 @@ class _Link:
     def _places(self, start: int, at: Vector) -> dict[int, Vector]:
         """Origins of the frames of the chain, from the one of frame `start`, up to the base and out again."""
         g, turn = self.g, self.turn
-        steps: dict[int, Vector] = {}
-
-        def step(f: int) -> Vector:
-            if f not in steps:
-                rotation = turn.rotations[turn.tree[f][0]]
-                steps[f] = vec.apply(g, rotation, self._scaled(turn.offset(f)))
-            return steps[f]
-
         places = {start: at}
         f = start
         while f >= 0:
             parent = turn.tree[f][0]
-            places[parent] = vec.sub(g, places[f], step(f))
+            places[parent] = vec.sub(g, places[f], self._step(f))
             f = parent
         for f in self.chain:
             if f not in places:
-                places[f] = vec.add(g, places[turn.tree[f][0]], step(f))
+                places[f] = vec.add(g, places[turn.tree[f][0]], self._step(f))
         return places
+
+    def _step(self, f: int) -> Vector:
+        """From the origin of the parent's frame to that of frame f."""
+        if f not in self._steps:
+            rotation = self.turn.rotations[self.turn.tree[f][0]]
+            self._steps[f] = vec.apply(self.g, rotation, self._scaled(self.turn.offset(f)))
+        return self._steps[f]
 
     def _axis(self, f: int, place: Vector) -> Spatial:
         g, turn = self.g, self.turn
@@ -153,13 +169,40 @@ class _Link:
                 v.insert(0, vec.named(g, f"v{f}", vec.sub(g, v[0], move)))
         return list(zip(omegas, v, strict=True))
 
+    def _point_motion(
+        self, axes: list[Spatial], places: dict[int, Vector]
+    ) -> tuple[list[Spatial], list[Vector]]:
+        """Twist before each joint, then the link's, and each ṡ, from velocities u relative to the moving o.
+
+        With r the place of a frame: ṙ = u, u = ω × r for the link's own, u_parent = u − ω × step − slide q̇,
+        and s = r × z gives ṡ = u × z + r × ż. The parent's v at o is u − ω × r.
+        """
+        g, turn = self.g, self.turn
+        u = vec.cross(g, turn.omega[self.chain[-1]], places[self.chain[-1]])
+        twists: list[Spatial] = [(turn.omega[self.chain[-1]], vec.zero(g))]
+        rates: list[Vector] = []
+        for f, (z, s) in zip(reversed(self.chain), reversed(axes), strict=True):
+            parent, joint = turn.tree[f]
+            omega = turn.omega[parent]
+            if joint.kind == "revolute":
+                rate = vec.add(g, vec.cross(g, u, z), vec.cross(g, places[f], turn.zd[f]))
+                u = vec.sub(g, u, vec.cross(g, omega, self._step(f)))
+            else:
+                rate = vec.cross(g, omega, s)
+                slid = vec.scale(g, turn.x.qd[joint.coordinate], s)
+                u = vec.sub(g, vec.sub(g, u, vec.cross(g, omega, self._step(f))), slid)
+            rates.insert(0, rate)
+            u = vec.named(g, f"u{f}", u)
+            twists.insert(0, (omega, vec.sub(g, u, vec.cross(g, omega, places[parent]))))
+        return twists, rates
+
     def _moments(self, body: RigidBody) -> None:
         """I, P and B in the common frame."""
         g, lower, w, v = self.g, self.turn.lower, self.omega, self.v
         rows = tuple(tuple(lower(entry) for entry in row) for row in body.inertia)
         half = g.mul(g.const(0.5), g.sum(rows[i][i] for i in range(3)))
         flipped = vec.symmetric(lambda i, k: g.sub(half, rows[i][i]) if i == k else g.neg(rows[i][k]))
-        central = vec.rotated(g, self.turn.rotations[self.chain[-1]], flipped)
+        central = self._clean(vec.rotated(g, self.turn.rotations[self.chain[-1]], flipped))
         second = vec.symmetric(lambda i, k: g.add(central[i][k], g.mul(self.h[i], self.com[k])))
         # tr(E) = ½ tr(I about the centre of mass) + m c·c, the same in any axes; I = tr(E) − E.
         trace = g.add(half, vec.dot(g, self.h, self.com))
@@ -177,14 +220,28 @@ class _Link:
         )
         self.b: Matrix = (a, b, c)  # type: ignore[assignment]
 
-    def _screws(self, axes: list[Spatial], twists: list[Spatial], gravity: Vector) -> list[_Screw]:
+    def _clean(self, m: Matrix) -> Matrix:
+        """Drop numbers that are nothing but rounding: in principal axes the products of inertia are zero."""
+        g = self.g
+        values = [abs(v) for row in m for e in row if (v := g.value(e)) is not None]
+        least = ROUNDING * max(values, default=0.0)
+
+        def kept(i: int, k: int) -> Node:
+            value = g.value(m[i][k])
+            return g.zero if value is not None and abs(value) <= least else m[i][k]
+
+        return vec.symmetric(kept)
+
+    def _screws(
+        self, axes: list[Spatial], rates: list[Vector], twists: list[Spatial], gravity: Vector
+    ) -> list[_Screw]:
         """S, Ṡ, S̈ of the path's joints, and the acceleration reached at the link."""
         g, turn = self.g, self.turn
         a = vec.sub(g, vec.zero(g), gravity)
         screws = []
-        for f, axis, twist in zip(self.chain, axes, twists, strict=False):
+        for f, axis, rate, twist in zip(self.chain, axes, rates, twists, strict=False):
             parent, joint = turn.tree[f]
-            sd = turn.zd[f], vec.named(g, f"sd{f + 1}", motion_cross(g, twist, axis)[1])
+            sd = turn.zd[f], vec.named(g, f"sd{f + 1}", rate)
             push = motion_cross(g, (turn.alpha[parent], a), axis)[1]
             sdd = turn.zdd[f], vec.add(g, push, motion_cross(g, twist, sd)[1])
             screws.append(_Screw(joint.coordinate, axis, sd, sdd))
