@@ -7,7 +7,6 @@ from typing import Any
 from linkwise.emit import BACKENDS
 from linkwise.emit.package import Derivation, identifier, manifest, shared_files
 from linkwise.errors import LinkwiseError, within
-from linkwise.graph.count import count_operations
 from linkwise.graph.derive import Kernel, link_kernel
 from linkwise.model import Options, read_robot
 from linkwise.model.robot import Robot
@@ -65,8 +64,7 @@ def generate(
         files.update(BACKENDS[backend].files(derivation))
     progress("emit", len(chosen), len(chosen))
     files.update(shared_files(derivation, [b for b in chosen if BACKENDS[b].module]))
-    operations = [count_operations(k.graph, k.forms[0].decomposition()) for k in derivation.kernels]
-    files["manifest.json"] = manifest(derivation, files, operations)
+    files["manifest.json"] = manifest(derivation, files)
     return files
 
 
@@ -75,4 +73,5 @@ def _chosen(backends: Iterable[str]) -> tuple[str, ...]:
     for name in names:
         if name not in BACKENDS:
             raise LinkwiseError(f"no back end {name!r}; choose among {', '.join(BACKENDS)}")
+    names += [needed for name in names for needed in BACKENDS[name].needs]
     return tuple(name for name in BACKENDS if name in names)

@@ -21,6 +21,7 @@ class Backend:
     module: str
     doc: str
     files: Callable[[Derivation], Files]
+    needs: tuple[str, ...] = ()
 
 
 def _runtime(name: str) -> Files:
@@ -47,8 +48,6 @@ def _numpy(d: Derivation) -> Files:
 def _native(d: Derivation) -> Files:
     from linkwise import __version__
 
-    yield from c_files(d)
-    yield from _torch(d)
     shared = {"version": __version__}
     build = {**shared, "package": d.package}
     sizes = {**shared, "sizes": packed_sizes(d.kernels), "n": len(d.system.coordinates)}
@@ -68,7 +67,13 @@ BACKENDS: dict[str, Backend] = {
             "each link's Lagrangian, differentiated by torch",
             _autograd,
         ),
-        Backend("native", "native_backend", "the C code, compiled by this system's compiler", _native),
+        Backend(
+            "native",
+            "native_backend",
+            "the C code, compiled by this system's compiler",
+            _native,
+            ("c", "torch"),
+        ),
         Backend("c", "", "closed forms in C99, to compile into a program of your own", c_files),
         Backend("formulas", "", "closed forms to read, for small robots", formula_files),
     )

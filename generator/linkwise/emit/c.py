@@ -8,12 +8,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise import __version__
-from linkwise.emit.code import Code, straight_line
+from linkwise.emit.c_fused import fused
+from linkwise.emit.c_kernel import KernelFunction, decomposition_groups, kernel_function
 from linkwise.emit.package import Derivation
-from linkwise.emit.printer import CPrinter
 from linkwise.emit.render import render
 from linkwise.graph.derive import Kernel, parameter_names
-from linkwise.graph.expression import Node
 from linkwise.symbolic.system import System
 
 BLOCK = {"double": 8, "float": 16}
@@ -21,17 +20,6 @@ BLOCK = {"double": 8, "float": 16}
 
 GROUP = 384
 """Values that wait in blocks at a time: 24 KiB, half of a usual first-level cache."""
-
-
-@dataclass(frozen=True)
-class KernelFunction:
-    """One C function over a block: the lines that fetch its inputs, and those that compute and store."""
-
-    name: str
-    arrays: tuple[str, ...]
-    inputs: tuple[tuple[str, str], ...]
-    statements: tuple[str, ...]
-    unused: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -81,7 +69,9 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     groups = list(link_groups(sizes))
     kinds = ("acceleration", "velocity", "gravity", "linear")
     room = {kind: max(1, *(getattr(group, kind) for group in groups)) for kind in kinds}
+    whole = fused(system, derivation.fused, derivation.kernels)
     robot = {**shared, "links": sizes, "groups": groups, "room": room, "largest": max(room.values())}
+    robot["shared"] = whole.shared if whole else 0
     gradient = {**shared, "links": sizes, "largest": max(k.velocity for k in sizes)}
     header = {
         "name": name,
@@ -94,6 +84,9 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     yield f"c/{name}.h", render("c/robot.h.j2", shared | totals | header)
     yield "c/blocks.inc", render("c/blocks.inc.j2", shared | totals | parameters)
     yield "c/robot.inc", render("c/robot.inc.j2", robot)
+    if whole:
+        view = {**shared, "number": 0, "functions": whole.functions}
+        yield "c/fused.inc", render("c/link.inc.j2", view)
     yield "c/gradient.inc", render("c/gradient.inc.j2", gradient)
     for file in ("turn.c", "turn.h"):
         yield f"c/{file}", render(f"c/{file}.j2", {**shared, "name": name})
@@ -156,60 +149,9 @@ def packed_sizes(kernels: Sequence[Kernel]) -> tuple[int, int, int, int, int]:
 def _functions(system: System, kernel: Kernel, number: int) -> Iterator[tuple[str, list[KernelFunction]]]:
     """Stems of the link's files and the functions in each."""
     forms = kernel.forms[0]
-    torque = {"torque": list(forms.torque.values())}
-    decomposition = {
-        "acceleration": list(forms.acceleration.values()),
-        "velocity": list(forms.velocity.values()),
-        "gravity": list(forms.gravity.values()),
-        **torque,
-        "linear": forms.linear_block(kernel.graph.zero),
-    }
-    yield (
-        "link",
-        [
-            kernel_function(system, kernel, f"link_{number}_decomposition", decomposition),
-            kernel_function(system, kernel, f"link_{number}_torque", torque),
-        ],
-    )
+    groups = decomposition_groups(kernel, forms)
+    yield "link", [kernel_function(system, kernel, f"link_{number}_decomposition", groups)]
+    torque = {"torque": groups["torque"]}
+    yield "torque", [kernel_function(system, kernel, f"link_{number}_torque", torque)]
     gradient = {"gradient": list(forms.position_gradient.values())}
     yield "gradient", [kernel_function(system, kernel, f"gradient_{number}", gradient)]
-
-
-def kernel_function(
-    system: System, kernel: Kernel, name: str, groups: dict[str, list[Node]]
-) -> KernelFunction:
-    """C function whose output arrays are `groups`; sines and cosines of the coordinates are inputs."""
-    g = kernel.graph
-    given = {g.call(f, q): f"{f[0]}{k + 1}" for k, q in enumerate(kernel.inputs.q) for f in ("sin", "cos")}
-    nodes = [node for group in groups.values() for node in group]
-    code = straight_line(g, nodes, CPrinter(), given)
-    sources = {
-        f"{prefix}{k + 1}": f"{array}[{k} * W + b]"
-        for prefix, array in (
-            ("q", "q"),
-            ("qd", "qd"),
-            ("qdd", "qdd"),
-            ("s", "sine"),
-            ("c", "cosine"),
-        )
-        for k in range(len(system.coordinates))
-    }
-    # By name: where a parameter stands depends on the robot, and a link's file must not.
-    sources |= {name: f"p[at_{name}]" for name in parameter_names(system).values()}
-    inputs = tuple((symbol, source) for symbol, source in sources.items() if symbol in code.symbols)
-    places = [(array, at) for array, group in groups.items() for at in range(len(group))]
-    used = {source.split("[")[0] for _, source in inputs}
-    unused = [a for a in ("q", "qd", "qdd", "sine", "cosine", "p") if a not in used]
-    unused += [array for array, group in groups.items() if not group]
-    return KernelFunction(name, tuple(groups), inputs, tuple(_statements(code, places)), tuple(unused))
-
-
-def _statements(code: Code, places: Sequence[tuple[str, int]]) -> Iterator[str]:
-    """Assignments, and each output stored as soon as it can be: fewer values are then alive at a time."""
-    waiting: dict[int, list[str]] = {}
-    for (array, at), text, ready in zip(places, code.outputs, code.ready, strict=True):
-        waiting.setdefault(ready, []).append(f"{array}[{at} * W + b] = {text};")
-    yield from waiting.get(0, ())
-    for number, (variable, text) in enumerate(code.assignments, 1):
-        yield f"const real {variable} = {text};"
-        yield from waiting.get(number, ())

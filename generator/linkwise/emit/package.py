@@ -6,14 +6,15 @@ import keyword
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import sympy as sp
 
 from linkwise import __version__
 from linkwise.emit.render import render
-from linkwise.graph.count import OperationCount
-from linkwise.graph.derive import Kernel
+from linkwise.graph.count import decomposition_cost
+from linkwise.graph.derive import Kernel, fused_kernel
 from linkwise.symbolic.system import System
 
 SCHEMA = 1
@@ -27,6 +28,11 @@ class Derivation:
     kernels: tuple[Kernel, ...]
     package: str
     request: Mapping[str, Any]
+
+    @cached_property
+    def fused(self) -> Kernel | None:
+        """Kernel of all links together, if there is one; found when first asked for."""
+        return fused_kernel(self.system)
 
     @property
     def linear(self) -> frozenset[int]:
@@ -73,9 +79,10 @@ def shared_files(derivation: Derivation, backends: Sequence[str]) -> Iterator[tu
         yield "numpy_backend.py", render("package/numpy_backend.py.j2", shared)
 
 
-def manifest(derivation: Derivation, files: Mapping[str, str], operations: Sequence[OperationCount]) -> str:
-    """JSON text: what was generated, from what, and the SHA-256 of every file."""
+def manifest(derivation: Derivation, files: Mapping[str, str]) -> str:
+    """JSON text: what was generated, from what, what it costs, and the SHA-256 of every file."""
     system = derivation.system
+    fused = derivation.fused if "c/fused.inc" in files else None
     data = {
         "schema": SCHEMA,
         "name": derivation.package,
@@ -87,10 +94,11 @@ def manifest(derivation: Derivation, files: Mapping[str, str], operations: Seque
             {
                 "name": link.name,
                 "path": list(system.path(j)),
-                "operations": operations[j].arithmetic,
+                "operations": decomposition_cost([derivation.kernels[j]]),
             }
             for j, link in enumerate(system.links)
         ],
+        "fused_operations": decomposition_cost([fused]) if fused else None,
         "parameters": {s.name: float(v) for s, v in system.parameters.items()},
         "units": {
             "angle": "rad",

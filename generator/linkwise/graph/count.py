@@ -3,8 +3,12 @@
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from linkwise.graph.expression import Graph, Node, reachable
+
+if TYPE_CHECKING:
+    from linkwise.graph.derive import Kernel
 
 
 @dataclass(frozen=True)
@@ -34,3 +38,11 @@ def count_operations(graph: Graph, outputs: Iterable[Node]) -> OperationCount:
     """Count what computing `outputs` takes. A sign in front of a value is free."""
     ops = Counter(graph.nodes[node][0] for node in reachable(graph, outputs))
     return OperationCount(ops["add"] + ops["sub"], ops["mul"], ops["div"], ops["call"])
+
+
+def decomposition_cost(kernels: Iterable["Kernel"]) -> int:
+    """Additions, multiplications and divisions of full decompositions, each kernel by itself."""
+    return sum(
+        count_operations(k.graph, [node for forms in k.forms for node in forms.decomposition()]).arithmetic
+        for k in kernels
+    )

@@ -1,4 +1,7 @@
-"""From link energies to kernels: the closed forms of one link, or of all, on one graph."""
+"""From link energies to kernels: the closed forms of one link, or of all, on one graph.
+
+A rigid link's common frame is free; a few are tried, and the one that costs the fewest operations is kept.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,8 +22,11 @@ from linkwise.model.robot import Joint
 from linkwise.symbolic.system import LinkEnergy, System
 
 MAX_AXES, MAX_ORIGINS = 4, 3
+MAX_FUSED = 4000
+"""Largest sum of squared path lengths for a fused kernel."""
 
 Tree = Sequence[tuple[int, Joint]]
+Attempt = tuple[int, CommonAxes, Origin]
 
 
 @dataclass(frozen=True)
@@ -62,16 +68,25 @@ def link_kernel(system: System, link: int) -> Kernel:
         if energy.body is None:
             return _energy_kernel(system, energy, system.path(link))
         tree = [(f - 1, joint) for f, joint in enumerate(energy.body.joints)]
-        return _rigid_kernel(system, [energy], tree, [range(len(tree))])
+        search = _Search(system, [energy], tree, [range(len(tree))])
+        _, axes, origin = min([*search.central(MAX_AXES), *search.framed(MAX_AXES)], key=itemgetter(0))
+        return search.build(axes, origin)
 
 
-def fused_kernel(system: System) -> Kernel:
-    """Closed forms of every link of a rigid robot on one graph, in one common frame."""
-    if system.robot is None:
-        raise ValueError("only rigid robots have a fused kernel")
+def fused_kernel(system: System) -> Kernel | None:
+    """Decomposition of every link of a rigid robot on one graph, in one common frame, where they share work.
+
+    None for energies of a user's own, and for a robot so large that finding the frame takes too long.
+    """
+    if system.robot is None or len(system.links) < 2:
+        return None
     tree = [(-1 if k.parent is None else k.parent, k.joint) for k in system.robot.links]
     chains = [energy.body.chain for energy in system.links if energy.body is not None]
-    return _rigid_kernel(system, list(system.links), tree, chains)
+    if sum(len(chain) ** 2 for chain in chains) > MAX_FUSED:
+        return None
+    search = _Search(system, system.links, tree, chains)
+    _, axes, origin = min(search.framed(MAX_AXES - 1), key=itemgetter(0))
+    return search.build(axes, origin, gradient=False)
 
 
 def _energy_kernel(system: System, energy: LinkEnergy, path: tuple[int, ...]) -> Kernel:
@@ -81,46 +96,56 @@ def _energy_kernel(system: System, energy: LinkEnergy, path: tuple[int, ...]) ->
     return Kernel(lower.graph, x, _parameters(system, lower), (forms,))
 
 
-def _rigid_kernel(
-    system: System, links: list[LinkEnergy], tree: Tree, chains: Sequence[Sequence[int]]
-) -> Kernel:
-    """Try a few common frames and keep the one that costs the fewest operations.
+class _Search:
+    """Common frames for some links of a tree, by what their decomposition costs."""
 
-    First each set of axes, with the origin in the centre of mass and in the frame of the axes; then variants
-    of what was best: other frames' origins, and velocities by points.
-    """
-    longest = max(chains, key=len)
-    bodies = [energy.body for energy in links if energy.body is not None]
+    def __init__(
+        self, system: System, links: Sequence[LinkEnergy], tree: Tree, chains: Sequence[Sequence[int]]
+    ) -> None:
+        self.system, self.tree, self.chains = system, tree, chains
+        self.bodies = [energy.body for energy in links if energy.body is not None]
 
-    def build(axes: CommonAxes, origin: Origin, gradient: bool) -> Kernel:
-        lower, x = lowering(system)
-        turn = Orientation(lower, tree, bodies[0].gravity, axes, x)
+    def build(self, axes: CommonAxes, origin: Origin, gradient: bool = True) -> Kernel:
+        """Kernel in a common frame, with or without the position gradient."""
+        lower, x = lowering(self.system)
+        turn = Orientation(lower, self.tree, self.bodies[0].gravity, axes, x)
         forms = tuple(
             rigid_forms(turn, body, chain, origin, gradient)
-            for body, chain in zip(bodies, chains, strict=True)
+            for body, chain in zip(self.bodies, self.chains, strict=True)
         )
-        return Kernel(lower.graph, x, _parameters(system, lower), forms)
+        return Kernel(lower.graph, x, _parameters(self.system, lower), forms)
 
-    def attempt(axes: CommonAxes, origin: Origin) -> tuple[int, CommonAxes, Origin]:
-        kernel = build(axes, origin, gradient=False)
+    def attempt(self, axes: CommonAxes, origin: Origin) -> Attempt:
+        """Operations of a common frame, and the frame."""
+        kernel = self.build(axes, origin, gradient=False)
         outputs = [node for forms in kernel.forms for node in forms.decomposition()]
         return count_operations(kernel.graph, outputs).arithmetic, axes, origin
 
-    candidates = list(_axes(longest))
-    own = [CommonAxes(longest[-1], turned=principal)] if (principal := principal_axes(bodies[-1])) else []
-    central = min((attempt(axes, Origin()) for axes in [*candidates, *own]), key=itemgetter(0))
-    framed = min((attempt(axes, Origin(axes.frame)) for axes in candidates), key=itemgetter(0))
-    variants = [(central[1], Origin(by_points=True))]
-    frames = [f for f in _spread([-1, *longest], MAX_ORIGINS) if f != framed[1].frame]
-    variants += [(framed[1], Origin(f)) for f in frames]
-    _, axes, origin = min([central, framed, *(attempt(*v) for v in variants)], key=itemgetter(0))
-    return build(axes, origin, gradient=True)
+    def framed(self, most_axes: int) -> Iterator[Attempt]:
+        """Frames of the longest chain, their own axes and origin, then the best with other origins."""
+        longest = max(self.chains, key=len)
+        tried = [self.attempt(axes, Origin(axes.frame)) for axes in _axes(longest, most_axes)]
+        yield from tried
+        best = min(tried, key=itemgetter(0))[1]
+        for frame in _spread([-1, *longest], MAX_ORIGINS):
+            if frame != best.frame:
+                yield self.attempt(best, Origin(frame))
+
+    def central(self, most_axes: int) -> Iterator[Attempt]:
+        """Origins in the one link's centre of mass, with principal axes too; the best one also by points."""
+        chain, body = self.chains[0], self.bodies[0]
+        axes = list(_axes(chain, most_axes))
+        if principal := principal_axes(body):
+            axes.append(CommonAxes(chain[-1], turned=principal))
+        tried = [self.attempt(candidate, Origin()) for candidate in axes]
+        yield from tried
+        yield self.attempt(min(tried, key=itemgetter(0))[1], Origin(by_points=True))
 
 
-def _axes(chain: Sequence[int]) -> Iterator[CommonAxes]:
+def _axes(chain: Sequence[int], most: int) -> Iterator[CommonAxes]:
     """Axes to try: the base's, and those before and behind joints spread over the chain."""
     yield CommonAxes(-1)
-    for f in _spread(chain, MAX_AXES):
+    for f in _spread(chain, most):
         yield CommonAxes(f)
         yield CommonAxes(f, before=True)
 

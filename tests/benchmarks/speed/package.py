@@ -34,7 +34,8 @@ class Package:
     @property
     def operations(self) -> int:
         """Additions and multiplications of all links."""
-        return sum(link["operations"] for link in self.manifest["links"])
+        links = sum(link["operations"] for link in self.manifest["links"])
+        return int(self.manifest["fused_operations"] or links)
 
     @property
     def outputs(self) -> int:
