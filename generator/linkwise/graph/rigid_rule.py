@@ -23,12 +23,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from linkwise.graph import vector as vec
-from linkwise.graph.expression import Graph, Matrix, Node, Vector
+from linkwise.graph.expression import Matrix, Node, Vector
 from linkwise.graph.forms import LinkForms
 from linkwise.graph.orientation import Orientation
+from linkwise.graph.spatial import Spatial, force_cross, motion_cross, pair_product, spatial_add
 from linkwise.symbolic.system import RigidBody
 
-Spatial = tuple[Vector, Vector]
 ROUNDING = 1e-14
 
 
@@ -282,23 +282,3 @@ class _Link:
         bent = self._bent(screw.sd[0])
         after = spatial_add(g, self.accelerated(screw.sdd), spatial_add(g, bent, bent))
         return after, spatial_add(g, after, force_cross(g, screw.s, self.wrench))
-
-
-def motion_cross(g: Graph, a: Spatial, b: Spatial) -> Spatial:
-    """(ω, v) × (z, s) = (ω × z, ω × s + v × z)."""
-    return vec.cross(g, a[0], b[0]), vec.add(g, vec.cross(g, a[0], b[1]), vec.cross(g, a[1], b[0]))
-
-
-def force_cross(g: Graph, a: Spatial, f: Spatial) -> Spatial:
-    """(z, s) ×* (N, f) = (z × N + s × f, z × f)."""
-    return vec.add(g, vec.cross(g, a[0], f[0]), vec.cross(g, a[1], f[1])), vec.cross(g, a[0], f[1])
-
-
-def spatial_add(g: Graph, a: Spatial, b: Spatial) -> Spatial:
-    """a + b."""
-    return vec.add(g, a[0], b[0]), vec.add(g, a[1], b[1])
-
-
-def pair_product(g: Graph, s: Spatial, f: Spatial) -> Node:
-    """z · N + s · f."""
-    return g.add(vec.dot(g, s[0], f[0]), vec.dot(g, s[1], f[1]))
