@@ -122,3 +122,17 @@ def test_resampling_follows_the_signal_and_not_the_window(tmp_path):
 def test_too_short(tmp_path):
     with pytest.raises(LinkwiseError, match="1 samples; a movement needs 5"):
         read(write_csv(tmp_path / "a.csv", smooth(1, 3)))
+
+
+def test_a_rate_beyond_reason_is_refused(tmp_path):
+    path = write_csv(tmp_path / "a.csv", smooth(73, 3, rate=60))
+    message = r"--resample 1e\+12 Hz is more than 100 times the log's own mean rate of 60 Hz"
+    with pytest.raises(LinkwiseError, match=message):
+        read(path, Reading(resample=1e12), spool=tmp_path)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.csv"]
+
+
+def test_resampling_reports_progress():
+    seen = []
+    resample(smooth(50, 1), 200.0, None, rows=40, progress=lambda *step: seen.append(step))
+    assert seen == [("resampling", 40, 99), ("resampling", 80, 99), ("resampling", 99, 99)]

@@ -22,6 +22,7 @@ from linkwise.motion.settings import (
 from linkwise.motion.tables import Format
 
 Kind = Literal["recorded", "simulated", "both"]
+_UNITS = {"reading": "B", "resampling": "samples", "analysing": "samples"}
 
 Log = Annotated[Path, typer.Argument(help="Motion log: .csv, .mot, .sto or .parquet")]
 Package = Annotated[Path, typer.Option(help="Directory of a generated robot")]
@@ -88,6 +89,7 @@ def analyze(
     as_json: Json = False,
 ) -> None:
     """Who loads whom: every torque term of a recorded movement, as a table, figures and a page."""
+    from linkwise.motion.directory import ended_by_signal
     from linkwise.motion.files import Wanted, analyze_to
     from linkwise.motion.robot import load_robot
     from linkwise.progress import progress as shown_progress
@@ -106,7 +108,7 @@ def analyze(
     )
     wanted = Wanted(format, tuple(figure or ()), page)
     package = load_robot(robot, backend)
-    with shown_progress({"reading": "B", "analysing": "samples"}) as progress:
+    with ended_by_signal(), shown_progress(_UNITS) as progress:
         analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress)
     for warning in analysis.warnings:
         typer.echo(f"warning: {log}: {warning}", err=True)

@@ -41,23 +41,24 @@ def read_samples(
     log = open_log(path)
     with within(str(path)):
         selection = select(log.columns, joints, reading)
-    table = Spool(1 + len(joints), spool)
     angles = [at for at, unit in enumerate(joint_units, 1) if unit == "rad"]
     scale = units.scale(log, reading)
     reach = np.zeros(1 + len(joints))
     row = log.first_row
-    for block, done in log.read(selection.columns):
-        _check_finite(block, path, row, log, selection)
-        reach = np.maximum(reach, np.abs(block).max(axis=0, initial=0.0))
-        block[:, angles] *= scale
-        table.append(block)
-        row += len(block)
-        progress("reading", done, log.size)
-    samples = table.finish()
+    with Spool(1 + len(joints), spool) as table:
+        for block, done in log.read(selection.columns):
+            _check_finite(block, path, row, log, selection)
+            reach = np.maximum(reach, np.abs(block).max(axis=0, initial=0.0))
+            block[:, angles] *= scale
+            table.append(block)
+            row += len(block)
+            progress("reading", done, log.size)
+        samples = table.finish()
     with within(str(path)):
         rate = _check_time(samples[:, 0], log.first_row, reading)
         if reading.resample is not None:
-            samples, rate = resample(samples, reading.resample, spool), reading.resample
+            rate = reading.resample
+            samples = resample(samples, rate, spool, progress=progress)
     names = [log.columns[at] for at in selection.joints]
     peaks = [(names[at - 1], float(reach[at])) for at in angles]
     return Samples(samples[:, 0], samples[:, 1:], rate, selection.ignored, units.doubts(peaks, scale))
