@@ -1,5 +1,8 @@
 """The analysis against the package's own calls, and what the paper's figures show."""
 
+from copy import deepcopy
+from dataclasses import replace
+
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -171,3 +174,44 @@ def test_parquet_in_parquet_out(tmp_path):
     pq.write_table(pa.table(named), tmp_path / "a.parquet")
     reading = Reading(mapping=tuple((f"q/{name}", name) for name in JOINTS))
     np.testing.assert_array_equal(analyze(tmp_path / "a.parquet", PLANAR3, reading).q, table[:, 1:])
+
+
+@pytest.mark.parametrize("backend", ["torch", "autograd"])
+def test_tensor_back_ends_give_the_same(tmp_path, backend):
+    pytest.importorskip("torch")
+    path = write_csv(tmp_path / "a.csv", smooth(20, 3))
+    for convention in ("closing", "gradient"):
+        processing = Processing(convention=convention)
+        ours = analyze(path, load_robot(PLANAR3, backend), processing=processing)
+        other = analyze(path, load_robot(PLANAR3, "numpy"), processing=processing)
+        assert ours.robot.backend == backend
+        np.testing.assert_allclose(ours.values, other.values, rtol=1e-9, atol=1e-10)
+
+
+def test_partial_torques_are_those_of_an_independent_recursion(tmp_path):
+    path = write_csv(tmp_path / "a.csv", smooth(60, 6), [f"joint{i}" for i in range(1, 7)])
+    result = analyze(path, PUMA560)
+    assert result.closure.recursion_absolute > 0
+    assert result.closure.recursion_relative < 1e-12
+    by_hand = replace(result.robot, recursion=None, skeleton=None)
+    assert analyze(path, by_hand).closure.recursion_relative is None
+
+
+def test_a_robot_at_odds_with_the_recursion_is_refused(tmp_path):
+    """What sums cannot see: every torque too large by the same part."""
+    path = write_csv(tmp_path / "a.csv", smooth(60, 3))
+    robot = load_robot(PLANAR3)
+    heavy = deepcopy(robot.recursion)
+    heavy.bodies[2]["mass"] *= 1.001
+    with pytest.raises(LinkwiseError, match="a.csv: .* not those of the Newton-Euler recursion"):
+        analyze(path, replace(robot, recursion=heavy))
+
+
+@pytest.mark.parametrize("lowpass", [None, Lowpass(5.0)])
+def test_results_that_overflow_are_named(tmp_path, lowpass):
+    table = smooth(60, 3)
+    table[30, 2] = 1e306
+    path = write_csv(tmp_path / "a.csv", table)
+    message = r"a.csv: row \d+, time 0\.\d+ s: result column 'q.*/joint.' is -?(inf|nan); the log's values"
+    with pytest.raises(LinkwiseError, match=message):
+        analyze(path, PLANAR3, processing=Processing(lowpass=lowpass))

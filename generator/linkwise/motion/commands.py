@@ -152,10 +152,16 @@ def _lowpass(cutoff: float | None, order: int | None, padding: Padding | None) -
 
 def _told(analysis: Analysis, files: Sequence[Path]) -> str:
     closure = analysis.closure
+    recursion = (
+        "no independent value for energies written by hand"
+        if closure.recursion_relative is None
+        else f"partial torques agree with an independent Newton-Euler recursion within"
+        f" {closure.recursion_relative:.1e}"
+    )
     return "\n".join(
         [
             f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {analysis.robot.backend};"
-            f" terms sum to partial torques within {closure.terms_relative:.1e},"
+            f" {recursion}; closure: terms sum to partial torques within {closure.terms_relative:.1e},"
             f" these to joint torques within {closure.links_relative:.1e} (relative)",
             *map(str, files),
         ]

@@ -58,7 +58,8 @@ def padding_length(sos: Array) -> int:
 def _run(sos: Array, x: Array, state: Array) -> tuple[Array, Array]:
     if not len(x):
         return x, state
-    y, after = extra("scipy.signal").sosfilt(sos, x, axis=0, zi=state)
+    with np.errstate(over="ignore", invalid="ignore"):
+        y, after = extra("scipy.signal").sosfilt(sos, x, axis=0, zi=state)
     return y, after
 
 

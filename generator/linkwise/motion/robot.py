@@ -13,8 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
 from linkwise.motion.skeleton import Body, read_skeleton
+from linkwise.motion.tensors import TENSORS, TensorModel
 
 Array = NDArray[np.float64]
 BACKENDS = ("native", "numpy")
@@ -79,6 +81,8 @@ class Robot:
     up: tuple[float, float, float]
     """Against gravity, in the base frame; z for a robot without gravity."""
     manifest_sha256: str
+    recursion: NewtonEuler | None = None
+    """Partial torques by an independent way; None where the energies were written by hand."""
 
 
 def load_robot(directory: Path, backend: str | None = None) -> Robot:
@@ -93,6 +97,7 @@ def load_robot(directory: Path, backend: str | None = None) -> Robot:
         manifest: dict[str, Any] = json.loads(text)
         name, skeleton = str(manifest["name"]), read_skeleton(manifest["skeleton"])
         up = _up(manifest["conventions"].get("gravity"))
+        recursion = NewtonEuler(manifest) if skeleton is not None else None
     except (ValueError, KeyError, TypeError) as error:
         raise LinkwiseError(f"{manifest_path}: damaged ({error}); generate the robot again") from error
     digest = hashlib.sha256(text).hexdigest()
@@ -108,6 +113,7 @@ def load_robot(directory: Path, backend: str | None = None) -> Robot:
         skeleton,
         up,
         digest,
+        recursion,
     )
 
 
@@ -143,7 +149,8 @@ def _load(directory: Path, package: ModuleType, backends: Sequence[str]) -> tupl
     reasons = []
     for backend in backends:
         try:
-            return backend, package.load(backend)
+            model = package.load(backend)
+            return backend, TensorModel(model) if backend in TENSORS else model
         except Exception as error:  # A back end may lack its compiler, its library or its files.
             reasons.append(f"{backend}: {error}")
     raise LinkwiseError(

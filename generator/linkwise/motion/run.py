@@ -48,7 +48,8 @@ class Job:
 
     def run(self, sink: Sink, progress: Progress) -> Run:
         """Analyse every sample, handing the blocks to `sink`."""
-        return run(self.samples, self.terms, self.processing, sink, progress)
+        with within(self.source):
+            return run(self.samples, self.terms, self.processing, sink, progress)
 
     @property
     def count(self) -> int:

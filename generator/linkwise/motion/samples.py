@@ -27,6 +27,8 @@ class Samples:
     rate: float
     ignored: tuple[str, ...]
     warnings: tuple[str, ...]
+    first_row: int | None = None
+    """Number of the first sample's row in the log; None where they were resampled."""
 
 
 def read_samples(
@@ -61,7 +63,14 @@ def read_samples(
             samples = resample(samples, rate, spool, progress=progress)
     names = [log.columns[at] for at in selection.joints]
     peaks = [(names[at - 1], float(reach[at])) for at in angles]
-    return Samples(samples[:, 0], samples[:, 1:], rate, selection.ignored, units.doubts(peaks, scale))
+    return Samples(
+        samples[:, 0],
+        samples[:, 1:],
+        rate,
+        selection.ignored,
+        units.doubts(peaks, scale),
+        log.first_row if reading.resample is None else None,
+    )
 
 
 def _check_finite(block: Array, path: Path, row: int, log: Log, selection: Selection) -> None:

@@ -11,6 +11,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.motion.analysis import Totals
 from linkwise.motion.closure import Closure
 from linkwise.motion.differentiate import derivatives
+from linkwise.motion.independent import against_recursion
 from linkwise.motion.samples import Samples
 from linkwise.motion.settings import Processing
 from linkwise.motion.terms import Terms
@@ -54,7 +55,7 @@ def run(samples: Samples, terms: Terms, processing: Processing, sink: Sink, prog
     total = np.zeros(len(terms.columns))
     peak = np.zeros(len(terms.columns))
     closure = Closure()
-    with ThreadPoolExecutor(1) as writer:
+    with ThreadPoolExecutor(1) as writer, np.errstate(over="ignore", invalid="ignore"):
         pending: Future[None] | None = None
         for first, last in _blocks(start, stop, len(terms.columns)):
             block = np.empty((len(terms.columns), last - first))
@@ -64,8 +65,12 @@ def run(samples: Samples, terms: Terms, processing: Processing, sink: Sink, prog
                 out = block[:, at - first : end - first]
                 closure |= terms.fill(out, samples.time[at:end], q, qd, qdd)
                 magnitude = np.abs(out)
-                total += magnitude.sum(axis=1)
+                added = magnitude.sum(axis=1)
+                if not np.isfinite(added).all():
+                    raise _overflow(samples, terms, out, at)
+                total += added
                 np.maximum(peak, magnitude.max(axis=1), out=peak)
+            closure |= against_recursion(terms.robot, terms.columns, block)
             closure.check()
             if pending is not None:
                 pending.result()
@@ -74,6 +79,18 @@ def run(samples: Samples, terms: Terms, processing: Processing, sink: Sink, prog
         if pending is not None:
             pending.result()
     return Run(Totals(total / (stop - start), peak), closure, stop - start)
+
+
+def _overflow(samples: Samples, terms: Terms, out: Array, start: int) -> LinkwiseError:
+    """Say where the first result that is no number stands, by time; columns come cause before effect."""
+    bad = ~np.isfinite(out)
+    at = int(bad.any(axis=0).argmax())
+    column = int(bad[:, at].argmax()) if bad.any() else int(np.abs(out).max(axis=1).argmax())
+    row = "" if samples.first_row is None else f"row {samples.first_row + start + at}, "
+    return LinkwiseError(
+        f"{row}time {samples.time[start + at]:.6g} s: result column {terms.columns[column].name!r} is"
+        f" {out[column, at]:.3g}; the log's values are too large"
+    )
 
 
 def _blocks(start: int, stop: int, columns: int) -> Iterator[tuple[int, int]]:
