@@ -203,7 +203,7 @@ def test_a_robot_at_odds_with_the_recursion_is_refused(tmp_path):
     robot = load_robot(PLANAR3)
     heavy = deepcopy(robot.recursion)
     heavy.bodies[2]["mass"] *= 1.001
-    with pytest.raises(LinkwiseError, match="a.csv: .* not those of the Newton-Euler recursion"):
+    with pytest.raises(LinkwiseError, match=r"a.csv: .* not those of the Newton-Euler recursion"):
         analyze(path, replace(robot, recursion=heavy))
 
 
@@ -212,6 +212,19 @@ def test_results_that_overflow_are_named(tmp_path, lowpass):
     table = smooth(60, 3)
     table[30, 2] = 1e306
     path = write_csv(tmp_path / "a.csv", table)
-    message = r"a.csv: row \d+, time 0\.\d+ s: result column 'q.*/joint.' is -?(inf|nan); the log's values"
+    message = (
+        r"a.csv: row \d+, time 0[.\d]* s: result column '(q|tau).*/joint.' is -?(inf|nan); the log's values"
+    )
     with pytest.raises(LinkwiseError, match=message):
         analyze(path, PLANAR3, processing=Processing(lowpass=lowpass))
+
+
+def test_slashes_in_names_are_escaped(tmp_path):
+    robot = load_robot(PLANAR3)
+    names = ("a", "a/b", "a%2Fb")
+    slashed = replace(robot, joints=names, links=("b/a", "a", "link"))
+    result = analyze(write_csv(tmp_path / "a.csv", smooth(20, 3), names), slashed)
+    columns = [column.name for column in result.columns]
+    assert len(set(columns)) == len(columns)
+    np.testing.assert_array_equal(result["tau/a%2Fb/link"], result.partial_torque[:, 1, 2])
+    np.testing.assert_array_equal(result["tau/a%252Fb"], result.torque[:, 2])

@@ -123,3 +123,10 @@ def test_other_files(tmp_path):
     (tmp_path / "a.csv").write_bytes(b"time,\xff\n")
     with pytest.raises(LinkwiseError, match="not UTF-8"):
         open_log(tmp_path / "a.csv")
+
+
+def test_a_decimal_comma_is_named(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time;joint1\n0;1\n0,01;2\n", encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=r"row 3, column 'time': '0,01' has a decimal comma"):
+        whole(path, (0, 1))

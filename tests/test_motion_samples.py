@@ -136,3 +136,49 @@ def test_resampling_reports_progress():
     seen = []
     resample(smooth(50, 1), 200.0, None, rows=40, progress=lambda *step: seen.append(step))
     assert seen == [("resampling", 40, 99), ("resampling", 80, 99), ("resampling", 99, 99)]
+
+
+@pytest.mark.parametrize("digits", [3, 4])
+def test_time_rounded_to_its_last_digit_is_even(tmp_path, digits):
+    table = smooth(300, 3, rate=60)
+    table[:, 0] = np.round(table[:, 0], digits)
+    assert read(write_csv(tmp_path / "a.csv", table)).rate == pytest.approx(60, rel=1e-4)
+
+
+def test_jitter_is_not_rounding(tmp_path):
+    table = smooth(300, 3, rate=60)
+    table[:, 0] = np.round(table[:, 0], 3)
+    table[100:, 0] += 0.001
+    table[200:, 0] += 0.001
+    with pytest.raises(LinkwiseError, match=r"time column: a step of .* --resample"):
+        read(write_csv(tmp_path / "a.csv", table))
+
+
+def test_milliseconds_are_doubted(tmp_path):
+    table = smooth(30, 3) * [1000, 1, 1, 1]
+    (warning,) = read(write_csv(tmp_path / "a.csv", table)).warnings
+    assert warning == "0.1 samples a second are few: if time is in ms, divide it by 1000"
+    assert read(write_csv(tmp_path / "b.csv", smooth(30, 3, rate=10))).warnings == ()
+
+
+def test_unsaid_degrees_are_told(tmp_path):
+    path = write_mot(tmp_path / "a.mot", smooth(30, 3), JOINTS)
+    said = path.read_text(encoding="utf-8")
+    path.write_text(said.replace("inDegrees=yes\n", ""), encoding="utf-8")
+    (warning,) = read(path).warnings
+    assert warning.startswith("the header has no inDegrees: angles are taken for radians")
+    assert read(path, Reading(units="rad")).warnings == ()
+    path.write_text(said.replace("inDegrees=yes", "inDegrees=maybe"), encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=r"a.mot: inDegrees='maybe' in the header is neither yes nor no"):
+        read(path)
+
+
+def test_a_last_row_that_may_be_cut_is_doubted(tmp_path):
+    path = write_csv(tmp_path / "a.csv", np.round(smooth(30, 3) + 1.1, 2) + 0.001)
+    text = path.read_text(encoding="utf-8").rstrip("\n")
+    path.write_text(text, encoding="utf-8")
+    assert read(path).warnings == ()
+    path.write_text(text[:-2], encoding="utf-8")
+    (warning,) = read(path).warnings
+    assert "the last row has no line end" in warning
+    assert "may be cut off" in warning

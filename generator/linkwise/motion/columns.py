@@ -38,6 +38,11 @@ class Column:
         return self.quantity, self.joint, self.link, self.cause
 
 
+def escaped(name: str) -> str:
+    """A joint's or link's name as a part of a column's: no slash in it, and still one to one."""
+    return name.replace("%", "%25").replace("/", "%2F")
+
+
 def columns_of(robot: Robot, layout: PackedLayout) -> tuple[Column, ...]:
     """Columns in order: time, motion, τ_i, τ_ij, then the terms; what is identically 0 has none."""
     unit = {"rad": "N·m", "m": "N"}
@@ -45,9 +50,9 @@ def columns_of(robot: Robot, layout: PackedLayout) -> tuple[Column, ...]:
     motions: tuple[tuple[Quantity, str], ...] = (("q", ""), ("qd", "/s"), ("qdd", "/s²"))
     for quantity, suffix in motions:
         for i, joint in enumerate(robot.joints):
-            out.append(Column(quantity, f"{quantity}/{joint}", robot.units[i] + suffix, i))
+            out.append(Column(quantity, f"{quantity}/{escaped(joint)}", robot.units[i] + suffix, i))
     for i, joint in enumerate(robot.joints):
-        out.append(Column("tau", f"tau/{joint}", unit[robot.units[i]], i))
+        out.append(Column("tau", f"tau/{escaped(joint)}", unit[robot.units[i]], i))
 
     def load(quantity: Quantity, i: int, j: int, k: int | None = None) -> None:
         parts = [
@@ -56,7 +61,7 @@ def columns_of(robot: Robot, layout: PackedLayout) -> tuple[Column, ...]:
             robot.links[j],
             *([robot.joints[k]] if k is not None else []),
         ]
-        name = "/".join(parts).replace("tau_link/", "tau/", 1)
+        name = "/".join(map(escaped, parts)).replace("tau_link/", "tau/", 1)
         out.append(Column(quantity, name, unit[robot.units[i]], i, j, k))
 
     for i, j in sorted(map(tuple, layout.torque.tolist())):

@@ -25,6 +25,10 @@ class Log(Protocol):
         """Whether angles are in degrees, where the file says so."""
 
     @property
+    def doubts(self) -> tuple[str, ...]:
+        """Warnings about the file, complete once it has been read."""
+
+    @property
     def size(self) -> int:
         """What `read` counts up to: bytes of text, or rows."""
 

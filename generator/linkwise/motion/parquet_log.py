@@ -20,6 +20,7 @@ class ParquetLog:
     size: int
     degrees: bool | None = None
     first_row: int = 1
+    doubts: tuple[str, ...] = ()
 
     @classmethod
     def open(cls, path: Path) -> "ParquetLog":

@@ -15,7 +15,10 @@ from linkwise.motion.spool import Spool
 from linkwise.progress import Progress
 
 TOLERANCE = 1e-3
-"""How far a time step may be from the mean one, as a share of it; text rounds to less than that."""
+"""How far a time step may be from the mean one, as a share of it."""
+
+SLOW = 5.0
+"""Hz; hardly any movement is recorded so slowly, and milliseconds taken for seconds look like it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,7 @@ def read_samples(
         selection = select(log.columns, joints, reading)
     angles = [at for at, unit in enumerate(joint_units, 1) if unit == "rad"]
     scale = units.scale(log, reading)
+    unsaid = units.unsaid(log, path, reading) if angles else ()
     reach = np.zeros(1 + len(joints))
     row = log.first_row
     with Spool(1 + len(joints), spool) as table:
@@ -58,6 +62,7 @@ def read_samples(
         samples = table.finish()
     with within(str(path)):
         rate = _check_time(samples[:, 0], log.first_row, reading)
+        slow = _doubts(rate)
         if reading.resample is not None:
             rate = reading.resample
             samples = resample(samples, rate, spool, progress=progress)
@@ -68,7 +73,7 @@ def read_samples(
         samples[:, 1:],
         rate,
         selection.ignored,
-        units.doubts(peaks, scale),
+        (*log.doubts, *slow, *unsaid, *units.doubts(peaks, scale)),
         log.first_row if reading.resample is None else None,
     )
 
@@ -104,10 +109,31 @@ def _check_time(time: Array, first: int, reading: Reading) -> float:
         )
     mean = (time[-1] - time[0]) / (len(time) - 1)
     off = np.abs(steps - mean)
-    if reading.resample is None and off.max() > TOLERANCE * mean:
+    if reading.resample is None and off.max() > TOLERANCE * mean and not _rounded(time):
         at = int(np.argmax(off))
         raise LinkwiseError(
             f"row {first + at + 1}, time column: a step of {steps[at]:.6g} s where the mean is"
             f" {mean:.6g} s; bring the log to an even rate with --resample {1 / mean:.6g}"
         )
     return float(1 / mean)
+
+
+def _rounded(time: Array) -> bool:
+    """Whether the times are an even grid, rounded to the last digit they are given in.
+
+    60 Hz in milliseconds has steps of 16 and 17 ms, and that is even time. Digits coarser than a fifth
+    of a step explain too much to count.
+    """
+    at = np.arange(len(time))
+    step, start = np.polyfit(at, time - time[0], 1)
+    off = np.ptp(time - time[0] - start - step * at)
+    for unit in 10.0 ** -np.arange(10):
+        if unit < step / 5 and np.abs(time - np.round(time / unit) * unit).max() < 1e-3 * unit:
+            return bool(off < 1.1 * unit)
+    return False
+
+
+def _doubts(rate: float) -> tuple[str, ...]:
+    if rate >= SLOW:
+        return ()
+    return (f"{rate:.4g} samples a second are few: if time is in ms, divide it by 1000",)

@@ -14,6 +14,7 @@ import numpy as np
 
 from linkwise.errors import LinkwiseError
 from linkwise.motion.log import BLOCK, Array
+from linkwise.motion.text_end import doubts_of_the_end
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class TextLog:
     delimiter: str | None
     degrees: bool | None = None
     rows: int | None = None
+    doubts: tuple[str, ...] = ()
 
     @property
     def size(self) -> int:
@@ -106,6 +108,10 @@ class TextLog:
                 try:
                     float(cell)
                 except ValueError:
+                    if re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", cell):
+                        return LinkwiseError(
+                            f"{where}, column {name!r}: {cell!r} has a decimal comma; write decimal points"
+                        )
                     return LinkwiseError(f"{where}, column {name!r}: {cell!r} is not a number")
         return None
 
@@ -121,7 +127,7 @@ def open_delimited(path: Path) -> TextLog:
         raise LinkwiseError(f"{path}: row 1: no header; name the columns there, the time first")
     if all(_is_number(name) for name in columns):
         raise LinkwiseError(f"{path}: row 1 holds numbers; put a header of column names above it")
-    return TextLog(path, columns, 2, delimiter)
+    return TextLog(path, columns, 2, delimiter, doubts=doubts_of_the_end(path, delimiter))
 
 
 def open_storage(path: Path) -> TextLog:
@@ -147,9 +153,20 @@ def open_storage(path: Path) -> TextLog:
         raise LinkwiseError(
             f"{path}: row {row + 1}: {len(columns)} column names where the header promises nColumns={wanted}"
         )
-    degrees = {"yes": True, "no": False}.get(facts.get("indegrees", "").lower())
+    said = facts.get("indegrees")
+    degrees = None if said is None else {"yes": True, "no": False}.get(said.lower())
+    if said is not None and degrees is None:
+        raise LinkwiseError(f"{path}: inDegrees={said!r} in the header is neither yes nor no")
     # Values are padded with blanks, so any run of blanks parts them, whatever parts the names.
-    return TextLog(path, columns, row + 2, None, degrees, _count(path, facts, "nRows"))
+    return TextLog(
+        path,
+        columns,
+        row + 2,
+        None,
+        degrees,
+        _count(path, facts, "nRows"),
+        doubts_of_the_end(path, None),
+    )
 
 
 def _count(path: Path, facts: dict[str, str], key: str) -> int | None:

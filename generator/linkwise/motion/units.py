@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 from linkwise.errors import LinkwiseError
 from linkwise.motion.log import Log
@@ -20,6 +21,13 @@ def scale(log: Log, reading: Reading) -> float:
             f" inDegrees={'yes' if log.degrees else 'no'}; leave --units away"
         )
     return math.pi / 180 if (log.degrees if told is None else told) else 1.0
+
+
+def unsaid(log: Log, path: Path, reading: Reading) -> tuple[str, ...]:
+    """A warning for a file that ought to say its unit, and does not."""
+    if path.suffix.lower() not in {".mot", ".sto"} or log.degrees is not None or reading.units is not None:
+        return ()
+    return ("the header has no inDegrees: angles are taken for radians; say so with --units rad or deg",)
 
 
 def doubts(peaks: Sequence[tuple[str, float]], factor: float) -> tuple[str, ...]:
