@@ -16,6 +16,12 @@ class AutogradBackend(TorchBackend):
 
     name = "autograd"
 
+    def arrays(self, named, n):
+        """Check and broadcast the motion to a common shape (..., n)."""
+        if torch._C._are_functorch_transforms_active():
+            raise TypeError("this back end does not run inside torch.func; take torch")
+        return super().arrays(named, n)
+
     @property
     def modules(self):
         """One nn.Module a link; module(q, qd) is its Lagrangian in J."""

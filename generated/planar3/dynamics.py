@@ -25,12 +25,29 @@ class Coefficients(NamedTuple):
 
 
 class Propagation(NamedTuple):
-    """Motion propagation torques: c2 qdd and c1 qd (..., n, N, n), and g (..., n, N)."""
+    """Motion propagation torques: c2 qdd and c1 qd (..., n, N, n), and g (..., n, N); closing convention."""
 
     acceleration: object
     velocity: object
     gravity: object
-    convention: str = "closing"
+
+    @property
+    def convention(self):
+        """Which c1 was taken."""
+        return "closing"
+
+
+class GradientPropagation(NamedTuple):
+    """The same with c1 = d(tau_ij)/d(qd_k), the gradient convention."""
+
+    acceleration: object
+    velocity: object
+    gravity: object
+
+    @property
+    def convention(self):
+        """Which c1 was taken."""
+        return "gradient"
 
 
 class Layout(NamedTuple):
@@ -48,14 +65,18 @@ class Layout(NamedTuple):
 
 
 class Packed(NamedTuple):
-    """The full decomposition, packed: values (..., count) and, in `layout`, the indices they belong to."""
+    """The full decomposition, packed: values (..., count); `layout` has the indices they belong to."""
 
     acceleration: object
     velocity: object
     gravity: object
     torque: object
     velocity_linear: object
-    layout: Layout
+
+    @property
+    def layout(self):
+        """Indices of the values, see `Layout`."""
+        return LAYOUT
 
 
 def _layout():
@@ -64,11 +85,16 @@ def _layout():
     every = [row for rows in pairs for row in rows]
     linear = [row for j, rows in enumerate(pairs) if j in LINEAR for row in rows]
     single = [(i, j) for j, path in enumerate(PATHS) for i in path]
-    return Layout(
-        *(np.array(rows, dtype=np.intp).reshape(-1, width) for rows, width in (
-            (upper, 3), (every, 3), (single, 2), (single, 2), (linear, 3),
-        ))
-    )
+    tables = [
+        np.array(rows, dtype=np.intp).reshape(-1, width)
+        for rows, width in ((upper, 3), (every, 3), (single, 2), (single, 2), (linear, 3))
+    ]
+    for table in tables:
+        table.flags.writeable = False
+    return Layout(*tables)
+
+
+LAYOUT = _layout()
 
 
 class Dynamics:
@@ -79,20 +105,27 @@ class Dynamics:
     joint_names = JOINT_NAMES
     joint_units = JOINT_UNITS
     link_names = LINK_NAMES
-    layout = _layout()
+    layout = LAYOUT
 
-    def __init__(self, backend):
+    def __init__(self, backend, given):
         self.backend = backend
+        self._given = given
         self.parameters = backend.parameters
         self._tables = {}
 
     def __repr__(self):
         return f"<{self.n} joints, {self.N} links on {self.backend.name}>"
 
+    def __reduce__(self):
+        """Pickled, copied or sent to another process, it is loaded again there."""
+        from .load import load
+
+        return load, (self.backend.name, self._given)
+
     def packed(self, q, qd, qdd):
         """Full decomposition without the zeros: c2, c1 (closing), g and tau, see `Layout`."""
         q, qd, qdd = self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n)
-        return Packed(*self.backend.decomposition(q, qd, qdd), self.layout)
+        return Packed(*self.backend.decomposition(q, qd, qdd))
 
     def packed_torque(self, q, qd, qdd):
         """tau_ij on the paths only, (..., G); its indices are `layout.torque`."""
@@ -130,7 +163,8 @@ class Dynamics:
         if convention == "gradient":
             c1 = 2.0 * c1 - self._dense(packed.velocity_linear, "velocity_linear")
         gravity = self._dense(packed.gravity, "gravity")
-        return Propagation(c2 * qdd[..., None, None, :], c1 * qd[..., None, None, :], gravity, convention)
+        kind = Propagation if convention == "closing" else GradientPropagation
+        return kind(c2 * qdd[..., None, None, :], c1 * qd[..., None, None, :], gravity)
 
     def position_gradient(self, q, qd, qdd):
         """c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
@@ -140,7 +174,7 @@ class Dynamics:
     def masked(self, q, qd, qdd, mask):
         """sum over m, k of mask_mk c_m,ijk q_k^(m) (Eq. 21-24), shape (..., n, N).
 
-        mask: zeros and ones, shape (3, n); row m is the order: 0 position, 1 velocity, 2 acceleration. Gravity is in
+        mask: shape (3, n), zeros and ones, or weights between; row m is the order: 0 position, 1 velocity, 2 acceleration. Gravity is in
         no row: a mask of ones in rows 1 and 2 gives tau_ij - g_ij.
         """
         if np.shape(mask) != (3, self.n):
@@ -150,7 +184,8 @@ class Dynamics:
         coefficients = self.coefficients(q, qd)
         total = coefficients.velocity @ (mask[1] * qd)[..., None, :, None]
         total = total + coefficients.acceleration @ (mask[2] * qdd)[..., None, :, None]
-        if bool((mask[0] != 0).any()):
+        # A tensor of numbers that nobody may look at yet, as under vmap, might ask for positions too.
+        if not isinstance(mask, np.ndarray) or mask[0].any():
             total = total + self.position_gradient(q, qd, qdd) @ (mask[0] * q)[..., None, :, None]
         return total[..., 0]
 
@@ -162,7 +197,7 @@ class Dynamics:
 
     def _table(self, name, like):
         """Constant tables, kept for each dtype and device."""
-        key = name, str(like.dtype), str(getattr(like, "device", ""))
+        key = name, like.dtype, getattr(like, "device", None)
         if key not in self._tables:
             if name == "joint sums":
                 sums = np.zeros((len(self.layout.torque), self.n))

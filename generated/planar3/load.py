@@ -19,6 +19,8 @@ def load(backend='numpy', parameters=None):
 
     Raises ValueError for a back end or a parameter that this package doesn't have.
     """
+    if not BACKENDS:
+        raise ValueError("this package has no back end to load; generate it with --backend numpy, say")
     if backend not in BACKENDS:
         raise ValueError(f"no back end {backend!r} in this package; choose one of {', '.join(BACKENDS)}")
     unknown = sorted(set(parameters or {}) - set(PARAMETERS))
@@ -29,17 +31,17 @@ def load(backend='numpy', parameters=None):
     if backend == "numpy":
         from .numpy_backend import create
 
-        return Dynamics(create(values))
+        return Dynamics(create(values), dict(parameters or {}))
     if backend == "torch":
         from .torch_backend import create
 
-        return Dynamics(create(values))
+        return Dynamics(create(values), dict(parameters or {}))
     if backend == "autograd":
         from .autograd_backend import create
 
-        return Dynamics(create(values))
+        return Dynamics(create(values), dict(parameters or {}))
     if backend == "native":
         from .native_backend import create
 
-        return Dynamics(create(values))
+        return Dynamics(create(values), dict(parameters or {}))
     raise AssertionError(backend)

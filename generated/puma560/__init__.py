@@ -7,7 +7,7 @@
 See `load` for the back ends and `dynamics.Dynamics` for all calls.
 """
 
-from .dynamics import Coefficients, Dynamics, Layout, Packed, Propagation
+from .dynamics import Coefficients, Dynamics, GradientPropagation, Layout, Packed, Propagation
 from .load import BACKENDS, load
 from .names import JOINT_NAMES as joint_names
 from .names import LINK_NAMES as link_names
@@ -17,6 +17,7 @@ __all__ = [
     "BACKENDS",
     "Coefficients",
     "Dynamics",
+    "GradientPropagation",
     "Layout",
     "Packed",
     "Propagation",

@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
@@ -33,7 +34,13 @@ def compiled(call, kind):
     """C function of a call for a dtype; the first one from a library compiles it."""
     part, outputs = CALLS[call]
     name, suffix = {"f8": ("double", ""), "f4": ("float", "f")}[kind.str[1:]]
-    function = getattr(ctypes.CDLL(str(library(part + name))), f"{NAME}_{call}{suffix}")
+    path = library(part + name)
+    try:
+        loaded = ctypes.CDLL(str(path))
+    except OSError:
+        path.unlink(missing_ok=True)  # cut short by a full disk, say: build it again
+        loaded = ctypes.CDLL(str(library(part + name)))
+    function = getattr(loaded, f"{NAME}_{call}{suffix}")
     function.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * (4 + outputs)
     function.restype = None
     return function
@@ -45,6 +52,11 @@ def pool(threads):
     return ThreadPoolExecutor(threads, thread_name_prefix="linkwise")
 
 
+# Threads don't survive a fork; the child starts its own.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=pool.cache_clear)
+
+
 class NativeBackend(NumpyBackend):
     """Answers in kind: arrays for arrays, tensors for tensors. `threads` is how many a large batch may use."""
 
@@ -53,11 +65,19 @@ class NativeBackend(NumpyBackend):
     def __init__(self, parameters):
         compiled("decomposition", np.dtype("f8"))
         self.threads = os.cpu_count() or 1
-        self.tensor_parameters = parameters
-        super().__init__({k: _plain(v) for k, v in parameters.items()}, ())
-        values = [float(self.parameters[name]) for name in PARAMETERS]
-        self.values = {np.dtype(kind): np.array(values, dtype=kind) for kind in ("f4", "f8")}
-        self.calls = {}
+        super().__init__({}, ())
+        self.parameters = dict(parameters)
+        self.learned = _tensors(parameters.values())
+        self.constants = {}
+        for kind in (np.dtype("f4"), np.dtype("f8")):
+            self.constants[kind] = self._values(kind)
+
+    def _values(self, kind):
+        """Parameters in the order of `PARAMETERS`; a tensor's value is the one it has now."""
+        for name in PARAMETERS:
+            if np.shape(self.parameters[name]) != ():
+                raise ValueError(f"parameter {name!r} must be one number here; the numpy and torch back ends take one a sample")
+        return np.array([_number(self.parameters[name]) for name in PARAMETERS], dtype=kind)
 
     def arrays(self, named, n):
         """Check and broadcast the motion to a common shape (..., n)."""
@@ -117,9 +137,9 @@ class NativeBackend(NumpyBackend):
             results.append(buffer[at:end].reshape(*shape, size) if shape else buffer[at:end])
             outputs.append(start + at * kind.itemsize)
             at = end
-        if (call, kind) not in self.calls:
-            self.calls[call, kind] = compiled(call, kind), _address(self.values[kind])
-        function, p = self.calls[call, kind]
+        function = compiled(call, kind)
+        values = self._values(kind) if self.learned else self.constants[kind]
+        p = _address(values)
         parts = min(self.threads, buffer.nbytes // PER_THREAD)
         if parts > 1:
             self._split(parts, function, p, count, kind.itemsize, inputs, zip(outputs, sizes, strict=True))
@@ -167,10 +187,11 @@ def _address(array):
 
 
 def _tensors(values):
-    """Whether the values are torch tensors; asks without importing torch."""
-    return any(type(v).__module__.startswith("torch") for v in values)
+    """Whether one of the values is a torch tensor; torch isn't imported to find out."""
+    torch = sys.modules.get("torch")
+    return torch is not None and any(isinstance(v, torch.Tensor) for v in values)
 
 
-def _plain(value):
-    """A parameter's value without its gradient."""
-    return value.detach().cpu().numpy() if _tensors([value]) else value
+def _number(value):
+    """A parameter's value as it is now, without its gradient."""
+    return float(value.detach() if _tensors([value]) else value)

@@ -47,7 +47,10 @@ def library(part):
 
 def find_compiler():
     """Command line of the C compiler: CC if set, else cc, gcc or clang."""
-    given = shlex.split(os.environ.get("CC", ""))
+    try:
+        given = shlex.split(os.environ.get("CC", ""))
+    except ValueError as error:
+        raise RuntimeError(f"CC={os.environ['CC']!r} is no command: {error}") from None
     for candidate in ([given] if given else [["cc"], ["gcc"], ["clang"]]):
         if shutil.which(candidate[0]):
             return candidate
@@ -93,7 +96,11 @@ def locked(path):
     """Keep other processes out while one builds; the lock goes with the process that holds it."""
     import fcntl
 
-    with open(path, "w") as file:
+    try:
+        file = open(path, "w")
+    except OSError as error:
+        raise RuntimeError(f"cannot write to the cache {path.parent}: {error.strerror}; set LINKWISE_CACHE") from None
+    with file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield
 
@@ -111,6 +118,8 @@ def build(compiler, flags, units, target):
         command = [*compiler, "-shared", *objects, "-lm", "-o", f"{folder}/library.so"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         finished(command, done.stderr, done.returncode)
+        if not os.path.exists(f"{folder}/library.so"):
+            raise RuntimeError(f"{compiler[0]} made no library; point CC to a C compiler")
         os.replace(f"{folder}/library.so", target)
 
 
@@ -118,4 +127,5 @@ def finished(command, errors, code):
     """Raise RuntimeError with the compiler's first complaint if it failed."""
     if code:
         first = next((line for line in errors.splitlines() if "error" in line), errors.strip()[:200])
-        raise RuntimeError(f"{command[0]} failed: {first}; the other back ends need no compiler")
+        reason = first or f"exit status {code}"
+        raise RuntimeError(f"{command[0]} failed: {reason}; the other back ends need no compiler")

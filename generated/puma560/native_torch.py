@@ -21,7 +21,7 @@ class TorchSide(TorchBackend):
     name = "native"
 
     def __init__(self, native):
-        super().__init__(native.tensor_parameters)
+        super().__init__(native.parameters)
         self.native = native
 
     def arrays(self, named, n):
@@ -29,6 +29,8 @@ class TorchSide(TorchBackend):
         motion = super().arrays(named, n)
         if motion[0].device.type != "cpu":
             raise TypeError(f"the tensors lie on {motion[0].device}; this back end takes CPU tensors, torch takes all")
+        if _transformed(motion):
+            raise TypeError("this back end does not run inside torch.func or forward-mode differentiation; take torch")
         return motion
 
     def decomposition(self, q, qd, qdd):
@@ -45,15 +47,26 @@ class TorchSide(TorchBackend):
 
     def _run(self, call, q, qd, qdd):
         p = torch.stack([self.parameters[name].to(q).reshape(()) for name in PARAMETERS]) if PARAMETERS else q.new_empty(0)
-        if torch.is_grad_enabled() and any(t.requires_grad for t in (q, qd, qdd, p)):
+        recorded = torch.is_grad_enabled() and any(t.requires_grad for t in (q, qd, qdd, p))
+        if recorded or torch.compiler.is_compiling():
             results = OPERATORS[call](q, qd, qdd, p)
             return results if isinstance(results, tuple) else (results,)
         return compute(call, q, qd, qdd, self.native)
 
 
+def _transformed(motion):
+    """Whether a transformation that needs more than values is under way; it would be lost without a word."""
+    if torch.compiler.is_compiling():
+        return False
+    if torch._C._are_functorch_transforms_active():
+        return True
+    inside = torch.autograd.forward_ad._current_level >= 0
+    return inside and any(torch.autograd.forward_ad.unpack_dual(t).tangent is not None for t in motion)
+
+
 def compute(call, q, qd, qdd, native):
     """Results of the C code as tensors that share its memory."""
-    motion = (t.detach().numpy() for t in (q, qd, qdd))
+    motion = (t.detach().resolve_neg().numpy() for t in (q, qd, qdd))
     results = getattr(native, call)(*motion)
     return tuple(torch.from_numpy(r) for r in (results if isinstance(results, list) else [results]))
 

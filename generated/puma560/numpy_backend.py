@@ -24,7 +24,7 @@ class NumpyBackend:
 
     def arrays(self, named, n):
         """Check and broadcast the motion to a common shape (..., n)."""
-        arrays = {name: np.asarray(value) for name, value in named.items()}
+        arrays = {name: value if type(value) is np.ndarray else _array(name, value) for name, value in named.items()}
         first, *rest = arrays.values()
         if first.dtype in FLOATS and first.shape[-1:] == (n,):
             if all(a.shape == first.shape and a.dtype == first.dtype for a in rest):
@@ -69,6 +69,15 @@ class NumpyBackend:
     def position_gradient(self, q, qd, qdd):
         """c0, packed."""
         return self.concatenate(self._each("position_gradient", q, qd, qdd))
+
+
+def _array(name, value):
+    """Anything array-like as an array; what an array cannot hold is refused."""
+    if hasattr(value, "detach"):
+        raise TypeError(f"{name} is a tensor; this back end takes arrays, torch and native take tensors")
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError(f"{name} is a masked array; fill its gaps first")
+    return np.asarray(value)
 
 
 def same_kind(arrays, n):

@@ -3,7 +3,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -52,6 +52,8 @@ def _options(
     locked: dict[str, float] = {}
     for item in lock or []:
         joint, _, value = item.rpartition("=")
+        if joint in locked:
+            raise LinkwiseError(f"--lock holds {joint!r} twice; give it one value")
         try:
             locked[joint] = float(value)
         except ValueError:
@@ -69,7 +71,7 @@ def generate(
     name: Annotated[str | None, typer.Option(help="Name of the package; the robot's if not given")] = None,
     backend: Annotated[
         list[str] | None,
-        typer.Option(help="autograd, torch, numpy, c or formulas; may be repeated; all if not given"),
+        typer.Option(help="numpy, torch, autograd, native, c or formulas; may be repeated; all if not given"),
     ] = None,
     parameters: Annotated[
         str, typer.Option(help="numeric, or symbolic: keep them as run-time parameters")
@@ -84,7 +86,8 @@ def generate(
     """Write the package of a robot."""
     from linkwise import pipeline
     from linkwise.emit import BACKENDS
-    from linkwise.emit.write import write_package
+    from linkwise.emit.package import identifier
+    from linkwise.emit.write import check_target, write_package
     from linkwise.progress import progress
 
     options = _options(lock, parameters, base, root, tip, allow_unphysical, free_mimic)
@@ -100,6 +103,7 @@ def generate(
         "free_mimic": free_mimic,
     }
     system = pipeline.read_system(robot, options)
+    check_target(out / (name or identifier(system.name)), system.name)
     with progress() as report:
         files = pipeline.generate(system, backend or list(BACKENDS), name, request, report)
     directory = out / json.loads(files["manifest.json"])["name"]
@@ -169,7 +173,19 @@ def main() -> None:
     """Run the command line; a user's mistake is one line on stderr and exit status 2."""
     _register()
     try:
-        app()
+        status = typer.main.get_command(app)(standalone_mode=False)
     except LinkwiseError as error:
-        print(f"linkwise: error: {' '.join(str(error).split())}", file=sys.stderr)
-        sys.exit(2)
+        _fail(str(error))
+    except typer.Abort:
+        sys.exit(130)
+    except Exception as error:
+        # Typer's own complaints about options; anything else is no mistake of the user's.
+        if not hasattr(error, "format_message"):
+            raise
+        _fail(f"{error.format_message()} See linkwise --help")
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _fail(message: str) -> NoReturn:
+    print(f"linkwise: error: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(2)

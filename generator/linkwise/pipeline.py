@@ -56,7 +56,9 @@ def generate(
     chosen = _chosen(backends)
     package = name if name is not None else identifier(system.name)
     if package != identifier(package):
-        raise LinkwiseError(f"--name {package!r} is no module name; use lower-case letters, digits and _")
+        raise LinkwiseError(
+            f"--name {package[:80]!r} is no module name of its own; use up to 60 letters a-z, digits and _"
+        )
     derivation = Derivation(system, derive(system, progress), package, request or {})
     files: dict[str, str] = {}
     for number, backend in enumerate(chosen):

@@ -4,6 +4,7 @@ import hashlib
 import json
 import keyword
 import re
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +19,8 @@ from linkwise.graph.derive import Kernel, fused_kernel
 from linkwise.symbolic.system import System
 
 SCHEMA = 1
+LONGEST_NAME = 60
+TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}
 
 
 @dataclass(frozen=True)
@@ -41,9 +44,9 @@ class Derivation:
 
 
 def identifier(name: str) -> str:
-    """Module name made of a robot's name: letters, digits and underscores."""
-    text = re.sub(r"[^0-9a-z_]+", "_", name.lower()).strip("_") or "robot"
-    if text[0].isdigit() or keyword.iskeyword(text):
+    """Module name made of a robot's name: letters, digits, underscores; no keyword, no module in use."""
+    text = re.sub(r"[^0-9a-z_]+", "_", name.lower()).strip("_")[:LONGEST_NAME] or "robot"
+    if text[0].isdigit() or keyword.iskeyword(text) or text in TAKEN:
         text = f"robot_{text}"
     return text
 

@@ -1,0 +1,134 @@
+"""The native back end: what its compiled code and its cache must not get wrong."""
+
+import multiprocessing
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from copy import deepcopy
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+import torch
+from conftest import needs_compiler
+
+pytestmark = needs_compiler
+
+
+@pytest.fixture(scope="module")
+def planar3(package_of: Callable[[str], ModuleType]) -> ModuleType:
+    return package_of("planar3")
+
+
+@pytest.fixture(scope="module")
+def planar3_symbolic(package_of: Callable[[str], ModuleType]) -> ModuleType:
+    return package_of("planar3 symbolic")
+
+
+@pytest.fixture(scope="module")
+def motion() -> np.ndarray:
+    return np.random.default_rng(0).uniform(-2.0, 2.0, (3, 4000, 3))
+
+
+def test_a_parameter_that_is_learned_counts_with_its_present_value(planar3_symbolic: ModuleType) -> None:
+    mass = torch.tensor(0.6, dtype=torch.float64, requires_grad=True)
+    native = planar3_symbolic.load("native", {"m_1": mass})
+    reference = planar3_symbolic.load("torch", {"m_1": mass})
+    motion = torch.linspace(-1.0, 1.0, 9, dtype=torch.float64).reshape(3, 3)
+    with torch.no_grad():
+        mass += 1.0
+        torch.testing.assert_close(native.inverse_dynamics(*motion), reference.inverse_dynamics(*motion))
+    arrays = native.inverse_dynamics(*motion.numpy())
+    np.testing.assert_allclose(arrays, reference.inverse_dynamics(*motion).detach().numpy())
+
+
+def test_a_process_forked_after_a_large_batch_works(planar3: ModuleType, motion: np.ndarray) -> None:
+    robot = planar3.load("native")
+    robot.backend.threads = 2
+    expected = robot.inverse_dynamics(*np.tile(motion, (1, 20, 1)))
+
+    def child(queue: multiprocessing.Queue) -> None:  # type: ignore[type-arg]
+        queue.put(robot.inverse_dynamics(*np.tile(motion, (1, 20, 1))).sum())
+
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    process = context.Process(target=child, args=(queue,))
+    process.start()
+    assert queue.get(timeout=30) == pytest.approx(expected.sum())
+    process.join()
+
+
+@pytest.mark.parametrize("backend", ["numpy", "torch", "native"])
+def test_a_loaded_robot_can_be_copied_and_pickled(planar3: ModuleType, backend: str) -> None:
+    robot = planar3.load(backend)
+    assert deepcopy(robot).joint_names == robot.joint_names
+    assert pickle.loads(pickle.dumps(robot)).backend.name == backend
+
+
+def test_threads_give_the_same_numbers(planar3: ModuleType, motion: np.ndarray) -> None:
+    robot = planar3.load("native")
+    many = np.tile(motion, (1, 30, 1))
+    robot.backend.threads = 1
+    one = robot.packed(*many).velocity
+    robot.backend.threads = 3
+    np.testing.assert_array_equal(robot.packed(*many).velocity, one)
+
+
+# Torch itself warns of a deprecation when forward mode is first used.
+@pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")
+def test_transformations_that_need_more_than_values_are_refused(planar3: ModuleType) -> None:
+    robot = planar3.load("native")
+    q = torch.ones(3, dtype=torch.float64)
+    with pytest.raises(TypeError, match="take torch"):
+        torch.func.vmap(lambda x: robot.inverse_dynamics(x, q, q))(torch.ones(2, 3, dtype=torch.float64))
+    with torch.autograd.forward_ad.dual_level():
+        dual = torch.autograd.forward_ad.make_dual(q, q)
+        with pytest.raises(TypeError, match="take torch"):
+            robot.inverse_dynamics(dual, q, q)
+
+
+def test_subclasses_and_negated_views_of_tensors_are_tensors(planar3: ModuleType) -> None:
+    class Special(torch.Tensor):
+        pass
+
+    robot = planar3.load("native")
+    q = torch.ones(3, dtype=torch.float64)
+    assert torch.is_tensor(robot.inverse_dynamics(q.as_subclass(Special), q, q))
+    view = torch._neg_view(q)
+    torch.testing.assert_close(robot.inverse_dynamics(view, q, q), robot.inverse_dynamics(-q, q, q))
+
+
+def load_elsewhere(package: ModuleType, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Load the package's native back end in another process."""
+    folder = Path(str(package.__file__)).parent
+    code = f"import sys; sys.path.insert(0, {str(folder.parent)!r})\nimport {folder.name} as package\n"
+    command = [sys.executable, "-c", code + "package.load('native')"]
+    return subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "message"),
+    [
+        ("CC", "no-such-compiler", "apt install gcc"),
+        ("CC", '"gcc', "is no command"),
+        ("CC", "true", "made no library"),
+        ("LINKWISE_CACHE", "/proc", "set LINKWISE_CACHE"),
+    ],
+)
+def test_a_compiler_or_cache_that_cannot_be_is_named(
+    planar3: ModuleType, tmp_path: Path, variable: str, value: str, message: str
+) -> None:
+    done = load_elsewhere(planar3, **{"LINKWISE_CACHE": str(tmp_path), variable: value})
+    assert done.returncode == 1
+    assert message in done.stderr.splitlines()[-1]
+
+
+def test_a_library_cut_short_is_built_again(planar3: ModuleType, tmp_path: Path) -> None:
+    assert load_elsewhere(planar3, LINKWISE_CACHE=str(tmp_path)).returncode == 0
+    (library,) = tmp_path.glob("*.so")
+    library.write_bytes(b"")
+    assert load_elsewhere(planar3, LINKWISE_CACHE=str(tmp_path)).returncode == 0
+    assert library.stat().st_size > 0
