@@ -88,6 +88,68 @@ def test_unknown_symbol_is_refused_by_name() -> None:
         puck(sp.Symbol("mu") * Coordinate("x", "m").qd ** 2)
 
 
+@pytest.mark.parametrize("symbolic", [False, True])
+def test_two_parameters_of_one_name_are_refused(symbolic: bool) -> None:
+    x = Coordinate("x", "m")
+    m, m2 = sp.Symbol("m"), sp.Symbol("m", positive=True)
+    links = [LinkEnergy("a", m * x.qd**2 / 2, m2 * x.q)]
+    with pytest.raises(LinkwiseError, match=r"^2 different parameters are called m, told apart by their"):
+        energy_system("puck", [x], links, {m: 1.0, m2: 5.0}, symbolic)
+    with pytest.raises(LinkwiseError, match=r"^link 'a': the symbol m is not the one among `parameters`"):
+        energy_system("puck", [x], links, {m: 1.0}, symbolic)
+
+
+X = Coordinate("x", "m")
+A, B = sp.symbols("a b")
+
+
+@pytest.mark.parametrize(
+    ("potential", "message"),
+    [
+        (sp.nan, "link 'disc': its energies hold NaN or infinity"),
+        (sp.oo * X.q, "link 'disc': its energies hold NaN or infinity"),
+        (X.q / (A - B), "link 'disc': its energies hold NaN or infinity"),
+        (sp.sqrt(-A) * X.q, "link 'disc': its energies hold the imaginary unit"),
+        (sp.I * X.q, "link 'disc': its energies hold the imaginary unit"),
+        (None, "link 'disc': its potential energy is None; give a SymPy expression"),
+        ("x", "link 'disc': its potential energy is 'x'; give a SymPy expression"),
+        (True, "link 'disc': its potential energy is True; give a SymPy expression"),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("symbolic", [False, True])
+def test_energy_that_is_no_real_number_is_refused(potential: object, message: str, symbolic: bool) -> None:
+    links = [LinkEnergy("disc", X.qd**2, potential)]
+    with pytest.raises(LinkwiseError, match=f"^{message}"):
+        energy_system("puck", [X], links, {A: 2.0, B: 2.0}, symbolic)
+
+
+HEAD = "from linkwise import *\nimport sympy as sp\nx = Coordinate('x')\n"
+GOOD = HEAD + "coordinates = [x]\nlinks = [LinkEnergy('a', x.qd**2, 0)]\n"
+FILES = {
+    "exit": (GOOD + "import sys; sys.exit(0)", "running the file failed: SystemExit: 0"),
+    "number": (GOOD + "coordinates = [Coordinate(3)]", "the coordinate name 3 is no string"),
+    "unit": (GOOD + "coordinates = [Coordinate('x', 'deg')]", "coordinate 'x' has the unit 'deg'; give rad"),
+    "link": (GOOD + "links = [LinkEnergy(None, x.qd**2, 0)]", "the link name None is no string"),
+    "name": (GOOD + "name = 3", "the robot's name is 3; give a string"),
+    "list": (GOOD + "parameters = [3]", "`parameters` must be a dictionary of SymPy symbols"),
+    "text": (GOOD + "parameters = {'m': 1}", "`parameters` must be a dictionary of SymPy symbols"),
+    "word": (GOOD + "parameters = {sp.Symbol('m'): 'heavy'}", "parameter m has no value as a real number"),
+    "complex": (GOOD + "parameters = {sp.Symbol('m'): sp.I}", "parameter m has no value as a real number"),
+    "huge": (GOOD + "parameters = {sp.Symbol('m'): 10**400}", "parameter m has no value as a real number"),
+    "infinite": (GOOD + "parameters = {sp.Symbol('m'): sp.oo}", "parameter m is NaN or infinite"),
+}
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_defect_of_a_python_file_is_named(case: str, tmp_path: Path) -> None:
+    text, message = FILES[case]
+    (tmp_path / "bad.py").write_text(text)
+    with pytest.raises(LinkwiseError) as caught:
+        read_system(tmp_path / "bad.py")
+    assert str(caught.value).startswith(f"{tmp_path / 'bad.py'}: {message}")
+
+
 def test_unsupported_function_is_refused_by_name() -> None:
     x = Coordinate("x", "m")
     system = puck(x.qd**2, sp.gamma(x.q))
