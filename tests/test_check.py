@@ -1,0 +1,174 @@
+"""What `linkwise check` accepts, refuses and leaves out."""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sympy as sp
+from linkwise import (
+    Coordinate,
+    LinkEnergy,
+    LinkwiseError,
+    check_package,
+    energy_system,
+    generate,
+    read_system,
+    write_package,
+)
+
+
+@pytest.fixture(scope="session")
+def planar2(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("check") / "planar2"
+    write_package(generate(read_system("planar2"), ["numpy"]), directory)
+    return directory
+
+
+@pytest.fixture
+def package(planar2: Path, tmp_path: Path) -> Path:
+    """A package of one's own to damage."""
+    return shutil.copytree(planar2, tmp_path / "planar2", ignore=shutil.ignore_patterns("__pycache__"))
+
+
+def change_manifest(package: Path, change: Callable[[Any], object]) -> None:
+    path = package / "manifest.json"
+    data = json.loads(path.read_text())
+    change(data)
+    path.write_text(json.dumps(data))
+
+
+def change_file(package: Path, name: str, old: str, new: str) -> None:
+    """Change a file and its hash."""
+    text = (package / name).read_text()
+    assert old in text
+    text = text.replace(old, new)
+    (package / name).write_text(text)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    change_manifest(package, lambda data: data["files"].update({name: digest}))
+
+
+def marks(directory: Path) -> dict[str, str]:
+    return {result.name: result.mark for result in check_package(directory, 10)}
+
+
+def test_a_coefficient_that_is_zero_but_for_rounding_passes(tmp_path: Path) -> None:
+    theta, length = Coordinate("theta"), 0.7
+    vx, vy = (sp.diff(length * f(theta.q), theta.q) * theta.qd for f in (sp.sin, sp.cos))
+    bob = LinkEnergy("bob", 1.3 * (vx**2 + vy**2) / 2, -1.3 * 9.81 * length * sp.cos(theta.q))
+    system = energy_system("pendulum", [theta], [bob])
+    write_package(generate(system, ["numpy", "torch", "autograd"]), tmp_path / "pendulum")
+    found = marks(tmp_path / "pendulum")
+    assert set(found.values()) == {"ok"}
+    assert "numpy against autograd: c1" in found
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "failing"),
+    [
+        ("n1_1_z, 0.0,", "n1_1_z, 1e-7,", "numpy: decomposition closes to tau_ij"),
+        (" = 0.005 + ", " = 0.00500001 + ", "numpy: M^j against Newton-Euler recursion"),
+    ],
+)
+def test_a_slightly_wrong_coefficient_fails_all_the_same(
+    old: str, new: str, failing: str, package: Path
+) -> None:
+    change_file(package, "numpy_forms/link_2.py", old, new)
+    assert marks(package)[failing] == "FAIL"
+
+
+@pytest.mark.parametrize(
+    ("error", "mark"),
+    [
+        ('RuntimeError("gcc failed: error: expected install")', "FAIL"),
+        ('OSError("no space")', "FAIL"),
+        ('ValueError("strange")', "FAIL"),
+        ('ImportError("gone", name=__package__ + ".numpy_forms")', "FAIL"),
+        ('RuntimeError("needs a C compiler: apt install gcc")', "skip"),
+        ('ImportError("No module named torch", name="torch")', "skip"),
+    ],
+)
+def test_only_what_is_missing_here_is_left_out(error: str, mark: str, package: Path) -> None:
+    change_file(package, "load.py", "    if backend not in", f"    raise {error}\n    if backend not in")
+    found = marks(package)
+    assert found.pop("hashes") == "ok"
+    assert found.pop("back ends") == "FAIL"
+    assert list(found.values()) == [mark]
+
+
+def test_a_package_that_cannot_be_imported_or_asked_fails(package: Path) -> None:
+    change_file(package, "dynamics.py", "class Dynamics", "def broken(:\nclass Dynamics")
+    assert marks(package) == {"hashes": "ok", "import": "FAIL"}
+    change_file(package, "dynamics.py", "def broken(:\n", "")
+    change_file(package, "dynamics.py", "def partial_torque", "def full_torque")
+    assert marks(package)["answers"] == "FAIL"
+
+
+def test_energies_without_an_oracle_are_left_out(tmp_path: Path) -> None:
+    x = Coordinate("x", "m")
+    system = energy_system("puck", [x], [LinkEnergy("disc", x.qd**2, x.q)])
+    write_package(generate(system, ["numpy"]), tmp_path / "puck")
+    assert marks(tmp_path / "puck")["numpy: oracle"] == "skip"
+
+
+@pytest.mark.parametrize("backend", ["c", "formulas"])
+def test_a_package_with_nothing_to_load_has_its_hashes_checked(backend: str, tmp_path: Path) -> None:
+    write_package(generate(read_system("planar2"), [backend]), tmp_path / "planar2")
+    results = check_package(tmp_path / "planar2")
+    assert [(r.name, r.mark, r.passed) for r in results] == [
+        ("hashes", "ok", True),
+        ("back ends", "skip", True),
+    ]
+    assert results[1].detail.startswith("nothing to load")
+
+
+def test_files_beyond_the_manifest_fail(package: Path) -> None:
+    (package / "__pycache__").mkdir()
+    (package / "__pycache__/names.pyc").write_bytes(b"")
+    assert check_package(package, 5)[0].passed
+    (package / "numpy_forms/more.py").write_text("")
+    [result] = check_package(package)
+    assert (result.mark, result.detail) == ("FAIL", "numpy_forms/more.py was added")
+
+
+def test_a_manifest_that_lists_no_files_fails(package: Path) -> None:
+    change_manifest(package, lambda data: data.update(files={}))
+    assert check_package(package)[0].detail.startswith("the manifest lists no files; ")
+
+
+DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
+    **{
+        key: (lambda data, key=key: data.pop(key), f"{key!r} is ")  # type: ignore[misc]
+        for key in ("joints", "links", "skeleton", "conventions", "request", "files")
+    },
+    "no joints": (lambda data: data.update(joints=[]), "'joints' must be a list"),
+    "joint": (lambda data: data["joints"].append(3), "'joints' must be a list of objects with a name"),
+    "path": (lambda data: data["links"][0].update(path=[7]), "'links' must be a list of objects"),
+    "path of words": (lambda data: data["links"][0].update(path="ab"), "'links' must be a list of objects"),
+    "request": (lambda data: data.update(request=3), "'request' is no object"),
+    "gravity": (lambda data: data["conventions"].pop("gravity"), "'conventions' has no gravity of three"),
+    "skeleton of words": (lambda data: data.update(skeleton="ab"), "'skeleton' is no list"),
+    "body": (lambda data: data["skeleton"].append(None), "'rotation' of body 2 of the skeleton is no array"),
+    "mass": (lambda data: data["skeleton"][0].update(mass="a"), "'mass' of body 0 of the skeleton is no"),
+    "nan": (
+        lambda data: data["skeleton"][1].update(com=[float("nan"), 0, 0]),
+        "'com' of body 1 of the skeleton is no array of 3 numbers",
+    ),
+    "coordinate": (lambda data: data["skeleton"][1].update(coordinate=5), "body 1 of the skeleton hangs on"),
+    "kind": (lambda data: data["skeleton"][1].update(kind=[]), "body 1 of the skeleton hangs on no joint"),
+    "parent": (lambda data: data["skeleton"][1].update(parent=1), "'parent' of body 1 of the skeleton is no"),
+    "link": (lambda data: data["skeleton"][1].update(link="hand"), "link 'link2' is not in the skeleton"),
+}
+
+
+@pytest.mark.parametrize("case", DAMAGES)
+def test_a_damaged_manifest_is_named(case: str, package: Path) -> None:
+    change, message = DAMAGES[case]
+    change_manifest(package, change)
+    with pytest.raises(LinkwiseError) as caught:
+        check_package(package)
+    assert str(caught.value).startswith(f"{package / 'manifest.json'} is damaged: {message}")
+    assert str(caught.value).endswith("; generate the package again")
