@@ -2,15 +2,20 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
 from linkwise.model import Options, read_robot
-from linkwise.pipeline import silent
+from linkwise.pipeline import derive, silent
 from linkwise.report.fit import fit, held_against
+from linkwise.report.operations import link_operations
 from linkwise.report.plots import reduction_images
 from linkwise.report.polynomial import count_polynomial
-from linkwise.report.reduction import Point, curve
+from linkwise.report.reduction import PAPER, Point, curve
+from linkwise.report.seconds import row_view
 from linkwise.report.study import study, verdicts
 from linkwise.report.study_text import page
 from linkwise.symbolic.rigid import link_energies
@@ -65,7 +70,36 @@ def test_no_polynomial_is_claimed_without_counts_to_confirm_it() -> None:
 def test_emitted_code_saves_less_than_the_terms_promise(points: tuple[Point, ...]) -> None:
     ten = points[9]
     assert ten.operations_reduction < ten.written_reduction < ten.reduction
-    assert ten.bucket.shared < ten.bucket.written
+    assert ten.part.shared < ten.part.written
+
+
+def test_operations_hold_the_product_with_the_motion_and_the_sum_over_links(
+    points: tuple[Point, ...],
+) -> None:
+    costs = list(link_operations(planar(10), (0,), PAPER))
+    rows = [cost.rows[0] for cost in costs]
+    one, ten = points[0], points[9]
+    assert (one.part.shared, one.torque.shared) == (4, 7)
+    # n coefficients, n − 1 additions, one multiplication; n torques, n − 1 additions.
+    assert ten.part.shared == sum(row.coefficient.shared for row in rows if row.coefficient) + 9 + 1
+    assert ten.torque.shared == sum(row.torque.shared for row in rows if row.torque) + 9
+
+
+def test_what_is_timed_is_the_part_and_the_whole() -> None:
+    system = planar(3)
+    module: dict[str, Any] = {}
+    exec(render("report/row.py.j2", row_view(system, derive(system))), module)
+    draw = np.random.default_rng(3)
+    q, qd, qdd = draw.standard_normal((3, 5, 3))
+    p = {symbol.name: value for symbol, value in system.parameters.items()}
+    without = qdd * [0.0, 1.0, 1.0]
+    part = module["whole"](q, qd, qdd, p) - module["whole"](q, qd, without, p)
+    np.testing.assert_allclose(module["extract"](q, qd, qdd, p), part, rtol=1e-12, atol=1e-12)
+
+
+def test_further_counts_stop_at_the_budget_without_a_word() -> None:
+    assert len(curve(planar(14), 3, 150, silent, beyond=14)) == 4
+    assert len(curve(planar(4), 3, 10**6, silent, beyond=14)) == 4
 
 
 def test_the_study_says_where_the_claim_holds() -> None:

@@ -20,6 +20,7 @@ from linkwise.report.laurent import Laurent
 from linkwise.report.question import Question
 from linkwise.report.survey import LinkTorques, link_torques
 from linkwise.report.terms import terms_report
+from linkwise.report.terms_text import data, page
 from linkwise.symbolic.rigid import link_energies
 from linkwise.symbolic.system import LinkEnergy, System
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
@@ -198,6 +199,38 @@ def test_equal_parameters_on_two_links_are_collected_in_their_sum() -> None:
     numeric = link_energies(read_robot("planar2", Options(parameters="numeric")))
     *links, total = terms_report(numeric, Question(), 10**6, False, silent).rows
     assert total.count.total < sum(row.count.total for row in links)
+
+
+def test_the_part_kept_is_counted_with_its_motion() -> None:
+    leg = link_energies(read_robot(Path(__file__).parent / "data" / "leg.toml", Options("symbolic")))
+    report = terms_report(leg, Question(), 10**6, False, silent)
+    # Each segment adds m q̈ to the force along the first slide; together (m1 + m2 + m3 + m4) q̈.
+    parts = [cost.rows[0].part for cost in report.operations]
+    assert [part and part.shared for part in parts] == [1, 1, 1, 1]
+    torque, part = report.sums[0]
+    assert (part.shared, part.written) == (4, 4)
+    each = [cost.rows[0].torque for cost in report.operations]
+    assert torque.shared == sum(t.shared for t in each if t) + 3
+    said = page(report)
+    assert "| τ_1,4, the part kept alone | 1 | 1 |" in said
+    assert "| τ_1 over all links, the part kept alone | 4 | 4 |" in said
+    assert data(report)["operations_of_sums"]["1"]["kept"]["after_sharing"] == 4
+
+
+@pytest.mark.parametrize(
+    ("order", "coordinate", "operations"),
+    # τ_1 = m q̈1 + q̈2 + k cos q1: q̈2 alone is free, and a motion off the path is no part.
+    [(2, 0, 1), (2, 1, 0), (2, 2, None), (0, 0, 1)],
+)
+def test_a_part_costs_what_its_product_costs(order: int, coordinate: int, operations: int | None) -> None:
+    a, b, c = Coordinate("a"), Coordinate("b"), Coordinate("c")
+    m, k = sp.symbols("m k", real=True)
+    energy = LinkEnergy("arm", m * a.qd**2 / 2 + a.qd * b.qd, k * sp.sin(a.q))
+    tail = LinkEnergy("tail", c.qd**2, sp.S.Zero)
+    system = System("odd", (a, b, c), (energy, tail), {m: 1.0, k: 1.0})
+    (cost,) = terms_report(system, Question(0, 0, coordinate, order), 100, False, silent).operations
+    part = cost.rows[0].part
+    assert (part and part.shared) == operations
 
 
 def test_counts_rest_on_expressions_alone() -> None:

@@ -58,10 +58,11 @@ def timings_of(found: dict[str, Any]) -> tuple[Timing, ...]:
     )
 
 
-def page(result: Study, found: dict[str, Any]) -> str:
-    """Return the measurement as Markdown."""
+def page(result: Study, found: dict[str, Any], pictures: bool = False) -> str:
+    """Return the measurement as Markdown; with its picture where that lies beside it."""
     timings = timings_of(found)
     view = {
+        "pictures": pictures,
         "robot": found["robot"],
         "batch": found["batch"],
         "machine": ", ".join(f"{k} {found[k]}" for k in ("machine", "python", "numpy", "torch")),

@@ -1,12 +1,15 @@
-"""Operations of the emitted code: of a whole link, of one torque, of one bucket alone."""
+"""Operations of the emitted code: of a whole link, of one torque, of the part with one motion alone.
 
-from collections.abc import Iterator
+part of τ_ij = c2_ijk q̈_k  or  c1_ijk q̇_k  or  g_ij
+part of τ_i  = (Σ_j c2_ijk) q̈_k, and so on: the coefficients are added first, then multiplied once
+"""
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise.graph.count import count_operations
-from linkwise.graph.derive import link_kernel
+from linkwise.graph.derive import Kernel, link_kernel
 from linkwise.graph.expression import Graph, Node, operands, reachable
-from linkwise.graph.forms import LinkForms
 from linkwise.report.question import Question
 from linkwise.symbolic.system import System
 
@@ -32,39 +35,71 @@ NO_OPERATIONS = Operations(0, 0)
 
 
 @dataclass(frozen=True)
+class PartOperations:
+    """One τ_ij and its part: the coefficient alone, and its product with the motion; None is a zero."""
+
+    torque: Operations | None
+    coefficient: Operations | None
+    part: Operations | None
+
+
+@dataclass(frozen=True)
 class LinkOperations:
-    """Link j's cost: everything (c2, c1, g, τ of all joints); by joint i, τ_ij and its bucket."""
+    """Link j's cost: everything (c2, c1, g, τ of all joints); τ_ij and its part by joint i."""
 
     link: int
     everything: Operations
-    torque: dict[int, Operations]
-    bucket: dict[int, Operations]
+    rows: dict[int, PartOperations]
 
 
 def link_operations(system: System, joints: tuple[int, ...], question: Question) -> Iterator[LinkOperations]:
     """Operations of each link's own kernel, link after link."""
     for j in range(len(system.links)):
         kernel = link_kernel(system, j)
-        graph, forms = kernel.graph, kernel.forms[0]
-        rows = [i for i in joints if i in forms.path]
-        yield LinkOperations(
-            j,
-            operations(graph, list(forms.decomposition())),
-            {i: operations(graph, [forms.torque[i]]) for i in rows},
-            {i: operations(graph, bucket(forms, i, question)) for i in rows},
-        )
+        forms = kernel.forms[0]
+        everything = operations(kernel.graph, list(forms.decomposition()))
+        rows = {i: _row(kernel, i, question) for i in joints if i in forms.path}
+        yield LinkOperations(j, everything, rows)
 
 
-def bucket(forms: LinkForms, i: int, question: Question) -> list[Node]:
-    """Node of the coefficient asked for; none where it is zero, its coordinate off the path."""
-    k = question.coordinate
+def _row(kernel: Kernel, i: int, question: Question) -> PartOperations:
+    graph, k = kernel.graph, question.coordinate
+    factor = coefficient(kernel, i, question)
+    motion = (graph.one, kernel.inputs.qd[k], kernel.inputs.qdd[k])[question.order]
+    torque = kernel.forms[0].torque[i]
+    return PartOperations(*(_cost(graph, node) for node in (torque, factor, graph.mul(factor, motion))))
+
+
+def coefficient(kernel: Kernel, i: int, question: Question) -> Node:
+    """Node of the coefficient asked for; zero where its coordinate is off the path."""
+    forms, k = kernel.forms[0], question.coordinate
     if question.order == 0:
-        return [forms.gravity[i]]
+        return forms.gravity[i]
     if k not in forms.path:
-        return []
+        return kernel.graph.zero
     if question.order == 1:
-        return [forms.velocity[i, k]]
-    return [forms.acceleration[min(i, k), max(i, k)]]
+        return forms.velocity[i, k]
+    return forms.acceleration[min(i, k), max(i, k)]
+
+
+def _cost(graph: Graph, node: Node) -> Operations | None:
+    return None if node == graph.zero else operations(graph, [node])
+
+
+def summed(costs: Sequence[LinkOperations], i: int, question: Question) -> tuple[Operations, Operations]:
+    """Cost of τ_i = Σ_j τ_ij and of its part, each link computed by itself; zeros are not added."""
+    rows = [cost.rows[i] for cost in costs if i in cost.rows]
+    torque = _sum([row.torque for row in rows if row.torque])
+    parts = [row.part for row in rows if row.part]
+    if len(parts) < 2:
+        return torque, _sum(parts)
+    product = Operations(1, 1) if question.order else NO_OPERATIONS
+    return torque, _sum([row.coefficient for row in rows if row.coefficient]) + product
+
+
+def _sum(terms: Sequence[Operations]) -> Operations:
+    additions = max(0, len(terms) - 1)
+    return sum(terms, Operations(additions, additions))
 
 
 def operations(graph: Graph, outputs: list[Node]) -> Operations:

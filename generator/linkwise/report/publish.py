@@ -24,15 +24,15 @@ def study_files(result: Study, measured: dict[str, Any] | None = None) -> dict[s
     texts = {
         "reduction.json": json_text(study_text.data(result)),
         "reduction.csv": study_text.table(result),
-        "reduction.md": study_text.page(result),
+        "reduction.md": study_text.page(result, pictures=True),
     }
     images = plots.reduction_images(result)
     images |= plots.readings_images("readings", result.robot, readings(result))
     if measured is not None:
         texts["measured.json"] = json_text(measured)
-        texts["measured.md"] = measured_text.page(result, measured)
+        texts["measured.md"] = measured_text.page(result, measured, pictures=True)
         lines = readings(result, measured_text.timings_of(measured))
-        images |= plots.readings_images("measured", result.robot, lines)
+        images |= plots.readings_images("readings-measured", result.robot, lines)
     return _encoded(texts) | images
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from linkwise.errors import LinkwiseError
 from linkwise.progress import Progress
 from linkwise.report.laurent import BudgetExceededError
-from linkwise.report.operations import NO_OPERATIONS, Operations, link_operations
+from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations, link_operations, summed
 from linkwise.report.question import Question
 from linkwise.report.survey import RunningCount, link_torques
 from linkwise.symbolic.system import System
@@ -22,7 +22,7 @@ class Point:
     total: int
     kept: int
     torque: Operations
-    bucket: Operations
+    part: Operations
     everything: Operations
 
     @property
@@ -38,12 +38,12 @@ class Point:
     @property
     def operations_reduction(self) -> float:
         """Share of the emitted operations of τ_1 that need no computing."""
-        return _saved(self.bucket.shared, self.torque.shared)
+        return _saved(self.part.shared, self.torque.shared)
 
     @property
     def written_reduction(self) -> float:
         """The same with every shared expression written out wherever it is used."""
-        return _saved(self.bucket.written, self.torque.written)
+        return _saved(self.part.written, self.torque.written)
 
 
 def _saved(part: int, whole: int) -> float:
@@ -51,24 +51,31 @@ def _saved(part: int, whole: int) -> float:
     return 1.0 - part / whole if whole else 0.0
 
 
-def curve(system: System, most: int, budget: int, progress: Progress) -> tuple[Point, ...]:
-    """Points for 1..most links; raises LinkwiseError for a tree, or beyond the budget.
+def curve(system: System, last: int, budget: int, progress: Progress, beyond: int = 0) -> tuple[Point, ...]:
+    """Points for 1..last links, and to `beyond` as far as links and budget reach.
+
+    Raises LinkwiseError for a tree, or where 1..last is beyond the links or the budget.
 
     A link's torques depend on nothing behind it: the arm of n links is that of n − 1 and one more.
     """
-    _require_serial(system, most)
+    most = max(last, min(beyond, len(system.links)))
+    _require_serial(system, last, most)
     running = RunningCount(len(system.coordinates))
-    torque = bucket = everything = NO_OPERATIONS
+    costs: list[LinkOperations] = []
+    everything = NO_OPERATIONS
     points: list[Point] = []
-    costs = link_operations(system, (0,), PAPER)
+    links = link_operations(system, (0,), PAPER)
     try:
-        for found, cost in zip(link_torques(system, (0,), budget, progress, most), costs, strict=False):
+        for found, cost in zip(link_torques(system, (0,), budget, progress, most), links, strict=False):
             running.add(found.torques[0], found.variables)
-            torque, bucket = torque + cost.torque[0], bucket + cost.bucket[0]
+            costs.append(cost)
             everything += cost.everything
+            whole, part = summed(costs, 0, PAPER)
             count = running.count
-            points.append(Point(len(points) + 1, count.total, count.kept(2, 0), torque, bucket, everything))
+            points.append(Point(len(points) + 1, count.total, count.kept(2, 0), whole, part, everything))
     except BudgetExceededError as error:
+        if len(points) >= last:
+            return tuple(points)
         raise LinkwiseError(
             f"{system.name}: {len(points) + 1} links need more than {budget} terms; "
             f"ask for at most {len(points)}, or raise --budget"
@@ -76,10 +83,10 @@ def curve(system: System, most: int, budget: int, progress: Progress) -> tuple[P
     return tuple(points)
 
 
-def _require_serial(system: System, most: int) -> None:
-    if most > len(system.links):
+def _require_serial(system: System, last: int, most: int) -> None:
+    if last > len(system.links):
         raise LinkwiseError(
-            f"{system.name}: --dof reaches {most}, but {len(system.links)} links move; reduce it"
+            f"{system.name}: --dof reaches {last}, but {len(system.links)} links move; reduce it"
         )
     for j in range(most):
         if system.path(j) != tuple(range(j + 1)):

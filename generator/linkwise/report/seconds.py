@@ -85,22 +85,22 @@ def _of_arm(system: System, n: int) -> Iterator[Timing]:
     q, qd, qdd = (random.standard_normal((BATCH, n)) for _ in range(3))
     kernels = derive(system)
     files = generate(system, ["numpy", "autograd"], name=PACKAGE)
-    files["row.py"] = render("report/row.py.j2", {"functions": list(_row_functions(system, kernels))})
+    files["row.py"] = render("report/row.py.j2", row_view(system, kernels))
     with tempfile.TemporaryDirectory() as folder:
         package = _imported(files, Path(folder) / PACKAGE)
         closed, auto = package.load("numpy"), package.load("autograd")
         row = importlib.import_module(f"{PACKAGE}.row")
         p = closed.parameters
         times = _fastest(
-            lambda: [extract(q, qd, qdd, p) for extract in row.EXTRACT],
-            lambda: [whole(q, qd, qdd, p) for whole in row.WHOLE],
+            lambda: row.extract(q, qd, qdd, p),
+            lambda: row.whole(q, qd, qdd, p),
             lambda: closed.coefficients(q, qd),
         )
         yield Timing(n, "closed form", *times)
         tq, tqd, tqdd = (torch.from_numpy(a) for a in (q, qd, qdd))
         times = _fastest(
-            lambda: [_second(torch, module, tq, tqd) for module in auto.backend.modules],
-            lambda: auto.partial_torque(tq, tqd, tqdd),
+            lambda: sum(_second(torch, module, tq, tqd) for module in auto.backend.modules) * tqdd[..., :1],
+            lambda: auto.inverse_dynamics(tq, tqd, tqdd),
             lambda: auto.coefficients(tq, tqd),
         )
         yield Timing(n, "autograd", *times)
@@ -125,12 +125,21 @@ class RowFunction:
     output: str
 
 
-def _row_functions(system: System, kernels: tuple[Kernel, ...]) -> Iterator[RowFunction]:
+def row_view(system: System, kernels: tuple[Kernel, ...]) -> dict[str, Any]:
     """Functions for c2_1j1 and for τ_1j, written as the package writes its own."""
-    for j, kernel in enumerate(kernels):
-        forms = kernel.forms[0]
-        yield _function(system, kernel, f"extract_{j + 1}", forms.acceleration[0, 0])
-        yield _function(system, kernel, f"whole_{j + 1}", forms.torque[0])
+    coefficients = [
+        _function(system, kernel, f"coefficient_{j + 1}", kernel.forms[0].acceleration[0, 0])
+        for j, kernel in enumerate(kernels)
+    ]
+    torques = [
+        _function(system, kernel, f"torque_{j + 1}", kernel.forms[0].torque[0])
+        for j, kernel in enumerate(kernels)
+    ]
+    return {
+        "functions": coefficients + torques,
+        "coefficients": [function.name for function in coefficients],
+        "torques": [function.name for function in torques],
+    }
 
 
 def _function(system: System, kernel: Kernel, name: str, output: Node) -> RowFunction:

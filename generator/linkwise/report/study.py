@@ -39,8 +39,8 @@ class Study:
 def study(
     name: str, system: System, first: int, last: int, beyond: int, budget: int, progress: Progress
 ) -> Study:
-    """Count 1..max(last, beyond) links of a serial arm and report on first..last under `name`."""
-    every = curve(system, max(last, beyond), budget, progress)
+    """Count the links of a serial arm, to `beyond` where possible, and report on first..last under `name`."""
+    every = curve(system, last, budget, progress, beyond)
     points = every[first - 1 : last]
     dof, y = [p.dof for p in points], [p.reduction for p in points]
     return Study(
@@ -114,7 +114,8 @@ def _operations_verdict(last: Point) -> str:
     verdict = "Weaker" if last.operations_reduction < last.reduction else "Stronger"
     return (
         f"**{verdict} in emitted code.** At {last.dof} DoF the part kept takes "
-        f"{last.bucket.shared} operations and the whole {last.torque.shared}: "
+        f"{last.part.shared} operations, the product with q̈_1 among them, and the whole "
+        f"{last.torque.shared}: "
         f"{last.operations_reduction:.1%} are saved, against {last.reduction:.1%} of the terms. "
         "Emitted code computes once what an expanded sum repeats; with nothing shared "
         f"{last.written_reduction:.1%} of the operations would be saved."

@@ -36,8 +36,8 @@ def _point(point: Point) -> dict[str, Any]:
         "reduction": round(point.reduction, DIGITS),
         "operations": point.torque.shared,
         "operations_written_out": point.torque.written,
-        "kept_operations": point.bucket.shared,
-        "kept_operations_written_out": point.bucket.written,
+        "kept_operations": point.part.shared,
+        "kept_operations_written_out": point.part.written,
         "operations_reduction": round(point.operations_reduction, DIGITS),
         "written_out_reduction": round(point.written_reduction, DIGITS),
         "decomposition_operations": point.everything.shared,
@@ -71,14 +71,15 @@ def table(result: Study) -> str:
     return csv_text(rows[0], (row.values() for row in rows))
 
 
-def page(result: Study) -> str:
-    """Return the study as Markdown."""
-    return render("report/reduction.md.j2", view(result))
+def page(result: Study, pictures: bool = False) -> str:
+    """Return the study as Markdown; with pictures where they lie beside it."""
+    return render("report/reduction.md.j2", view(result, pictures))
 
 
-def view(result: Study) -> dict[str, Any]:
+def view(result: Study, pictures: bool) -> dict[str, Any]:
     """Fields of the page's template."""
     return {
+        "pictures": pictures,
         "robot": result.robot,
         "form": result.form,
         "dof": f"{result.dof[0]}..{result.dof[-1]}",
@@ -110,10 +111,10 @@ def _costs(point: Point) -> tuple[str, ...]:
     return (
         str(point.dof),
         str(point.torque.shared),
-        str(point.bucket.shared),
+        str(point.part.shared),
         f"{point.operations_reduction:.4f}",
         str(point.torque.written),
-        str(point.bucket.written),
+        str(point.part.written),
         f"{point.written_reduction:.4f}",
         str(point.everything.shared),
     )

@@ -6,7 +6,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.progress import Progress
 from linkwise.report.count import TermCount
 from linkwise.report.laurent import BudgetExceededError
-from linkwise.report.operations import LinkOperations, link_operations
+from linkwise.report.operations import LinkOperations, Operations, link_operations, summed
 from linkwise.report.question import Question
 from linkwise.report.survey import RunningCount, form_of, link_torques
 from linkwise.symbolic.system import System
@@ -29,7 +29,10 @@ class TorqueTerms:
 
 @dataclass(frozen=True)
 class TermsReport:
-    """The answer for one robot; the first `counted` of the links `wanted` fitted the budget."""
+    """The answer for one robot; the first `counted` of the links `wanted` fitted the budget.
+
+    sums: operations of τ_i over all links, and of its part, by joint i; none when one link is asked for
+    """
 
     robot: str
     question: Question
@@ -41,6 +44,7 @@ class TermsReport:
     budget: int
     rows: tuple[TorqueTerms, ...]
     operations: tuple[LinkOperations, ...]
+    sums: dict[int, tuple[Operations, Operations]]
 
     @property
     def complete(self) -> bool:
@@ -62,7 +66,8 @@ def terms_report(
             f"{system.name}: link {system.links[counted].name!r} needs more than {budget} terms, "
             f"after {counted} of {wanted} links; raise --budget, or pass --partial to report on those"
         )
-    costs = link_operations(system, question.joints(len(system.coordinates)), question)
+    joints = question.joints(len(system.coordinates))
+    costs = tuple(link_operations(system, joints, question))
     return TermsReport(
         system.name,
         question,
@@ -74,6 +79,7 @@ def terms_report(
         budget,
         rows,
         tuple(cost for cost in costs if question.link in (None, cost.link)),
+        {i: summed(costs, i, question) for i in joints if question.link is None},
     )
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from linkwise.emit.render import render
 from linkwise.report.files import csv_text
-from linkwise.report.operations import LinkOperations, Operations
+from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations
 from linkwise.report.terms import TermsReport, TorqueTerms
 
 DIGITS = 6
@@ -27,6 +27,10 @@ def data(report: TermsReport) -> dict[str, Any]:
         "term_budget": report.budget,
         "torques": [_torque(row) for row in report.rows],
         "operations": [_operations(cost) for cost in report.operations],
+        "operations_of_sums": {
+            str(i + 1): {"torque": _pair(torque), "kept": _pair(part)}
+            for i, (torque, part) in report.sums.items()
+        },
     }
 
 
@@ -47,12 +51,13 @@ def _operations(cost: LinkOperations) -> dict[str, Any]:
     return {
         "link": cost.link + 1,
         "everything": _pair(cost.everything),
-        "torque": {str(i + 1): _pair(o) for i, o in cost.torque.items()},
-        "kept": {str(i + 1): _pair(o) for i, o in cost.bucket.items()},
+        "torque": {str(i + 1): _pair(row.torque) for i, row in cost.rows.items()},
+        "kept": {str(i + 1): _pair(row.part) for i, row in cost.rows.items()},
     }
 
 
-def _pair(cost: Operations) -> dict[str, int]:
+def _pair(cost: Operations | None) -> dict[str, int]:
+    cost = cost or NO_OPERATIONS
     return {"before_sharing": cost.written, "after_sharing": cost.shared}
 
 
@@ -95,7 +100,7 @@ def view(report: TermsReport) -> dict[str, Any]:
         "buckets": [
             (_name(row), row.count.gravity, row.count.acceleration, row.count.velocity) for row in report.rows
         ],
-        "operations": [line for cost in report.operations for line in _lines(cost)],
+        "operations": _operation_lines(report),
     }
 
 
@@ -120,11 +125,19 @@ def _summary(row: TorqueTerms, links: Sequence[str]) -> tuple[str, str, int, int
     return _name(row), link, row.count.total, row.kept, share
 
 
-def _lines(cost: LinkOperations) -> list[tuple[str, int, int]]:
-    j = cost.link + 1
-    lines = [(f"link {j}: everything", cost.everything.written, cost.everything.shared)]
-    for i, torque in cost.torque.items():
-        kept = cost.bucket[i]
-        lines.append((f"τ_{i + 1},{j} as a whole", torque.written, torque.shared))
-        lines.append((f"τ_{i + 1},{j}, the part kept alone", kept.written, kept.shared))
-    return lines
+def _operation_lines(report: TermsReport) -> list[tuple[str, int, int]]:
+    lines: list[tuple[str, Operations | None]] = []
+    for cost in report.operations:
+        j = cost.link + 1
+        lines.append((f"link {j}: everything", cost.everything))
+        for i, row in cost.rows.items():
+            lines += _whole_and_part(f"τ_{i + 1},{j}", row.torque, row.part)
+    for i, (torque, part) in report.sums.items():
+        lines += _whole_and_part(f"τ_{i + 1} over all links", torque, part)
+    return [(name, pair.written, pair.shared) for name, pair in ((n, c or NO_OPERATIONS) for n, c in lines)]
+
+
+def _whole_and_part(
+    name: str, torque: Operations | None, part: Operations | None
+) -> list[tuple[str, Operations | None]]:
+    return [(f"{name} as a whole", torque), (f"{name}, the part kept alone", part)]
