@@ -1,6 +1,7 @@
 """The cost-reduction curve against the goldens, its fit, and the polynomials behind it."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,14 @@ from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
 from linkwise.model import Options, read_robot
 from linkwise.pipeline import derive, silent
+from linkwise.report import style
 from linkwise.report.fit import fit, held_against
 from linkwise.report.operations import link_operations
-from linkwise.report.plots import reduction_images
+from linkwise.report.plots import Reading, _readings, reduction_images
 from linkwise.report.polynomial import count_polynomial
+from linkwise.report.readings import readings
 from linkwise.report.reduction import PAPER, Point, curve
-from linkwise.report.seconds import row_view
+from linkwise.report.seconds import Timing, row_view
 from linkwise.report.study import study, verdicts
 from linkwise.report.study_text import page
 from linkwise.symbolic.rigid import link_energies
@@ -100,6 +103,31 @@ def test_what_is_timed_is_the_part_and_the_whole() -> None:
 def test_further_counts_stop_at_the_budget_without_a_word() -> None:
     assert len(curve(planar(14), 3, 150, silent, beyond=14)) == 4
     assert len(curve(planar(4), 3, 10**6, silent, beyond=14)) == 4
+
+
+def drawn(lines: Sequence[Reading]) -> Any:
+    """Axes of the comparison, drawn with the plots' own settings."""
+    axes: list[Any] = []
+
+    def draw(figure: Any) -> None:
+        _readings(figure, "arm", lines)
+        axes.append(figure.axes[0])
+
+    style.images("readings", draw, (6.3, 4.0))
+    return axes[0]
+
+
+def test_the_comparison_is_titled_by_what_is_shown_and_its_legend_tells_dashes() -> None:
+    result = study("arm", planar(9), 1, 4, 9, 10**6, silent)
+    timings = [Timing(n, method, 1.0, 2.0, 3.0) for n in (1, 2) for method in ("closed form", "autograd")]
+    assert drawn(readings(result)).get_title("left") == "arm: one question read in terms and operations"
+    measured = drawn(readings(result, timings))
+    assert measured.get_title("left") == "arm: one question read in terms, operations and seconds"
+    legend = measured.get_legend()
+    for line in legend.get_lines():
+        length = legend.handlelength * legend.prop.get_size()
+        _, dashes = line._dash_pattern
+        assert dashes is None or length >= 2 * sum(dashes)
 
 
 def test_the_study_says_where_the_claim_holds() -> None:

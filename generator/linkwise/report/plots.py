@@ -19,8 +19,9 @@ DARKEST = 0.42
 
 @dataclass(frozen=True)
 class Reading:
-    """One line of the comparison: reduction by degrees of freedom."""
+    """One line of the comparison: reduction by degrees of freedom, in things of one kind."""
 
+    kind: str
     label: str
     dof: tuple[int, ...]
     reduction: tuple[float, ...]
@@ -85,12 +86,17 @@ def _readings(figure: Any, robot: str, readings: Sequence[Reading]) -> None:
             markeredgecolor="white",
             label=reading.label,
         )
-    axes.set_ylabel("saved when only the q̈₁ part of τ₁ is computed")
+    axes.set_ylabel("saved by the q̈₁ part of τ₁ alone")
     axes.set_ylim(min(0.0, *(min(r.reduction) - 0.05 for r in readings)), 1.02)
     axes.yaxis.set_major_formatter(lambda value, _: f"{100 * value:.0f} %")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
-    axes.set_title(f"{robot}: one question, counted and timed", loc="left")
+    axes.set_title(f"{robot}: one question read in {_listed([r.kind for r in readings])}", loc="left")
     _whole_numbers(axes, readings[0].dof)
+
+
+def _listed(kinds: Sequence[str]) -> str:
+    *before, last = dict.fromkeys(kinds)
+    return f"{', '.join(before)} and {last}" if before else last
 
 
 def _whole_numbers(axes: Any, dof: Sequence[int]) -> None:

@@ -17,8 +17,11 @@ def readings(result: Study, timings: Sequence[Timing] = ()) -> tuple[Reading, ..
     """Lines of the comparison; the measured ones only where there are timings."""
     points, dof = result.points, result.dof
     counted = (
-        Reading("terms, as in the paper", dof, tuple(p.reduction for p in points), style.BLUE, "o", "-"),
         Reading(
+            "terms", "terms, as in the paper", dof, tuple(p.reduction for p in points), style.BLUE, "o", "-"
+        ),
+        Reading(
+            "operations",
             "operations, nothing shared",
             dof,
             tuple(p.written_reduction for p in points),
@@ -27,6 +30,7 @@ def readings(result: Study, timings: Sequence[Timing] = ()) -> tuple[Reading, ..
             (0, (5, 1)),
         ),
         Reading(
+            "operations",
             "operations as emitted",
             dof,
             tuple(p.operations_reduction for p in points),
@@ -42,5 +46,11 @@ def _measured(timings: Sequence[Timing], method: str) -> Reading:
     label, color, marker, dash = LOOKS[method]
     chosen = [t for t in timings if t.method == method]
     return Reading(
-        label, tuple(t.dof for t in chosen), tuple(t.reduction for t in chosen), color, marker, dash
+        "seconds",
+        label,
+        tuple(t.dof for t in chosen),
+        tuple(t.reduction for t in chosen),
+        color,
+        marker,
+        dash,
     )

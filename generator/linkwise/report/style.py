@@ -27,6 +27,7 @@ SETTINGS = {
     "grid.color": PALE,
     "grid.linewidth": 0.6,
     "legend.frameon": False,
+    "legend.handlelength": 4.5,
     "lines.linewidth": 1.6,
     "figure.dpi": 100,
 }
