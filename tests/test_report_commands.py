@@ -1,6 +1,7 @@
 """The report commands as a user calls them."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,13 @@ def report(*arguments: str) -> subprocess.CompletedProcess[str]:
         (("reduction", "--dof", "-1..3"), "--dof '-1..3' is no range"),
         (("reduction", "--dof", "0..3"), "1 ≤ FIRST ≤ LAST"),
         (("reduction", "--robot", "puma560", "--dof", "1..7"), "--dof reaches 7, but 6 links move"),
+        (("reduction", "--dof", "1..12", "--tip", "link9"), "--dof reaches 12, but 9 links move"),
+        (("reduction", "--dof", "1..9", "--tip", "link5"), "--dof reaches 9, but 5 links move"),
+        (("reduction", "--dof", "1..1000000"), "reaches 1000000, but the planar arm has at most 200 joints"),
+        (("reduction", "--budget", "0"), "--budget is 0; give at least 1 term"),
+        (("terms", "planar3", "--budget", "-4"), "--budget is -4"),
+        (("terms", "planar3", "--order", "3"), "--order is 3; choose 2 for acceleration"),
+        (("terms", "planar3", "--order", "-1"), "--order is -1; choose"),
         (("reduction", "--budget", "10"), "raise --budget"),
         (("reduction", "--seconds", "nowhere.json"), "nowhere.json: cannot be read"),
         (("terms", "puma560", "--budget", "100"), "raise --budget"),
@@ -59,6 +67,22 @@ def test_reports_are_the_same_bytes_from_run_to_run(tmp_path: Path) -> None:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
 
 
+def test_a_held_joint_leaves_the_range_that_was_asked_for() -> None:
+    run = report("reduction", "--dof", "1..10", "--lock", "joint1=0", "--json")
+    assert run.returncode == 0, run.stderr
+    assert [point["dof"] for point in json.loads(run.stdout)["points"]] == list(range(1, 11))
+
+
+def test_a_page_shows_the_pictures_that_lie_beside_it_and_no_others(tmp_path: Path) -> None:
+    printed = report("reduction", "--dof", "1..3").stdout
+    assert "](" not in printed
+    assert "--measure" in printed
+    assert report("reduction", "--dof", "1..3", "--out", str(tmp_path)).returncode == 0
+    shown = re.findall(r"\]\((.*?)\)", (tmp_path / "reduction.md").read_text())
+    assert shown == ["reduction.svg", "readings.svg"]
+    assert all((tmp_path / name).is_file() for name in shown)
+
+
 def test_any_bucket_of_any_torque_can_be_asked_for() -> None:
     asked = ("--joint", "joint2", "--link", "3", "--coordinate", "3", "--order", "1", "--json")
     run = report("terms", "planar3", *asked)
@@ -75,6 +99,8 @@ def test_measured_seconds_stay_in_files_of_their_own_and_draw_again(tmp_path: Pa
         (n, method) for n in (1, 2) for method in ("closed form", "autograd")
     ]
     assert all(t["extract"] > 0.0 and 0.0 < t["whole"] < 1e6 for t in timings)
+    assert "](readings-measured.svg)" in (first / "measured.md").read_text()
+    assert (first / "readings-measured.svg").read_bytes() != (first / "readings.svg").read_bytes()
     stored = str(first / "measured.json")
     assert report("reduction", "--dof", "1..2", "--seconds", stored, "--out", str(again)).returncode == 0
     for path in first.iterdir():

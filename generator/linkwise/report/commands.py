@@ -1,6 +1,7 @@
 """The subcommands `report terms` and `report reduction`."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,8 +13,9 @@ CHECKED_TO = 14
 """A planar arm is counted at least to here: the paper's ten joints, and four to confirm."""
 BUDGET = 2_000_000
 """Terms of one expansion; a polynomial of this size takes about 0.5 GB."""
+PLANAR_ARM = "planar arm"
 
-Budget = Annotated[int, typer.Option(min=1, help="Terms that one expansion may hold")]
+Budget = Annotated[int, typer.Option(help="Terms that one expansion may hold")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
 Lock = Annotated[list[str] | None, typer.Option(help="Hold a joint: JOINT=VALUE; may be repeated")]
 Out = Annotated[Path | None, typer.Option(help="Directory that gets the report's files")]
@@ -34,7 +36,7 @@ def terms(
     joint: Annotated[str, typer.Option(help="Joint i: its name, its number from 1, or all")] = "1",
     link: Annotated[str, typer.Option(help="Link j: its name, its number from 1, or all")] = "all",
     coordinate: Annotated[str, typer.Option(help="Joint k, whose motion is kept")] = "1",
-    order: Annotated[int, typer.Option(min=0, max=2, help="Kept: 2 acceleration, 1 velocity, 0 gravity")] = 2,
+    order: Annotated[int, typer.Option(help="Kept: 2 acceleration, 1 velocity, 0 gravity")] = 2,
     parameters: Annotated[
         str, typer.Option(help="symbolic: a symbol a parameter; numeric: its number")
     ] = "symbolic",
@@ -57,6 +59,9 @@ def terms(
     from linkwise.report.question import Question, position
     from linkwise.report.terms import terms_report
 
+    _require_budget(budget)
+    if order not in (0, 1, 2):
+        raise LinkwiseError(f"--order is {order}; choose 2 for acceleration, 1 for velocity, 0 for gravity")
     system = read_system(robot, _options(parameters, lock, root, tip))
     joints, links = [c.name for c in system.coordinates], [part.name for part in system.links]
     question = Question(
@@ -100,19 +105,39 @@ def reduction(
     from linkwise.report.study import study
 
     first, last = dof_range(dof)
-    most = max(last, CHECKED_TO) if robot == "planar" else last
-    spec, name = (f"planar{most}", "planar arm") if robot == "planar" else (robot, Path(robot).stem)
-    system = read_system(spec, _options("symbolic", lock, root, tip))
+    _require_budget(budget)
+    options = _options("symbolic", lock, root, tip)
+    if robot == "planar":
+        arm = read_system(f"planar{_planar_joints(last, len(options.lock))}", options)
+        name, system, beyond = PLANAR_ARM, replace(arm, name=PLANAR_ARM), CHECKED_TO
+    else:
+        name, system, beyond = Path(robot).stem, read_system(robot, options), last
     found = None if seconds is None else measured_text.read(seconds)
     if out is not None:
         require_writable(out)
     with progress() as advance:
-        result = study(name, system, first, last, most, budget, advance)
+        result = study(name, system, first, last, beyond, budget, advance)
         if measured and found is None:
             found = measured_text.data(name, timing.measure(system, result.dof, advance))
     if out is not None:
         write_all(out, study_files(result, found))
     typer.echo(json_text(study_text.data(result)) if as_json else study_text.page(result), nl=False)
+    if found is not None and not as_json:
+        typer.echo("\n" + measured_text.page(result, found), nl=False)
+
+
+def _require_budget(budget: int) -> None:
+    if budget < 1:
+        raise LinkwiseError(f"--budget is {budget}; give at least 1 term")
+
+
+def _planar_joints(last: int, locked: int) -> int:
+    """Joints of the planar arm of which `locked` are held, so that enough move."""
+    from linkwise.model.read import MAX_PLANAR
+
+    if last > MAX_PLANAR:
+        raise LinkwiseError(f"--dof reaches {last}, but the planar arm has at most {MAX_PLANAR} joints")
+    return min(max(last, CHECKED_TO) + locked, MAX_PLANAR)
 
 
 def dof_range(text: str) -> tuple[int, int]:
