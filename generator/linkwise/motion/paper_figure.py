@@ -1,17 +1,22 @@
 """The paper's Fig. 5-9 and 10-14 as five panels below one another."""
 
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from linkwise.motion.analysis import Analysis
 from linkwise.motion.columns import Column, Quantity
 from linkwise.motion.extras import extra
+from linkwise.motion.names import short
 from linkwise.motion.palette import colour, dash
 from linkwise.motion.summary import provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+PANEL, LINE = 1.75, 0.22
+"""Heights in inches of a panel and of a legend's line."""
 
 
 @dataclass(frozen=True)
@@ -23,16 +28,25 @@ class _Panel:
 
 def paper(analysis: Analysis, i: int) -> "Figure":
     """Coordinates, τ_i, and for joint i: τ_ij, τp_ij(q̇_j), τp_ij(q̈_j), j's own coordinate."""
-    figure = extra("matplotlib.figure").Figure(figsize=(7.6, 10.2), layout="constrained")
-    panels = _panels(analysis, i)
-    axes = figure.subplots(len(panels), 1, sharex=True)
+    robot, panels = analysis.robot, _panels(analysis, i)
+    legends = [_legend_rows(robot.joints), _legend_rows(robot.links)]
+    heights = [PANEL] * len(panels) + [LINE * (rows + 1) for rows in legends]
+    figure = extra("matplotlib.figure").Figure(figsize=(7.6, sum(heights) + 0.9), layout="constrained")
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    axes = [figure.add_subplot(grid[0])]
+    axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(1, len(panels))]
+    for axis in axes[:-1]:
+        axis.tick_params(labelbottom=False)
     for axis, panel in zip(axes, panels, strict=True):
         _draw(axis, analysis, panel)
     axes[-1].set_xlabel("time (s)")
     axes[-1].set_xlim(analysis.time[0], analysis.time[-1])
     figure.align_ylabels(axes)
+    for row, (title, names) in enumerate([("Joints", robot.joints), ("Links", robot.links)], len(panels)):
+        _legend(figure.add_subplot(grid[row]), title, names)
     figure.suptitle(f"{analysis.robot.name} · {analysis.source}", x=0.01, ha="left", fontsize=11)
-    figure.supxlabel(provenance(analysis), x=0.01, ha="left", fontsize=7, color="#5A6270")
+    foot = "\n".join([*textwrap.wrap(_left_out(analysis), 125), provenance(analysis)])
+    figure.supxlabel(foot, x=0.01, ha="left", fontsize=7, color="#5A6270")
     return figure  # type: ignore[no-any-return]
 
 
@@ -40,7 +54,7 @@ def _panels(analysis: Analysis, i: int) -> tuple[_Panel, ...]:
     robot = analysis.robot
     units = " or ".join(dict.fromkeys(robot.units))
     loads = " or ".join(dict.fromkeys("N·m" if unit == "rad" else "N" for unit in robot.units))
-    on = f"on {robot.joints[i]} ({'N·m' if robot.units[i] == 'rad' else 'N'})"
+    on = f"on {short(robot.joints[i])} ({'N·m' if robot.units[i] == 'rad' else 'N'})"
     own = own_joints(analysis)
 
     def own_term(quantity: Quantity) -> Callable[[Column], bool]:
@@ -56,12 +70,12 @@ def _panels(analysis: Analysis, i: int) -> tuple[_Panel, ...]:
             lambda c: c.quantity == "tau_link" and c.joint == i,
         ),
         _Panel(
-            f"Propagation torques {on}: by each link, its joint's velocity",
+            f"Propagation torques {on}: each link's own joint only, velocity",
             rf"$\tau^p_{{{number}j}}(\dot q_j)$",
             own_term("tau_qd"),
         ),
         _Panel(
-            f"Propagation torques {on}: by each link, its joint's acceleration",
+            f"Propagation torques {on}: each link's own joint only, acceleration",
             rf"$\tau^p_{{{number}j}}(\ddot q_j)$",
             own_term("tau_qdd"),
         ),
@@ -85,16 +99,52 @@ def own_joints(analysis: Analysis) -> tuple[int, ...]:
 
 
 def _draw(axis: Any, analysis: Analysis, panel: _Panel) -> None:
-    robot = analysis.robot
-    lines, names = [], []
     for column, values in zip(analysis.columns, analysis.values, strict=True):
         if panel.wanted(column):
             at = column.joint if column.link is None else column.link
-            style = {"color": colour(at or 0), "linestyle": dash(at or 0), "linewidth": 1.5}
-            lines += axis.plot(analysis.time, values, **style)
-            names.append((robot.joints if column.link is None else robot.links)[at or 0])
+            axis.plot(analysis.time, values, **_style(at or 0))
     axis.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
     axis.set_title(panel.title)
     axis.set_ylabel(panel.symbol, fontsize=11, parse_math=True)
-    if lines:
-        axis.legend(lines, names, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+
+
+def _style(at: int) -> dict[str, Any]:
+    return {"color": colour(at), "linestyle": dash(at), "linewidth": 1.5}
+
+
+def _legend_columns(names: Sequence[str]) -> int:
+    """As many as fit beside one another."""
+    return max(1, min(6, 100 // (max(len(short(name)) for name in names) + 6)))
+
+
+def _legend_rows(names: Sequence[str]) -> int:
+    return -(-len(names) // _legend_columns(names))
+
+
+def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
+    """One legend for all panels that show these names, on an axis of its own."""
+    line = extra("matplotlib.lines").Line2D
+    axis.set_axis_off()
+    legend = axis.legend(
+        [line([], [], **_style(at)) for at in range(len(names))],
+        [short(name) for name in names],
+        title=title,
+        loc="upper left",
+        bbox_to_anchor=(0, 1),
+        borderaxespad=0,
+        ncols=_legend_columns(names),
+        alignment="left",
+        frameon=False,
+        fontsize=8,
+    )
+    legend.set_in_layout(False)
+
+
+def _left_out(analysis: Analysis) -> str:
+    """What the last two panels do not show."""
+    own, robot = own_joints(analysis), analysis.robot
+    others = [name for at, name in enumerate(robot.joints) if at not in own]
+    text = "The last two panels show each link's own joint only; the table and the page have every joint."
+    if others:
+        text += f" Not in them, as they carry no link with mass directly: {', '.join(map(short, others))}."
+    return text

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from linkwise.motion.analysis import Analysis
 from linkwise.motion.columns import Quantity
 from linkwise.motion.extras import extra
+from linkwise.motion.names import short
 from linkwise.motion.palette import GRAVITY, colour
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ def shares(analysis: Analysis, _: int) -> "Figure":
     robot = analysis.robot
     movement = []
     for k, joint in enumerate(robot.joints):
-        movement.append(_Cause("tau_qdd", k, f"{joint} acceleration", colour(k)))
-        movement.append(_Cause("tau_qd", k, f"{joint} velocity", colour(k), "////"))
+        movement.append(_Cause("tau_qdd", k, f"{short(joint)} acceleration", colour(k)))
+        movement.append(_Cause("tau_qd", k, f"{short(joint)} velocity", colour(k), "////"))
     every = [_Cause("tau_gravity", None, "gravity", GRAVITY), *movement]
     rows = -(-len(every) // 3)
     figure = extra("matplotlib.figure").Figure(
@@ -38,7 +39,7 @@ def shares(analysis: Analysis, _: int) -> "Figure":
     _bars(right, analysis, movement)
     left.set_title("everything")
     right.set_title("the movement alone, without gravity")
-    left.set_yticks(range(len(robot.joints)), robot.joints)
+    left.set_yticks(range(len(robot.joints)), [short(joint) for joint in robot.joints])
     left.invert_yaxis()
     left.set_ylabel("loaded joint")
     for axis in (left, right):
