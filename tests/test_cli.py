@@ -37,6 +37,32 @@ def test_generate_says_what_it_wrote_in_plain_lines(linkwise: Run, tmp_path: Pat
     assert done.stderr.splitlines() == ["derive: 100%", "emit: 100%"]
 
 
+def test_generate_leaves_a_foreign_directory_alone(linkwise: Run, tmp_path: Path) -> None:
+    foreign = tmp_path / "out/planar2"
+    (foreign / "src").mkdir(parents=True)
+    (foreign / "manifest.json").write_text('{"name": "an extension"}')
+    (foreign / "src/precious.js").write_text("precious")
+    done = linkwise("generate", "planar2", "--out", "out", "--backend", "c")
+    assert done.returncode == 2
+    assert done.stderr.startswith("linkwise: error: out/planar2 exists and is no generated package")
+    assert (foreign / "src/precious.js").read_text() == "precious"
+
+
+def test_generate_leaves_the_package_of_another_robot_alone(linkwise: Run, planar2: Path) -> None:
+    done = linkwise("generate", "planar4", "--out", "out", "--name", "planar2", "--backend", "c")
+    assert done.returncode == 2
+    assert "holds the package of another robot, 'planar2'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments", [["generate", "planar3"], ["frobnicate"], ["check", "x", "--samples", "0"]]
+)
+def test_a_mistaken_option_is_one_line(linkwise: Run, arguments: list[str]) -> None:
+    done = linkwise(*arguments)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+
+
 def test_generate_replaces_an_earlier_package_whole(linkwise: Run, planar2: Path) -> None:
     assert (planar2 / "numpy_forms").is_dir()
     linkwise("generate", "planar2", "--out", "out", "--backend", "c")

@@ -169,6 +169,22 @@ def test_closed_forms_run_under_vmap(call: str, package_of: Callable[[str], Modu
     assert relative_error(torch.func.vmap(function)(*states), function(*states)) <= 1e-15
 
 
+@pytest.mark.parametrize("call", ["propagation", "packed", "masked"])
+def test_calls_with_many_results_run_under_vmap(call: str, package_of: Callable[[str], ModuleType]) -> None:
+    robot = package_of("planar3").load("torch")
+    states = states_of("torch", 4, 3)
+    arguments = (*states, torch.ones(4, 3, 3)) if call == "masked" else states
+    mapped = torch.func.vmap(getattr(robot, call))(*arguments)
+    plain = getattr(robot, call)(*states, *([np.ones((3, 3))] if call == "masked" else []))
+    for one, other in zip(mapped, plain, strict=True):
+        torch.testing.assert_close(one, other)
+
+
+def test_the_layout_cannot_be_changed_by_accident(package_of: Callable[[str], ModuleType]) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        package_of("planar3").load("numpy").layout.torque[:] = 0
+
+
 def test_coefficients_run_under_vmap(package_of: Callable[[str], ModuleType]) -> None:
     robot = package_of("puma560").load("torch")
     q, qd, _ = states_of("torch", 4, 6)

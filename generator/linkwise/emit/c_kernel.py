@@ -25,6 +25,11 @@ class KernelFunction:
     unused: tuple[str, ...]
     shares: bool
 
+    @property
+    def parameters(self) -> str:
+        """Declarations of the output arrays."""
+        return ", ".join(f"real *restrict {array}" for array in self.arrays)
+
 
 def turned(kernel: Kernel) -> dict[Node, str]:
     """Names of the sines and cosines of the coordinates, which kernels are given."""

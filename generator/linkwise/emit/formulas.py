@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import sympy as sp
+from sympy.simplify.fu import TR8
 
 from linkwise import __version__
 from linkwise.emit.package import Derivation
@@ -11,6 +12,8 @@ from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.system import System
 
 MOST_COORDINATES = 3
+ROUNDING = 1e-12
+"""Share of a torque's largest coefficient below which one is rounding."""
 
 
 def formula_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
@@ -18,11 +21,11 @@ def formula_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     system = derivation.system
     if len(system.coordinates) > MOST_COORDINATES:
         return
-    rows = list(_rows(system))
-    for kind, printer in (("txt", sp.sstr), ("tex", sp.latex)):
+    rows = [(i, j, _shown(system, tau)) for i, j, tau in _rows(system)]
+    for kind, printer in (("txt", sp.sstr), ("tex", _latex)):
         view = {
             "version": __version__,
-            "rows": [(i + 1, j + 1, printer(_shown(system, expr))) for i, j, expr in rows],
+            "rows": [(i + 1, j + 1, printer(expr)) for i, j, expr in rows],
             "joints": [ascii(c.name) for c in system.coordinates],
             "links": [ascii(link.name) for link in system.links],
         }
@@ -36,10 +39,25 @@ def _rows(system: System) -> Iterator[tuple[int, int, sp.Expr]]:
 
 
 def _shown(system: System, expr: sp.Expr) -> sp.Expr:
-    """The expression expanded, with q_1, \\dot q_1 and \\ddot q_1 for the coordinates and short numbers."""
+    """The expression expanded, products of sines and cosines as ones of angle sums, numbers short.
+
+    What then cancels, such as sin² + cos² − 1, leaves rounding behind, which is dropped.
+    """
     names = {}
-    for k, c in enumerate(system.coordinates):
-        names[c.q], names[c.qd] = sp.Symbol(f"q_{k + 1}"), sp.Symbol(f"qd_{k + 1}")
-        names[c.qdd] = sp.Symbol(f"qdd_{k + 1}")
-    expanded = sp.expand(sp.expand(expr.xreplace(names)))
-    return expanded.xreplace({f: sp.Float(f, 12) for f in expanded.atoms(sp.Float)})
+    for k, c in enumerate(system.coordinates, 1):
+        names |= {c.q: sp.Symbol(f"q_{k}"), c.qd: sp.Symbol(f"qd_{k}"), c.qdd: sp.Symbol(f"qdd_{k}")}
+    expanded = sp.expand(TR8(sp.expand(expr.xreplace(names))))
+    terms = [term.as_coeff_Mul() for term in sp.Add.make_args(expanded)]
+    least = ROUNDING * max((abs(number) for number, _ in terms), default=0)
+    kept = sp.Add(*(number * rest for number, rest in terms if abs(number) > least))
+    return kept.xreplace({f: sp.Float(f, 12) for f in kept.atoms(sp.Float)})
+
+
+def _latex(expr: sp.Expr) -> str:
+    """LaTeX with dots over q_k for its velocity and acceleration."""
+    dots = {}
+    for symbol in expr.free_symbols:
+        kind, _, number = symbol.name.rpartition("_")
+        if kind in ("qd", "qdd"):
+            dots[symbol] = rf"\{'d' * (len(kind) - 1)}ot{{q}}_{{{number}}}"
+    return str(sp.latex(expr, symbol_names=dots))
