@@ -102,6 +102,11 @@ def test_measured_seconds_stay_in_files_of_their_own_and_draw_again(tmp_path: Pa
     assert "](readings-measured.svg)" in (first / "measured.md").read_text()
     assert (first / "readings-measured.svg").read_bytes() != (first / "readings.svg").read_bytes()
     stored = str(first / "measured.json")
+    printed = report("reduction", "--dof", "1..2", "--seconds", stored)
+    assert "# Measured time of planar arm" in printed.stdout
+    assert "](" not in printed.stdout
+    as_json = report("reduction", "--dof", "1..2", "--seconds", stored, "--json")
+    assert json.loads(as_json.stdout)["measured"]["timings"] == timings
     assert report("reduction", "--dof", "1..2", "--seconds", stored, "--out", str(again)).returncode == 0
     for path in first.iterdir():
         assert path.read_bytes() == (again / path.name).read_bytes(), path.name

@@ -121,8 +121,12 @@ def reduction(
             found = measured_text.data(name, timing.measure(system, result.dof, advance))
     if out is not None:
         write_all(out, study_files(result, found))
-    typer.echo(json_text(study_text.data(result)) if as_json else study_text.page(result), nl=False)
-    if found is not None and not as_json:
+    if as_json:
+        measurement = {} if found is None else {"measured": found}
+        typer.echo(json_text(study_text.data(result) | measurement), nl=False)
+        return
+    typer.echo(study_text.page(result), nl=False)
+    if found is not None:
         typer.echo("\n" + measured_text.page(result, found), nl=False)
 
 
