@@ -43,7 +43,7 @@ def _shown(system: System, expr: sp.Expr) -> sp.Expr:
 
     What then cancels, such as sin² + cos² − 1, leaves rounding behind, which is dropped.
     """
-    names = {}
+    names: dict[sp.Symbol, sp.Symbol] = {}
     for k, c in enumerate(system.coordinates, 1):
         names |= {c.q: sp.Symbol(f"q_{k}"), c.qd: sp.Symbol(f"qd_{k}"), c.qdd: sp.Symbol(f"qdd_{k}")}
     expanded = sp.expand(TR8(sp.expand(expr.xreplace(names))))
