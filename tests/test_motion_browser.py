@@ -2,13 +2,18 @@
 
 import json
 import shutil
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from linkwise.motion import Processing, Reading
+from linkwise.motion import Processing, Reading, analyze
+from linkwise.motion.analysis import Totals
+from linkwise.motion.columns import Column
 from linkwise.motion.files import Wanted, analyze_to
+from linkwise.motion.page import report
 from linkwise.motion.robot import load_robot
 from linkwise.motion.run import silent
 from motion_logs import PLANAR3, smooth, write_csv
@@ -170,3 +175,59 @@ def test_downloads(page, result, tmp_path):
     np.testing.assert_array_equal(saved[:, 0], table["time"].to_numpy()[::2])
     record = json.loads((result / "analysis.json").read_text(encoding="utf-8"))
     assert record["samples"] == 2 * len(saved)
+
+
+def crowd(place, count=14):
+    """A page of as many joints, one with a name of 80 letters, where k loads i through link k."""
+    place.mkdir()
+    analysis = analyze(write_csv(place / "a.csv", smooth(40, 3)), PLANAR3)
+    names = tuple(
+        f"spine_joint_{i}" if i != 4 else f"{'name_from_a_drawing_' * 4}"[:79] + "4" for i in range(14)
+    )
+    robot = replace(analysis.robot, joints=names, links=names, units=("rad",) * count, skeleton=None)
+    columns = [Column("time", "time", "s")] + [
+        Column("tau_qdd", f"tau_qdd/{i}/{k}/{k}", "N·m", i, k, k) for i in range(count) for k in range(count)
+    ]
+    values = np.vstack([analysis.values[0], np.sin(np.arange(count * count)[:, None] + np.arange(40) / 9)])
+    totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
+    made = replace(analysis, robot=robot, columns=tuple(columns), values=values, totals=totals)
+    (place / "report.html").write_text(report(made), encoding="utf-8")
+    return names, (place / "report.html").as_uri()
+
+
+TICKS = (
+    "return [...document.querySelectorAll('#map .' + arguments[0] + ' text')]"
+    ".map((text) => [text.textContent, text.getBoundingClientRect()])"
+    ".map(([text, box]) => [text, box.left, box.right, box.top, box.bottom])"
+)
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_many_joints_and_long_names_fit(driver, tmp_path, width):
+    names, address = crowd(tmp_path / "page")
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    driver.get(address)
+    full, plot, area = driver.execute_script(
+        "return [document.documentElement.scrollWidth, document.getElementById('map').clientWidth,"
+        "document.querySelector('#map .nsewdrag').getBoundingClientRect().width]"
+    )
+    assert full <= width
+    assert area > 0.5 * plot
+    columns = driver.execute_script(TICKS, "xtick")
+    assert [text for text, *_ in columns][:2] == (["q̈ 1", "q̈ 3"] if width < 500 else ["q̈ 1", "q̈ 2"])
+    for (_, _, right, _, _), (_, left, _, _, _) in pairwise(columns):
+        assert right <= left + 1
+    rows = driver.execute_script(TICKS, "ytick")
+    assert len(rows) == 14
+    assert "…" in rows[4][0]
+    for (_, _, _, _, bottom), (_, _, _, top, _) in pairwise(sorted(rows, key=lambda row: row[3])):
+        assert bottom <= top + 1
+    hover, colours = driver.execute_script(
+        "return [document.getElementById('map').data[0].customdata[4][4],"
+        "document.getElementById('curves').data.map((trace) => trace.line.color)]"
+    )
+    assert hover[:2] == [names[4], f"{names[4]} q̈"]
+    assert len(set(colours)) == 14
+    assert driver.get_log("browser") == []
+    driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
