@@ -77,6 +77,18 @@ def test_threads_give_the_same_numbers(planar3: ModuleType, motion: np.ndarray) 
     np.testing.assert_array_equal(robot.packed(*many).velocity, one)
 
 
+def test_results_that_are_held_stay_as_they_are(planar3: ModuleType, motion: np.ndarray) -> None:
+    robot = planar3.load("native")
+    held = [robot.packed(*(scale * motion)) for scale in (1.0, 0.5, 0.25)]
+    views = [robot.packed(*(scale * motion)).torque[::7, 1] for scale in (1.0, 0.5, 0.25)]
+    for _ in range(8):
+        robot.packed(*(3.0 * motion))
+    for scale, result, view in zip((1.0, 0.5, 0.25), held, views, strict=True):
+        again = planar3.load("numpy").packed(*(scale * motion))
+        np.testing.assert_allclose(result.velocity, again.velocity, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(view, again.torque[::7, 1], rtol=1e-12, atol=1e-12)
+
+
 # Torch itself warns of a deprecation when forward mode is first used.
 @pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")
 def test_transformations_that_need_more_than_values_are_refused(planar3: ModuleType) -> None:
