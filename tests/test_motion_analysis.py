@@ -207,16 +207,19 @@ def test_a_robot_at_odds_with_the_recursion_is_refused(tmp_path):
         analyze(path, replace(robot, recursion=heavy))
 
 
+@pytest.mark.parametrize("value", [1e306, 1.7e308])
 @pytest.mark.parametrize("lowpass", [None, Lowpass(5.0)])
-def test_results_that_overflow_are_named(tmp_path, lowpass):
+def test_results_that_overflow_are_named(tmp_path, lowpass, value):
     table = smooth(60, 3)
-    table[30, 2] = 1e306
+    table[30, 2] = value
     path = write_csv(tmp_path / "a.csv", table)
     message = (
         r"a.csv: row \d+, time 0[.\d]* s: result column '(q|tau).*/joint.' is -?(inf|nan); the log's values"
     )
-    with pytest.raises(LinkwiseError, match=message):
+    with pytest.raises(LinkwiseError, match=message) as error:
         analyze(path, PLANAR3, processing=Processing(lowpass=lowpass))
+    if lowpass is None:
+        assert str(error.value).endswith(f"too large: 'joint2' comes to {value:.3g} in row 32")
 
 
 def test_slashes_in_names_are_escaped(tmp_path):

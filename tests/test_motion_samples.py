@@ -138,11 +138,11 @@ def test_resampling_reports_progress():
     assert seen == [("resampling", 40, 99), ("resampling", 80, 99), ("resampling", 99, 99)]
 
 
-@pytest.mark.parametrize("digits", [3, 4])
-def test_time_rounded_to_its_last_digit_is_even(tmp_path, digits):
-    table = smooth(300, 3, rate=60)
+@pytest.mark.parametrize(("rate", "digits"), [(60, 3), (60, 4), (240, 3)])
+def test_time_rounded_to_its_last_digit_is_even(tmp_path, rate, digits):
+    table = smooth(300, 3, rate=rate)
     table[:, 0] = np.round(table[:, 0], digits)
-    assert read(write_csv(tmp_path / "a.csv", table)).rate == pytest.approx(60, rel=1e-4)
+    assert read(write_csv(tmp_path / "a.csv", table)).rate == pytest.approx(rate, rel=1e-4)
 
 
 def test_jitter_is_not_rounding(tmp_path):

@@ -109,7 +109,10 @@ def _check_time(time: Array, first: int, reading: Reading) -> float:
         )
     mean = (time[-1] - time[0]) / (len(time) - 1)
     off = np.abs(steps - mean)
-    if reading.resample is None and off.max() > TOLERANCE * mean and not _rounded(time):
+    if reading.resample is None and off.max() > TOLERANCE * mean:
+        step = _rounded(time)
+        if step is not None:
+            return 1 / step
         at = int(np.argmax(off))
         raise LinkwiseError(
             f"row {first + at + 1}, time column: a step of {steps[at]:.6g} s where the mean is"
@@ -118,19 +121,19 @@ def _check_time(time: Array, first: int, reading: Reading) -> float:
     return float(1 / mean)
 
 
-def _rounded(time: Array) -> bool:
-    """Whether the times are an even grid, rounded to the last digit they are given in.
+def _rounded(time: Array) -> float | None:
+    """Step of the even grid that the times are, rounded to the last digit they are given in, if they are.
 
-    60 Hz in milliseconds has steps of 16 and 17 ms, and that is even time. Digits coarser than a fifth
+    60 Hz in milliseconds has steps of 16 and 17 ms, and that is even time. Digits coarser than a third
     of a step explain too much to count.
     """
     at = np.arange(len(time))
     step, start = np.polyfit(at, time - time[0], 1)
     off = np.ptp(time - time[0] - start - step * at)
     for unit in 10.0 ** -np.arange(10):
-        if unit < step / 5 and np.abs(time - np.round(time / unit) * unit).max() < 1e-3 * unit:
-            return bool(off < 1.1 * unit)
-    return False
+        if unit < step / 3 and np.abs(time - np.round(time / unit) * unit).max() < 1e-3 * unit:
+            return float(step) if off < 1.1 * unit else None
+    return None
 
 
 def _doubts(rate: float) -> tuple[str, ...]:

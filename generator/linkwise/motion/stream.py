@@ -89,8 +89,18 @@ def _overflow(samples: Samples, terms: Terms, out: Array, start: int) -> Linkwis
     row = "" if samples.first_row is None else f"row {samples.first_row + start + at}, "
     return LinkwiseError(
         f"{row}time {samples.time[start + at]:.6g} s: result column {terms.columns[column].name!r} is"
-        f" {out[column, at]:.3g}; the log's values are too large"
+        f" {out[column, at]:.3g}; the log's values are too large{_largest(samples, terms, start + at)}"
     )
+
+
+def _largest(samples: Samples, terms: Terms, at: int) -> str:
+    """The largest coordinate near a sample."""
+    first = max(0, at - INNER)
+    near = np.abs(samples.q[first : at + INNER])
+    near[~np.isfinite(near)] = 0.0  # a filter can make everything so
+    row, joint = np.unravel_index(int(np.argmax(near)), near.shape)
+    where = f"row {samples.first_row + first + row}" if samples.first_row is not None else "a sample nearby"
+    return f": {terms.robot.joints[joint]!r} comes to {near[row, joint]:.3g} in {where}"
 
 
 def _blocks(start: int, stop: int, columns: int) -> Iterator[tuple[int, int]]:
