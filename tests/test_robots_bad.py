@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from linkwise import LinkwiseError, Options, read_system
+from linkwise.model import read_robot
 from urdf_text import chain, joint, link, mimic, robot
 
 AB = joint("ab", "a", "b")
@@ -87,6 +88,168 @@ BAD = {
         "joint 'bc' moves no mass at all; give a link beyond it mass, hold it with --lock bc=0, or pass",
     ),
 }
+
+HUGE = "1" * 400
+ROD = (
+    '[[link]]\nname = "rod"\nmass = {mass}\n{more}[[joint]]\nname = "hinge"\nparent = "base"\nchild = "rod"\n'
+)
+
+
+def toml(mass: str = "1.0", more: str = "", head: str = "schema = 1") -> str:
+    return f"{head}\n" + ROD.format(mass=mass, more=more)
+
+
+PARAMETER = "schema = 1\nparameters = {{ l1 = {} }}"
+BAD_TOML = {
+    "nan gravity": (toml(head="schema = 1\ngravity = [0, nan, 0]"), "gravity has NaN or infinity in it"),
+    "infinite gravity": (toml(head="schema = 1\ngravity = [0, 0, -inf]"), "gravity has NaN or infinity"),
+    "nan parameter": (toml(head=PARAMETER.format("nan")), "parameter 'l1' is NaN or infinite; give a number"),
+    "huge mass": (toml(HUGE), "link 'rod': 'mass' is too large a number"),
+    "huge parameter": (toml(head=PARAMETER.format(HUGE)), "parameter 'l1' is too large a number"),
+    "endless number": (toml("1" * 5000), "malformed TOML: Exceeds the limit"),
+    "zero over": (
+        toml('"1/(l1-l1)"', head=PARAMETER.format(0.3)),
+        "'1/(l1-l1)' has no value: division by zero",
+    ),
+    "value over": (
+        toml('"1/(l1-0.3)"', head=PARAMETER.format(0.3)),
+        "link 'rod', mass: '1/(l1-0.3)' has no value: division by zero",
+    ),
+    "no number": (
+        toml('"1/(l1-0.3) - 1/(l1-0.3)*2"', head=PARAMETER.format(0.3)),
+        "has no value: division by zero",
+    ),
+    "huge power": (toml('"l1**8"', head=PARAMETER.format(1e300)), "has no value: the result is too large"),
+    "schema true": (toml(head="schema = true"), "the schema is True; write schema = 1 at the top"),
+    "schema 1.0": (toml(head="schema = 1.0"), "the schema is 1.0; write schema = 1 at the top"),
+    "number for link": ("schema = 1\nlink = [3]", "entry 1 of link must be a table"),
+    "number for joint": ("schema = 1\njoint = [{}, 3]", "entry 2 of joint must be a table"),
+    "deep": ("schema = 1\nlink = " + "[" * 5000, "malformed TOML: "),
+}
+
+
+@pytest.mark.parametrize("parameters", ["numeric", "symbolic"])
+@pytest.mark.parametrize("case", BAD_TOML)
+def test_defect_of_a_toml_file_is_named(case: str, parameters: Any, tmp_path: Path) -> None:
+    text, message = BAD_TOML[case]
+    (tmp_path / "bad.toml").write_text(text)
+    with pytest.raises(LinkwiseError) as caught:
+        read_system(tmp_path / "bad.toml", Options(parameters))
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(f"{tmp_path / 'bad.toml'}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_toml_may_start_with_a_byte_order_mark(tmp_path: Path) -> None:
+    (tmp_path / "good.toml").write_text(toml(), encoding="utf-8-sig")
+    assert [c.name for c in read_system(tmp_path / "good.toml").coordinates] == ["hinge"]
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        (
+            "planar1001",
+            "planar1001: planarN takes N from 1 to 1000, as the number of coefficients grows with",
+        ),
+        ("planar99999999999", "planar99999999999: planarN takes N from 1 to 1000, as the number of"),
+        ("planar" + "9" * 5000, ": planarN takes N from 1 to 1000"),
+        ("planar0", "no such file or built-in robot; the built-ins are planar3, planarN (N from 1 to 1000)"),
+        (".", ".: this is a directory; give the robot's file"),
+        ("a" * 300 + ".toml", ".toml: cannot be read: File name too long"),
+    ],
+    ids=lambda text: text[:20],
+)
+def test_what_is_no_robot_is_told_apart(spec: str, message: str) -> None:
+    with pytest.raises(LinkwiseError) as caught:
+        read_system(spec)
+    assert message in str(caught.value)
+
+
+def test_planar_arms_are_read_up_to_the_limit() -> None:
+    assert len(read_robot("planar1000").links) == 1000
+
+
+def test_entities_are_refused_in_plain_words(tmp_path: Path) -> None:
+    (tmp_path / "bad.urdf").write_text('<!DOCTYPE robot [<!ENTITY a "aaaa">]><robot name="&a;"/>')
+    with pytest.raises(
+        LinkwiseError, match="malformed XML: it defines entities or refers to other files; write"
+    ):
+        read_system(tmp_path / "bad.urdf")
+
+
+def notes_of(path: Path | str, options: Options | None = None) -> set[tuple[str, str, str]]:
+    return {(note.kind, note.subject, note.detail) for note in read_robot(path, options).notes}
+
+
+def test_massless_names_links_of_the_file_only(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_text(robot(link("a"), '<link name="b"/>', link("c"), AB, joint("bc", "b", "c", type="planar")))
+    assert [note[1:] for note in notes_of(path) if note[0] == "massless"] == [("b", "")]
+    floating = notes_of(path, Options(base="floating"))
+    assert [note[1:] for note in floating if note[0] == "massless"] == [("b", "")]
+
+
+def test_root_on_the_ground_is_noted_with_its_mass(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_text(robot(link("a", "2.5"), link("b"), AB))
+    merged = ("merged", "a", "into the ground, with its 2.5 kg")
+    assert merged in notes_of(path)
+    assert merged in notes_of(path, Options("symbolic"))
+    assert merged not in notes_of(path, Options(base="floating"))
+
+
+@pytest.mark.parametrize(
+    ("ratio", "offset", "detail"),
+    [(1.0, 0.0, "= ab"), (-1.0, 0.0, "= -ab"), (0.5, -0.25, "= 0.5 ab - 0.25"), (1.0, 2.0, "= ab + 2")],
+)
+def test_mimic_is_written_as_one_would(ratio: float, offset: float, detail: str, tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_text(chain(AB, joint("bc", "b", "c", inner=mimic("ab", ratio, offset))))
+    assert ("mimic", "bc", detail) in notes_of(path)
+
+
+def test_promoted_parameters_come_with_units_and_their_frame(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_text(chain(AB, BC))
+    promoted = {
+        subject: detail for kind, subject, detail in notes_of(path, Options("symbolic")) if kind == "promoted"
+    }
+    assert promoted["m_…"] == "mass in kg"
+    assert promoted["p_…"] == "place of the joint in m, in linkwise's frame of the parent"
+    assert not [note for note in notes_of("planar3", Options("symbolic")) if note[0] == "promoted"]
+    assert not [note for note in notes_of(path) if note[0] == "promoted"]
+
+
+MJCF = """<mujoco>{option}<worldbody><body name="arm">
+<joint name="a" axis="0 0 1" armature="0.1"/><joint name="b" axis="0 1 0"/><geom size="0.1"/>
+<body><joint name="c" axis="0 1 0"/><geom size="0.1"/></body></body></worldbody>
+<equality><joint joint1="{one}" joint2="b" polycoef="0 2 0 0 0"/><joint active="false" joint1="b"/></equality>
+</mujoco>"""
+
+
+def test_coupled_joints_of_mjcf_are_refused_unless_freed(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    path = tmp_path / "hand.xml"
+    path.write_text(MJCF.format(option="", one="c"))
+    with pytest.raises(
+        LinkwiseError, match="joint 'c' is coupled to 'b' by an equality, which the torques would"
+    ):
+        read_robot(path)
+    assert len(read_robot(path, Options(lock={"c": 0.0})).coordinates) == 2
+    notes = notes_of(path, Options(free_mimic=True))
+    assert ("freed", "c", "coupled to 'b' by an equality, which the torques leave out") in notes
+    assert ("ignored", "armature", "1 ×, not in the torques") in notes
+    assert not [note for note in notes if note[0] == "massless" or note[1] == "geom"]
+
+
+def test_nan_gravity_of_mjcf_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)  # MuJoCo logs its own doubts there
+    path = tmp_path / "hand.xml"
+    path.write_text(MJCF.format(option='<option gravity="0 0 nan"/>', one="c"))
+    with pytest.raises(LinkwiseError, match="gravity has NaN or infinity in it"):
+        read_robot(path, Options(free_mimic=True))
 
 
 @pytest.mark.parametrize("case", BAD)

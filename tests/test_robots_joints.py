@@ -173,6 +173,7 @@ def test_notes_say_what_was_done(tmp_path: Path) -> None:
         ("ignored", "transmission", "2 ×"),
         ("ignored", "visual", "1 ×"),
         ("locked", "cd", "at 0.2 rad"),
+        ("merged", "a", "into the ground, with its 1.5 kg"),
         ("merged", "c", "into b"),
         ("merged", "d", "into b"),
         ("damping", "ab", "0.5 N·m·s/rad"),

@@ -100,7 +100,7 @@ def test_what_is_not_used_is_named(tmp_path: Path) -> None:
     path = write(tmp_path, loss=0.3, actuator='<actuator><motor joint="swing"/></actuator>')
     notes = read_system(path, Options(joint_friction=True)).robot.notes
     ignored = {note.subject: note.detail for note in notes if note.kind == "ignored"}
-    assert ignored == {"actuator": "1 ×", "damping": "1 ×", "friction": "1 ×", "geom": "4 ×"}
+    assert ignored == {"actuator": "1 ×", "damping": "1 ×", "friction": "1 ×"}
     losses = [
         (note.kind, note.subject, note.detail) for note in notes if note.kind in ("damping", "friction")
     ]

@@ -4,13 +4,13 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from linkwise.errors import LinkwiseError
-from linkwise.model.coordinates import coordinates
+from linkwise.model.coordinates import check_couplings, coordinates
 from linkwise.model.description import Connection, Description
 from linkwise.model.expand import expand
 from linkwise.model.links import moving_links
 from linkwise.model.mass import check_body
-from linkwise.model.parameters import evaluated, numeric, promoted
-from linkwise.model.robot import Coordinate, Link, Note, Robot
+from linkwise.model.parameters import numeric, promoted
+from linkwise.model.robot import Coordinate, Link, Note, Robot, is_finite
 from linkwise.model.tree import cut, depth_first
 
 
@@ -32,11 +32,20 @@ def assemble(description: Description, options: Options) -> Robot:
     """Build the robot; raises LinkwiseError that names the link or joint and the mend."""
     notes = list(description.notes)
     description = cut(description, options.root, options.tip, notes)
-    notes += _check_bodies(description, options.allow_unphysical)
+    plain = numeric(description)
+    notes += _check_bodies(plain, options.allow_unphysical)
+    if not all(is_finite(entry) for entry in plain.gravity):
+        raise LinkwiseError("gravity has NaN or infinity in it; give three numbers")
     if options.parameters == "numeric":
-        description = numeric(description)
+        description = plain
     root, connections = depth_first(description)
-    if options.base == "floating":
+    if options.base == "fixed":
+        notes += [
+            Note("merged", body.name, f"into the ground, with its {body.mass:g} kg")
+            for body in plain.bodies
+            if body.name == root and body.mass
+        ]
+    else:
         connections = (Connection("base", "floating", "", root), *connections)
     if not connections or all(c.type == "fixed" for c in connections):
         raise LinkwiseError(
@@ -44,10 +53,12 @@ def assemble(description: Description, options: Options) -> Robot:
         )
     joints = [(connection, expand(connection, notes)) for connection in connections]
     axes = tuple(axis for _, parts in joints for axis in parts)
+    notes += check_couplings(description.couplings, axes, options.lock, options.free_mimic)
     moving, motion = coordinates(axes, connections, options.lock, options.free_mimic, notes)
     links = moving_links(description.bodies, joints, motion, notes)
     _check_motion(links, moving, options.allow_unphysical, notes)
-    notes += [Note("massless", link.name) for link in links if link.massless]
+    named = {body.name for body in description.bodies if not body.invented}
+    notes += [Note("massless", link.name) for link in links if link.massless and link.name in named]
     if options.joint_friction:
         notes += _losses(connections)
     parameters = description.parameters
@@ -58,7 +69,7 @@ def assemble(description: Description, options: Options) -> Robot:
 def _check_bodies(description: Description, allow: bool) -> list[Note]:
     notes = []
     for body in description.bodies:
-        fault = check_body(evaluated(body, description.parameters))
+        fault = check_body(body)
         if fault and not (allow or body.unphysical):
             raise LinkwiseError(f"{fault}; correct it, or pass --allow-unphysical")
         if fault:

@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
-from linkwise.model.description import Connection, Mimic
+from linkwise.model.description import Connection, Coupling, Mimic
 from linkwise.model.expand import Axis
 from linkwise.model.robot import Coordinate, Note
 
@@ -42,8 +42,33 @@ def coordinates(
         motion[name] = Motion(
             master.coordinate, mimic.ratio * master.ratio, mimic.offset + mimic.ratio * master.offset
         )
-        notes.append(Note("mimic", name, f"= {mimic.ratio:g} {mimic.master} + {mimic.offset:g}"))
+        notes.append(Note("mimic", name, _rule(mimic)))
     return tuple(moving), motion
+
+
+def check_couplings(
+    couplings: tuple[Coupling, ...], axes: tuple[Axis, ...], lock: dict[str, float], free: bool
+) -> list[Note]:
+    """Return a note for each coupled joint that moves freely here; raises LinkwiseError unless `free`."""
+    notes = []
+    for coupling in couplings:
+        joint, master = coupling.joint, coupling.master
+        if joint in lock or joint not in {axis.name for axis in axes}:
+            continue
+        rule = f"coupled to {master!r}" if master else "held"
+        if not free:
+            raise LinkwiseError(
+                f"joint {joint!r} is {rule} by an equality, which the torques would leave out; hold it with "
+                f"--lock {joint}=0, or let such joints move by themselves with --free-mimic"
+            )
+        notes.append(Note("freed", joint, f"{rule} by an equality, which the torques leave out"))
+    return notes
+
+
+def _rule(mimic: Mimic) -> str:
+    ratio = {1.0: "", -1.0: "-"}.get(mimic.ratio, f"{mimic.ratio:g} ")
+    offset = f" {'-' if mimic.offset < 0 else '+'} {abs(mimic.offset):g}" if mimic.offset else ""
+    return f"= {ratio}{mimic.master}{offset}"
 
 
 def _check_axes(axes: tuple[Axis, ...], lock: dict[str, float]) -> None:

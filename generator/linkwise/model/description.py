@@ -13,7 +13,8 @@ IDENTITY: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Body:
     """A link as the file has it; inertia about the centre of mass, in the link's axes.
 
-    `unphysical` holds the file's own reason for an inertia that no rigid body has (empty: none).
+    `unphysical` holds the file's own reason for an inertia that no rigid body has (empty: none); `invented`
+    says that the reader made the body up, between two axes of one joint.
     """
 
     name: str
@@ -21,6 +22,7 @@ class Body:
     com: Vec3 = ZERO3
     inertia: Mat3 = ZERO33
     unphysical: str = ""
+    invented: bool = False
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,14 @@ class Mimic:
     master: str
     ratio: float = 1.0
     offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A joint that a constraint makes follow another one, or holds where `master` is empty."""
+
+    joint: str
+    master: str
 
 
 @dataclass(frozen=True)
@@ -61,3 +71,4 @@ class Description:
     gravity: Vec3 = (0.0, 0.0, -9.81)
     parameters: tuple[tuple[str, float], ...] = ()
     notes: tuple[Note, ...] = field(default=())
+    couplings: tuple[Coupling, ...] = ()

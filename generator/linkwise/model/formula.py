@@ -32,11 +32,23 @@ def parse_formula(text: str, parameters: Mapping[str, float]) -> Scalar:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise LinkwiseError(f"{text!r} is no formula; write numbers, parameters and + - * / **") from None
     try:
-        return _value(tree, text, parameters)
+        value = _value(tree, text, parameters)
+        _check_finite(value, parameters)
     except (ZeroDivisionError, OverflowError, ValueError) as error:
         if isinstance(error, LinkwiseError):
             raise
         raise LinkwiseError(f"{text!r} has no value: {error}") from None
+    return value
+
+
+def _check_finite(value: Scalar, parameters: Mapping[str, float]) -> None:
+    """Raise ValueError for a formula that the parameters' values make infinite or undefined."""
+    if isinstance(value, sp.Expr):
+        value = value.xreplace({symbol: sp.Float(parameters[symbol.name]) for symbol in value.free_symbols})
+        if value.has(sp.zoo, sp.nan):
+            raise ZeroDivisionError("division by zero")
+    if not math.isfinite(float(value)):
+        raise OverflowError("the result is too large")
 
 
 def _value(node: ast.expr, text: str, parameters: Mapping[str, float]) -> Scalar:

@@ -10,12 +10,15 @@ from typing import Any
 
 from linkwise.errors import LinkwiseError
 from linkwise.model import geometry as geo
-from linkwise.model.description import IDENTITY, ZERO3, Body, Connection, Description
+from linkwise.model.description import IDENTITY, ZERO3, Body, Connection, Coupling, Description
 from linkwise.model.mjcf_unused import unused
 from linkwise.model.robot import Mat3, Note, Rotation, Vec3
 
 TYPES = ("floating", "ball", "prismatic", "revolute")
 """Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
+
+EQUALITY_OF_JOINTS = 2
+"""mjEQ_JOINT of MuJoCo's mjtEq."""
 
 
 def read_mjcf(path: Path) -> Description:
@@ -34,7 +37,7 @@ def read_mjcf(path: Path) -> Description:
     for number in range(1, model.nbody):
         chain, body, anchor = _body(model, number, anchors, notes)
         connections += chain
-        bodies += [Body(c.child) for c in chain[:-1]] + [body]
+        bodies += [Body(c.child, invented=True) for c in chain[:-1]] + [body]
         anchors.append(anchor)
     name = model.names.split(b"\0")[0].decode()
     x, y, z = map(float, model.opt.gravity)
@@ -44,6 +47,18 @@ def read_mjcf(path: Path) -> Description:
         tuple(connections),
         (x, y, z),
         notes=(*notes, *unused(model)),
+        couplings=_couplings(model, [c.name for c in connections if c.type != "fixed"]),
+    )
+
+
+def _couplings(model: Any, joints: list[str]) -> tuple[Coupling, ...]:
+    """Return which joint follows which by an active equality; -1 stands for a constant."""
+    return tuple(
+        Coupling(joints[int(one)], joints[int(other)] if other >= 0 else "")
+        for kind, active, one, other in zip(
+            model.eq_type, model.eq_active0, model.eq_obj1id, model.eq_obj2id, strict=True
+        )
+        if active and int(kind) == EQUALITY_OF_JOINTS
     )
 
 

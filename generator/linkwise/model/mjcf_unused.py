@@ -10,7 +10,6 @@ COUNTS = {
     "contact pair": "npair",
     "equality": "neq",
     "flex": "nflex",
-    "geom": "ngeom",
     "keyframe": "nkey",
     "light": "nlight",
     "mocap": "nmocap",
@@ -29,10 +28,17 @@ VALUES = {
 }
 """Arrays that act on a joint or body where they are not zero."""
 
+REMARKS = {"armature": ", not in the torques"}
+"""The inertia of a motor's rotor: unlike the others here, it belongs to rigid-body dynamics."""
+
 
 def unused(model: Any) -> list[Note]:
     """Return a note for each kind of thing that is there, with how often."""
     counts = {what: int(getattr(model, name)) for what, name in COUNTS.items()}
     counts |= {what: sum(value != 0 for value in getattr(model, name)) for what, name in VALUES.items()}
     counts["fluid"] = int(model.opt.density != 0 or model.opt.viscosity != 0)
-    return [Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()) if count]
+    return [
+        Note("ignored", what, f"{count} ×{REMARKS.get(what, '')}")
+        for what, count in sorted(counts.items())
+        if count
+    ]

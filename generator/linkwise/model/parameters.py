@@ -7,7 +7,19 @@ import sympy as sp
 
 from linkwise.errors import LinkwiseError
 from linkwise.model.description import Body, Description
-from linkwise.model.robot import Link, Mat3, Robot, Scalar, Vec3, is_finite
+from linkwise.model.robot import Link, Mat3, Note, Robot, Scalar, Vec3, is_finite
+
+PROMOTED = (
+    ("m_", Note("promoted", "m_…", "mass in kg")),
+    (
+        "c_",
+        Note(
+            "promoted", "c_…", "centre of mass in m, in linkwise's frame of the link: z on the joint's axis"
+        ),
+    ),
+    ("I_", Note("promoted", "I_…", "inertia about the centre of mass in kg·m², in the same frame")),
+    ("p_", Note("promoted", "p_…", "place of the joint in m, in linkwise's frame of the parent")),
+)
 
 Values = Sequence[tuple[str, float]]
 
@@ -33,11 +45,6 @@ def _symbols(values: Values) -> dict[sp.Symbol, float]:
     return {sp.Symbol(name, real=True): value for name, value in values}
 
 
-def evaluated(body: Body, values: Values) -> Body:
-    """Return the body with numbers in place of parameters."""
-    return _body(body, _symbols(values))
-
-
 def numeric(description: Description) -> Description:
     """Return the description with numbers in place of parameters."""
     values = _symbols(description.parameters)
@@ -55,7 +62,8 @@ def promoted(robot: Robot) -> Robot:
     """Return the robot with a named parameter for each number of its lengths, masses and inertias.
 
     Zeros stay: they are the robot's structure, such as an arm's being planar. Names are m, c_x, I_xy of the
-    link and p_x of its joint, followed by the link's name.
+    link and p_x of its joint, with the link's name after the letter. They are in linkwise's own frame of
+    the link, z on the joint's axis (p in the parent's), which a file's frame need not be.
     """
     values = dict(robot.parameters)
 
@@ -89,7 +97,10 @@ def promoted(robot: Robot) -> Robot:
 
     links = tuple(link(old) for old in robot.links)
     used = _used(links, robot.gravity)
-    return replace(robot, links=links, parameters=tuple((k, v) for k, v in values.items() if k in used))
+    given = {name for name, _ in robot.parameters}
+    notes = [note for letter, note in PROMOTED if any(k[:2] == letter and k not in given for k in values)]
+    parameters = tuple((k, v) for k, v in values.items() if k in used)
+    return replace(robot, links=links, parameters=parameters, notes=(*robot.notes, *notes))
 
 
 def _used(links: tuple[Link, ...], gravity: Vec3) -> set[str]:

@@ -103,6 +103,7 @@ class Note:
         "freed",
         "damping",
         "friction",
+        "promoted",
     ]
     subject: str
     detail: str = ""

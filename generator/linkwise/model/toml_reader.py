@@ -9,7 +9,7 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.model import geometry as geo
 from linkwise.model.description import Body, Connection, Description, Mimic
 from linkwise.model.formula import parse_formula
-from linkwise.model.robot import Mat3, Note, Scalar, Vec3
+from linkwise.model.robot import Mat3, Note, Scalar, Vec3, is_finite
 
 TOP = {"schema", "name", "gravity", "base", "parameters", "link", "joint"}
 LINK = {"name", "mass", "com", "inertia", "allow_unphysical"}
@@ -38,7 +38,7 @@ class _Table:
 
     def scalar(self, key: str, value: Any) -> Scalar:
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return float(value)
+            return _float(f"{self.place}: {key!r}", value)
         if isinstance(value, str):
             with within(f"{self.place}, {key}"):
                 return parse_formula(value, self.parameters)
@@ -61,10 +61,10 @@ class _Table:
 def read_toml(path: Path) -> Description:
     """Read a robot; raises LinkwiseError naming the table, the key and the mend."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (ValueError, RecursionError) as error:  # ValueError: no TOML, no UTF-8, or too many digits
         raise LinkwiseError(f"malformed TOML: {error}") from None
-    if data.get("schema") != 1:
+    if type(data.get("schema")) is not int or data["schema"] != 1:
         raise LinkwiseError(f"the schema is {data.get('schema')!r}; write schema = 1 at the top")
     parameters = _parameters(data.get("parameters", {}))
     top = _Table("the file", data, TOP, parameters)
@@ -93,18 +93,30 @@ def _parameters(data: Any) -> dict[str, float]:
             )
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise LinkwiseError(f"parameter {name!r} must be a number")
+        if not is_finite(_float(f"parameter {name!r}", value)):
+            raise LinkwiseError(f"parameter {name!r} is NaN or infinite; give a number")
     return {name: float(value) for name, value in data.items()}
+
+
+def _float(place: str, value: int | float) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        raise LinkwiseError(f"{place} is too large a number; 1e308 is about the largest") from None
 
 
 def _list(data: dict[str, Any], key: str) -> list[Any]:
     items = data.get(key, [])
     if not isinstance(items, list):
         raise LinkwiseError(f"write each {key} as a table of its own, headed [[{key}]]")
+    for number, item in enumerate(items, 1):
+        if not isinstance(item, dict):
+            raise LinkwiseError(f"entry {number} of {key} must be a table; head each with [[{key}]]")
     return items
 
 
-def _body(data: Any, parameters: Mapping[str, float]) -> Body:
-    name = data.get("name") if isinstance(data, dict) else None
+def _body(data: dict[str, Any], parameters: Mapping[str, float]) -> Body:
+    name = data.get("name")
     table = _Table(f"link {name!r}", data, LINK, parameters)
     return Body(
         table.text("name"),
@@ -121,8 +133,8 @@ def _inertia(table: _Table, data: Any) -> Mat3:
     return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
-def _connection(data: Any, parameters: Mapping[str, float], notes: list[Note]) -> Connection:
-    name = data.get("name") if isinstance(data, dict) else None
+def _connection(data: dict[str, Any], parameters: Mapping[str, float], notes: list[Note]) -> Connection:
+    name = data.get("name")
     table = _Table(f"joint {name!r}", data, JOINT, parameters)
     raw = geo.from_rpy(*table.numbers("rpy", [0.0, 0.0, 0.0]))
     rotation = geo.snap(raw)

@@ -43,7 +43,11 @@ def root_tag(path: Path) -> str:
 def _parse(path: Path) -> Element:
     try:
         root: Element = fromstring(path.read_bytes())
-    except (ParseError, DefusedXmlException, UnicodeDecodeError, ValueError) as error:
+    except DefusedXmlException:
+        raise LinkwiseError(
+            "malformed XML: it defines entities or refers to other files; write the text out"
+        ) from None
+    except (ParseError, UnicodeDecodeError, ValueError) as error:
         raise LinkwiseError(f"malformed XML: {error}") from None
     return root
 
