@@ -87,7 +87,7 @@ def test_check_prints_the_largest_error_of_each(linkwise: Run, planar2: Path) ->
     assert "largest relative error" in done.stdout
     results = json.loads(linkwise("check", planar2, "--samples", 5, "--json").stdout)
     assert all(result["passed"] for result in results)
-    assert {"name", "passed", "error", "detail"} == set(results[0])
+    assert {"name", "passed", "error", "detail", "mark"} == set(results[0])
 
 
 def test_check_catches_a_tampered_file(linkwise: Run, planar2: Path) -> None:

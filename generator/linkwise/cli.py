@@ -28,7 +28,10 @@ Base = Annotated[str, typer.Option(help="fixed or floating")]
 Root = Annotated[str | None, typer.Option(help="Keep only what hangs on this link")]
 Tip = Annotated[str | None, typer.Option(help="Keep only the chain to this link")]
 FreeMimic = Annotated[
-    bool, typer.Option("--free-mimic", help="Let a mimic joint without a master move by itself")
+    bool,
+    typer.Option(
+        "--free-mimic", help="Let a mimic joint without a master, or one that MJCF couples, move by itself"
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
 
@@ -124,10 +127,10 @@ def check(
 
     results = check_package(package, samples)
     if as_json:
-        typer.echo(json.dumps([result.__dict__ for result in results], indent=1))
+        typer.echo(json.dumps([{**result.__dict__, "mark": result.mark} for result in results], indent=1))
     else:
         for result in results:
-            typer.echo(f"{'ok  ' if result.passed else 'FAIL'}  {result.name:<58} {result.detail}")
+            typer.echo(f"{result.mark:<4}  {result.name:<58} {result.detail}")
     if not all(result.passed for result in results):
         raise typer.Exit(1)
 
