@@ -33,7 +33,8 @@ TUNING = {
 def library(part):
     """Path of the library compiled from c/NAME_part.c, built if it isn't there; raises RuntimeError if it cannot be.
 
-    part: double, float, gradient_double or gradient_float; what nobody asks for isn't compiled.
+    part: double, float, gradient_double or gradient_float; what nobody asks for isn't compiled. The first two have
+    a file for one sample at a time too, compiled beside it.
     """
     compiler = find_compiler()
     flags = (*FLAGS, *TUNING.get(platform.machine(), ()))
@@ -41,7 +42,8 @@ def library(part):
     if not target.exists():
         with locked(target.with_suffix(".lock")):
             if not target.exists():
-                build(compiler, flags, ((f"{NAME}_{part}.c", ()), TURN), target)
+                single = () if part.startswith("gradient") else ((f"{NAME}_one_{part}.c", ()),)
+                build(compiler, flags, ((f"{NAME}_{part}.c", ()), *single, TURN), target)
     return target
 
 

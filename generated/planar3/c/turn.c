@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "turn.h"
+#include "internal.h"
 
 void planar3_turn(size_t count, const double *restrict angle, double *restrict sine, double *restrict cosine)
 {

@@ -18,6 +18,13 @@ from linkwise.symbolic.system import System
 BLOCK = {"double": 8, "float": 16}
 """Samples in a block: one cache line of each quantity."""
 
+PARTS = (
+    ("robot", "", "decomposition and torques of many samples"),
+    ("one", "one_", "decomposition and torques of one sample"),
+    ("gradient", "gradient_", "position gradient"),
+)
+"""Files for each number type: what they include, what their names begin with, what they hold."""
+
 GROUP = 384
 """Values that wait in blocks at a time: 24 KiB, half of a usual first-level cache."""
 
@@ -82,18 +89,27 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     }
     parameters = {"parameters": list(parameter_names(system).values())}
     yield f"c/{name}.h", render("c/robot.h.j2", shared | totals | header)
-    yield "c/blocks.inc", render("c/blocks.inc.j2", shared | totals | parameters)
+    yield "c/sizes.inc", render("c/sizes.inc.j2", shared | totals | parameters)
+    yield "c/blocks.inc", render("c/blocks.inc.j2", shared)
+    yield "c/one.inc", render("c/one.inc.j2", {**shared, "links": sizes})
     yield "c/robot.inc", render("c/robot.inc.j2", robot)
     if whole:
         view = {**shared, "number": 0, "functions": whole.functions}
         yield "c/fused.inc", render("c/link.inc.j2", view)
     yield "c/gradient.inc", render("c/gradient.inc.j2", gradient)
-    for file in ("turn.c", "turn.h"):
+    for file in ("turn.c", "internal.h"):
         yield f"c/{file}", render(f"c/{file}.j2", {**shared, "name": name})
     for kind, suffix in (("double", ""), ("float", "f")):
-        for part, stem in (("robot", name), ("gradient", f"{name}_gradient")):
-            view = {"name": name, "type": kind, "suffix": suffix, "block": BLOCK[kind], "part": part}
-            yield f"c/{stem}_{kind}.c", render("c/robot.c.j2", shared | view)
+        for part, stem, what in PARTS:
+            view = {
+                "name": name,
+                "type": kind,
+                "suffix": suffix,
+                "block": BLOCK[kind],
+                "part": part,
+                "what": what,
+            }
+            yield f"c/{name}_{stem}{kind}.c", render("c/robot.c.j2", shared | view)
 
 
 def link_sizes(kernels: Sequence[Kernel]) -> Iterator[LinkSizes]:
