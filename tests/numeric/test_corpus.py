@@ -15,9 +15,9 @@ LIMIT = 1e-9
 ROBOT: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "kinova": ({}, {"joints": 6, "links": 6, "merged": 6}),
     "panda": ({}, {"joints": 8, "links": 9, "mimic": 1}),
-    "solo12": ({}, {"joints": 12, "links": 12, "merged": 4}),
+    "solo12": ({}, {"joints": 12, "links": 12, "merged": 5}),
     "allegro_left_hand": ({"allow_unphysical": True}, {"joints": 16, "links": 16}),
-    "human": ({"base": "floating"}, {"joints": 42, "links": 18, "massless": 24}),
+    "human": ({"base": "floating"}, {"joints": 42, "links": 18, "massless": 19}),
     "iris_simple": ({"base": "floating"}, {"joints": 6, "links": 1}),
     "simple_humanoid_classical": ({}, {"joints": 29, "links": 29}),
     "romeo": ({"allow_unphysical": True}, {"joints": 33, "links": 31, "mimic": 22}),
