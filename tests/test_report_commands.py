@@ -32,7 +32,7 @@ def report(*arguments: str) -> subprocess.CompletedProcess[str]:
         (("reduction", "--seconds", "nowhere.json"), "nowhere.json: cannot be read"),
         (("terms", "puma560", "--budget", "100"), "raise --budget"),
         (("terms", "planar3", "--joint", "7"), "--joint '7' is not there; choose 1..3"),
-        (("terms", "planar3", "--lock", "joint1"), "--lock 'joint1' is not JOINT=VALUE"),
+        (("terms", "planar3", "--lock", "joint1"), "--lock 'joint1' is not of the form JOINT=VALUE"),
     ],
 )
 def test_a_users_mistake_is_one_line_and_leaves_no_file(

@@ -3,7 +3,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -36,37 +36,6 @@ FreeMimic = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
 
 
-def _options(
-    lock: list[str] | None,
-    parameters: str,
-    base: str,
-    root: str | None,
-    tip: str | None,
-    allow_unphysical: bool,
-    free_mimic: bool,
-    joint_friction: bool = False,
-) -> Any:
-    from linkwise.model import Options
-
-    if parameters not in ("numeric", "symbolic"):
-        raise LinkwiseError(f"--parameters is {parameters!r}; choose numeric or symbolic")
-    if base not in ("fixed", "floating"):
-        raise LinkwiseError(f"--base is {base!r}; choose fixed or floating")
-    locked: dict[str, float] = {}
-    for item in lock or []:
-        joint, _, value = item.rpartition("=")
-        if joint in locked:
-            raise LinkwiseError(f"--lock holds {joint!r} twice; give it one value")
-        try:
-            locked[joint] = float(value)
-        except ValueError:
-            joint = ""
-        if not joint or abs(locked[joint]) == float("inf") or locked[joint] != locked[joint]:
-            raise LinkwiseError(f"--lock {item!r} is not of the form JOINT=VALUE, such as --lock elbow=0.5")
-    flags = allow_unphysical, free_mimic, joint_friction
-    return Options(parameters, locked, base, root, tip, *flags)  # type: ignore[arg-type]
-
-
 @app.command()
 def generate(
     robot: Robot,
@@ -92,8 +61,17 @@ def generate(
     from linkwise.emit.package import identifier
     from linkwise.emit.write import check_target, write_package
     from linkwise.progress import progress
+    from linkwise.reading import reading_options
 
-    options = _options(lock, parameters, base, root, tip, allow_unphysical, free_mimic)
+    options = reading_options(
+        lock,
+        parameters,
+        base,
+        root=root,
+        tip=tip,
+        allow_unphysical=allow_unphysical,
+        free_mimic=free_mimic,
+    )
     request = {
         "robot": robot if not Path(robot).is_file() else Path(robot).name,
         "backends": backend or list(BACKENDS),
@@ -156,9 +134,20 @@ def inspect(
     """Show a robot's joints, links and parameters, and what was merged, locked or ignored."""
     from linkwise import pipeline
     from linkwise.inspection import inspection, table
+    from linkwise.reading import reading_options
 
     system = pipeline.read_system(
-        robot, _options(lock, parameters, base, root, tip, allow_unphysical, free_mimic, joint_friction)
+        robot,
+        reading_options(
+            lock,
+            parameters,
+            base,
+            root=root,
+            tip=tip,
+            allow_unphysical=allow_unphysical,
+            free_mimic=free_mimic,
+            joint_friction=joint_friction,
+        ),
     )
     data = inspection(system)
     typer.echo(json.dumps(data, indent=1) if as_json else table(data))

@@ -3,7 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -53,6 +53,7 @@ def terms(
     """Count terms and operations of the partial torques, and those that one bucket needs."""
     from linkwise.pipeline import read_system
     from linkwise.progress import progress
+    from linkwise.reading import reading_options
     from linkwise.report import terms_text
     from linkwise.report.files import json_text, require_writable, write_all
     from linkwise.report.publish import terms_files
@@ -62,7 +63,7 @@ def terms(
     _require_budget(budget)
     if order not in (0, 1, 2):
         raise LinkwiseError(f"--order is {order}; choose 2 for acceleration, 1 for velocity, 0 for gravity")
-    system = read_system(robot, _options(parameters, lock, root, tip))
+    system = read_system(robot, reading_options(lock, parameters, root=root, tip=tip))
     joints, links = [c.name for c in system.coordinates], [part.name for part in system.links]
     question = Question(
         None if joint == "all" else position(joint, joints, "--joint"),
@@ -98,6 +99,7 @@ def reduction(
     """Draw the share of terms of τ_1 that its q̈_1 part does not need (the paper's Fig. 15)."""
     from linkwise.pipeline import read_system
     from linkwise.progress import progress
+    from linkwise.reading import reading_options
     from linkwise.report import measured_text, study_text
     from linkwise.report import seconds as timing
     from linkwise.report.files import json_text, require_writable, write_all
@@ -106,7 +108,7 @@ def reduction(
 
     first, last = dof_range(dof)
     _require_budget(budget)
-    options = _options("symbolic", lock, root, tip)
+    options = reading_options(lock, "symbolic", root=root, tip=tip)
     if robot == "planar":
         arm = read_system(f"planar{_planar_joints(last, len(options.lock))}", options)
         name, system, beyond = PLANAR_ARM, replace(arm, name=PLANAR_ARM), CHECKED_TO
@@ -153,21 +155,3 @@ def dof_range(text: str) -> tuple[int, int]:
             f"--dof {text!r} is no range; write FIRST..LAST with 1 ≤ FIRST ≤ LAST, such as 1..10"
         )
     return first, last
-
-
-def _options(parameters: str, lock: list[str] | None, root: str | None, tip: str | None) -> Any:
-    """Reading options; raises LinkwiseError for a lock that is not JOINT=VALUE."""
-    from linkwise.model import Options
-
-    if parameters not in ("numeric", "symbolic"):
-        raise LinkwiseError(f"--parameters is {parameters!r}; choose numeric or symbolic")
-    locks = {}
-    for entry in lock or []:
-        joint, _, value = entry.rpartition("=")
-        try:
-            locks[joint] = float(value)
-        except ValueError as error:
-            raise LinkwiseError(
-                f"--lock {entry!r} is not JOINT=VALUE; write such as --lock elbow=0.5"
-            ) from error
-    return Options(parameters, locks, root=root, tip=tip)  # type: ignore[arg-type]
