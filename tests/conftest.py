@@ -8,7 +8,7 @@ from types import ModuleType
 
 import pytest
 from linkwise import Options, generate, read_system, write_package
-from linkwise.check.package import import_package
+from linkwise.package.load import import_package
 
 DATA = Path(__file__).parent / "data"
 PANDA = (

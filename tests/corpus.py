@@ -32,7 +32,7 @@ ALSO = {"human.urdf": ({"base": "floating"},)}
 def study(path: Path, options: dict[str, Any], samples: int) -> dict[str, Any]:
     """Generate one robot in this process and compare it; a process of its own makes peak memory honest."""
     from linkwise import LinkwiseError, Options, generate, read_system, write_package
-    from linkwise.check.package import import_package
+    from linkwise.package.load import import_package
 
     row: dict[str, Any] = {"file": str(path.relative_to(ROBOTS)), "options": options}
     start = time.perf_counter()

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from linkwise import generate, read_system
-from linkwise.emit import BACKENDS
+from linkwise.emit.backend import BACKENDS
 
 GENERATED = Path(__file__).parents[1] / "generated"
 

@@ -5,8 +5,8 @@ import random
 
 import pytest
 from evaluation import evaluate
-from linkwise.graph.differentiate import derivative, substitute
-from linkwise.graph.expression import FUNCTIONS, Graph, Node
+from linkwise.expression.differentiate import derivative, substitute
+from linkwise.expression.graph import FUNCTIONS, Graph, Node
 
 SMOOTH_AT_HALF = sorted(FUNCTIONS)
 

@@ -6,12 +6,12 @@ from answers import random_states, relative_error
 from conftest import DATA, LOCKED_FINGERS, PANDA
 from evaluation import evaluate
 from linkwise import Options, read_system
-from linkwise.graph.count import count_operations
-from linkwise.graph.derive import link_kernel, lowering
-from linkwise.graph.euler_lagrange import euler_lagrange
-from linkwise.graph.expression import Graph
-from linkwise.graph.forms import LinkForms
-from linkwise.pipeline import derive
+from linkwise.dynamics.coefficients import LinkForms
+from linkwise.dynamics.derive import derive, link_kernel
+from linkwise.dynamics.euler_lagrange import euler_lagrange
+from linkwise.dynamics.kernel import lowering
+from linkwise.expression.count import count_operations
+from linkwise.expression.graph import Graph
 from linkwise.symbolic.system import System
 
 BLOCKS = ("acceleration", "velocity", "gravity", "torque", "position_gradient")

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from linkwise.analysis import Lowpass, Processing, Reading, analyze, stream
+from linkwise.analysis.closure import Closure
+from linkwise.analysis.motions import MOTIONS, SIMULATED
+from linkwise.analysis.motions import write_csv as write_motion
+from linkwise.analysis.robot import load_robot
 from linkwise.errors import LinkwiseError
-from linkwise.motion import Lowpass, Processing, Reading, analyze, stream
-from linkwise.motion.closure import Closure
-from linkwise.motion.motions import MOTIONS, SIMULATED
-from linkwise.motion.motions import write_csv as write_motion
-from linkwise.motion.robot import load_robot
 from motion_logs import JOINTS, LEG, PLANAR3, PUMA560, smooth, write_csv, write_mot
 
 
@@ -145,7 +145,7 @@ def test_motions_of_the_paper():
 def test_walking_with_a_planar_leg(tmp_path):
     """A log like OpenSim's inverse kinematics: degrees, 60 Hz, more columns than the leg has joints."""
     from linkwise import pipeline
-    from linkwise.emit.write import write_package
+    from linkwise.package.write import write_package
 
     write_package(pipeline.generate(pipeline.read_system(str(LEG)), ["numpy"]), tmp_path / "leg")
     legs = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]

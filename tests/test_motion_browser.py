@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from linkwise.motion import Processing, Reading, analyze
-from linkwise.motion.analysis import Totals
-from linkwise.motion.columns import Column
-from linkwise.motion.files import Wanted, analyze_to
-from linkwise.motion.page import report
-from linkwise.motion.robot import load_robot
-from linkwise.motion.run import silent
+from linkwise.analysis import Processing, Reading, analyze
+from linkwise.analysis.columns import Column
+from linkwise.analysis.files import Wanted, analyze_to
+from linkwise.analysis.page import report
+from linkwise.analysis.result import Totals
+from linkwise.analysis.robot import load_robot
+from linkwise.progress import silent
 from motion_logs import PLANAR3, smooth, write_csv
 
 pytestmark = pytest.mark.browser

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from linkwise.analysis.differentiate import FIRST, SECOND, derivatives
+from linkwise.analysis.filtering import lowpass
+from linkwise.analysis.settings import Lowpass, Processing
 from linkwise.errors import LinkwiseError
-from linkwise.motion.differentiate import FIRST, SECOND, derivatives
-from linkwise.motion.filtering import lowpass
-from linkwise.motion.settings import Lowpass, Processing
 from motion_logs import smooth
 from scipy import signal
 

@@ -10,13 +10,13 @@ import pyarrow.parquet as pq
 import pytest
 import typer
 from linkwise import progress
+from linkwise.analysis import analyze, directory, tables
+from linkwise.analysis import files as files_module
+from linkwise.analysis.directory import whole_directory
+from linkwise.analysis.run import Keep, stride_for
+from linkwise.analysis.settings import Lowpass, Processing
+from linkwise.cli.motion import register
 from linkwise.errors import LinkwiseError
-from linkwise.motion import analyze, directory, tables
-from linkwise.motion import files as files_module
-from linkwise.motion.commands import register
-from linkwise.motion.directory import whole_directory
-from linkwise.motion.run import Keep, stride_for
-from linkwise.motion.settings import Lowpass, Processing
 from motion_logs import PLANAR3, smooth, write_csv
 from typer.testing import CliRunner
 
@@ -170,7 +170,7 @@ def test_long_logs_are_thinned_evenly():
 
 def test_importing_the_commands_needs_no_extra():
     code = (
-        "import sys, linkwise.motion.commands;"
+        "import sys, linkwise.cli.motion;"
         "print({'scipy', 'pyarrow', 'matplotlib', 'plotly'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -6,9 +6,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from linkwise.analysis import text_log
+from linkwise.analysis.log import open_log
 from linkwise.errors import LinkwiseError
-from linkwise.motion import text_log
-from linkwise.motion.log import open_log
 from motion_logs import JOINTS, smooth, write_csv, write_mot
 
 

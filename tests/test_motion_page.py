@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from linkwise.analysis import analyze
+from linkwise.analysis.page import TEMPLATE, report, view
+from linkwise.analysis.page_data import page_data
 from linkwise.emit.render import variables
-from linkwise.motion import analyze
-from linkwise.motion.page import TEMPLATE, report, view
-from linkwise.motion.page_data import page_data
 from motion_logs import PLANAR3, smooth, write_csv
 
 EVIL = '</script><script>alert("1")</script>&<!--'

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from linkwise.analysis import analyze
+from linkwise.analysis.columns import Column
+from linkwise.analysis.names import short
+from linkwise.analysis.poses import Body, poses
+from linkwise.analysis.robot import load_robot
 from linkwise.errors import LinkwiseError
-from linkwise.motion import analyze
-from linkwise.motion.columns import Column
-from linkwise.motion.names import short
-from linkwise.motion.robot import load_robot
-from linkwise.motion.skeleton import Body, poses
 from matplotlib.figure import Figure
 from motion_logs import JOINTS, PLANAR3, smooth, write_csv
 

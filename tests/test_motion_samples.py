@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from linkwise.analysis.resample import resample
+from linkwise.analysis.samples import read_samples
+from linkwise.analysis.selection import select
+from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
-from linkwise.motion.resample import resample
-from linkwise.motion.run import silent
-from linkwise.motion.samples import read_samples
-from linkwise.motion.selection import select
-from linkwise.motion.settings import Reading
+from linkwise.progress import silent
 from motion_logs import JOINTS, smooth, write_csv, write_mot
 
 ANGLES = ("rad", "rad", "rad")

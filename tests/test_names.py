@@ -10,7 +10,7 @@ import pytest
 from answers import random_states
 from compiled import compile_library
 from linkwise import Options, check_package, generate, read_system, write_package
-from linkwise.check.package import import_package
+from linkwise.package.load import import_package
 
 HOSTILE = (
     "quote\" and ' and \\",
@@ -121,7 +121,7 @@ def test_a_joint_may_be_called_like_anything_inside(
     [("Arm 2 (left)", "arm_2_left"), ("7dof", "robot_7dof"), ("class", "robot_class"), ("∂", "robot")],
 )
 def test_robots_name_becomes_a_module_name(name: str, module: str) -> None:
-    from linkwise.emit.package import identifier
+    from linkwise.emit.assemble import identifier
 
     assert identifier(name) == module
     assert module.isidentifier()

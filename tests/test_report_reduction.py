@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from linkwise.dynamics.derive import derive
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
-from linkwise.model import Options, read_robot
-from linkwise.pipeline import derive, silent
+from linkwise.progress import silent
 from linkwise.report import style
 from linkwise.report.fit import fit, held_against
 from linkwise.report.operations import link_operations
@@ -21,7 +21,8 @@ from linkwise.report.reduction import PAPER, Point, curve
 from linkwise.report.seconds import Timing, row_view
 from linkwise.report.study import study, verdicts
 from linkwise.report.study_text import page
-from linkwise.symbolic.rigid import link_energies
+from linkwise.robot import Options, read_robot
+from linkwise.symbolic.link_energy import link_energies
 from linkwise.symbolic.system import System
 
 GOLDEN = json.loads((Path(__file__).parent / "data" / "term_counts.json").read_text())

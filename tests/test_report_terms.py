@@ -8,12 +8,11 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
+from linkwise.dynamics.derive import link_kernel
+from linkwise.dynamics.kernel import Kernel
 from linkwise.errors import LinkwiseError
-from linkwise.graph.derive import Kernel, link_kernel
-from linkwise.graph.expression import FUNCTIONS, Node, reachable
-from linkwise.model import Options, read_robot
-from linkwise.model.robot import Coordinate
-from linkwise.pipeline import silent
+from linkwise.expression.graph import FUNCTIONS, Node, reachable
+from linkwise.progress import silent
 from linkwise.report import laurent
 from linkwise.report.count import count_terms
 from linkwise.report.laurent import Laurent
@@ -21,7 +20,9 @@ from linkwise.report.question import Question
 from linkwise.report.survey import LinkTorques, link_torques
 from linkwise.report.terms import terms_report
 from linkwise.report.terms_text import data, page
-from linkwise.symbolic.rigid import link_energies
+from linkwise.robot import Options, read_robot
+from linkwise.robot.robot import Coordinate
+from linkwise.symbolic.link_energy import link_energies
 from linkwise.symbolic.system import LinkEnergy, System
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 from sympy.simplify.fu import TR8

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from linkwise import LinkwiseError, Options, read_system
-from linkwise.model import read_robot
+from linkwise.robot import read_robot
 from urdf_text import chain, joint, link, mimic, robot
 
 AB = joint("ab", "a", "b")

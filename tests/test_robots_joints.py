@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from answers import random_states, relative_error
 from linkwise import Options, generate, read_system, write_package
-from linkwise.check.package import import_package
+from linkwise.package.load import import_package
 from urdf_text import chain, joint, link, mimic, robot
 
 pytest.importorskip("pinocchio")

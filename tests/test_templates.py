@@ -7,7 +7,8 @@ import jinja2
 import pytest
 from conftest import DATA
 from linkwise import Options, generate, read_system
-from linkwise.emit import autograd, c, closed_forms, formulas, package
+from linkwise.emit import assemble, autograd, backend, closed_forms, formulas
+from linkwise.emit.c import sources
 from linkwise.emit.render import render, variables
 
 ROBOTS = (
@@ -21,8 +22,6 @@ ROBOTS = (
 @pytest.fixture(scope="module")
 def views() -> dict[str, list[set[str]]]:
     """Fields of every view that generating a few robots renders, by template."""
-    import linkwise.emit
-
     seen: dict[str, list[set[str]]] = {}
 
     def recording(template: str, view: Mapping[str, Any]) -> str:
@@ -30,7 +29,7 @@ def views() -> dict[str, list[set[str]]]:
         return render(template, view)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (linkwise.emit, autograd, c, closed_forms, formulas, package):
+        for module in (backend, autograd, sources, closed_forms, formulas, assemble):
             patch.setattr(module, "render", recording)
         for robot, options in ROBOTS:
             generate(read_system(robot, options))

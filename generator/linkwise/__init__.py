@@ -4,16 +4,15 @@ system = linkwise.read_system("planar3")     # or a .toml, .urdf or .py file, or
 files = linkwise.generate(system)               # {path: text} of an importable package
 """
 
-__version__ = "0.1.0"
-
+from linkwise.analysis import Analysis, Lowpass, Processing, Reading, analyze
 from linkwise.check import check_package
-from linkwise.emit.write import write_package
 from linkwise.errors import LinkwiseError
-from linkwise.model import Coordinate, Options, read_robot
-from linkwise.motion import Analysis, Lowpass, Processing, Reading, analyze
+from linkwise.package.write import write_package
 from linkwise.pipeline import generate, read_system
-from linkwise.symbolic.energies import energy_system
+from linkwise.robot import Coordinate, Options, read_robot
 from linkwise.symbolic.system import LinkEnergy, System
+from linkwise.symbolic.user_energies import energy_system
+from linkwise.version import VERSION as __version__
 
 __all__ = [
     "Analysis",
@@ -25,6 +24,7 @@ __all__ = [
     "Processing",
     "Reading",
     "System",
+    "__version__",
     "analyze",
     "check_package",
     "energy_system",

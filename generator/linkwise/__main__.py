@@ -1,6 +1,6 @@
 """`python -m linkwise`."""
 
-from linkwise.cli import main
+from linkwise.cli.app import main
 
 if __name__ == "__main__":
     main()

@@ -4,16 +4,16 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from linkwise.emit import BACKENDS
-from linkwise.emit.package import Derivation, identifier, manifest, shared_files
+from linkwise.dynamics.derive import derive
+from linkwise.emit.assemble import Derivation, identifier, manifest, shared_files
+from linkwise.emit.backend import BACKENDS
 from linkwise.errors import LinkwiseError, within
-from linkwise.graph.derive import Kernel, link_kernel
-from linkwise.model import Options, read_robot
-from linkwise.model.robot import Robot
 from linkwise.progress import Progress, silent
-from linkwise.symbolic.energies import read_energies
-from linkwise.symbolic.rigid import link_energies
+from linkwise.robot import Options, read_robot
+from linkwise.robot.robot import Robot
+from linkwise.symbolic.link_energy import link_energies
 from linkwise.symbolic.system import System
+from linkwise.symbolic.user_energies import read_energies
 
 
 def read_system(spec: str | Path, options: Options | None = None) -> System:
@@ -27,17 +27,6 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
                 )
             return read_energies(Path(spec), options.parameters == "symbolic")
     return link_energies(read_robot(spec, options))
-
-
-def derive(system: System, progress: Progress = silent) -> tuple[Kernel, ...]:
-    """One kernel a link: its closed forms on a graph."""
-    kernels = []
-    for j in range(len(system.links)):
-        progress("derive", j, len(system.links))
-        with within(f"while deriving robot {system.name!r}"):
-            kernels.append(link_kernel(system, j))
-    progress("derive", len(system.links), len(system.links))
-    return tuple(kernels)
 
 
 def generate(

@@ -5,9 +5,10 @@ import time
 from importlib.metadata import files
 from pathlib import Path
 
-from linkwise.model import Options
-from linkwise.pipeline import read_system, silent
+from linkwise.pipeline import read_system
+from linkwise.progress import silent
 from linkwise.report.survey import RunningCount, link_torques
+from linkwise.robot import Options
 
 BUDGET = 10**7
 

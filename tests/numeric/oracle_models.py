@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import linkwise.model.robots
+import linkwise.robot.builtin
 import numpy as np
 import pinocchio as pin
 
@@ -24,7 +24,7 @@ def planar3() -> Any:
 
 def puma560() -> Any:
     """Return the arm of Armstrong, Khatib and Burdick, read off its table a second time."""
-    path = Path(linkwise.model.robots.__path__[0]) / "puma560.toml"
+    path = Path(linkwise.robot.builtin.__path__[0]) / "puma560.toml"
     table = tomllib.loads(path.read_text())
     quarter = {"pi/2": np.pi / 2, "-pi/2": -np.pi / 2}
     model = pin.Model()

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator
 
-from linkwise import __version__
-from linkwise.emit.energy_code import Function, energy_functions
+from linkwise.emit.energies import Function, energy_functions
 from linkwise.emit.render import render
 from linkwise.symbolic.system import System
+from linkwise.version import VERSION
 
 
 def autograd_files(system: System, linear: frozenset[int]) -> Iterator[tuple[str, str]]:
@@ -14,7 +14,7 @@ def autograd_files(system: System, linear: frozenset[int]) -> Iterator[tuple[str
         functions = energy_functions(system, j)
         view = {
             "number": j + 1,
-            "version": __version__,
+            "version": VERSION,
             "twist": energy.body is not None,
             "uses_torch": any(_calls(function) for function in functions),
             "parent": None if energy.parent is None else energy.parent + 1,
@@ -24,9 +24,9 @@ def autograd_files(system: System, linear: frozenset[int]) -> Iterator[tuple[str
             "linear": j in linear,
         }
         yield f"autograd/link_{j + 1}.py", render("autograd/link.py.j2", view)
-    shared = {"version": __version__}
+    shared = {"version": VERSION}
     yield "autograd/partial_lagrangian.py", render("autograd/partial_lagrangian.py.j2", shared)
-    init = {"version": __version__, "numbers": range(1, len(system.links) + 1)}
+    init = {"version": VERSION, "numbers": range(1, len(system.links) + 1)}
     yield "autograd/__init__.py", render("autograd/init.py.j2", init)
 
 

@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from linkwise import __version__
-from linkwise.emit.code import straight_line
-from linkwise.emit.energy_code import fetched
+from linkwise.dynamics.kernel import Kernel
+from linkwise.emit.energies import fetched
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
-from linkwise.graph.derive import Kernel
-from linkwise.graph.expression import Node
+from linkwise.emit.straight_line import straight_line
+from linkwise.expression.graph import Node
 from linkwise.symbolic.system import System
+from linkwise.version import VERSION
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ def closed_form_files(system: System, kernels: Sequence[Kernel], library: str) -
     for j, kernel in enumerate(kernels):
         view = {
             "number": j + 1,
-            "version": __version__,
+            "version": VERSION,
             "import_library": imported,
             "name": ascii(system.links[j].name),
             "path": repr(kernel.forms[0].path),
@@ -39,7 +39,7 @@ def closed_form_files(system: System, kernels: Sequence[Kernel], library: str) -
         }
         yield f"{folder}/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
     numbers = range(1, len(kernels) + 1)
-    init = {"library": library, "version": __version__, "numbers": numbers}
+    init = {"library": library, "version": VERSION, "numbers": numbers}
     yield f"{folder}/__init__.py", render("closed_forms/init.py.j2", init)
 
 

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import sympy as sp
 from sympy.simplify.fu import TR8
 
-from linkwise import __version__
-from linkwise.emit.package import Derivation
+from linkwise.emit.assemble import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.system import System
+from linkwise.version import VERSION
 
 MOST_COORDINATES = 3
 ROUNDING = 1e-12
@@ -24,7 +24,7 @@ def formula_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     rows = [(i, j, _shown(system, tau)) for i, j, tau in _rows(system)]
     for kind, printer in (("txt", sp.sstr), ("tex", _latex)):
         view = {
-            "version": __version__,
+            "version": VERSION,
             "rows": [(i + 1, j + 1, printer(expr)) for i, j, expr in rows],
             "joints": [ascii(c.name) for c in system.coordinates],
             "links": [ascii(link.name) for link in system.links],

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from linkwise.graph.expression import Entry
+from linkwise.expression.graph import Entry
 
 ATOM, PRODUCT, SUM = 3, 2, 1
 Text = tuple[str, int]

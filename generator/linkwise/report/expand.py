@@ -11,9 +11,9 @@ from fractions import Fraction
 import sympy as sp
 
 from linkwise.errors import LinkwiseError
-from linkwise.model.robot import Coordinate
 from linkwise.report import laurent
 from linkwise.report.laurent import Laurent
+from linkwise.robot.robot import Coordinate
 from linkwise.symbolic.system import Definition
 
 ROUNDING = 1e-9

@@ -7,9 +7,10 @@ part of τ_i  = (Σ_j c2_ijk) q̈_k, and so on: the coefficients are added first
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from linkwise.graph.count import count_operations
-from linkwise.graph.derive import Kernel, link_kernel
-from linkwise.graph.expression import Graph, Node, operands, reachable
+from linkwise.dynamics.derive import link_kernel
+from linkwise.dynamics.kernel import Kernel
+from linkwise.expression.count import count_operations
+from linkwise.expression.graph import Graph, Node, operands, reachable
 from linkwise.report.question import Question
 from linkwise.symbolic.system import System
 

@@ -12,13 +12,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from linkwise.emit.code import straight_line
-from linkwise.emit.energy_code import fetched
+from linkwise.dynamics.derive import derive
+from linkwise.dynamics.kernel import Kernel
+from linkwise.emit.energies import fetched
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
-from linkwise.graph.derive import Kernel
-from linkwise.graph.expression import Node
-from linkwise.pipeline import derive, generate
+from linkwise.emit.straight_line import straight_line
+from linkwise.expression.graph import Node
+from linkwise.pipeline import generate
 from linkwise.progress import Progress
 from linkwise.report.extras import report_extra
 from linkwise.symbolic.system import System

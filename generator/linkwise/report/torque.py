@@ -7,10 +7,10 @@ i e. A digit is a byte, so the exponents of a term are the bytes of its key.
 
 from collections.abc import Iterator
 
-from linkwise.model.robot import Coordinate
 from linkwise.report import laurent
 from linkwise.report.expand import Variables
 from linkwise.report.laurent import I_SQUARED, ZERO_BYTE, Laurent
+from linkwise.robot.robot import Coordinate
 
 
 class Differentiation:

@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import sympy as sp
 
-from linkwise.model.robot import Coordinate, Joint, Mat3, Robot, Scalar, Vec3
+from linkwise.robot.robot import Coordinate, Joint, Mat3, Robot, Scalar, Vec3
 
 Definition: TypeAlias = tuple[sp.Symbol, sp.Expr]
 

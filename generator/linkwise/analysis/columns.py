@@ -1,0 +1,83 @@
+"""The columns of a result: what each holds, of which joint, link and cause, in which unit."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from linkwise.analysis.robot import PackedLayout, Robot
+
+Quantity = Literal["time", "q", "qd", "qdd", "tau", "tau_link", "tau_qdd", "tau_qd", "tau_gravity"]
+MEANING: dict[Quantity, str] = {
+    "time": "time",
+    "q": "joint coordinate",
+    "qd": "joint velocity",
+    "qdd": "joint acceleration",
+    "tau": "joint torque, all links together",
+    "tau_link": "partial torque: on the joint, due to the motion of the link",
+    "tau_qdd": "propagation torque: on the joint, through the link, by the cause's acceleration",
+    "tau_qd": "propagation torque: on the joint, through the link, by the cause's velocity",
+    "tau_gravity": "gravity and other potentials of the link on the joint",
+}
+TERMS: tuple[Quantity, ...] = ("tau_qdd", "tau_qd", "tau_gravity")
+"""The parts that sum to a partial torque."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column; `joint`, `link` and `cause` are indices, None where they mean nothing."""
+
+    quantity: Quantity
+    name: str
+    unit: str
+    joint: int | None = None
+    link: int | None = None
+    cause: int | None = None
+
+    @property
+    def key(self) -> tuple[Quantity, int | None, int | None, int | None]:
+        """What identifies the column, without names."""
+        return self.quantity, self.joint, self.link, self.cause
+
+
+def escaped(name: str) -> str:
+    """A joint's or link's name as a part of a column's: no slash in it, and still one to one."""
+    return name.replace("%", "%25").replace("/", "%2F")
+
+
+def columns_of(robot: Robot, layout: PackedLayout) -> tuple[Column, ...]:
+    """Columns in order: time, motion, τ_i, τ_ij, then the terms; what is identically 0 has none."""
+    unit = {"rad": "N·m", "m": "N"}
+    out = [Column("time", "time", "s")]
+    motions: tuple[tuple[Quantity, str], ...] = (("q", ""), ("qd", "/s"), ("qdd", "/s²"))
+    for quantity, suffix in motions:
+        for i, joint in enumerate(robot.joints):
+            out.append(Column(quantity, f"{quantity}/{escaped(joint)}", robot.units[i] + suffix, i))
+    for i, joint in enumerate(robot.joints):
+        out.append(Column("tau", f"tau/{escaped(joint)}", unit[robot.units[i]], i))
+
+    def load(quantity: Quantity, i: int, j: int, k: int | None = None) -> None:
+        parts = [
+            quantity,
+            robot.joints[i],
+            robot.links[j],
+            *([robot.joints[k]] if k is not None else []),
+        ]
+        name = "/".join(map(escaped, parts)).replace("tau_link/", "tau/", 1)
+        out.append(Column(quantity, name, unit[robot.units[i]], i, j, k))
+
+    for i, j in sorted(map(tuple, layout.torque.tolist())):
+        load("tau_link", i, j)
+    for i, j, k, _ in mirrored(layout):
+        load("tau_qdd", i, j, k)
+    for i, j, k in sorted(map(tuple, layout.velocity.tolist())):
+        load("tau_qd", i, j, k)
+    for i, j in sorted(map(tuple, layout.gravity.tolist())):
+        load("tau_gravity", i, j)
+    return tuple(out)
+
+
+def mirrored(layout: PackedLayout) -> list[tuple[int, int, int, int]]:
+    """All (i, j, k, source) of c2, sorted: only i ≤ k is stored, and c2 is symmetric in i and k."""
+    rows = set()
+    for source, (i, j, k) in enumerate(layout.acceleration.tolist()):
+        rows |= {(i, j, k, source), (k, j, i, source)}
+    return sorted(rows)

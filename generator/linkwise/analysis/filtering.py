@@ -1,0 +1,75 @@
+"""The zero-phase low-pass over a log of any length, in place.
+
+`scipy.signal.sosfiltfilt` wants the whole log at once. Here its two passes, forwards and backwards,
+run over blocks and carry the filter's state from one to the next: memory stays flat, and the result
+is sosfiltfilt's, sample for sample, for every block length.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.analysis.extras import extra
+from linkwise.analysis.settings import Lowpass
+from linkwise.errors import LinkwiseError
+
+Array = NDArray[np.float64]
+
+
+def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536) -> None:
+    """Filter q (samples, n) in place; `rate` in Hz, `rows` the block length.
+
+    Raises LinkwiseError for a cutoff at or above half the rate, or a log shorter than the padding.
+    """
+    signal = extra("scipy.signal")
+    if settings.cutoff >= rate / 2:
+        raise LinkwiseError(
+            f"--cutoff {settings.cutoff:g} Hz is not below half the sampling rate of {rate:g} Hz; lower it"
+        )
+    sos = signal.butter(settings.order, settings.cutoff, fs=rate, output="sos")
+    pad = padding_length(sos) if settings.padding != "none" else 0
+    if len(q) <= pad:
+        raise LinkwiseError(
+            f"{len(q)} samples are too few for the filter's padding of {pad}; lower --filter-order"
+        )
+    front = _extension(q[: pad + 1], settings.padding)
+    back = _extension(q[-1 : -pad - 2 : -1], settings.padding)[::-1]
+    rest = signal.sosfilt_zi(sos)[:, :, None]
+    blocks = [(at, min(at + rows, len(q))) for at in range(0, len(q), rows)]
+
+    state = rest * (front[0] if pad else q[0])
+    _, state = _run(sos, front, state)
+    for start, stop in blocks:
+        q[start:stop], state = _run(sos, q[start:stop], state)
+    back, _ = _run(sos, back, state)
+
+    state = rest * (back[-1] if pad else q[-1])
+    _, state = _run(sos, back[::-1], state)
+    for start, stop in reversed(blocks):
+        backwards, state = _run(sos, q[start:stop][::-1], state)
+        q[start:stop] = backwards[::-1]
+
+
+def padding_length(sos: Array) -> int:
+    """Samples of padding that sosfiltfilt takes: three times the taps not at the origin."""
+    taps = 2 * len(sos) + 1 - min((sos[:, 2] == 0).sum(), (sos[:, 5] == 0).sum())
+    return int(3 * taps)
+
+
+def _run(sos: Array, x: Array, state: Array) -> tuple[Array, Array]:
+    if not len(x):
+        return x, state
+    with np.errstate(over="ignore", invalid="ignore"):
+        y, after = extra("scipy.signal").sosfilt(sos, x, axis=0, zi=state)
+    return y, after
+
+
+def _extension(edge: Array, padding: str) -> Array:
+    """What stands before edge[0], (len(edge) - 1, n): turned about the end, mirrored, or held."""
+    beyond: Array = edge[:0:-1]
+    if padding == "odd":
+        beyond = 2 * edge[0] - beyond
+    elif padding == "even":
+        beyond = beyond.copy()  # the filter works in place
+    else:
+        beyond = np.repeat(edge[:1], len(edge) - 1, axis=0)
+    return beyond

@@ -1,0 +1,109 @@
+"""A whole log, block by block: each is differentiated, analysed, summed up and handed on."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.analysis.closure import Closure
+from linkwise.analysis.differentiate import derivatives
+from linkwise.analysis.independent import against_recursion
+from linkwise.analysis.result import Totals
+from linkwise.analysis.samples import Samples
+from linkwise.analysis.settings import Processing
+from linkwise.analysis.terms import Terms
+from linkwise.errors import LinkwiseError
+from linkwise.progress import Progress
+
+Array = NDArray[np.float64]
+Sink = Callable[[Array], None]
+"""Takes one block (columns, samples) after the other; the block is the sink's own."""
+
+INNER = 4096
+"""Samples computed at once, so that the intermediate values stay in the cache."""
+
+BLOCK_BYTES = 48 << 20
+"""Size of a block handed on, about: some three of them are in memory at any time."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is known once every block is done."""
+
+    totals: Totals
+    closure: Closure
+    samples: int
+
+
+def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
+    """First sample analysed and the one after the last; LinkwiseError if there are too few."""
+    count, needed = len(samples.time), processing.span
+    cut = needed // 2 if processing.edges == "trim" else 0
+    if count < needed + 2 * cut:
+        raise LinkwiseError(
+            f"{count} samples, but the {processing.derivative} formula"
+            f"{' with trimmed edges' if cut else ''} needs {needed + 2 * cut} or more"
+        )
+    return cut, count - cut
+
+
+def run(samples: Samples, terms: Terms, processing: Processing, sink: Sink, progress: Progress) -> Run:
+    """Send every block to `sink`, which works in a thread beside the computation."""
+    start, stop = span_of(samples, processing)
+    total = np.zeros(len(terms.columns))
+    peak = np.zeros(len(terms.columns))
+    closure = Closure()
+    with ThreadPoolExecutor(1) as writer, np.errstate(over="ignore", invalid="ignore"):
+        pending: Future[None] | None = None
+        for first, last in _blocks(start, stop, len(terms.columns)):
+            block = np.empty((len(terms.columns), last - first))
+            for at in range(first, last, INNER):
+                end = min(at + INNER, last)
+                q, qd, qdd = derivatives(samples.q, samples.rate, at, end, processing)
+                out = block[:, at - first : end - first]
+                closure |= terms.fill(out, samples.time[at:end], q, qd, qdd)
+                magnitude = np.abs(out)
+                added = magnitude.sum(axis=1)
+                if not np.isfinite(added).all():
+                    raise _overflow(samples, terms, out, at)
+                total += added
+                np.maximum(peak, magnitude.max(axis=1), out=peak)
+            closure |= against_recursion(terms.robot, terms.columns, block)
+            closure.check()
+            if pending is not None:
+                pending.result()
+            pending = writer.submit(sink, block)
+            progress("analysing", last - start, stop - start)
+        if pending is not None:
+            pending.result()
+    return Run(Totals(total / (stop - start), peak), closure, stop - start)
+
+
+def _overflow(samples: Samples, terms: Terms, out: Array, start: int) -> LinkwiseError:
+    """Say where the first result that is no number stands, by time; columns come cause before effect."""
+    bad = ~np.isfinite(out)
+    at = int(bad.any(axis=0).argmax())
+    column = int(bad[:, at].argmax()) if bad.any() else int(np.abs(out).max(axis=1).argmax())
+    row = "" if samples.first_row is None else f"row {samples.first_row + start + at}, "
+    return LinkwiseError(
+        f"{row}time {samples.time[start + at]:.6g} s: result column {terms.columns[column].name!r} is"
+        f" {out[column, at]:.3g}; the log's values are too large{_largest(samples, terms, start + at)}"
+    )
+
+
+def _largest(samples: Samples, terms: Terms, at: int) -> str:
+    """The largest coordinate near a sample."""
+    first = max(0, at - INNER)
+    near = np.abs(samples.q[first : at + INNER])
+    near[~np.isfinite(near)] = 0.0  # a filter can make everything so
+    row, joint = np.unravel_index(int(np.argmax(near)), near.shape)
+    where = f"row {samples.first_row + first + row}" if samples.first_row is not None else "a sample nearby"
+    return f": {terms.robot.joints[joint]!r} comes to {near[row, joint]:.3g} in {where}"
+
+
+def _blocks(start: int, stop: int, columns: int) -> Iterator[tuple[int, int]]:
+    rows = max(INNER, BLOCK_BYTES // (8 * columns) // INNER * INNER)
+    for at in range(start, stop, rows):
+        yield at, min(at + rows, stop)

@@ -1,0 +1,57 @@
+"""The closed forms of one link, as nodes of a graph."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from linkwise.expression.graph import Graph, Node
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Nodes of q, q̇ and q̈, by coordinate, and of the run-time parameters, by name."""
+
+    q: tuple[Node, ...]
+    qd: tuple[Node, ...]
+    qdd: tuple[Node, ...]
+
+
+@dataclass(frozen=True)
+class LinkForms:
+    """Link j's closed forms over its path(j), coordinates ascending; every dictionary is keyed (i, k) or i.
+
+    acceleration: c2_ijk for i ≤ k, link j's mass matrix M^j, which is symmetric
+    velocity: c1_ijk, of the closing convention
+    velocity_linear: the part ∂h1/∂q̇ of c1 that stems from energy terms linear in q̇; empty without such
+    gravity: g_ij                         torque: τ_ij
+    position_gradient: c0_ijk = ∂τ_ij/∂q_k
+    """
+
+    path: tuple[int, ...]
+    acceleration: dict[tuple[int, int], Node]
+    velocity: dict[tuple[int, int], Node]
+    gravity: dict[int, Node]
+    torque: dict[int, Node]
+    position_gradient: dict[tuple[int, int], Node]
+    velocity_linear: dict[tuple[int, int], Node] = field(default_factory=dict)
+
+    def linear_block(self, zero: Node) -> list[Node]:
+        """`velocity_linear` with its zeros, over all (i, k); empty when there is none."""
+        if not self.velocity_linear:
+            return []
+        return [self.velocity_linear.get(pair, zero) for pair in self.velocity]
+
+    def decomposition(self) -> Iterator[Node]:
+        """Every output of the full decomposition, in the packed order: c2, c1, g, τ."""
+        yield from self.acceleration.values()
+        yield from self.velocity.values()
+        yield from self.gravity.values()
+        yield from self.torque.values()
+
+
+def inputs(graph: Graph, n: int) -> Inputs:
+    """Return the symbols q1…, qd1…, qdd1… of n coordinates."""
+    return Inputs(
+        tuple(graph.symbol(f"q{k + 1}") for k in range(n)),
+        tuple(graph.symbol(f"qd{k + 1}") for k in range(n)),
+        tuple(graph.symbol(f"qdd{k + 1}") for k in range(n)),
+    )

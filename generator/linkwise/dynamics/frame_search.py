@@ -1,0 +1,80 @@
+"""Common frames of the rigid-link rule: a few are tried, and the one of the fewest operations is kept."""
+
+from collections.abc import Iterator, Sequence
+from operator import itemgetter
+
+from linkwise.dynamics.kernel import Kernel, lowering, parameter_nodes
+from linkwise.dynamics.principal_axes import principal_axes
+from linkwise.dynamics.rigid_link import Origin, rigid_forms
+from linkwise.dynamics.screws import CommonAxes, Orientation
+from linkwise.expression.count import count_operations
+from linkwise.robot.robot import Joint
+from linkwise.symbolic.system import LinkEnergy, System
+
+MAX_AXES, MAX_ORIGINS = 4, 3
+
+Tree = Sequence[tuple[int, Joint]]
+Attempt = tuple[int, CommonAxes, Origin]
+
+
+class FrameSearch:
+    """Common frames for some links of a tree, by what their decomposition costs."""
+
+    def __init__(
+        self, system: System, links: Sequence[LinkEnergy], tree: Tree, chains: Sequence[Sequence[int]]
+    ) -> None:
+        self.system, self.tree, self.chains = system, tree, chains
+        self.bodies = [energy.body for energy in links if energy.body is not None]
+
+    def build(self, axes: CommonAxes, origin: Origin, gradient: bool = True) -> Kernel:
+        """Kernel in a common frame, with or without the position gradient."""
+        lower, x = lowering(self.system)
+        turn = Orientation(lower, self.tree, self.bodies[0].gravity, axes, x)
+        forms = tuple(
+            rigid_forms(turn, body, chain, origin, gradient)
+            for body, chain in zip(self.bodies, self.chains, strict=True)
+        )
+        return Kernel(lower.graph, x, parameter_nodes(self.system, lower), forms)
+
+    def attempt(self, axes: CommonAxes, origin: Origin) -> Attempt:
+        """Operations of a common frame, and the frame."""
+        kernel = self.build(axes, origin, gradient=False)
+        outputs = [node for forms in kernel.forms for node in forms.decomposition()]
+        return count_operations(kernel.graph, outputs).arithmetic, axes, origin
+
+    def framed(self, most_axes: int) -> Iterator[Attempt]:
+        """Frames of the longest chain, their own axes and origin, then the best with other origins."""
+        longest = max(self.chains, key=len)
+        tried = [self.attempt(axes, Origin(axes.frame)) for axes in _axes(longest, most_axes)]
+        yield from tried
+        best = min(tried, key=itemgetter(0))[1]
+        for frame in _spread([-1, *longest], MAX_ORIGINS):
+            if frame != best.frame:
+                yield self.attempt(best, Origin(frame))
+
+    def central(self, most_axes: int) -> Iterator[Attempt]:
+        """Origins in the one link's centre of mass, with principal axes too; the best one also by points."""
+        chain, body = self.chains[0], self.bodies[0]
+        axes = list(_axes(chain, most_axes))
+        if principal := principal_axes(body):
+            axes.append(CommonAxes(chain[-1], turned=principal))
+        tried = [self.attempt(candidate, Origin()) for candidate in axes]
+        yield from tried
+        yield self.attempt(min(tried, key=itemgetter(0))[1], Origin(by_points=True))
+
+
+def _axes(chain: Sequence[int], most: int) -> Iterator[CommonAxes]:
+    """Axes to try: the base's, and those before and behind joints spread over the chain."""
+    yield CommonAxes(-1)
+    for f in _spread(chain, most):
+        yield CommonAxes(f)
+        yield CommonAxes(f, before=True)
+
+
+def _spread(items: Sequence[int], most: int) -> list[int]:
+    """At most `most` of the items: all of the first few, then spread evenly to the last."""
+    if len(items) <= most:
+        return list(items)
+    near = list(items[: most // 2])
+    step = (len(items) - 1 - len(near)) / (most - len(near) - 1)
+    return near + [items[round(len(near) + step * k)] for k in range(most - len(near))]

@@ -1,0 +1,57 @@
+"""A kernel: the closed forms of one link, or of all, on one graph."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import sympy as sp
+
+from linkwise.dynamics.coefficients import Inputs, LinkForms, inputs
+from linkwise.expression.count import count_operations
+from linkwise.expression.from_sympy import Lowering
+from linkwise.expression.graph import Graph, Node
+from linkwise.symbolic.system import System
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A graph, its inputs, the nodes of the parameters by symbol, and the forms of the links it computes."""
+
+    graph: Graph
+    inputs: Inputs
+    parameters: dict[sp.Symbol, Node]
+    forms: tuple[LinkForms, ...]
+
+
+def lowering(system: System) -> tuple[Lowering, Inputs]:
+    """Return an empty graph with symbols for the coordinates, velocities and parameters."""
+    graph = Graph()
+    x = inputs(graph, len(system.coordinates))
+    symbols = {c.q: node for c, node in zip(system.coordinates, x.q, strict=True)}
+    symbols |= {c.qd: node for c, node in zip(system.coordinates, x.qd, strict=True)}
+    symbols |= {p: graph.symbol(name) for p, name in parameter_names(system).items()}
+    return Lowering(graph, symbols), x
+
+
+def parameter_names(system: System) -> dict[sp.Symbol, str]:
+    """Identifiers of the run-time parameters: their names made safe, and told apart when they then agree."""
+    names: dict[sp.Symbol, str] = {}
+    for symbol in system.parameters:
+        safe = "".join(c if c.isascii() and c.isalnum() else "_" for c in symbol.name)
+        name = f"p_{safe}"
+        while name in names.values():
+            name += "_"
+        names[symbol] = name
+    return names
+
+
+def decomposition_cost(kernels: Iterable[Kernel]) -> int:
+    """Additions, multiplications and divisions of full decompositions, each kernel by itself."""
+    return sum(
+        count_operations(k.graph, [node for forms in k.forms for node in forms.decomposition()]).arithmetic
+        for k in kernels
+    )
+
+
+def parameter_nodes(system: System, lower: Lowering) -> dict[sp.Symbol, Node]:
+    """Return the nodes of the run-time parameters."""
+    return {symbol: lower.symbols[symbol] for symbol in system.parameters}

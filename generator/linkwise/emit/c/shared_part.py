@@ -1,0 +1,48 @@
+"""The fused kernel in C: what several links share is computed once, by a function of its own."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from linkwise.dynamics.kernel import Kernel, decomposition_cost
+from linkwise.emit.c.kernel_function import KernelFunction, decomposition_groups, kernel_function, turned
+from linkwise.expression.graph import Node, operands, reachable
+from linkwise.symbolic.system import System
+
+
+@dataclass(frozen=True)
+class Fused:
+    """Functions of the shared part and of each link's rest, and how many values they share."""
+
+    functions: tuple[KernelFunction, ...]
+    shared: int
+
+
+def fused(system: System, kernel: Kernel | None, kernels: Sequence[Kernel]) -> Fused | None:
+    """Functions of a robot's fused kernel; None where the links alone cost no more."""
+    if kernel is None or decomposition_cost([kernel]) >= decomposition_cost(kernels):
+        return None
+    given = turned(kernel)
+    outputs = [list(forms.decomposition()) for forms in kernel.forms]
+    shared = _shared(kernel, outputs, given)
+    names = {node: f"x{number + 1}" for number, node in enumerate(shared)}
+    functions = [kernel_function(system, kernel, "shared_part", {"x": shared})]
+    for number, forms in enumerate(kernel.forms, 1):
+        groups = decomposition_groups(kernel, forms)
+        functions.append(kernel_function(system, kernel, f"rest_{number}", groups, names))
+    return Fused(tuple(functions), len(shared))
+
+
+def _shared(kernel: Kernel, outputs: list[list[Node]], given: dict[Node, str]) -> list[Node]:
+    """Values that at least two links need, and that something outside the shared part uses directly."""
+    nodes = kernel.graph.nodes
+    needs = [set(reachable(kernel.graph, group, given)) for group in outputs]
+    times = Counter(node for need in needs for node in need)
+    common = {
+        node
+        for node, count in times.items()
+        if count > 1 and node not in given and nodes[node][0] not in ("const", "symbol", "neg")
+    }
+    used = {o for node in times if node not in common and node not in given for o in operands(nodes[node])}
+    used |= {node for group in outputs for node in group}
+    return sorted(common & used)

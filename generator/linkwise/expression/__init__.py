@@ -1,0 +1,1 @@
+"""The expression graph, which knows nothing of mechanics."""

@@ -1,0 +1,1 @@
+"""A generated package seen from outside."""

@@ -1,0 +1,74 @@
+"""What a robot file says, before fixed joints are merged and frames are chosen."""
+
+from dataclasses import dataclass, field
+
+from linkwise.robot.robot import Mat3, Note, Rotation, Scalar, Vec3
+
+ZERO3: Vec3 = (0.0, 0.0, 0.0)
+ZERO33: Mat3 = (ZERO3, ZERO3, ZERO3)
+IDENTITY: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Body:
+    """A link as the file has it; inertia about the centre of mass, in the link's axes.
+
+    `unphysical` holds the file's own reason for an inertia that no rigid body has (empty: none); `invented`
+    says that the reader made the body up, between two axes of one joint.
+    """
+
+    name: str
+    mass: Scalar = 0.0
+    com: Vec3 = ZERO3
+    inertia: Mat3 = ZERO33
+    unphysical: str = ""
+    invented: bool = False
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """q = ratio · q_master + offset."""
+
+    master: str
+    ratio: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A joint that a constraint makes follow another one, or holds where `master` is empty."""
+
+    joint: str
+    master: str
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A joint as the file has it: any type, any axis; axis in the joint's frame.
+
+    Damping (N·m·s/rad or N·s/m) and friction (N·m or N) are reported only.
+    """
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    rotation: Rotation = IDENTITY
+    translation: Vec3 = ZERO3
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    mimic: Mimic | None = None
+    damping: float = 0.0
+    friction: float = 0.0
+
+
+@dataclass(frozen=True)
+class Description:
+    """A robot as its file has it."""
+
+    name: str
+    bodies: tuple[Body, ...]
+    connections: tuple[Connection, ...]
+    gravity: Vec3 = (0.0, 0.0, -9.81)
+    parameters: tuple[tuple[str, float], ...] = ()
+    notes: tuple[Note, ...] = field(default=())
+    couplings: tuple[Coupling, ...] = ()

@@ -1,0 +1,83 @@
+"""Joint types as chains of revolute and prismatic axes."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from linkwise.errors import LinkwiseError
+from linkwise.robot import transforms as geo
+from linkwise.robot.description import Connection
+from linkwise.robot.robot import Note, is_finite
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+Vector = tuple[float, float, float]
+Kind = Literal["revolute", "prismatic"]
+SINGLE: dict[str, Kind] = {
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "hinge": "revolute",
+    "prismatic": "prismatic",
+}
+Part = tuple[str, Kind, Vector]
+BALL: tuple[Part, ...] = (("yaw", "revolute", Z), ("pitch", "revolute", Y), ("roll", "revolute", X))
+FLOATING: tuple[Part, ...] = (("x", "prismatic", X), ("y", "prismatic", Y), ("z", "prismatic", Z), *BALL)
+KNOWN = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating", "ball")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One degree of freedom of a file's joint; `last` carries the child link."""
+
+    name: str
+    suffix: str
+    kind: Kind
+    direction: Vector
+    last: bool
+
+    @property
+    def unit(self) -> Literal["rad", "m"]:
+        """Return rad or m."""
+        return "rad" if self.kind == "revolute" else "m"
+
+
+def expand(connection: Connection, notes: list[Note]) -> list[Axis]:
+    """Return the axes of a joint, none for a fixed one; raises LinkwiseError for an unknown type.
+
+    A floating joint is x, y, z of its parent's frame, then yaw, pitch, roll about the moved z, y, x: the
+    order of rpy. A ball is its last three. A planar joint slides in the plane normal to its axis, then
+    turns about it.
+    """
+    if connection.type == "fixed":
+        return []
+    if connection.type in SINGLE:
+        return [Axis(connection.name, "", SINGLE[connection.type], _unit(connection), True)]
+    parts = _parts(connection)
+    names = ", ".join(suffix for suffix, _, _ in parts)
+    notes.append(Note("expanded", connection.name, f"{connection.type}: {names}"))
+    return [
+        Axis(f"{connection.name}_{suffix}", suffix, kind, direction, index == len(parts) - 1)
+        for index, (suffix, kind, direction) in enumerate(parts)
+    ]
+
+
+def _parts(connection: Connection) -> tuple[Part, ...]:
+    if connection.type == "floating":
+        return FLOATING
+    if connection.type == "ball":
+        return BALL
+    if connection.type == "planar":
+        x, y, z = geo.transpose(geo.align_z(_unit(connection)))
+        return ("x", "prismatic", x), ("y", "prismatic", y), ("yaw", "revolute", z)
+    raise LinkwiseError(
+        f"joint {connection.name!r} has the unknown type {connection.type!r}; use one of {', '.join(KNOWN)}"
+    )
+
+
+def _unit(connection: Connection) -> Vector:
+    x, y, z = connection.axis
+    if not all(is_finite(a) for a in connection.axis):
+        raise LinkwiseError(f"joint {connection.name!r} has NaN or infinity in its axis; give numbers")
+    length = math.hypot(x, y, z)
+    if length < 1e-9:
+        raise LinkwiseError(f"joint {connection.name!r} has a zero axis; give its direction, such as 0 0 1")
+    return x / length, y / length, z / length

@@ -1,0 +1,61 @@
+"""One door for every description: a built-in name or a file."""
+
+import re
+from importlib import resources
+from pathlib import Path
+
+from linkwise.errors import LinkwiseError, within
+from linkwise.robot.build import Options, assemble
+from linkwise.robot.builtin.planar import planar
+from linkwise.robot.description import Description
+from linkwise.robot.readers.mjcf import read_mjcf
+from linkwise.robot.readers.toml import read_toml
+from linkwise.robot.readers.urdf import read_urdf, root_tag
+from linkwise.robot.robot import Robot
+
+
+def read_xml(path: Path) -> Description:
+    """Read MJCF where the root element says so, else URDF."""
+    return read_mjcf(path) if root_tag(path) == "mujoco" else read_urdf(path)
+
+
+BUILT_IN = ("planar3", "planarN (N from 1 to 1000)", "puma560")
+READERS = {".toml": read_toml, ".urdf": read_urdf, ".xml": read_xml, ".mjcf": read_mjcf}
+MAX_PLANAR = 1000
+"""An arm of N joints has some N³/3 coefficients of each order: 1000 are far beyond what can be generated."""
+
+
+def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
+    """Robot from a built-in name or a file; raises LinkwiseError naming the file and the mend."""
+    options = options or Options()
+    with within(str(spec)):
+        if match := re.fullmatch(r"planar([1-9][0-9]*)", str(spec)):
+            return assemble(planar(_joints(match[1])), options)
+        if str(spec) == "puma560":
+            with resources.as_file(resources.files("linkwise.robot.builtin") / "puma560.toml") as built_in:
+                return assemble(read_toml(built_in), options)
+        try:
+            description = _read_file(Path(spec))
+        except OSError as error:
+            raise LinkwiseError(f"cannot be read: {error.strerror}") from None
+        return assemble(description, options)
+
+
+def _joints(digits: str) -> int:
+    if len(digits) > len(str(MAX_PLANAR)) or int(digits) > MAX_PLANAR:
+        raise LinkwiseError(
+            f"planarN takes N from 1 to {MAX_PLANAR}, as the number of coefficients grows with N³; "
+            "choose a smaller N"
+        )
+    return int(digits)
+
+
+def _read_file(path: Path) -> Description:
+    if path.is_dir():
+        raise LinkwiseError("this is a directory; give the robot's file")
+    if not path.is_file():
+        raise LinkwiseError(f"no such file or built-in robot; the built-ins are {', '.join(BUILT_IN)}")
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise LinkwiseError(f"unknown kind of file {path.suffix!r}; give {', '.join(READERS)} or .py")
+    return reader(path)

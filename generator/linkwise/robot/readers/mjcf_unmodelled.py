@@ -1,0 +1,44 @@
+"""What a compiled MJCF model says beyond the dynamics of rigid bodies."""
+
+from typing import Any
+
+from linkwise.robot.robot import Note
+
+COUNTS = {
+    "actuator": "nu",
+    "camera": "ncam",
+    "contact pair": "npair",
+    "equality": "neq",
+    "flex": "nflex",
+    "keyframe": "nkey",
+    "light": "nlight",
+    "mocap": "nmocap",
+    "plugin": "nplugin",
+    "sensor": "nsensor",
+    "site": "nsite",
+    "tendon": "ntendon",
+}
+VALUES = {
+    "armature": "dof_armature",
+    "damping": "dof_damping",
+    "friction": "dof_frictionloss",
+    "gravity compensation": "body_gravcomp",
+    "limit": "jnt_limited",
+    "spring": "jnt_stiffness",
+}
+"""Arrays that act on a joint or body where they are not zero."""
+
+REMARKS = {"armature": ", not in the torques"}
+"""The inertia of a motor's rotor: unlike the others here, it belongs to rigid-body dynamics."""
+
+
+def unused(model: Any) -> list[Note]:
+    """Return a note for each kind of thing that is there, with how often."""
+    counts = {what: int(getattr(model, name)) for what, name in COUNTS.items()}
+    counts |= {what: sum(value != 0 for value in getattr(model, name)) for what, name in VALUES.items()}
+    counts["fluid"] = int(model.opt.density != 0 or model.opt.viscosity != 0)
+    return [
+        Note("ignored", what, f"{count} ×{REMARKS.get(what, '')}")
+        for what, count in sorted(counts.items())
+        if count
+    ]

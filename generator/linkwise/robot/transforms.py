@@ -1,0 +1,118 @@
+"""Rotations and rigid transforms over numbers and symbols."""
+
+import math
+from collections.abc import Iterable, Sequence
+
+from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3
+
+SNAP = 1e-12
+
+
+def times(number: float, value: Scalar) -> Scalar:
+    """number · value, without factors 0.0 and ±1.0 left in an expression."""
+    if number == 0.0:
+        return 0.0
+    return value if number == 1.0 else -value if number == -1.0 else number * value
+
+
+def rotate(rotation: Rotation, a: Sequence[Scalar]) -> Vec3:
+    """Return rotation · a."""
+    x, y, z = (_sum(times(r, v) for r, v in zip(row, a, strict=True)) for row in rotation)
+    return x, y, z
+
+
+def transpose(rotation: Rotation) -> Rotation:
+    """Return the transpose."""
+    a, b, c = zip(*rotation, strict=True)
+    return a, b, c
+
+
+def compose(a: Rotation, b: Rotation) -> Rotation:
+    """Return a · b, snapped."""
+    return snap(
+        [[sum(x * y for x, y in zip(row, col, strict=True)) for col in zip(*b, strict=True)] for row in a]
+    )
+
+
+def add(a: Vec3, b: Vec3) -> Vec3:
+    """Return a + b."""
+    x, y, z = (_sum((p, q)) for p, q in zip(a, b, strict=True))
+    return x, y, z
+
+
+def rotate_inertia(rotation: Rotation, inertia: Mat3) -> Mat3:
+    """Return rotation · inertia · rotationᵀ, exactly symmetric."""
+    half = [rotate(rotation, row) for row in inertia]  # rows of (R I)ᵀ, as I is symmetric
+    columns = tuple(zip(*half, strict=True))
+    full = [rotate(rotation, row) for row in columns]
+    a, b, c = (tuple(full[min(i, k)][max(i, k)] for k in range(3)) for i in range(3))
+    return a, b, c  # type: ignore[return-value]
+
+
+def from_rpy(roll: float, pitch: float, yaw: float) -> list[list[float]]:
+    """Return Rz(yaw) Ry(pitch) Rx(roll), as URDF defines rpy; not snapped. All NaN for an infinite angle."""
+    if not all(map(math.isfinite, (roll, pitch, yaw))):
+        return [[math.nan] * 3] * 3
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+
+
+def from_quaternion(w: float, x: float, y: float, z: float) -> list[list[float]]:
+    """Return the rotation of a unit quaternion; not snapped."""
+    return [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+
+
+def about_z(angle: float) -> Rotation:
+    """Return Rz(angle), snapped."""
+    c, s = math.cos(angle), math.sin(angle)
+    return snap([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def align_z(axis: Sequence[float]) -> Rotation:
+    """Return a rotation whose third column is the unit vector `axis`; a permutation for ±x, ±y, ±z."""
+    x, y, z = snap([list(axis)])[0]
+    if z == 1.0:
+        return snap([[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    if abs(x) == 1.0:
+        return snap([[0, 0, x], [x, 0, 0], [0, 1, 0]])
+    if abs(y) == 1.0:
+        return snap([[0, 1, 0], [0, 0, y], [y, 0, 0]])
+    if z == -1.0:
+        return snap([[1, 0, 0], [0, -1, 0], [0, 0, -1]])
+    # The shortest turn from z to the axis (Rodrigues).
+    f = 1.0 / (1.0 + z)
+    return snap([[1 - f * x * x, -f * x * y, x], [-f * x * y, 1 - f * y * y, y], [-x, -y, z]])
+
+
+def snap(rows: Sequence[Sequence[float]]) -> Rotation:
+    """Round entries within 1e-12 of −1, 0 or 1; ±90° turns then leave no 6e-17 behind."""
+    return tuple(_row(row) for row in rows)
+
+
+def _row(row: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = (_near_whole(e) for e in row)
+    return x, y, z
+
+
+def _near_whole(e: float) -> float:
+    if not math.isfinite(e):
+        return e
+    return float(round(e)) + 0.0 if abs(e - round(e)) < SNAP else float(e)
+
+
+def _sum(terms: Iterable[Scalar]) -> Scalar:
+    total: Scalar = 0.0
+    for term in terms:
+        if isinstance(term, float) and term == 0.0:
+            continue
+        total = term if isinstance(total, float) and total == 0.0 else total + term
+    return total

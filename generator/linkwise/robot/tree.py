@@ -1,0 +1,103 @@
+"""The tree of a description: its one root, the walk from it, and cutting parts off."""
+
+from collections import Counter
+from dataclasses import replace
+
+from linkwise.errors import LinkwiseError
+from linkwise.robot.description import Connection, Description
+from linkwise.robot.robot import Note, is_finite
+
+
+def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
+    """Root link and the joints from it, parents first, siblings in the file's order.
+
+    Raises LinkwiseError for two parents, several roots and loops.
+    """
+    parents = Counter(c.child for c in description.connections)
+    for link, count in parents.items():
+        if count > 1:
+            joints = ", ".join(repr(c.name) for c in description.connections if c.child == link)
+            raise LinkwiseError(
+                f"link {link!r} has {count} parents (joints {joints}); loops are not supported, keep one"
+            )
+    roots = [body.name for body in description.bodies if body.name not in parents]
+    if not roots:
+        raise LinkwiseError(
+            f"the joints form a loop through link {description.bodies[0].name!r}; no link is the root"
+        )
+    if len(roots) > 1:
+        raise LinkwiseError(
+            f"there are several roots ({', '.join(map(repr, roots))}); connect them, or choose one "
+            "with --root"
+        )
+    below: dict[str, list[Connection]] = {}
+    for c in reversed(description.connections):
+        below.setdefault(c.parent, []).append(c)
+    order: list[Connection] = []
+    stack = below.get(roots[0], [])[:]
+    while stack:
+        order.append(stack.pop())
+        stack += below.get(order[-1].child, [])
+    if len(order) != len(description.connections):
+        lost = sorted({c.child for c in description.connections} - {c.child for c in order})
+        raise LinkwiseError(
+            f"link {lost[0]!r} cannot be reached from the root {roots[0]!r}: its joints form a loop"
+        )
+    return roots[0], tuple(order)
+
+
+def _check_names(description: Description) -> None:
+    links = [body.name for body in description.bodies]
+    if not links:
+        raise LinkwiseError("the robot has no link; give at least one")
+    for what, names in (("link", links), ("joint", [c.name for c in description.connections])):
+        for name, count in Counter(names).items():
+            if not name.strip():
+                raise LinkwiseError(f"a {what} has an empty name; name it")
+            if count > 1:
+                raise LinkwiseError(f"{count} {what}s are named {name!r}; rename all but one")
+    known = set(links)
+    for c in description.connections:
+        for role, link in (("parent", c.parent), ("child", c.child)):
+            if link not in known:
+                raise LinkwiseError(
+                    f"joint {c.name!r} names {link!r} as its {role}, but there is no such link"
+                )
+        if c.mimic and not (is_finite(c.mimic.ratio) and is_finite(c.mimic.offset)):
+            raise LinkwiseError(f"joint {c.name!r} has NaN or infinity in its mimic; give numbers")
+        values = [*c.translation, *(entry for row in c.rotation for entry in row)]
+        if not all(is_finite(value) for value in values):
+            raise LinkwiseError(f"joint {c.name!r} has NaN or infinity in its origin; give numbers")
+
+
+def cut(description: Description, root: str | None, tip: str | None, notes: list[Note]) -> Description:
+    """Keep what hangs on link `root`, and of that only the chain to link `tip`.
+
+    Raises LinkwiseError for names that are empty, double or unknown.
+    """
+    _check_names(description)
+    known = {body.name for body in description.bodies}
+    for flag, link in (("--root", root), ("--tip", tip)):
+        if link is not None and link not in known:
+            raise LinkwiseError(f"{flag} names no link {link!r}; the links are {', '.join(sorted(known))}")
+    kept = known
+    if root is not None:
+        kept, frontier = {root}, [root]
+        while frontier:
+            new = [c.child for c in description.connections if c.parent in frontier and c.child not in kept]
+            kept, frontier = kept | set(new), new
+    if tip is not None:
+        parent = {c.child: c.parent for c in description.connections if c.parent in kept}
+        chain, at = {tip}, tip
+        while at in parent and at != root and parent[at] not in chain:
+            at = parent[at]
+            chain.add(at)
+        if root is not None and root not in chain:
+            raise LinkwiseError(f"--tip {tip!r} does not hang on --root {root!r}; choose links of one chain")
+        kept &= chain
+    notes += [Note("cut", body.name) for body in description.bodies if body.name not in kept]
+    return replace(
+        description,
+        bodies=tuple(b for b in description.bodies if b.name in kept),
+        connections=tuple(c for c in description.connections if c.parent in kept and c.child in kept),
+    )

@@ -1,0 +1,172 @@
+"""Systems whose link energies a user writes in SymPy."""
+
+import runpy
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import sympy as sp
+
+from linkwise.errors import LinkwiseError, within
+from linkwise.robot.robot import Coordinate, is_finite
+from linkwise.symbolic.system import LinkEnergy, System
+
+
+def energy_system(
+    name: str,
+    coordinates: Iterable[Coordinate],
+    links: Iterable[LinkEnergy],
+    parameters: Mapping[sp.Symbol, float] | None = None,
+    symbolic: bool = False,
+) -> System:
+    """System from link energies, checked: every symbol known, degree at most 2 in the velocities.
+
+    `parameters` gives each other symbol its value; they become numbers unless `symbolic`. Velocity terms of
+    the potential count as kinetic, terms of the kinetic energy without velocities as potential.
+
+    Raises LinkwiseError naming the link.
+    """
+    coordinates, links = tuple(coordinates), tuple(links)
+    _check_names(name, coordinates, links)
+    values = _values(parameters or {}, coordinates)
+    checked = []
+    for link in links:
+        with within(f"link {link.name!r}"):
+            checked.append(_checked(link, coordinates, values, symbolic))
+    return System(name, coordinates, tuple(checked), values if symbolic else {})
+
+
+def read_energies(path: Path, symbolic: bool = False) -> System:
+    """Run a Python file that defines `coordinates`, `links` and perhaps `parameters`, as `energy_system`."""
+    try:
+        scope: dict[str, Any] = runpy.run_path(str(path))
+    except LinkwiseError:
+        raise
+    except (Exception, SystemExit) as error:  # the user's own code may raise anything
+        raise LinkwiseError(f"running the file failed: {type(error).__name__}: {error}") from error
+    for required, kind in (("coordinates", Coordinate), ("links", LinkEnergy)):
+        items = scope.get(required)
+        if not isinstance(items, (list, tuple)) or not all(isinstance(item, kind) for item in items):
+            raise LinkwiseError(f"the file must define {required!r}, a list of linkwise.{kind.__name__}")
+    return energy_system(
+        scope.get("name", path.stem),
+        scope["coordinates"],
+        scope["links"],
+        scope.get("parameters"),
+        symbolic,
+    )
+
+
+def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[LinkEnergy, ...]) -> None:
+    if not isinstance(name, str):
+        raise LinkwiseError(f"the robot's name is {name!r}; give a string")
+    if not coordinates or not links:
+        raise LinkwiseError("there must be at least one coordinate and one link")
+    for what, names in (
+        ("coordinate", [c.name for c in coordinates]),
+        ("link", [k.name for k in links]),
+    ):
+        for item in names:
+            if not isinstance(item, str):
+                raise LinkwiseError(f"the {what} name {item!r} is no string; put it in quotes")
+            if not item.strip() or names.count(item) > 1:
+                fault = "is used twice" if item.strip() else "is empty"
+                raise LinkwiseError(f"the {what} name {item!r} {fault}; give each its own")
+    for coordinate in coordinates:
+        if coordinate.unit not in ("rad", "m"):
+            raise LinkwiseError(
+                f"coordinate {coordinate.name!r} has the unit {coordinate.unit!r}; give rad or m"
+            )
+
+
+def _values(
+    parameters: Mapping[sp.Symbol, float], coordinates: tuple[Coordinate, ...]
+) -> dict[sp.Symbol, float]:
+    """Parameters with their values as floats; one symbol a name, as generated code knows names only."""
+    if not isinstance(parameters, Mapping) or not all(isinstance(s, sp.Symbol) for s in parameters):
+        raise LinkwiseError("`parameters` must be a dictionary of SymPy symbols and their values")
+    for name, count in Counter(symbol.name for symbol in parameters).items():
+        if count > 1:
+            raise LinkwiseError(
+                f"{count} different parameters are called {name}, told apart by their assumptions only; "
+                "rename all but one"
+            )
+    values = {}
+    for symbol, value in parameters.items():
+        if symbol in {s for c in coordinates for s in (c.q, c.qd)}:
+            raise LinkwiseError(f"{symbol} is both a coordinate and a parameter; rename one")
+        try:
+            values[symbol] = float(value)
+        except (TypeError, ValueError, OverflowError):
+            raise LinkwiseError(f"parameter {symbol} has no value as a real number; give one") from None
+        if not is_finite(values[symbol]):
+            raise LinkwiseError(f"parameter {symbol} is NaN or infinite; give a number")
+    return values
+
+
+def _checked(
+    link: LinkEnergy,
+    coordinates: tuple[Coordinate, ...],
+    values: dict[sp.Symbol, float],
+    symbolic: bool,
+) -> LinkEnergy:
+    kinetic, potential = _expression("kinetic", link.kinetic), _expression("potential", link.potential)
+    velocities = [c.qd for c in coordinates]
+    known = {c.q for c in coordinates} | set(velocities) | set(values)
+    for symbol in sorted((kinetic.free_symbols | potential.free_symbols) - known, key=str):
+        if symbol.name in {parameter.name for parameter in values}:
+            raise LinkwiseError(
+                f"the symbol {symbol} is not the one among `parameters`: their assumptions differ; "
+                "make it once and use it everywhere"
+            )
+        raise LinkwiseError(
+            f"the symbol {symbol} is neither a coordinate (use its .q and .qd) nor among `parameters`; "
+            "add it there"
+        )
+    numbers = {symbol: sp.Float(value, 17) for symbol, value in values.items()}
+    plain = kinetic.xreplace(numbers), potential.xreplace(numbers)
+    _check_real(kinetic, potential, *plain)
+    if not symbolic:
+        kinetic, potential = plain
+    _check_degree(kinetic - potential, velocities)
+    if not (kinetic - potential).free_symbols & (known - set(values)):
+        raise LinkwiseError("its energies depend on no coordinate; leave the link out")
+    rest = dict.fromkeys(velocities, sp.S.Zero)
+    moving = potential.free_symbols & set(velocities) or kinetic.subs(rest) != 0
+    if moving:
+        lagrangian = kinetic - potential
+        potential = -lagrangian.subs(rest)
+        kinetic = lagrangian + potential
+    return LinkEnergy(link.name, kinetic, potential)
+
+
+def _expression(what: str, energy: object) -> sp.Expr:
+    try:
+        expression = sp.sympify(energy, strict=True)
+    except sp.SympifyError:
+        expression = None
+    if not isinstance(expression, sp.Expr):
+        raise LinkwiseError(f"its {what} energy is {energy!r}; give a SymPy expression, 0 for none")
+    return expression
+
+
+def _check_real(*energies: sp.Expr) -> None:
+    for energy in energies:
+        if energy.has(sp.nan, sp.oo, -sp.oo, sp.zoo):
+            raise LinkwiseError("its energies hold NaN or infinity; look for a division by zero")
+        if energy.has(sp.I):
+            raise LinkwiseError("its energies hold the imaginary unit; energies are real")
+
+
+def _check_degree(lagrangian: sp.Expr, velocities: list[sp.Symbol]) -> None:
+    try:
+        degree = sp.Poly(lagrangian, *velocities, domain="EX").total_degree()
+    except sp.PolynomialError:
+        raise LinkwiseError(
+            "its energies are no polynomial in the velocities; use terms up to degree 2"
+        ) from None
+    if degree > 2:
+        raise LinkwiseError(
+            f"its energies have degree {degree} in the velocities; this method takes terms up to degree 2"
+        )
