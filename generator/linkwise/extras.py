@@ -1,0 +1,27 @@
+"""The optional libraries, imported when first needed, and in this one place."""
+
+import importlib
+from typing import Any
+
+from linkwise.errors import LinkwiseError
+
+BROUGHT_BY = {
+    "matplotlib": "motion",
+    "mujoco": "mjcf",
+    "plotly": "motion",
+    "pyarrow": "motion",
+    "scipy": "motion",
+    "torch": "torch",
+}
+"""The extra of pyproject.toml that installs each library."""
+
+
+def extra(module: str) -> Any:
+    """Import a module of an optional library; raises LinkwiseError that says how to install it."""
+    library = module.partition(".")[0]
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise LinkwiseError(
+            f"{library} is needed for this and is missing: pip install 'linkwise[{BROUGHT_BY[library]}]'"
+        ) from error
