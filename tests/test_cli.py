@@ -164,7 +164,7 @@ BAD_FILES = {
     "nan.toml": (arm(mass="nan"), "link 'rod' has NaN or infinity"),
     "infinity.toml": (arm(xyz="[inf, 0, 0]"), "joint 'hinge' has NaN or infinity in its origin"),
     "type.toml": (arm(type='"spherical"'), "joint 'hinge' has the unknown type 'spherical'"),
-    "parent.toml": (arm(parent='"moon"'), "joint 'hinge' names 'moon' as its parent"),
+    "parent.toml": (arm(parent='"moon"'), "joint 'hinge' has the parent 'moon', which is not a link"),
     "key.toml": (arm(weight="3"), "link 'rod' has the unknown key 'weight'"),
     "empty.toml": (arm(name='""', child='""'), "a link has an empty name"),
     "loop.toml": (
@@ -183,7 +183,7 @@ BAD_FILES = {
         arm() + '[[link]]\nname = "tip"\n' + SECOND.format(name="hinge", parent="rod", child="tip"),
         "2 joints are named 'hinge'",
     ),
-    "code.toml": (arm(mass="\"__import__('os').getcwd()\""), "is no formula"),
+    "code.toml": (arm(mass="\"__import__('os').getcwd()\""), "is not a formula"),
     "name.toml": (arm(mass='"m"'), "uses 'm', which is not among the parameters"),
     "still.toml": (arm(type='"fixed"'), "no joint moves"),
     "malformed.urdf": ("<robot><link", "malformed XML"),
@@ -229,13 +229,13 @@ BAD_ARGUMENTS = {
     "unknown file": (("arm.toml",), "arm.toml: no such file or built-in robot"),
     "lock without value": (("planar2", "--lock", "joint1"), "is not of the form JOINT=VALUE"),
     "lock at nan": (("planar2", "--lock", "joint1=nan"), "is not of the form JOINT=VALUE"),
-    "lock of no joint": (("planar2", "--lock", "elbow=0"), "names no moving joint 'elbow'"),
+    "lock of no joint": (("planar2", "--lock", "elbow=0"), "--lock 'elbow' is not a moving joint"),
     "back end": (("planar2", "--backend", "fortran"), "no back end 'fortran'; choose among numpy"),
     "name": (("planar2", "--name", "../arm"), "'../arm' is no module name"),
     "keyword": (("planar2", "--name", "class"), "'class' is no module name"),
     "parameters": (("planar2", "--parameters", "some"), "choose numeric or symbolic"),
     "base": (("planar2", "--base", "moving"), "choose fixed or floating"),
-    "tip": (("planar2", "--tip", "hand"), "--tip names no link 'hand'"),
+    "tip": (("planar2", "--tip", "hand"), "--tip 'hand' is not a link"),
 }
 
 
