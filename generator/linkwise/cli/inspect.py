@@ -1,13 +1,49 @@
-"""What a robot is made of, as data and as text."""
+"""The command `inspect`: what a robot is made of, as data and as text."""
 
-from typing import Any
+import json
+from collections.abc import Collection
+from dataclasses import asdict
+from typing import Annotated, Any
 
+import typer
+
+from linkwise import pipeline
+from linkwise.cli import Json
+from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import skeleton
+from linkwise.errors import LinkwiseError
+from linkwise.robot import Options
 from linkwise.symbolic.system import System
 
+LOSSES = ("damping", "friction")
+"""Kinds of notes that are shown on request."""
 
-def inspection(system: System) -> dict[str, Any]:
-    """Joints, links, parameters and the reader's notes, ready for JSON."""
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+@reads_robot()
+def inspect(
+    robot: RobotName,
+    options: Options,
+    joint_friction: Annotated[
+        bool,
+        typer.Option(
+            "--joint-friction", help="Also list the joints' damping and friction, which no torque holds"
+        ),
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Show a robot's joints, links and parameters, and what was merged, locked or ignored."""
+    system = pipeline.read_system(robot, options)
+    if joint_friction and system.robot is None:
+        raise LinkwiseError(f"{robot}: energies in Python take no --joint-friction; leave it out")
+    data = inspection(system, () if joint_friction else LOSSES)
+    typer.echo(json.dumps(data, indent=1) if as_json else table(data))
+
+
+def inspection(system: System, hidden: Collection[str] = LOSSES) -> dict[str, Any]:
+    """Joints, links, parameters and the notes of the kinds that are not hidden, ready for JSON."""
     bodies = {link["link"]: link for link in skeleton(system) or []}
     notes = system.robot.notes if system.robot is not None else ()
     return {
@@ -22,7 +58,7 @@ def inspection(system: System) -> dict[str, Any]:
             for j, link in enumerate(system.links)
         ],
         "parameters": {s.name: float(v) for s, v in system.parameters.items()},
-        "notes": [{"kind": n.kind, "subject": n.subject, "detail": n.detail} for n in notes],
+        "notes": [asdict(note) for note in notes if note.kind not in hidden],
     }
 
 
@@ -45,5 +81,6 @@ def table(data: dict[str, Any]) -> str:
         lines += ["", kind]
         for note in data["notes"]:
             if note["kind"] == kind:
-                lines.append(f"  {note['subject']} {note['detail']}".rstrip())
+                effect = f"; {note['effect']}" if note["effect"] else ""
+                lines.append(f"  {note['subject']} {note['detail']}".rstrip() + effect)
     return "\n".join(lines)

@@ -29,7 +29,7 @@ FILES = ("puma560", "torso")
 """Built-in robots that are TOML files beside `planar`."""
 
 BUILT_IN = ("planar3", f"planarN (N from 1 to {MAX_PLANAR})", *FILES)
-DESCRIPTIONS = f"{', '.join(BUILT_IN)}, or a {', '.join(READERS)} (.xml: URDF or MJCF) or .py file"
+DESCRIPTIONS = f"{', '.join(BUILT_IN)}, or a {', '.join(READERS)} or .py file; .xml is URDF or MJCF"
 """All that a robot may be read from, in words."""
 
 
