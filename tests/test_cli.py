@@ -44,7 +44,7 @@ def test_generate_leaves_a_foreign_directory_alone(linkwise: Run, tmp_path: Path
     (foreign / "src/precious.js").write_text("precious")
     done = linkwise("generate", "planar2", "--out", "out", "--backend", "c")
     assert done.returncode == 2
-    assert done.stderr.startswith("linkwise: error: out/planar2 exists and is no generated package")
+    assert done.stderr.startswith("linkwise: error: out/planar2 exists and is not a generated package")
     assert (foreign / "src/precious.js").read_text() == "precious"
 
 
@@ -71,7 +71,7 @@ def test_generate_replaces_an_earlier_package_whole(linkwise: Run, planar2: Path
 
 def test_manifest_tells_how_to_make_the_package_again(planar2: Path) -> None:
     manifest = json.loads((planar2 / "manifest.json").read_text())
-    assert manifest["schema"] == 1
+    assert manifest["schema"] == 2
     assert manifest["request"]["robot"] == "planar2"
     assert manifest["request"]["backends"] == ["numpy"]
     assert [joint["name"] for joint in manifest["joints"]] == ["joint1", "joint2"]
@@ -260,14 +260,14 @@ def test_generate_never_replaces_what_is_no_package(linkwise: Run, tmp_path: Pat
     (tmp_path / "out/planar2/thesis.txt").write_text("mine")
     done = linkwise("generate", "planar2", "--out", "out", "--backend", "c")
     assert done.returncode == 2
-    assert "exists and is no generated package" in done.stderr
+    assert "exists and is not a generated package" in done.stderr
     assert (tmp_path / "out/planar2/thesis.txt").read_text() == "mine"
 
 
 def test_check_of_no_package_says_so(linkwise: Run, tmp_path: Path) -> None:
     done = linkwise("check", tmp_path)
     assert done.returncode == 2
-    assert "holds no manifest.json" in done.stderr
+    assert "no manifest.json" in done.stderr
 
 
 def test_energies_take_no_lock(linkwise: Run) -> None:

@@ -124,7 +124,7 @@ def test_robot_directories_that_are_none(tmp_path):
     with pytest.raises(LinkwiseError, match="no generated robot there"):
         load_robot(tmp_path)
     (tmp_path / "manifest.json").write_text("{", encoding="utf-8")
-    with pytest.raises(LinkwiseError, match=r"manifest.json: damaged"):
+    with pytest.raises(LinkwiseError, match=r"manifest.json is damaged"):
         load_robot(tmp_path)
     with pytest.raises(LinkwiseError, match="no back end for the analysis"):
         load_robot(PLANAR3, "no-such")
@@ -193,7 +193,7 @@ def test_partial_torques_are_those_of_an_independent_recursion(tmp_path):
     result = analyze(path, PUMA560)
     assert result.closure.recursion_absolute > 0
     assert result.closure.recursion_relative < 1e-12
-    by_hand = replace(result.robot, recursion=None, skeleton=None)
+    by_hand = replace(result.robot, recursion=None, bodies=None)
     assert analyze(path, by_hand).closure.recursion_relative is None
 
 
@@ -202,7 +202,8 @@ def test_a_robot_at_odds_with_the_recursion_is_refused(tmp_path):
     path = write_csv(tmp_path / "a.csv", smooth(60, 3))
     robot = load_robot(PLANAR3)
     heavy = deepcopy(robot.recursion)
-    heavy.bodies[2]["mass"] *= 1.001
+    *others, last = heavy.bodies
+    heavy.bodies = (*others, replace(last, mass=1.001 * last.mass))
     with pytest.raises(LinkwiseError, match=r"a.csv: .* not those of the Newton-Euler recursion"):
         analyze(path, replace(robot, recursion=heavy))
 

@@ -184,7 +184,7 @@ def crowd(place, count=14):
     names = tuple(
         f"spine_joint_{i}" if i != 4 else f"{'name_from_a_drawing_' * 4}"[:79] + "4" for i in range(14)
     )
-    robot = replace(analysis.robot, joints=names, links=names, units=("rad",) * count, skeleton=None)
+    robot = replace(analysis.robot, joints=names, links=names, units=("rad",) * count, bodies=None)
     columns = [Column("time", "time", "s")] + [
         Column("tau_qdd", f"tau_qdd/{i}/{k}/{k}", "N·m", i, k, k) for i in range(count) for k in range(count)
     ]

@@ -29,9 +29,9 @@ def test_numbers_are_the_tables_to_the_last_bit(analysis):
     data = json.loads(page_data(analysis))
     values = np.frombuffer(base64.b64decode(data["values"]), "<f8")
     np.testing.assert_array_equal(values.reshape(analysis.values.shape), analysis.values)
-    origins = np.frombuffer(base64.b64decode(data["skeleton"]["origins"]), "<f8")
+    origins = np.frombuffer(base64.b64decode(data["bodies"]["origins"]), "<f8")
     assert origins.shape == (80 * 3 * 3,)
-    assert data["skeleton"]["up"] == [0, 9.80665, 0]
+    assert data["bodies"]["up"] == [0, 9.80665, 0]
 
 
 def test_names_cannot_end_their_element(analysis):
@@ -52,5 +52,5 @@ def test_page_is_one_file(analysis):
 
 
 def test_robot_without_geometry(analysis):
-    robot = replace(analysis.robot, skeleton=None)
-    assert json.loads(page_data(replace(analysis, robot=robot)))["skeleton"] is None
+    robot = replace(analysis.robot, bodies=None)
+    assert json.loads(page_data(replace(analysis, robot=robot)))["bodies"] is None

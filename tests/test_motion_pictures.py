@@ -7,9 +7,10 @@ import pytest
 from linkwise.analysis import analyze
 from linkwise.analysis.columns import Column
 from linkwise.analysis.names import short
-from linkwise.analysis.poses import Body, poses
+from linkwise.analysis.poses import poses
 from linkwise.analysis.robot import load_robot
 from linkwise.errors import LinkwiseError
+from linkwise.package.manifest import BodyEntry
 from matplotlib.figure import Figure
 from motion_logs import JOINTS, PLANAR3, smooth, write_csv
 
@@ -53,7 +54,7 @@ def test_unknown_figures_are_named(analysis):
 
 def test_poses_of_the_planar_arm():
     q = smooth(10, 3)[:, 1:]
-    bodies = load_robot(PLANAR3).skeleton
+    bodies = load_robot(PLANAR3).bodies
     origins, centres = poses(bodies, q)
     angle = np.cumsum(q, axis=1)
     steps = 0.25 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
@@ -63,9 +64,14 @@ def test_poses_of_the_planar_arm():
 
 
 def test_poses_of_a_slide_on_a_turned_frame():
-    turn = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # its z axis is the parent's x
-    slide = Body("a", None, True, 0, 2.0, turn, np.array([0.0, 1, 0]), np.array([0.0, 0, 3]))
-    crank = Body("b", 0, False, 1, -1.0, np.eye(3), np.array([0.0, 0, 1]), np.array([1.0, 0, 0]))
+    zero = (0.0, 0.0, 0.0)
+    turned = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))  # its z axis is the parent's x
+    upright = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    bulk = (zero, zero, zero)
+    slide = BodyEntry(
+        "a", None, "a", "prismatic", 0, 2.0, turned, (0.0, 1.0, 0.0), 1.0, (0.0, 0.0, 3.0), bulk
+    )
+    crank = BodyEntry("b", 0, "b", "revolute", 1, -1.0, upright, (0.0, 0.0, 1.0), 1.0, (1.0, 0.0, 0.0), bulk)
     origins, centres = poses([slide, crank], np.array([[0.5, np.pi / 2]]))
     np.testing.assert_allclose(origins[0], [[1, 1, 0], [2, 1, 0]], atol=1e-15)
     np.testing.assert_allclose(centres[0], [[4, 1, 0], [2, 1, -1]], atol=1e-15)
@@ -74,7 +80,7 @@ def test_poses_of_a_slide_on_a_turned_frame():
 def many(analysis, count=14):
     """The same numbers with as many names as asked for, one of 80 letters."""
     joints = tuple(f"joint{i}" if i != 4 else f"{'a_name_from_a_drawing_' * 4}4" for i in range(count))
-    robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * count, skeleton=None)
+    robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * count, bodies=None)
     columns = tuple(Column("q", f"q/{i}", "rad", i) for i in range(count))
     return replace(analysis, robot=robot, columns=columns, values=analysis.values[1 + np.arange(count) % 9])
 

@@ -55,7 +55,7 @@ def generate(
         files.update(BACKENDS[backend].files(derivation))
     progress("emit", len(chosen), len(chosen))
     files.update(shared_files(derivation, [b for b in chosen if BACKENDS[b].module]))
-    files["manifest.json"] = manifest(derivation, files)
+    files["manifest.json"] = manifest(derivation, files).text()
     return files
 
 

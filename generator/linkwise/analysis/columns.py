@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from linkwise.analysis.robot import PackedLayout, Robot
+from linkwise.analysis.robot import Robot
+from linkwise.package.load import PackedLayout
 
 Quantity = Literal["time", "q", "qd", "qdd", "tau", "tau_link", "tau_qdd", "tau_qd", "tau_gravity"]
 MEANING: dict[Quantity, str] = {

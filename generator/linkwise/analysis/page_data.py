@@ -49,15 +49,15 @@ def page_data(analysis: Analysis) -> str:
         "colours": list(COLOURS),
         "coloursDark": list(ON_DARK),
         "gravityColour": GRAVITY,
-        "skeleton": _skeleton(analysis),
+        "bodies": _bodies(analysis),
     }
     text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _skeleton(analysis: Analysis) -> dict[str, Any] | None:
+def _bodies(analysis: Analysis) -> dict[str, Any] | None:
     """Poses at every sample shown: origins and centres of mass, (samples, bodies, 3) each."""
-    bodies = analysis.robot.skeleton
+    bodies = analysis.robot.bodies
     if not bodies:
         return None
     origins, centres = poses(bodies, analysis.q)

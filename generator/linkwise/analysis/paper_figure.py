@@ -83,9 +83,9 @@ def _panels(analysis: Analysis, i: int) -> tuple[_Panel, ...]:
 
 
 def own_joints(analysis: Analysis) -> tuple[int, ...]:
-    """For each link the coordinate of its own joint: the skeleton's, else the last on its path."""
+    """For each link the coordinate of its own joint: the manifest's, else the last on its path."""
     robot = analysis.robot
-    known = {body.link: body.coordinate for body in robot.skeleton or ()}
+    known = {body.link: body.coordinate for body in robot.bodies or ()}
     return tuple(
         known.get(
             link,

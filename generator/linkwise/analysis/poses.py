@@ -1,53 +1,16 @@
 """Where a robot's links stand at each instant, for the stick figure."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwise.package.manifest import BodyEntry
+
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Body:
-    """One link's frame on its parent's: `rotation` (3, 3), `translation` and `com` (3,), in m.
-
-    With q the coordinate, the frame stands at `translation`, turned by rotation · Rz(ratio·q)
-    (revolute) or shifted along rotation · z by ratio·q (prismatic).
-    """
-
-    link: str
-    parent: int | None
-    prismatic: bool
-    coordinate: int
-    ratio: float
-    rotation: Array
-    translation: Array
-    com: Array
-
-
-def read_skeleton(entries: Sequence[dict[str, Any]] | None) -> tuple[Body, ...] | None:
-    """Bodies from a manifest's "skeleton"; None where the energies were written by hand."""
-    if entries is None:
-        return None
-    return tuple(
-        Body(
-            str(entry["link"]),
-            entry["parent"],
-            entry["kind"] == "prismatic",
-            int(entry["coordinate"]),
-            float(entry["ratio"]),
-            np.array(entry["rotation"], float).reshape(3, 3),
-            np.array(entry["translation"], float).reshape(3),
-            np.array(entry["com"], float).reshape(3),
-        )
-        for entry in entries
-    )
-
-
-def poses(bodies: Sequence[Body], q: Array) -> tuple[Array, Array]:
+def poses(bodies: Sequence[BodyEntry], q: Array) -> tuple[Array, Array]:
     """Origins and centres of mass in the base frame, each (S, bodies, 3), from q (S, n)."""
     turns: list[Array] = []
     origins: list[Array] = []
@@ -58,16 +21,16 @@ def poses(bodies: Sequence[Body], q: Array) -> tuple[Array, Array]:
         else:
             turn, origin = turns[body.parent], origins[body.parent]
         move = body.ratio * q[:, body.coordinate]
-        shift = np.broadcast_to(body.translation, (len(q), 3))
-        if body.prismatic:
-            shift = shift + move[:, None] * body.rotation[:, 2]
+        shift, rotation = np.broadcast_to(body.translation, (len(q), 3)), np.array(body.rotation)
+        if body.kind == "prismatic":
+            shift = shift + move[:, None] * rotation[:, 2]
         origin = origin + np.einsum("sab,sb->sa", turn, shift)
-        turn = turn @ body.rotation
-        if not body.prismatic:
+        turn = turn @ rotation
+        if body.kind == "revolute":
             turn = turn @ _about_z(move)
         turns.append(turn)
         origins.append(origin)
-        centres.append(origin + turn @ body.com)
+        centres.append(origin + turn @ np.array(body.com))
     return np.stack(origins, axis=1), np.stack(centres, axis=1)
 
 

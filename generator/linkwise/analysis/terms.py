@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from linkwise.analysis.closure import Closure, relative, residual
 from linkwise.analysis.columns import TERMS, Column, Quantity, columns_of, mirrored
-from linkwise.analysis.robot import PackedLayout, Robot
+from linkwise.analysis.robot import Robot
 from linkwise.analysis.settings import Convention
+from linkwise.package.load import PackedLayout
 
 Array = NDArray[np.float64]
 Source = tuple[int, int, int]

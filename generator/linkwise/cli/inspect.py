@@ -2,13 +2,14 @@
 
 from typing import Any
 
-from linkwise.emit.assemble import skeleton
+from linkwise.emit.assemble import rigid_tree
 from linkwise.symbolic.system import System
 
 
 def inspection(system: System) -> dict[str, Any]:
     """Joints, links, parameters and the reader's notes, ready for JSON."""
-    bodies = {link["link"]: link for link in skeleton(system) or []}
+    tree = rigid_tree(system)
+    mass = {body.link: body.mass for body in tree.bodies} if tree else {}
     notes = system.robot.notes if system.robot is not None else ()
     return {
         "name": system.name,
@@ -17,7 +18,7 @@ def inspection(system: System) -> dict[str, Any]:
             {
                 "name": link.name,
                 "path": [system.coordinates[k].name for k in system.path(j)],
-                "mass": bodies[link.name]["mass"] if link.name in bodies else None,
+                "mass": mass.get(link.name),
             }
             for j, link in enumerate(system.links)
         ],

@@ -1,7 +1,6 @@
 """Everything of a generated package that is not one back end: names, loading, shared calls, manifest."""
 
 import hashlib
-import json
 import keyword
 import re
 import sys
@@ -15,10 +14,11 @@ import sympy as sp
 from linkwise.dynamics.derive import fused_kernel
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
 from linkwise.emit.render import render
+from linkwise.package.manifest import BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
+from linkwise.robot.robot import Scalar, Vec3
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 
-SCHEMA = 1
 LONGEST_NAME = 60
 TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}
 
@@ -82,73 +82,56 @@ def shared_files(derivation: Derivation, backends: Sequence[str]) -> Iterator[tu
         yield "numpy_backend.py", render("package/numpy_backend.py.j2", shared)
 
 
-def manifest(derivation: Derivation, files: Mapping[str, str]) -> str:
-    """JSON text: what was generated, from what, what it costs, and the SHA-256 of every file."""
+def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
+    """What was generated, from what, what it costs, and the SHA-256 of every file."""
     system = derivation.system
-    fused = derivation.fused if "c/fused.inc" in files else None
-    data = {
-        "schema": SCHEMA,
-        "name": derivation.package,
-        "robot": system.name,
-        "generator": {"linkwise": VERSION, "sympy": sp.__version__},
-        "request": dict(derivation.request),
-        "joints": [{"name": c.name, "unit": c.unit} for c in system.coordinates],
-        "links": [
-            {
-                "name": link.name,
-                "path": list(system.path(j)),
-                "operations": decomposition_cost([derivation.kernels[j]]),
-            }
-            for j, link in enumerate(system.links)
-        ],
-        "fused_operations": decomposition_cost([fused]) if fused else None,
-        "parameters": {s.name: float(v) for s, v in system.parameters.items()},
-        "units": {
-            "angle": "rad",
-            "length": "m",
-            "mass": "kg",
-            "time": "s",
-            "torque": "N m",
-            "force": "N",
-        },
-        "conventions": {
-            "index_order": "joint i, link j, coordinate k",
-            "velocity": "closing: c1 = 1/2 d(tau)/d(qd) of the quadratic part; sum over k closes to tau_ij",
-            "gravity": list(_floats(system)),
-        },
-        "skeleton": skeleton(system),
-        "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(files.items())},
-    }
-    return json.dumps(data, indent=1) + "\n"
+    shared = derivation.fused if "c/fused.inc" in files else None
+    return Manifest(
+        derivation.package,
+        system.name,
+        {"linkwise": VERSION, "sympy": sp.__version__},
+        dict(derivation.request),
+        tuple(JointEntry(c.name, c.unit) for c in system.coordinates),
+        tuple(
+            LinkEntry(link.name, system.path(j), decomposition_cost([kernel]))
+            for j, (link, kernel) in enumerate(zip(system.links, derivation.kernels, strict=True))
+        ),
+        decomposition_cost([shared]) if shared else None,
+        {s.name: float(v) for s, v in system.parameters.items()},
+        rigid_tree(system),
+        {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(files.items())},
+    )
 
 
-def _value(system: System, scalar: Any) -> float:
-    return float(sp.sympify(scalar).xreplace(dict(system.parameters)))
-
-
-def _floats(system: System) -> Iterator[float]:
-    if system.robot is not None:
-        for entry in system.robot.gravity:
-            yield _value(system, entry)
-
-
-def skeleton(system: System) -> list[dict[str, Any]] | None:
-    """Return where the links are, numbers only, to draw and to check; None for a user's own energies."""
-    if system.robot is None:
+def rigid_tree(system: System) -> RigidTree | None:
+    """Return where the bodies are, numbers only, to draw and to check; None for a user's own energies."""
+    robot = system.robot
+    if robot is None:
         return None
-    return [
-        {
-            "link": link.name,
-            "parent": link.parent,
-            "joint": link.joint.name,
-            "kind": link.joint.kind,
-            "coordinate": link.joint.coordinate,
-            "ratio": link.joint.ratio,
-            "rotation": [list(row) for row in link.joint.rotation],
-            "translation": [_value(system, p) for p in link.joint.translation],
-            "mass": _value(system, link.mass),
-            "com": [_value(system, c) for c in link.com],
-            "inertia": [[_value(system, entry) for entry in row] for row in link.inertia],
-        }
-        for link in system.robot.links
-    ]
+    values = dict(system.parameters)
+
+    def number(scalar: Scalar) -> float:
+        return float(sp.sympify(scalar).xreplace(values))
+
+    def numbers(a: Vec3) -> tuple[float, float, float]:
+        return number(a[0]), number(a[1]), number(a[2])
+
+    return RigidTree(
+        numbers(robot.gravity),
+        tuple(
+            BodyEntry(
+                link.name,
+                link.parent,
+                link.joint.name,
+                link.joint.kind,
+                link.joint.coordinate,
+                link.joint.ratio,
+                link.joint.rotation,  # type: ignore[arg-type]
+                numbers(link.joint.translation),
+                number(link.mass),
+                numbers(link.com),
+                (numbers(link.inertia[0]), numbers(link.inertia[1]), numbers(link.inertia[2])),
+            )
+            for link in robot.links
+        ),
+    )

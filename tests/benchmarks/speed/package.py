@@ -35,7 +35,7 @@ class Package:
     def operations(self) -> int:
         """Additions and multiplications of all links."""
         links = sum(link["operations"] for link in self.manifest["links"])
-        return int(self.manifest["fused_operations"] or links)
+        return int(self.manifest["shared_operations"] or links)
 
     @property
     def outputs(self) -> int:
