@@ -11,8 +11,7 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, read_robot
 from linkwise.robot.robot import Robot
-from linkwise.symbolic.link_energy import link_energies
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import System, rigid_system
 from linkwise.symbolic.user_energies import read_energies
 
 
@@ -26,7 +25,7 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
                     "energies in Python take no --lock, --root, --tip or --base; change the energies"
                 )
             return read_energies(Path(spec), options.parameters == "symbolic")
-    return link_energies(read_robot(spec, options))
+    return rigid_system(read_robot(spec, options))
 
 
 def generate(
@@ -41,7 +40,7 @@ def generate(
     `request` goes into the manifest, so that a reader sees how to make the package again.
     Raises LinkwiseError for a name or back end that cannot be.
     """
-    system = link_energies(robot) if isinstance(robot, Robot) else robot
+    system = rigid_system(robot) if isinstance(robot, Robot) else robot
     chosen = _chosen(backends)
     package = name if name is not None else identifier(system.name)
     if package != identifier(package):

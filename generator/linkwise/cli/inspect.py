@@ -3,24 +3,24 @@
 from typing import Any
 
 from linkwise.emit.assemble import rigid_tree
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import RigidSystem, System
 
 
 def inspection(system: System) -> dict[str, Any]:
     """Joints, links, parameters and the reader's notes, ready for JSON."""
     tree = rigid_tree(system)
     mass = {body.link: body.mass for body in tree.bodies} if tree else {}
-    notes = system.robot.notes if system.robot is not None else ()
+    notes = system.robot.notes if isinstance(system, RigidSystem) else ()
     return {
         "name": system.name,
         "joints": [{"name": c.name, "unit": c.unit} for c in system.coordinates],
         "links": [
             {
-                "name": link.name,
+                "name": name,
                 "path": [system.coordinates[k].name for k in system.path(j)],
-                "mass": mass.get(link.name),
+                "mass": mass.get(name),
             }
-            for j, link in enumerate(system.links)
+            for j, name in enumerate(system.link_names)
         ],
         "parameters": {s.name: float(v) for s, v in system.parameters.items()},
         "notes": [{"kind": n.kind, "subject": n.subject, "detail": n.detail} for n in notes],

@@ -105,15 +105,17 @@ def reduction(
     from linkwise.report.files import json_text, require_writable, write_all
     from linkwise.report.publish import study_files
     from linkwise.report.study import study
+    from linkwise.robot import read_robot
+    from linkwise.symbolic.system import rigid_system
 
     first, last = dof_range(dof)
     _require_budget(budget)
     options = reading_options(lock, "symbolic", root=root, tip=tip)
     if robot == "planar":
-        arm = read_system(f"planar{_planar_joints(last, len(options.lock))}", options)
-        name, system, beyond = PLANAR_ARM, replace(arm, name=PLANAR_ARM), CHECKED_TO
+        arm = rigid_system(read_robot(f"planar{_planar_joints(last, len(options.lock))}", options))
+        name, system, beyond = PLANAR_ARM, replace(arm, robot=replace(arm.robot, name=PLANAR_ARM)), CHECKED_TO
     else:
-        name, system, beyond = Path(robot).stem, read_system(robot, options), last
+        name, system, beyond = Path(robot).stem, read_system(robot, options), last  # type: ignore[assignment]
     found = None if seconds is None else measured_text.read(seconds)
     if out is not None:
         require_writable(out)

@@ -16,7 +16,7 @@ from linkwise.dynamics.kernel import Kernel, decomposition_cost
 from linkwise.emit.render import render
 from linkwise.package.manifest import BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
 from linkwise.robot.robot import Scalar, Vec3
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import EnergySystem, System
 from linkwise.version import VERSION
 
 LONGEST_NAME = 60
@@ -93,8 +93,8 @@ def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
         dict(derivation.request),
         tuple(JointEntry(c.name, c.unit) for c in system.coordinates),
         tuple(
-            LinkEntry(link.name, system.path(j), decomposition_cost([kernel]))
-            for j, (link, kernel) in enumerate(zip(system.links, derivation.kernels, strict=True))
+            LinkEntry(name, system.path(j), decomposition_cost([kernel]))
+            for j, (name, kernel) in enumerate(zip(system.link_names, derivation.kernels, strict=True))
         ),
         decomposition_cost([shared]) if shared else None,
         {s.name: float(v) for s, v in system.parameters.items()},
@@ -105,9 +105,9 @@ def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
 
 def rigid_tree(system: System) -> RigidTree | None:
     """Return where the bodies are, numbers only, to draw and to check; None for a user's own energies."""
-    robot = system.robot
-    if robot is None:
+    if isinstance(system, EnergySystem):
         return None
+    robot = system.robot
     values = dict(system.parameters)
 
     def number(scalar: Scalar) -> float:

@@ -37,12 +37,12 @@ def _autograd(d: Derivation) -> Files:
 
 
 def _torch(d: Derivation) -> Files:
-    yield from closed_form_files(d.system, d.kernels, "torch")
+    yield from closed_form_files(d.system, d.kernels)
     yield from _runtime("torch_backend")
 
 
 def _numpy(d: Derivation) -> Files:
-    yield from closed_form_files(d.system, d.kernels, "numpy")
+    yield from closed_form_files(d.system, d.kernels)
 
 
 def _native(d: Derivation) -> Files:

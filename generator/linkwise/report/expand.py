@@ -14,7 +14,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.report import laurent
 from linkwise.report.laurent import Laurent
 from linkwise.robot.robot import Coordinate
-from linkwise.symbolic.system import Definition
+from linkwise.symbolic.link_energy import Definition
 
 ROUNDING = 1e-9
 """Where a fixed angle is no right angle, smaller shares of the largest coefficient are rounding."""

@@ -14,15 +14,14 @@ from typing import Any
 
 from linkwise.dynamics.derive import derive
 from linkwise.dynamics.kernel import Kernel
-from linkwise.emit.energies import fetched
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
-from linkwise.emit.straight_line import straight_line
+from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.expression.graph import Node
 from linkwise.pipeline import generate
 from linkwise.progress import Progress
 from linkwise.report.extras import report_extra
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import EnergySystem, System, rigid_system
 
 BATCH = 1024
 REPEATS, SHORTEST = 7, 0.02
@@ -68,10 +67,10 @@ def measure(system: System, dof: tuple[int, ...], progress: Progress) -> tuple[T
 
 def first_links(system: System, n: int) -> System:
     """Return the serial arm of the first n links."""
+    if isinstance(system, EnergySystem):
+        return replace(system, coordinates=system.coordinates[:n], links=system.links[:n])
     robot = system.robot
-    if robot is not None:
-        robot = replace(robot, coordinates=robot.coordinates[:n], links=robot.links[:n])
-    return replace(system, coordinates=system.coordinates[:n], links=system.links[:n], robot=robot)
+    return rigid_system(replace(robot, coordinates=robot.coordinates[:n], links=robot.links[:n]))
 
 
 def machine() -> dict[str, str]:

@@ -12,7 +12,8 @@ from linkwise.report.count import FORM, TermCount, count_terms
 from linkwise.report.expand import ROUNDING, Expansion, Variables
 from linkwise.report.laurent import BudgetExceededError, ExponentError, Laurent
 from linkwise.report.torque import Differentiation
-from linkwise.symbolic.system import LinkEnergy, System
+from linkwise.symbolic.link_energy import StepwiseEnergy, link_energies
+from linkwise.symbolic.system import RigidSystem, System
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ def link_torques(
     """Expand the first `links` links (None: all); raises BudgetExceededError at one too large."""
     rounding = 0.0 if is_exact(system) else ROUNDING
     expansion = Expansion(system.coordinates, budget, rounding)
-    wanted = system.links[:links]
+    wanted = link_energies(system)[:links]
     for j, link in enumerate(wanted):
         with within(f"link {link.name!r}"):
             try:
@@ -51,7 +52,7 @@ def link_torques(
 
 
 def _torques(
-    expansion: Expansion, link: LinkEnergy, joints: tuple[int, ...], path: tuple[int, ...]
+    expansion: Expansion, link: StepwiseEnergy, joints: tuple[int, ...], path: tuple[int, ...]
 ) -> dict[int, Laurent]:
     """Torques of a link on those of the joints that move it, by joint."""
     chosen = [i for i in path if i in joints]
@@ -65,9 +66,11 @@ def _torques(
 
 def is_exact(system: System) -> bool:
     """Whether no coefficient is rounded: rotations of 0 and ±1, no angle offsets, no irrational number."""
-    links = system.robot.links if system.robot is not None else ()
+    links = system.robot.links if isinstance(system, RigidSystem) else ()
     straight = all(e in (-1.0, 0.0, 1.0) for link in links for row in link.joint.rotation for e in row)
-    return straight and all(_is_rational(e.kinetic) and _is_rational(e.potential) for e in system.links)
+    return straight and all(
+        _is_rational(e.kinetic) and _is_rational(e.potential) for e in link_energies(system)
+    )
 
 
 def _is_rational(energy: sp.Expr) -> bool:
