@@ -31,9 +31,7 @@ class Terms:
     @classmethod
     def of(cls, robot: Robot, convention: Convention) -> "Terms":
         """Plan where each packed value of the robot goes."""
-        zero = np.zeros((1, len(robot.joints)))
-        layout = robot.model.packed(zero, zero, zero).layout
-        columns = columns_of(robot, layout)
+        columns = columns_of(robot, robot.model.layout)
         row = {column.key: at for at, column in enumerate(columns)}
         parts = [
             (at, _rows(columns, TERMS, joint=c.joint, link=c.link))
