@@ -13,7 +13,6 @@ from linkwise.dynamics.kernel import lowering
 from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Graph
 from linkwise.symbolic.link_energy import lineage, link_energies
-from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import System
 
 BLOCKS = ("acceleration", "velocity", "gravity", "torque", "position_gradient")

@@ -10,9 +10,6 @@ from linkwise.errors import LinkwiseError
 from linkwise.package.load import Model, Package, open_package
 from linkwise.package.manifest import FILE, BodyEntry
 
-BACKENDS = ("native", "numpy")
-"""Back ends in the order tried: compiled C is the fastest, NumPy always works."""
-
 
 @dataclass(frozen=True)
 class Robot:
@@ -36,7 +33,7 @@ def load_robot(directory: Path, backend: str | None = None) -> Robot:
     """Import the package in `directory`, with `backend` or the fastest that works here."""
     package = open_package(directory)
     manifest = package.manifest
-    chosen, model = _load(package, BACKENDS if backend is None else (backend,))
+    chosen, model = _load(package, package.fastest_first if backend is None else (backend,))
     tree = manifest.tree
     return Robot(
         manifest.name,

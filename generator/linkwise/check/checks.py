@@ -103,9 +103,9 @@ def _oracle(package: Package, loaded: dict[str, Model], states: States) -> Oracl
     manifest = package.manifest
     if manifest.tree is not None:
         return recursion_oracle(NewtonEuler(manifest, manifest.tree), states)
-    if "autograd" not in loaded:
-        return None
-    return difference_oracle(package.module.load("autograd").backend.modules, states)
+    backends = [model.backend for model in loaded.values()]
+    lagrangians = next((backend.modules for backend in backends if hasattr(backend, "modules")), None)
+    return None if lagrangians is None else difference_oracle(lagrangians, states)
 
 
 def _line(error: Exception) -> str:

@@ -4,15 +4,19 @@ import hashlib
 import keyword
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import resources
 from typing import Any
 
 import sympy as sp
 
+from linkwise import runtime
 from linkwise.dynamics.derive import fused_kernel
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
+from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.render import render
 from linkwise.package.manifest import BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
 from linkwise.robot.robot import Scalar, Vec3
@@ -20,6 +24,8 @@ from linkwise.symbolic.system import EnergySystem, System
 from linkwise.version import VERSION
 
 LONGEST_NAME = 60
+SHARED_RUNTIME = ("__init__.py", "dense.py", "dynamics.py", "interface.py", "quantities.py", "structure.py")
+"""Files of linkwise/runtime that every package has."""
 TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}
 
 
@@ -51,14 +57,14 @@ def identifier(name: str) -> str:
     return text
 
 
-def shared_files(derivation: Derivation, backends: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Files that serve every back end; `backends` are those that `load` is to know."""
-    from linkwise.emit.backend import BACKENDS
-
-    system = derivation.system
-    shared = {"version": VERSION}
+def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iterator[tuple[str, str]]:
+    """Files that serve every back end, and the runtime files of those `chosen`, which `load` is to know."""
+    loadable = {backend: backend.loading for backend in chosen if backend.loading}
+    fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
+    system, shared = derivation.system, {"version": VERSION}
     names = {
         **shared,
+        "name": repr(derivation.package),
         "joints": [ascii(c.name) for c in system.coordinates],
         "units": [repr(c.unit) for c in system.coordinates],
         "links": [ascii(link.name) for link in system.links],
@@ -66,20 +72,45 @@ def shared_files(derivation: Derivation, backends: Sequence[str]) -> Iterator[tu
         "linear": repr(tuple(sorted(derivation.linear))),
         "parameters": [(ascii(s.name), repr(float(v))) for s, v in system.parameters.items()],
     }
-    load = {
+    init = {
         **shared,
-        "backends": tuple(backends),
-        "default": repr(backends[0]) if backends else "None",
-        "docs": [(name, BACKENDS[name].doc) for name in backends],
-        "modules": {name: BACKENDS[name].module for name in backends},
+        "package": derivation.package,
+        "default": next((backend.name for backend in loadable), ""),
+        "makers": [Maker.of(backend, loading) for backend, loading in loadable.items()],
+        "fastest_first": [backend.name for backend, _ in fastest_first],
+        "parameters": _parameter_lines(system),
     }
-    yield "__init__.py", render("package/init.py.j2", {**shared, "package": derivation.package})
+    yield "__init__.py", render("package/init.py.j2", init)
     yield "names.py", render("package/names.py.j2", names)
-    yield "load.py", render("package/load.py.j2", load)
-    yield "dynamics.py", render("package/dynamics.py.j2", shared)
-    yield "packing.py", render("package/packing.py.j2", shared)
-    if backends:
-        yield "numpy_backend.py", render("package/numpy_backend.py.j2", shared)
+    yield "py.typed", ""
+    copied = {name for backend in loadable for name in backend.runtime}
+    for name in sorted(copied.union(SHARED_RUNTIME)):
+        yield f"runtime/{name}", resources.files(runtime).joinpath(name).read_text(encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Maker:
+    """A function of the package's __init__.py that makes one back end."""
+
+    name: str
+    doc: str
+    imports: tuple[str, ...]
+    made: str
+
+    @classmethod
+    def of(cls, backend: BackendFiles, loading: Loading) -> "Maker":
+        """Its class comes from runtime/, and is the first word of the expression."""
+        made = loading.made.partition("(")[0]
+        imported = f"from .runtime.{loading.module} import {made}"
+        return cls(backend.name, backend.doc, (*loading.imports, imported), loading.made)
+
+
+def _parameter_lines(system: System) -> list[str]:
+    """Names of the parameters as lines of a docstring, which none of their characters can end."""
+    if not system.parameters:
+        return ["none: generate with --parameters symbolic"]
+    text = ", ".join(ascii(symbol.name) for symbol in system.parameters)
+    return textwrap.wrap(text.replace("\\", "\\\\").replace('"', '\\"'), 100, break_long_words=False)
 
 
 def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:

@@ -34,6 +34,7 @@ class Model(Protocol):
     joint_units: Sequence[str]
     link_names: Sequence[str]
     layout: PackedLayout
+    backend: Any
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """τ_ij (..., n, N)."""
@@ -66,6 +67,11 @@ class Package:
     def backends(self) -> tuple[str, ...]:
         """Names of the back ends that can be loaded."""
         return tuple(self.module.BACKENDS)
+
+    @property
+    def fastest_first(self) -> tuple[str, ...]:
+        """The same, the fastest for large batches first."""
+        return tuple(self.module.FASTEST_FIRST)
 
     def load(self, backend: str) -> Model:
         """Model on a back end; passes on whatever the package raises, a missing library say."""
