@@ -22,14 +22,13 @@ from linkwise.report.seconds import Timing, row_view
 from linkwise.report.study import study, verdicts
 from linkwise.report.study_text import page
 from linkwise.robot import Options, read_robot
-from linkwise.symbolic.link_energy import link_energies
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import System, rigid_system
 
 GOLDEN = json.loads((Path(__file__).parent / "data" / "term_counts.json").read_text())
 
 
 def planar(n: int) -> System:
-    return link_energies(read_robot(f"planar{n}", Options(parameters="symbolic")))
+    return rigid_system(read_robot(f"planar{n}", Options(parameters="symbolic")))
 
 
 @pytest.fixture(scope="module")

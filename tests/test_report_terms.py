@@ -22,8 +22,7 @@ from linkwise.report.terms import terms_report
 from linkwise.report.terms_text import data, page
 from linkwise.robot import Options, read_robot
 from linkwise.robot.robot import Coordinate
-from linkwise.symbolic.link_energy import link_energies
-from linkwise.symbolic.system import LinkEnergy, System
+from linkwise.symbolic.system import EnergySystem, LinkEnergy, System, rigid_system
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 from sympy.simplify.fu import TR8
 
@@ -37,7 +36,7 @@ ARITHMETIC = {
 
 
 def symbolic(name: str) -> System:
-    return link_energies(read_robot(name, Options(parameters="symbolic")))
+    return rigid_system(read_robot(name, Options(parameters="symbolic")))
 
 
 def spring_pendulum() -> System:
@@ -50,7 +49,7 @@ def spring_pendulum() -> System:
         LinkEnergy("bob", kinetic + w * a.qd * sp.sin(2 * a.q), -m * g * length * sp.cos(a.q)),
     )
     values = dict.fromkeys((m, c, k, length, w, g), 1.0)
-    return System("spring_pendulum", (x, a), links, values)
+    return EnergySystem("spring_pendulum", (x, a), links, values)
 
 
 def values_at_random(system: System, seed: int) -> dict[str, float]:
@@ -143,7 +142,7 @@ def twisted(cosine: float, sine: float) -> System:
     robot = read_robot("planar3", Options(parameters="symbolic"))
     turn = ((1.0, 0.0, 0.0), (0.0, cosine, -sine), (0.0, sine, cosine))
     links = [replace(link, joint=replace(link.joint, rotation=turn)) for link in robot.links[1:]]
-    return link_energies(replace(robot, links=(robot.links[0], *links)))
+    return rigid_system(replace(robot, links=(robot.links[0], *links)))
 
 
 def test_rounded_rotations_leave_no_spurious_terms() -> None:
@@ -161,7 +160,7 @@ def test_an_angle_offset_leaves_no_spurious_terms() -> None:
     a, m = Coordinate("a"), sp.Symbol("m", real=True)
     sine, cosine = sp.sin(a.q + 0.3), sp.cos(a.q + 0.3)
     arm = LinkEnergy("arm", m * (sine**2 + cosine**2) * a.qd**2 / 2, m * cosine)
-    report = terms_report(System("offset", (a,), (arm,), {m: 1.0}), Question(), 100, False, silent)
+    report = terms_report(EnergySystem("offset", (a,), (arm,), {m: 1.0}), Question(), 100, False, silent)
     # m q̈, and cos 0.3 and sin 0.3 times one wave each.
     assert report.rows[0].count.total == 3
 
@@ -191,19 +190,19 @@ def test_a_robot_whose_first_link_exceeds_the_budget_is_refused() -> None:
 )
 def test_an_energy_without_terms_is_refused_by_name(energy: sp.Expr, complaint: str) -> None:
     a = Coordinate("a")
-    system = System("odd", (a,), (LinkEnergy("arm", a.qd**2, energy * a.q),))
+    system = EnergySystem("odd", (a,), (LinkEnergy("arm", a.qd**2, energy * a.q),))
     with pytest.raises(LinkwiseError, match=f"link 'arm': .*{complaint}"):
         terms_report(system, Question(), 10**6, False, silent)
 
 
 def test_equal_parameters_on_two_links_are_collected_in_their_sum() -> None:
-    numeric = link_energies(read_robot("planar2", Options(parameters="numeric")))
+    numeric = rigid_system(read_robot("planar2", Options(parameters="numeric")))
     *links, total = terms_report(numeric, Question(), 10**6, False, silent).rows
     assert total.count.total < sum(row.count.total for row in links)
 
 
 def test_the_part_kept_is_counted_with_its_motion() -> None:
-    leg = link_energies(read_robot(Path(__file__).parent / "data" / "leg.toml", Options("symbolic")))
+    leg = rigid_system(read_robot(Path(__file__).parent / "data" / "leg.toml", Options("symbolic")))
     report = terms_report(leg, Question(), 10**6, False, silent)
     # Each segment adds m q̈ to the force along the first slide; together (m1 + m2 + m3 + m4) q̈.
     parts = [cost.rows[0].part for cost in report.operations]
@@ -228,7 +227,7 @@ def test_a_part_costs_what_its_product_costs(order: int, coordinate: int, operat
     m, k = sp.symbols("m k", real=True)
     energy = LinkEnergy("arm", m * a.qd**2 / 2 + a.qd * b.qd, k * sp.sin(a.q))
     tail = LinkEnergy("tail", c.qd**2, sp.S.Zero)
-    system = System("odd", (a, b, c), (energy, tail), {m: 1.0, k: 1.0})
+    system = EnergySystem("odd", (a, b, c), (energy, tail), {m: 1.0, k: 1.0})
     (cost,) = terms_report(system, Question(0, 0, coordinate, order), 100, False, silent).operations
     part = cost.rows[0].part
     assert (part and part.shared) == operations
