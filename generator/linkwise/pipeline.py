@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.dynamics.derive import derive
-from linkwise.emit.assemble import Derivation, identifier, manifest, shared_files
+from linkwise.emit.assemble import Derivation, identifier, package_files
 from linkwise.emit.backend import BACKENDS
 from linkwise.errors import LinkwiseError, within
 from linkwise.progress import Progress, silent
@@ -49,14 +49,7 @@ def generate(
             f"--name {package[:80]!r} is no module name of its own; use up to 60 letters a-z, digits and _"
         )
     derivation = Derivation(system, derive(system, progress), package, request or {})
-    files: dict[str, str] = {}
-    for number, backend in enumerate(chosen):
-        progress("emit", number, len(chosen))
-        files.update(BACKENDS[backend].files(derivation))
-    progress("emit", len(chosen), len(chosen))
-    files.update(shared_files(derivation, [b for b in chosen if BACKENDS[b].module]))
-    files["manifest.json"] = manifest(derivation, files).text()
-    return files
+    return package_files(derivation, chosen, progress)
 
 
 def _chosen(backends: Iterable[str]) -> tuple[str, ...]:

@@ -14,7 +14,8 @@ import sympy as sp
 from linkwise.dynamics.derive import fused_kernel
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
 from linkwise.emit.render import render
-from linkwise.package.manifest import BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
+from linkwise.package.manifest import FILE, BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
+from linkwise.progress import Progress, silent
 from linkwise.robot.robot import Scalar, Vec3
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
@@ -41,6 +42,22 @@ class Derivation:
     def linear(self) -> frozenset[int]:
         """Links whose energy has terms linear in the velocities."""
         return frozenset(j for j, k in enumerate(self.kernels) if k.forms[0].velocity_linear)
+
+
+def package_files(
+    derivation: Derivation, backends: Sequence[str], progress: Progress = silent
+) -> dict[str, str]:
+    """Files of a package with these back ends, in the registry's order: {path inside the package: text}."""
+    from linkwise.emit.backend import BACKENDS
+
+    files: dict[str, str] = {}
+    for number, backend in enumerate(backends):
+        progress("emit", number, len(backends))
+        files.update(BACKENDS[backend].files(derivation))
+    progress("emit", len(backends), len(backends))
+    files.update(shared_files(derivation, [b for b in backends if BACKENDS[b].module]))
+    files[FILE] = manifest(derivation, files).text()
+    return files
 
 
 def identifier(name: str) -> str:
