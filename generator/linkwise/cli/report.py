@@ -52,20 +52,26 @@ def terms(
 ) -> None:
     """Count terms and operations of the partial torques, and those that one bucket needs."""
     from linkwise.cli.options import reading_options
+    from linkwise.output import require_writable, write_files
     from linkwise.pipeline import read_system
     from linkwise.progress import progress
-    from linkwise.report import terms_text
-    from linkwise.report.files import json_text, require_writable, write_all
-    from linkwise.report.publish import terms_files
-    from linkwise.report.question import Question, position
-    from linkwise.report.terms import terms_report
+    from linkwise.report import (
+        TermQuery,
+        json_text,
+        position,
+        progress_line,
+        terms_files,
+        terms_json,
+        terms_markdown,
+        terms_report,
+    )
 
     _require_budget(budget)
     if order not in (0, 1, 2):
         raise LinkwiseError(f"--order is {order}; choose 2 for acceleration, 1 for velocity, 0 for gravity")
     system = read_system(robot, reading_options(lock, parameters, root=root, tip=tip))
     joints, links = [c.name for c in system.coordinates], [part.name for part in system.links]
-    question = Question(
+    query = TermQuery(
         None if joint == "all" else position(joint, joints, "--joint"),
         None if link == "all" else position(link, links, "--link"),
         position(coordinate, joints, "--coordinate"),
@@ -74,12 +80,12 @@ def terms(
     if out is not None:
         require_writable(out)
     with progress() as advance:
-        result = terms_report(system, question, budget, partial, advance)
+        result = terms_report(system, query, budget, partial, advance)
     if out is not None:
-        write_all(out, terms_files(result))
-    typer.echo(json_text(terms_text.data(result)) if as_json else terms_text.page(result), nl=False)
+        write_files(out, terms_files(result))
+    typer.echo(json_text(terms_json(result)) if as_json else terms_markdown(result), nl=False)
     if not result.complete:
-        typer.echo(terms_text.progress_line(result), err=True)
+        typer.echo(progress_line(result), err=True)
 
 
 def reduction(
@@ -98,40 +104,45 @@ def reduction(
 ) -> None:
     """Draw the share of terms of τ_1 that its q̈_1 part does not need (the paper's Fig. 15)."""
     from linkwise.cli.options import reading_options
+    from linkwise.output import require_writable, write_files
     from linkwise.pipeline import read_system
     from linkwise.progress import progress
-    from linkwise.report import measured_text, study_text
-    from linkwise.report import seconds as timing
-    from linkwise.report.files import json_text, require_writable, write_all
-    from linkwise.report.publish import study_files
-    from linkwise.report.study import study
-    from linkwise.robot import read_robot
-    from linkwise.symbolic.system import rigid_system
+    from linkwise.report import (
+        json_text,
+        measure,
+        read_seconds,
+        reduction_json,
+        reduction_markdown,
+        seconds_json,
+        seconds_markdown,
+        study,
+        study_files,
+    )
 
     first, last = dof_range(dof)
     _require_budget(budget)
     options = reading_options(lock, "symbolic", root=root, tip=tip)
     if robot == "planar":
-        arm = rigid_system(read_robot(f"planar{_planar_joints(last, len(options.lock))}", options))
-        name, system, beyond = PLANAR_ARM, replace(arm, robot=replace(arm.robot, name=PLANAR_ARM)), CHECKED_TO
+        arm = read_system(f"planar{_planar_joints(last, len(options.lock))}", options)
+        name, system, beyond = PLANAR_ARM, replace(arm, name=PLANAR_ARM), CHECKED_TO
     else:
-        name, system, beyond = Path(robot).stem, read_system(robot, options), last  # type: ignore[assignment]
-    found = None if seconds is None else measured_text.read(seconds)
+        name, system, beyond = Path(robot).stem, read_system(robot, options), last
+    found = None if seconds is None else read_seconds(seconds)
     if out is not None:
         require_writable(out)
     with progress() as advance:
         result = study(name, system, first, last, beyond, budget, advance)
         if measured and found is None:
-            found = measured_text.data(name, timing.measure(system, result.dof, advance))
+            found = seconds_json(name, measure(system, result.dof, advance))
     if out is not None:
-        write_all(out, study_files(result, found))
+        write_files(out, study_files(result, found))
     if as_json:
         measurement = {} if found is None else {"measured": found}
-        typer.echo(json_text(study_text.data(result) | measurement), nl=False)
+        typer.echo(json_text(reduction_json(result) | measurement), nl=False)
         return
-    typer.echo(study_text.page(result), nl=False)
+    typer.echo(reduction_markdown(result), nl=False)
     if found is not None:
-        typer.echo("\n" + measured_text.page(result, found), nl=False)
+        typer.echo("\n" + seconds_markdown(result, found), nl=False)
 
 
 def _require_budget(budget: int) -> None:
@@ -154,6 +165,6 @@ def dof_range(text: str) -> tuple[int, int]:
     first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
     if not 1 <= first <= last:
         raise LinkwiseError(
-            f"--dof {text!r} is no range; write FIRST..LAST with 1 ≤ FIRST ≤ LAST, such as 1..10"
+            f"--dof {text!r} is not a range; write FIRST..LAST with 1 ≤ FIRST ≤ LAST, such as 1..10"
         )
     return first, last

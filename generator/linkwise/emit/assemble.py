@@ -5,7 +5,7 @@ import keyword
 import re
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
@@ -18,7 +18,9 @@ from linkwise.dynamics.derive import fused_kernel
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.render import render
-from linkwise.package.manifest import BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
+from linkwise.errors import LinkwiseError
+from linkwise.package.manifest import FILE, BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
+from linkwise.progress import Progress, silent
 from linkwise.robot.robot import Scalar, Vec3
 from linkwise.symbolic.system import EnergySystem, System
 from linkwise.version import VERSION
@@ -49,12 +51,37 @@ class Derivation:
         return frozenset(j for j, k in enumerate(self.kernels) if k.forms[0].velocity_linear)
 
 
+def package_files(
+    derivation: Derivation, backends: Sequence[BackendFiles], progress: Progress = silent
+) -> dict[str, str]:
+    """Files of a package with these back ends: {path inside the package: text}."""
+    files: dict[str, str] = {}
+    emitters = list(dict.fromkeys(emitter for backend in backends for emitter in backend.emits))
+    for number, emitter in enumerate(emitters):
+        progress("emit", number, len(emitters))
+        files.update(emitter(derivation))
+    progress("emit", len(emitters), len(emitters))
+    files.update(shared_files(derivation, backends))
+    files[FILE] = manifest(derivation, files).text()
+    return files
+
+
 def identifier(name: str) -> str:
     """Module name made of a robot's name: letters, digits, underscores; no keyword, no module in use."""
     text = re.sub(r"[^0-9a-z_]+", "_", name.lower()).strip("_")[:LONGEST_NAME] or "robot"
     if text[0].isdigit() or keyword.iskeyword(text) or text in TAKEN:
         text = f"robot_{text}"
     return text
+
+
+def checked_identifier(name: str | None, robot: str) -> str:
+    """The package name asked for, or one made of the robot's; raises LinkwiseError for one that cannot be."""
+    package = name if name is not None else identifier(robot)
+    if package != identifier(package):
+        raise LinkwiseError(
+            f"--name {package[:80]!r} is not a usable module name; use up to 60 letters a-z, digits and _"
+        )
+    return package
 
 
 def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iterator[tuple[str, str]]:

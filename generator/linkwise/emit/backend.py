@@ -5,9 +5,11 @@ An entry is read by the command line too, so that this file imports what emits o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from linkwise.errors import LinkwiseError
 
 if TYPE_CHECKING:
     from linkwise.emit.assemble import Derivation
@@ -133,3 +135,13 @@ BACKENDS: dict[str, BackendFiles] = {
         BackendFiles("formulas", "closed forms to read, for small robots", emits=(_formulas,)),
     )
 }
+
+
+def chosen_backends(names: Iterable[str]) -> tuple[BackendFiles, ...]:
+    """Back ends by name and those that they need, in this order; raises LinkwiseError for an unknown name."""
+    wanted = list(names)
+    for name in wanted:
+        if name not in BACKENDS:
+            raise LinkwiseError(f"no back end {name!r}; choose among {', '.join(BACKENDS)}")
+    wanted += [needed for name in wanted for needed in BACKENDS[name].needs]
+    return tuple(backend for name, backend in BACKENDS.items() if name in wanted)

@@ -1,20 +1,25 @@
 """Measured seconds as data and as a page; read back, they draw the same plot again."""
 
 import json
+import platform
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
-from linkwise.report.seconds import BATCH, Timing, machine
-from linkwise.report.study import Study
+from linkwise.extras import extra
+from linkwise.report.reduction_curve import Study
+from linkwise.report.seconds import BATCH, Timing
 
 DIGITS = 4
 
 
-def data(robot: str, timings: tuple[Timing, ...]) -> dict[str, Any]:
-    """Return the measurement as JSON values; times in µs a sample."""
+def seconds_json(robot: str, timings: Sequence[Timing]) -> dict[str, Any]:
+    """Return the measurement, and where it was made, as JSON values; times in µs a sample."""
     rows = [{**asdict(t), "reduction": t.reduction} for t in timings]
     return {
         "schema": 1,
@@ -23,15 +28,18 @@ def data(robot: str, timings: tuple[Timing, ...]) -> dict[str, Any]:
         "batch": BATCH,
         "threads": 1,
         "dtype": "float64",
-        **machine(),
+        "machine": platform.machine(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "torch": extra("torch").__version__,
         "timings": [
             {k: round(v, DIGITS) if isinstance(v, float) else v for k, v in row.items()} for row in rows
         ],
     }
 
 
-def read(path: Path) -> dict[str, Any]:
-    """Read an earlier measurement; raises LinkwiseError for a file that is none."""
+def read_seconds(path: Path) -> dict[str, Any]:
+    """Read an earlier measurement; raises LinkwiseError for a file that is not one."""
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         timings_of(found)
@@ -58,25 +66,22 @@ def timings_of(found: dict[str, Any]) -> tuple[Timing, ...]:
     )
 
 
-def page(result: Study, found: dict[str, Any], pictures: bool = False) -> str:
+def seconds_markdown(result: Study, found: dict[str, Any], pictures: bool = False) -> str:
     """Return the measurement as Markdown; with its picture where that lies beside it."""
     timings = timings_of(found)
+    methods = dict.fromkeys(t.method for t in timings)
     view = {
         "pictures": pictures,
         "robot": found["robot"],
         "batch": found["batch"],
         "machine": ", ".join(f"{k} {found[k]}" for k in ("machine", "python", "numpy", "torch")),
-        "verdicts": [_verdict(result, [t for t in timings if t.method == m]) for m in _methods(timings)],
+        "verdicts": [_verdict(result, [t for t in timings if t.method == m]) for m in methods],
         "rows": [_line(t) for t in timings],
     }
     return render("report/measured.md.j2", view)
 
 
-def _methods(timings: tuple[Timing, ...]) -> list[str]:
-    return list(dict.fromkeys(t.method for t in timings))
-
-
-def _verdict(result: Study, timings: list[Timing]) -> str:
+def _verdict(result: Study, timings: Sequence[Timing]) -> str:
     last = timings[-1]
     terms = {p.dof: p.reduction for p in result.points}.get(last.dof)
     text = (

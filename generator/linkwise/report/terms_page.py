@@ -1,31 +1,29 @@
-"""The terms report as data, as a table and as a page."""
+"""The terms report as data and as a page."""
 
 from collections.abc import Sequence
 from typing import Any
 
 from linkwise.emit.render import render
-from linkwise.report.files import csv_text
 from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations
-from linkwise.report.terms import TermsReport, TorqueTerms
+from linkwise.report.torque_terms import TermsReport, TorqueTerms
 
 DIGITS = 6
 """Decimals of a rate: more would be noise in a file that is compared byte for byte."""
 
 
-def data(report: TermsReport) -> dict[str, Any]:
+def terms_json(report: TermsReport) -> dict[str, Any]:
     """Return the whole report as JSON values; joints and links count from 1."""
-    question = report.question
     return {
         "schema": 1,
         "robot": report.robot,
         "form": report.form,
-        "kept": str(question),
+        "kept": str(report.query),
         "joints": list(report.joints),
         "links": list(report.links),
         "complete": report.complete,
         "links_counted": report.counted,
         "term_budget": report.budget,
-        "torques": [_torque(row) for row in report.rows],
+        "torques": [torque_row(row) for row in report.rows],
         "operations": [_operations(cost) for cost in report.operations],
         "operations_of_sums": {
             str(i + 1): {"torque": _pair(torque), "kept": _pair(part)}
@@ -34,13 +32,14 @@ def data(report: TermsReport) -> dict[str, Any]:
     }
 
 
-def _torque(row: TorqueTerms) -> dict[str, Any]:
+def torque_row(row: TorqueTerms) -> dict[str, Any]:
+    """Return one torque as JSON values."""
     return {
         "joint": row.joint + 1,
         "link": "all" if row.link is None else row.link + 1,
         "terms": row.count.total,
         "kept": row.kept,
-        "reduction": rate(row.reduction),
+        "reduction": None if row.reduction is None else round(row.reduction, DIGITS),
         "acceleration": list(row.count.acceleration),
         "velocity": list(row.count.velocity),
         "gravity": row.count.gravity,
@@ -61,47 +60,21 @@ def _pair(cost: Operations | None) -> dict[str, int]:
     return {"before_sharing": cost.written, "after_sharing": cost.shared}
 
 
-def rate(value: float | None) -> float | None:
-    """Round a rate for print."""
-    return None if value is None else round(value, DIGITS)
-
-
-def table(report: TermsReport) -> str:
-    """Return every count as comma-separated values, one torque a row."""
-    n = range(1, len(report.joints) + 1)
-    header = ["joint", "link", "terms", "kept", "reduction", "gravity"]
-    header += [f"acceleration_{k}" for k in n] + [f"velocity_{k}" for k in n]
-    return csv_text(
-        header,
-        (
-            [t["joint"], t["link"], t["terms"], t["kept"], t["reduction"], t["gravity"]]
-            + t["acceleration"]
-            + t["velocity"]
-            for t in (_torque(row) for row in report.rows)
-        ),
-    )
-
-
-def page(report: TermsReport) -> str:
+def terms_markdown(report: TermsReport) -> str:
     """Return the report as Markdown."""
-    return render("report/terms.md.j2", view(report))
-
-
-def view(report: TermsReport) -> dict[str, Any]:
-    """Fields of the page's template."""
-    names = report.links
-    return {
+    view = {
         "robot": report.robot,
         "form": report.form,
-        "kept": str(report.question),
+        "kept": str(report.query),
         "progress": progress_line(report),
-        "summary": [_summary(row, names) for row in report.rows],
+        "summary": [_summary(row, report.links) for row in report.rows],
         "coordinates": list(range(1, len(report.joints) + 1)),
         "buckets": [
             (_name(row), row.count.gravity, row.count.acceleration, row.count.velocity) for row in report.rows
         ],
         "operations": _operation_lines(report),
     }
+    return render("report/terms.md.j2", view)
 
 
 def progress_line(report: TermsReport) -> str:

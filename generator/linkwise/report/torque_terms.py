@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
 from linkwise.progress import Progress
-from linkwise.report.count import TermCount
+from linkwise.report.expanded_torques import form_of, link_torques
 from linkwise.report.laurent import BudgetExceededError
 from linkwise.report.operations import LinkOperations, Operations, link_operations, summed
-from linkwise.report.question import Question
-from linkwise.report.survey import RunningCount, form_of, link_torques
+from linkwise.report.term_count import RunningCount, TermCount, TermQuery
 from linkwise.symbolic.system import System
 
 
@@ -35,7 +34,7 @@ class TermsReport:
     """
 
     robot: str
-    question: Question
+    query: TermQuery
     form: str
     joints: tuple[str, ...]
     links: tuple[str, ...]
@@ -53,42 +52,42 @@ class TermsReport:
 
 
 def terms_report(
-    system: System, question: Question, budget: int, partial: bool, progress: Progress
+    system: System, query: TermQuery, budget: int, partial: bool, progress: Progress
 ) -> TermsReport:
     """Count terms and operations; raises LinkwiseError for a robot beyond the budget.
 
     With `partial` the links that fit are reported, as long as there is one of those asked for.
     """
-    wanted = len(system.links) if question.link is None else question.link + 1
-    rows, counted = _rows(system, question, wanted, budget, progress)
+    wanted = len(system.links) if query.link is None else query.link + 1
+    rows, counted = _rows(system, query, wanted, budget, progress)
     if counted < wanted and not (partial and rows):
         raise LinkwiseError(
-            f"{system.name}: link {system.links[counted].name!r} needs more than {budget} terms, "
+            f"{system.name}: link {system.link_names[counted]!r} needs more than {budget} terms, "
             f"after {counted} of {wanted} links; raise --budget, or pass --partial to report on those"
         )
-    joints = question.joints(len(system.coordinates))
-    costs = tuple(link_operations(system, joints, question))
+    joints = query.joints(len(system.coordinates))
+    costs = tuple(link_operations(system, joints, query))
     return TermsReport(
         system.name,
-        question,
+        query,
         form_of(system),
         tuple(c.name for c in system.coordinates),
-        tuple(link.name for link in system.links),
+        system.link_names,
         counted,
         wanted,
         budget,
         rows,
-        tuple(cost for cost in costs if question.link in (None, cost.link)),
-        {i: summed(costs, i, question) for i in joints if question.link is None},
+        tuple(cost for cost in costs if query.link in (None, cost.link)),
+        {i: summed(costs, i, query) for i in joints if query.link is None},
     )
 
 
 def _rows(
-    system: System, question: Question, wanted: int, budget: int, progress: Progress
+    system: System, query: TermQuery, wanted: int, budget: int, progress: Progress
 ) -> tuple[tuple[TorqueTerms, ...], int]:
     """Counts of each τ_ij and of the sums over j, and how many links fitted the budget."""
     n = len(system.coordinates)
-    sums = {i: RunningCount(n) for i in question.joints(n)}
+    sums = {i: RunningCount(n) for i in query.joints(n)}
     rows: list[TorqueTerms] = []
     counted = 0
     try:
@@ -96,17 +95,17 @@ def _rows(
             for i, running in sums.items():
                 torque = found.torques.get(i)
                 own = TermCount.none(n) if torque is None else running.add(torque, found.variables)
-                if question.link in (None, found.link):
-                    rows.append(_row(i, found.link, own, question))
+                if query.link in (None, found.link):
+                    rows.append(_row(i, found.link, own, query))
             counted += 1
     except BudgetExceededError:
         pass  # the report says how far it got
-    if question.link is None and rows:
-        rows += [_row(i, None, running.count, question) for i, running in sums.items()]
+    if query.link is None and rows:
+        rows += [_row(i, None, running.count, query) for i, running in sums.items()]
     # τ_i1, τ_i2, …, then their sum, joint after joint.
     rows.sort(key=lambda row: (row.joint, wanted if row.link is None else row.link))
     return tuple(rows), counted
 
 
-def _row(joint: int, link: int | None, count: TermCount, question: Question) -> TorqueTerms:
-    return TorqueTerms(joint, link, count, count.kept(question.order, question.coordinate))
+def _row(joint: int, link: int | None, count: TermCount, query: TermQuery) -> TorqueTerms:
+    return TorqueTerms(joint, link, count, count.kept(query))

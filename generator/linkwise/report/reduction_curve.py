@@ -4,18 +4,27 @@ from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
 from linkwise.progress import Progress
+from linkwise.report.curve_fit import (
+    PAPER_A,
+    PAPER_RATE,
+    CountPolynomial,
+    Saturation,
+    count_polynomial,
+    fit,
+    held_against,
+)
+from linkwise.report.expanded_torques import form_of, link_torques
 from linkwise.report.laurent import BudgetExceededError
 from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations, link_operations, summed
-from linkwise.report.question import Question
-from linkwise.report.survey import RunningCount, link_torques
+from linkwise.report.term_count import RunningCount, TermQuery
 from linkwise.symbolic.system import System
 
-PAPER = Question(joint=0, link=None, coordinate=0, order=2)
+PAPER = TermQuery(joint=0, link=None, coordinate=0, order=2)
 """The paper's: from τ_1, what contains q̈_1."""
 
 
 @dataclass(frozen=True)
-class Point:
+class CurvePoint:
     """The arm of the first `dof` links: Σ_j τ_1j against what its q̈_1 part alone takes."""
 
     dof: int
@@ -51,7 +60,45 @@ def _saved(part: int, whole: int) -> float:
     return 1.0 - part / whole if whole else 0.0
 
 
-def curve(system: System, last: int, budget: int, progress: Progress, beyond: int = 0) -> tuple[Point, ...]:
+@dataclass(frozen=True)
+class Study:
+    """The curve of one arm, with fits. The polynomials rest on points beyond those asked for too."""
+
+    robot: str
+    form: str
+    points: tuple[CurvePoint, ...]
+    fitted: Saturation | None
+    paper: Saturation
+    total: CountPolynomial | None
+    kept: CountPolynomial | None
+
+    @property
+    def dof(self) -> tuple[int, ...]:
+        """Degrees of freedom of the points."""
+        return tuple(point.dof for point in self.points)
+
+
+def study(
+    name: str, system: System, first: int, last: int, beyond: int, budget: int, progress: Progress
+) -> Study:
+    """Count the links of a serial arm, to `beyond` where possible, and report on first..last under `name`."""
+    every = curve(system, last, budget, progress, beyond)
+    points = every[first - 1 : last]
+    dof, y = [p.dof for p in points], [p.reduction for p in points]
+    return Study(
+        name,
+        form_of(system),
+        points,
+        fit(dof, y),
+        held_against(PAPER_A, PAPER_RATE, dof, y),
+        count_polynomial([p.total for p in every]),
+        count_polynomial([p.kept for p in every]),
+    )
+
+
+def curve(
+    system: System, last: int, budget: int, progress: Progress, beyond: int = 0
+) -> tuple[CurvePoint, ...]:
     """Points for 1..last links, and to `beyond` as far as links and budget reach.
 
     Raises LinkwiseError for a tree, or where 1..last is beyond the links or the budget.
@@ -63,7 +110,7 @@ def curve(system: System, last: int, budget: int, progress: Progress, beyond: in
     running = RunningCount(len(system.coordinates))
     costs: list[LinkOperations] = []
     everything = NO_OPERATIONS
-    points: list[Point] = []
+    points: list[CurvePoint] = []
     links = link_operations(system, (0,), PAPER)
     try:
         for found, cost in zip(link_torques(system, (0,), budget, progress, most), links, strict=False):
@@ -71,8 +118,12 @@ def curve(system: System, last: int, budget: int, progress: Progress, beyond: in
             costs.append(cost)
             everything += cost.everything
             whole, part = summed(costs, 0, PAPER)
-            count = running.count
-            points.append(Point(len(points) + 1, count.total, count.kept(2, 0), whole, part, everything))
+            total, kept = running.count.total, running.count.kept(PAPER)
+            if not kept:
+                raise LinkwiseError(
+                    f"{system.name}: no term of τ_1 contains q̈_1; the curve needs a first link with inertia"
+                )
+            points.append(CurvePoint(len(points) + 1, total, kept, whole, part, everything))
     except BudgetExceededError as error:
         if len(points) >= last:
             return tuple(points)
@@ -91,6 +142,6 @@ def _require_serial(system: System, last: int, most: int) -> None:
     for j in range(most):
         if system.path(j) != tuple(range(j + 1)):
             raise LinkwiseError(
-                f"{system.name}: link {system.links[j].name!r} is not moved by joints 1..{j + 1}; "
+                f"{system.name}: link {system.link_names[j]!r} is not moved by joints 1..{j + 1}; "
                 "the curve needs a serial arm with one moving link a joint"
             )
