@@ -4,11 +4,13 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import pytest
 from conftest import DATA, PANDA
+from linkwise import Options
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -72,8 +74,7 @@ def test_generate_replaces_an_earlier_package_whole(linkwise: Run, planar2: Path
 def test_manifest_tells_how_to_make_the_package_again(planar2: Path) -> None:
     manifest = json.loads((planar2 / "manifest.json").read_text())
     assert manifest["schema"] == 2
-    assert manifest["request"]["robot"] == "planar2"
-    assert manifest["request"]["backends"] == ["numpy"]
+    assert manifest["request"] == {"robot": "planar2", "backends": ["numpy"], **asdict(Options())}
     assert [joint["name"] for joint in manifest["joints"]] == ["joint1", "joint2"]
     assert manifest["links"][1]["path"] == [0, 1]
     written = {p.relative_to(planar2).as_posix() for p in planar2.rglob("*") if p.is_file()}
@@ -164,7 +165,7 @@ BAD_FILES = {
     "nan.toml": (arm(mass="nan"), "link 'rod' has NaN or infinity"),
     "infinity.toml": (arm(xyz="[inf, 0, 0]"), "joint 'hinge' has NaN or infinity in its origin"),
     "type.toml": (arm(type='"spherical"'), "joint 'hinge' has the unknown type 'spherical'"),
-    "parent.toml": (arm(parent='"moon"'), "joint 'hinge' names 'moon' as its parent"),
+    "parent.toml": (arm(parent='"moon"'), "joint 'hinge' has the parent 'moon', which is not a link"),
     "key.toml": (arm(weight="3"), "link 'rod' has the unknown key 'weight'"),
     "empty.toml": (arm(name='""', child='""'), "a link has an empty name"),
     "loop.toml": (
@@ -183,7 +184,7 @@ BAD_FILES = {
         arm() + '[[link]]\nname = "tip"\n' + SECOND.format(name="hinge", parent="rod", child="tip"),
         "2 joints are named 'hinge'",
     ),
-    "code.toml": (arm(mass="\"__import__('os').getcwd()\""), "is no formula"),
+    "code.toml": (arm(mass="\"__import__('os').getcwd()\""), "is not a formula"),
     "name.toml": (arm(mass='"m"'), "uses 'm', which is not among the parameters"),
     "still.toml": (arm(type='"fixed"'), "no joint moves"),
     "malformed.urdf": ("<robot><link", "malformed XML"),
@@ -229,13 +230,16 @@ BAD_ARGUMENTS = {
     "unknown file": (("arm.toml",), "arm.toml: no such file or built-in robot"),
     "lock without value": (("planar2", "--lock", "joint1"), "is not of the form JOINT=VALUE"),
     "lock at nan": (("planar2", "--lock", "joint1=nan"), "is not of the form JOINT=VALUE"),
-    "lock of no joint": (("planar2", "--lock", "elbow=0"), "names no moving joint 'elbow'"),
+    "lock of no joint": (("planar2", "--lock", "elbow=0"), "--lock 'elbow' is not a moving joint"),
     "back end": (("planar2", "--backend", "fortran"), "no back end 'fortran'; choose among numpy"),
     "name": (("planar2", "--name", "../arm"), "'../arm' is no module name"),
     "keyword": (("planar2", "--name", "class"), "'class' is no module name"),
-    "parameters": (("planar2", "--parameters", "some"), "choose numeric or symbolic"),
-    "base": (("planar2", "--base", "moving"), "choose fixed or floating"),
-    "tip": (("planar2", "--tip", "hand"), "--tip names no link 'hand'"),
+    "parameters": (
+        ("planar2", "--parameters", "some"),
+        "'some' is not one of 'numeric', 'symbolic'",
+    ),
+    "base": (("planar2", "--base", "moving"), "'moving' is not one of 'fixed', 'floating'"),
+    "tip": (("planar2", "--tip", "hand"), "--tip 'hand' is not a link"),
 }
 
 
@@ -274,3 +278,78 @@ def test_energies_take_no_lock(linkwise: Run) -> None:
     done = linkwise("inspect", DATA / "turntable.py", "--lock", "x=0")
     assert done.returncode == 2
     assert "energies in Python take no --lock" in done.stderr
+
+
+def test_energies_take_no_option_of_rigid_bodies(linkwise: Run) -> None:
+    given = ("--lock", "x=0", "--base", "floating", "--root", "a", "--tip", "b", "--allow-unphysical")
+    done = linkwise("inspect", DATA / "turntable.py", *given, "--free-mimic")
+    assert done.returncode == 2
+    named = "no --lock, --base, --root, --tip, --allow-unphysical, --free-mimic; change the energies"
+    assert named in done.stderr
+    done = linkwise("inspect", DATA / "turntable.py", "--joint-friction")
+    assert done.returncode == 2
+    assert "energies in Python take no --joint-friction" in done.stderr
+
+
+HAND = """<mujoco><worldbody><body name="palm"><joint name="a" axis="0 0 1" armature="0.1" damping="0.2"/>
+<geom size="0.1"/><body name="finger"><joint name="b" axis="0 1 0" stiffness="3"/><geom size="0.1"/></body>
+<body name="thumb"><joint name="c" axis="0 1 0" damping="0.3"/><geom size="0.1"/></body></body></worldbody>
+<equality><joint joint1="b" joint2="c"/></equality><actuator><motor joint="a"/></actuator></mujoco>"""
+
+
+def test_generate_warns_of_what_the_torques_leave_out(linkwise: Run, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    (tmp_path / "hand.xml").write_text(HAND)
+    done = linkwise("generate", "hand.xml", "--out", "out", "--backend", "c", "--free-mimic")
+    assert done.returncode == 0, done.stderr
+    assert [line for line in done.stderr.splitlines() if line.startswith("warning")] == [
+        "warning: hand.xml: left out of the torques: "
+        "actuator (1 ×), armature (1 ×), damping (2 ×), spring (1 ×)",
+        "warning: hand.xml: moving by themselves, their coupling left out of the torques: "
+        "b (coupled to 'c' by an equality)",
+    ]
+
+
+def test_generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be(
+    linkwise: Run, tmp_path: Path
+) -> None:
+    (tmp_path / "negative.toml").write_text(arm(mass="-2"))
+    flags = ("--backend", "c", "--allow-unphysical", "--base", "floating")
+    done = linkwise("generate", "negative.toml", "--out", "out", *flags)
+    assert done.returncode == 0, done.stderr
+    assert [line for line in done.stderr.splitlines() if line.startswith("warning")] == [
+        "warning: negative.toml: accepted though physically impossible: "
+        "rod (link 'rod' has negative mass -2 kg)",
+        "warning: negative.toml: six coordinates without any contact forces, singular at a pitch of ±90°: "
+        "base (floating: x, y, z, yaw, pitch, roll)",
+    ]
+
+
+def test_inspect_lists_joint_friction_on_request(linkwise: Run, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    (tmp_path / "hand.xml").write_text(HAND)
+    told = linkwise("inspect", "hand.xml", "--free-mimic").stdout
+    assert "  damping 2 ×; left out of the torques\n" in told
+    assert "N·m·s/rad" not in told
+    asked = linkwise("inspect", "hand.xml", "--free-mimic", "--joint-friction").stdout
+    assert "  c 0.3 N·m·s/rad" in asked
+
+
+@pytest.mark.parametrize("report", ["terms", "reduction"])
+def test_reports_read_what_generate_reads(report: str, linkwise: Run, tmp_path: Path) -> None:
+    (tmp_path / "negative.toml").write_text(arm(mass="-2"))
+    robot = ["negative.toml"] if report == "terms" else ["--robot", "negative.toml", "--dof", "1"]
+    refused = linkwise("report", report, *robot)
+    assert refused.returncode == 2
+    assert "pass --allow-unphysical" in refused.stderr
+    done = linkwise("report", report, *robot, "--allow-unphysical", "--parameters", "numeric", "--json")
+    assert done.returncode == 0, done.stderr
+
+
+def test_terms_of_a_floating_robot_are_counted(linkwise: Run, tmp_path: Path) -> None:
+    (tmp_path / "negative.toml").write_text(arm(mass="-2"))
+    flags = ("--base", "floating", "--allow-unphysical", "--free-mimic", "--joint", "hinge", "--json")
+    done = linkwise("report", "terms", "negative.toml", *flags)
+    assert done.returncode == 0, done.stderr
+    (torque, *_) = json.loads(done.stdout)["torques"]
+    assert torque["joint"] == 7

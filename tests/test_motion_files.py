@@ -8,14 +8,13 @@ import sys
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-import typer
 from linkwise import progress
 from linkwise.analysis import analyze, directory, tables
 from linkwise.analysis import files as files_module
 from linkwise.analysis.directory import whole_directory
 from linkwise.analysis.run import Keep, stride_for
 from linkwise.analysis.settings import Lowpass, Processing
-from linkwise.cli.motion import register
+from linkwise.cli.app import app
 from linkwise.errors import LinkwiseError
 from motion_logs import PLANAR3, smooth, write_csv
 from typer.testing import CliRunner
@@ -25,9 +24,6 @@ ROBOT = ("--robot", str(PLANAR3))
 
 @pytest.fixture
 def call():
-    app = typer.Typer()
-    register(app)
-
     def run(*arguments):
         result = CliRunner().invoke(app, [str(argument) for argument in arguments])
         if isinstance(result.exception, LinkwiseError):

@@ -24,8 +24,14 @@ def report(*arguments: str) -> subprocess.CompletedProcess[str]:
         (("reduction", "--dof", "1..12", "--tip", "link9"), "--dof reaches 12, but 9 links move"),
         (("reduction", "--dof", "1..9", "--tip", "link5"), "--dof reaches 9, but 5 links move"),
         (("reduction", "--dof", "1..1000000"), "reaches 1000000, but the planar arm has at most 1000 joints"),
-        (("reduction", "--budget", "0"), "--budget is 0; give at least 1 term"),
-        (("terms", "planar3", "--budget", "-4"), "--budget is -4"),
+        (
+            ("reduction", "--budget", "0"),
+            "'--budget': Input should be greater than or equal to 1. See linkwise",
+        ),
+        (
+            ("terms", "planar3", "--budget", "-4"),
+            "'--budget': Input should be greater than or equal to 1. See linkwise",
+        ),
         (("terms", "planar3", "--order", "3"), "--order is 3; choose 2 for acceleration"),
         (("terms", "planar3", "--order", "-1"), "--order is -1; choose"),
         (("reduction", "--budget", "10"), "raise --budget"),

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from linkwise import LinkwiseError, Options, read_system
-from linkwise.robot import read_robot
+from linkwise.robot import effects, read_robot
 from urdf_text import chain, joint, link, mimic, robot
 
 AB = joint("ab", "a", "b")
@@ -41,7 +41,7 @@ BAD = {
     ),
     "unknown link": (
         chain(AB, joint("bz", "b", "z")),
-        "joint 'bz' names 'z' as its child, but there is no such",
+        "joint 'bz' has the child 'z', which is not a link; correct it or add",
     ),
     "two parents": (
         chain(AB, BC, joint("ac", "a", "c")),
@@ -73,7 +73,7 @@ BAD = {
     ),
     "mimic of nothing": (
         chain(AB, joint("bc", "b", "c", inner=mimic("moon"))),
-        "joint 'bc' mimics 'moon', which is no moving joint here; hold it with --lock bc=0, or let such",
+        "joint 'bc' mimics 'moon', which is not a moving joint here; hold it with --lock bc=0, or let such",
     ),
     "mimic of many axes": (
         chain(AB, joint("bc", "b", "c", type="planar", inner=mimic("ab"))),
@@ -115,7 +115,7 @@ BAD_TOML = {
         toml('"1/(l1-0.3)"', head=PARAMETER.format(0.3)),
         "link 'rod', mass: '1/(l1-0.3)' has no value: division by zero",
     ),
-    "no number": (
+    "not a number": (
         toml('"1/(l1-0.3) - 1/(l1-0.3)*2"', head=PARAMETER.format(0.3)),
         "has no value: division by zero",
     ),
@@ -160,7 +160,7 @@ def test_toml_may_start_with_a_byte_order_mark(tmp_path: Path) -> None:
     ],
     ids=lambda text: text[:20],
 )
-def test_what_is_no_robot_is_told_apart(spec: str, message: str) -> None:
+def test_what_is_not_a_robot_is_told_apart(spec: str, message: str) -> None:
     with pytest.raises(LinkwiseError) as caught:
         read_system(spec)
     assert message in str(caught.value)
@@ -238,8 +238,11 @@ def test_coupled_joints_of_mjcf_are_refused_unless_freed(tmp_path: Path) -> None
         read_robot(path)
     assert len(read_robot(path, Options(lock={"c": 0.0})).coordinates) == 2
     notes = notes_of(path, Options(free_mimic=True))
-    assert ("freed", "c", "coupled to 'b' by an equality, which the torques leave out") in notes
-    assert ("ignored", "armature", "1 ×, not in the torques") in notes
+    assert ("freed", "c", "coupled to 'b' by an equality") in notes
+    assert ("ignored", "armature", "1 ×") in notes
+    touched = effects(read_robot(path, Options(free_mimic=True)).notes)
+    assert "left out of the torques: armature (1 ×)" in touched
+    assert any("coupling left out of the torques: c (coupled to 'b' by an equality)" in t for t in touched)
     assert not [note for note in notes if note[0] == "massless" or note[1] == "geom"]
 
 
@@ -264,9 +267,9 @@ def test_defect_of_the_file_is_named(case: str, tmp_path: Path) -> None:
 
 
 OPTIONS: dict[str, tuple[dict[str, Any], str]] = {
-    "lock": ({"lock": {"elbow": 0.0}}, "--lock names no moving joint 'elbow'; the joints are ab, bc"),
-    "tip": ({"tip": "hand"}, "--tip names no link 'hand'; the links are a, b, c"),
-    "root": ({"root": "hip"}, "--root names no link 'hip'; the links are a, b, c"),
+    "lock": ({"lock": {"elbow": 0.0}}, "--lock 'elbow' is not a moving joint; the joints are ab, bc"),
+    "tip": ({"tip": "hand"}, "--tip 'hand' is not a link; the links are a, b, c"),
+    "root": ({"root": "hip"}, "--root 'hip' is not a link; the links are a, b, c"),
     "tip before root": ({"root": "c", "tip": "a"}, "--tip 'a' does not hang on --root 'c'"),
     "root at the end": ({"root": "c"}, "no joint moves"),
     "lock of all": ({"lock": {"ab": 0.0, "bc": 1.0}}, "no joint moves; free at least one"),
@@ -300,7 +303,7 @@ def test_named_options_get_past(tmp_path: Path) -> None:
     assert len(read_system(path, Options(root="a")).coordinates) == 1
 
 
-def test_point_mass_with_rounding_in_its_inertia_is_no_defect(tmp_path: Path) -> None:
+def test_point_mass_with_rounding_in_its_inertia_is_not_a_defect(tmp_path: Path) -> None:
     noise = '<inertia ixx="0" iyy="4e-18" izz="0" ixy="0" ixz="2.4e-35" iyz="0"/>'
     head = f'<link name="b"><inertial><mass value="1.3"/><origin xyz="0.1 0 0"/>{noise}</inertial></link>'
     (tmp_path / "point.urdf").write_text(robot(link("a"), head, AB))

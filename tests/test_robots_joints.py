@@ -164,7 +164,7 @@ def test_notes_say_what_was_done(tmp_path: Path) -> None:
         "<transmission/><transmission/>",
     )
     (tmp_path / "robot.urdf").write_text(text)
-    notes = read_system(tmp_path / "robot.urdf", Options(lock={"cd": 0.2}, joint_friction=True)).robot.notes
+    notes = read_system(tmp_path / "robot.urdf", Options(lock={"cd": 0.2})).robot.notes
     found = {(note.kind, note.subject, note.detail) for note in notes}
     assert found == {
         ("snapped", "ab", "rotation entries within 1e-12 of -1, 0, 1"),

@@ -4,15 +4,20 @@ system = linkwise.read_system("planar3")     # or a .toml, .urdf or .py file, or
 files = linkwise.generate(system)               # {path: text} of an importable package
 """
 
-from linkwise.analysis import Analysis, Lowpass, Processing, Reading, analyze
-from linkwise.check import check_package
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from linkwise.errors import LinkwiseError
-from linkwise.package.write import write_package
-from linkwise.pipeline import generate, read_system
-from linkwise.robot import Coordinate, Options, read_robot
-from linkwise.symbolic.system import LinkEnergy, System
-from linkwise.symbolic.user_energies import energy_system
 from linkwise.version import VERSION as __version__
+
+if TYPE_CHECKING:
+    from linkwise.analysis import Analysis, Lowpass, Processing, Reading, analyze
+    from linkwise.check import check_package
+    from linkwise.package.write import write_package
+    from linkwise.pipeline import generate, read_system
+    from linkwise.robot import Coordinate, Options, read_robot
+    from linkwise.symbolic.system import LinkEnergy, System
+    from linkwise.symbolic.user_energies import energy_system
 
 __all__ = [
     "Analysis",
@@ -33,3 +38,34 @@ __all__ = [
     "read_system",
     "write_package",
 ]
+
+_ROOM_OF = {
+    "Analysis": "analysis",
+    "Coordinate": "robot",
+    "LinkEnergy": "symbolic.system",
+    "Lowpass": "analysis",
+    "Options": "robot",
+    "Processing": "analysis",
+    "Reading": "analysis",
+    "System": "symbolic.system",
+    "analyze": "analysis",
+    "check_package": "check",
+    "energy_system": "symbolic.user_energies",
+    "generate": "pipeline",
+    "read_robot": "robot",
+    "read_system": "pipeline",
+    "write_package": "package.write",
+}
+"""A room is imported when one of its names is first used, and SymPy, NumPy and SciPy not before."""
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+if not TYPE_CHECKING:  # for a type checker, any name would be one of linkwise's
+
+    def __getattr__(name: str) -> object:
+        if name not in _ROOM_OF:
+            raise AttributeError(f"module 'linkwise' has no attribute {name!r}")
+        return getattr(import_module(f"linkwise.{_ROOM_OF[name]}"), name)

@@ -31,10 +31,9 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
     options = options or Options()
     if Path(spec).suffix == ".py" and Path(spec).is_file():
         with within(str(spec)):
-            if options.lock or options.root or options.tip or options.base != "fixed":
-                raise LinkwiseError(
-                    "energies in Python take no --lock, --root, --tip or --base; change the energies"
-                )
+            rigid = [f"--{name.replace('_', '-')}" for name in options.given if name != "parameters"]
+            if rigid:
+                raise LinkwiseError(f"energies in Python take no {', '.join(rigid)}; change the energies")
             return read_energies(Path(spec), options.parameters == "symbolic")
     return rigid_system(read_robot(spec, options))
 

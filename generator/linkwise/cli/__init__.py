@@ -1,1 +1,16 @@
-"""The command line."""
+"""The command line: `app` starts it, and imports a command's file when the command is called.
+
+Here are the flags that several commands share; those that read a robot are in `options`.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+BUDGET = 2_000_000
+"""Terms of one expansion; a polynomial of this size takes about 0.5 GB."""
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
+Budget = Annotated[int, typer.Option(min=1, help="Terms that one expansion may hold")]
+ReportOut = Annotated[Path | None, typer.Option(help="Directory that gets the report's files")]

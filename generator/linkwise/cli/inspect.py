@@ -1,16 +1,51 @@
-"""What a robot is made of, as data and as text."""
+"""The command `inspect`: what a robot is made of, as data and as text."""
 
-from typing import Any
+import json
+from collections.abc import Collection
+from dataclasses import asdict
+from typing import Annotated, Any
 
+import typer
+
+from linkwise import pipeline
+from linkwise.cli import Json
+from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import rigid_tree
-from linkwise.symbolic.system import RigidSystem, System
+from linkwise.errors import LinkwiseError
+from linkwise.robot import Options
+from linkwise.symbolic.system import EnergySystem, System
+
+LOSSES = ("damping", "friction")
+"""Kinds of notes that are shown on request."""
+
+app = typer.Typer(add_completion=False)
 
 
-def inspection(system: System) -> dict[str, Any]:
-    """Joints, links, parameters and the reader's notes, ready for JSON."""
+@app.command()
+@reads_robot()
+def inspect(
+    robot: RobotName,
+    options: Options,
+    joint_friction: Annotated[
+        bool,
+        typer.Option(
+            "--joint-friction", help="Also list the joints' damping and friction, which no torque holds"
+        ),
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Show a robot's joints, links and parameters, and what was merged, locked or ignored."""
+    system = pipeline.read_system(robot, options)
+    if joint_friction and isinstance(system, EnergySystem):
+        raise LinkwiseError(f"{robot}: energies in Python take no --joint-friction; leave it out")
+    data = inspection(system, () if joint_friction else LOSSES)
+    typer.echo(json.dumps(data, indent=1) if as_json else table(data))
+
+
+def inspection(system: System, hidden: Collection[str] = LOSSES) -> dict[str, Any]:
+    """Joints, links, parameters and the notes of the kinds that are not hidden, ready for JSON."""
     tree = rigid_tree(system)
     mass = {body.link: body.mass for body in tree.bodies} if tree else {}
-    notes = system.robot.notes if isinstance(system, RigidSystem) else ()
     return {
         "name": system.name,
         "joints": [{"name": c.name, "unit": c.unit} for c in system.coordinates],
@@ -23,7 +58,7 @@ def inspection(system: System) -> dict[str, Any]:
             for j, name in enumerate(system.link_names)
         ],
         "parameters": {s.name: float(v) for s, v in system.parameters.items()},
-        "notes": [{"kind": n.kind, "subject": n.subject, "detail": n.detail} for n in notes],
+        "notes": [asdict(note) for note in system.notes if note.kind not in hidden],
     }
 
 
@@ -46,5 +81,6 @@ def table(data: dict[str, Any]) -> str:
         lines += ["", kind]
         for note in data["notes"]:
             if note["kind"] == kind:
-                lines.append(f"  {note['subject']} {note['detail']}".rstrip())
+                effect = f"; {note['effect']}" if note["effect"] else ""
+                lines.append(f"  {note['subject']} {note['detail']}".rstrip() + effect)
     return "\n".join(lines)

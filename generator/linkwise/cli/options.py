@@ -1,21 +1,71 @@
-"""The command line's reading options, for every command that reads a robot."""
+"""The flags that read a robot, defined once for every command that reads one."""
 
+import inspect
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import wraps
+from typing import Annotated, Any, Literal, cast
+
+import typer
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot import Options
+from linkwise.robot import DESCRIPTIONS, Options
+
+Parameters = Literal["numeric", "symbolic"]
+RobotName = Annotated[str, typer.Argument(help=DESCRIPTIONS)]
+PANEL = "Reading the robot"
 
 
-def reading_options(
-    lock: Iterable[str] | None, parameters: str = "numeric", base: str = "fixed", **others: object
+def _flag(*names: str, help: str) -> Any:
+    return typer.Option(*names, help=help, rich_help_panel=PANEL)
+
+
+def robot_options(
+    parameters: Annotated[
+        Parameters, _flag(help="numeric: their values; symbolic: a symbol for each, set at run time")
+    ] = "numeric",
+    lock: Annotated[list[str] | None, _flag(help="Hold a joint: JOINT=VALUE; may be repeated")] = None,
+    base: Annotated[Literal["fixed", "floating"], _flag(help="How the root link is held")] = "fixed",
+    root: Annotated[str | None, _flag(help="Keep only what hangs on this link")] = None,
+    tip: Annotated[str | None, _flag(help="Keep only the chain to this link")] = None,
+    allow_unphysical: Annotated[
+        bool, _flag("--allow-unphysical", help="Accept bodies that cannot exist")
+    ] = False,
+    free_mimic: Annotated[
+        bool,
+        _flag(
+            "--free-mimic",
+            help="Let a mimic joint without a master, or one that MJCF couples, move by itself",
+        ),
+    ] = False,
 ) -> Options:
-    """Options of the flags' values; `others` are fields of Options. Raises LinkwiseError naming the flag."""
-    if parameters not in ("numeric", "symbolic"):
-        raise LinkwiseError(f"--parameters is {parameters!r}; choose numeric or symbolic")
-    if base not in ("fixed", "floating"):
-        raise LinkwiseError(f"--base is {base!r}; choose fixed or floating")
-    return Options(parameters, _locks(lock or ()), base, **others)  # type: ignore[arg-type]
+    """Options of the flags' values; raises LinkwiseError naming the flag."""
+    return Options(parameters, _locks(lock or ()), base, root, tip, allow_unphysical, free_mimic)
+
+
+def reads_robot(
+    parameters: Parameters = "numeric",
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command the flags of `robot_options`; it gets what they say as its argument `options`.
+
+    `parameters` is the default of the flag of that name.
+    """
+    flags = dict(inspect.signature(robot_options).parameters)
+    flags["parameters"] = flags["parameters"].replace(default=parameters)
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @wraps(command)
+        def run(**given: Any) -> None:
+            chosen = {name: given.pop(name) for name in flags}
+            command(options=robot_options(**chosen), **given)
+
+        own = inspect.signature(command)
+        merged = [p for name, p in own.parameters.items() if name != "options"] + list(flags.values())
+        named = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in merged]
+        cast(Any, run).__signature__ = own.replace(parameters=named)  # what typer makes the flags from
+        return run
+
+    return decorate
 
 
 def _locks(items: Iterable[str]) -> dict[str, float]:

@@ -1,7 +1,19 @@
 """Robots: what a description says, and the readers for it."""
 
 from linkwise.robot.build import Options
-from linkwise.robot.read import BUILT_IN, read_robot
-from linkwise.robot.robot import Coordinate, Joint, Link, Note, Robot
+from linkwise.robot.notes import Note, effects
+from linkwise.robot.read import BUILT_IN, DESCRIPTIONS, read_robot
+from linkwise.robot.robot import Coordinate, Joint, Link, Robot
 
-__all__ = ["BUILT_IN", "Coordinate", "Joint", "Link", "Note", "Options", "Robot", "read_robot"]
+__all__ = [
+    "BUILT_IN",
+    "DESCRIPTIONS",
+    "Coordinate",
+    "Joint",
+    "Link",
+    "Note",
+    "Options",
+    "Robot",
+    "effects",
+    "read_robot",
+]

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from linkwise.errors import LinkwiseError
 from linkwise.robot.description import Connection, Coupling, Mimic
 from linkwise.robot.joint_types import Axis
-from linkwise.robot.robot import Coordinate, Note
+from linkwise.robot.notes import UNCOUPLED, Note
+from linkwise.robot.robot import Coordinate
 
 
 @dataclass(frozen=True)
@@ -18,22 +19,29 @@ class Motion:
     offset: float = 0.0
 
 
-def coordinates(
-    axes: tuple[Axis, ...],
-    connections: tuple[Connection, ...],
-    lock: dict[str, float],
-    free_mimic: bool,
-    notes: list[Note],
-) -> tuple[tuple[Coordinate, ...], dict[str, Motion]]:
-    """Return the coordinates, and how each axis moves with them, by its name."""
+@dataclass(frozen=True)
+class Movement:
+    """The coordinates, and how each axis moves with them, by its name."""
+
+    coordinates: tuple[Coordinate, ...]
+    motion: dict[str, Motion]
+    notes: tuple[Note, ...]
+
+
+def movement(
+    axes: tuple[Axis, ...], connections: tuple[Connection, ...], lock: dict[str, float], free_mimic: bool
+) -> Movement:
+    """Give each axis a coordinate of its own unless it is locked or follows another.
+
+    Raises LinkwiseError for two axes of one name, a lock without an axis, and a mimic that cannot be.
+    """
     _check_axes(axes, lock)
-    mimics = _mimics(connections, {axis.name for axis in axes}, lock, free_mimic, notes)
+    mimics, freed = _mimics(connections, {axis.name for axis in axes}, lock, free_mimic)
     motion: dict[str, Motion] = {}
     moving: list[Coordinate] = []
     for axis in axes:
         if axis.name in lock:
             motion[axis.name] = Motion(None, 0.0, lock[axis.name])
-            notes.append(Note("locked", axis.name, f"at {lock[axis.name]:g} {axis.unit}"))
         elif axis.name not in mimics:
             motion[axis.name] = Motion(len(moving))
             moving.append(Coordinate(axis.name, axis.unit))
@@ -42,8 +50,16 @@ def coordinates(
         motion[name] = Motion(
             master.coordinate, mimic.ratio * master.ratio, mimic.offset + mimic.ratio * master.offset
         )
-        notes.append(Note("mimic", name, _rule(mimic)))
-    return tuple(moving), motion
+    notes = [
+        *(Note("locked", a.name, f"at {lock[a.name]:g} {a.unit}") for a in axes if a.name in lock),
+        *(Note("mimic", name, _rule(mimic)) for name, mimic in mimics.items()),
+        *(
+            Note("ignored", c.name, "the mimic of a fixed joint")
+            for c in connections
+            if c.mimic and c.type == "fixed"
+        ),
+    ]
+    return Movement(tuple(moving), motion, (*notes, *freed))
 
 
 def check_couplings(
@@ -61,7 +77,7 @@ def check_couplings(
                 f"joint {joint!r} is {rule} by an equality, which the torques would leave out; hold it with "
                 f"--lock {joint}=0, or let such joints move by themselves with --free-mimic"
             )
-        notes.append(Note("freed", joint, f"{rule} by an equality, which the torques leave out"))
+        notes.append(Note("freed", joint, f"{rule} by an equality", UNCOUPLED))
     return notes
 
 
@@ -80,35 +96,34 @@ def _check_axes(axes: tuple[Axis, ...], lock: dict[str, float]) -> None:
             )
     for name in lock:
         if name not in counts:
-            raise LinkwiseError(f"--lock names no moving joint {name!r}; the joints are {', '.join(counts)}")
+            raise LinkwiseError(f"--lock {name!r} is not a moving joint; the joints are {', '.join(counts)}")
 
 
 def _mimics(
-    connections: tuple[Connection, ...],
-    axes: set[str],
-    lock: dict[str, float],
-    free: bool,
-    notes: list[Note],
-) -> dict[str, Mimic]:
-    """Joints that follow another one; raises LinkwiseError for those that cannot."""
+    connections: tuple[Connection, ...], axes: set[str], lock: dict[str, float], free: bool
+) -> tuple[dict[str, Mimic], list[Note]]:
+    """Joints that follow another, and notes on those let free; raises LinkwiseError where neither can be."""
     mimics: dict[str, Mimic] = {}
     for c in connections:
-        if c.mimic is None or c.name in lock:
+        if c.mimic is None or c.name in lock or c.type == "fixed":
             continue
-        if c.name in axes:
-            mimics[c.name] = c.mimic
-        elif c.type == "fixed":
-            notes.append(Note("ignored", c.name, "the mimic of a fixed joint"))
-        else:
+        if c.name not in axes:
             raise LinkwiseError(
                 f"joint {c.name!r} is {c.type} and mimics {c.mimic.master!r}; only a joint of one axis can"
             )
-    masterless = [name for name, mimic in mimics.items() if mimic.master not in axes]
+        mimics[c.name] = c.mimic
+    masterless = {name: mimic.master for name, mimic in mimics.items() if mimic.master not in axes}
     if masterless and not free:
-        _refuse(masterless, mimics)
-    for name in masterless:
-        master = mimics.pop(name).master
-        notes.append(Note("freed", name, f"mimics {master!r}, which is no moving joint here"))
+        _refuse(masterless)
+    mimics = {name: mimic for name, mimic in mimics.items() if name not in masterless}
+    _check_masters(mimics)
+    return mimics, [
+        Note("freed", name, f"mimics {master!r}, which is not a moving joint here", UNCOUPLED)
+        for name, master in masterless.items()
+    ]
+
+
+def _check_masters(mimics: dict[str, Mimic]) -> None:
     for name, mimic in mimics.items():
         if mimic.master in mimics:
             raise LinkwiseError(
@@ -116,13 +131,12 @@ def _mimics(
                 f"{'itself' if mimic.master == name else 'a mimic too'}; name the joint that moves, or hold "
                 f"it with --lock {name}=0"
             )
-    return mimics
 
 
-def _refuse(masterless: list[str], mimics: dict[str, Mimic]) -> None:
-    name = masterless[0]
+def _refuse(masterless: dict[str, str]) -> None:
+    name, master = next(iter(masterless.items()))
     others = f" ({len(masterless)} joints do so)" if len(masterless) > 1 else ""
     raise LinkwiseError(
-        f"joint {name!r} mimics {mimics[name].master!r}, which is no moving joint here{others}; hold it with "
+        f"joint {name!r} mimics {master!r}, which is not a moving joint here{others}; hold it with "
         f"--lock {name}=0, or let such joints move by themselves with --free-mimic"
     )

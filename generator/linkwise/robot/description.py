@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from linkwise.robot.robot import Mat3, Note, Rotation, Scalar, Vec3
+from linkwise.robot.notes import Note
+from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3
 
 ZERO3: Vec3 = (0.0, 0.0, 0.0)
 ZERO33: Mat3 = (ZERO3, ZERO3, ZERO3)
@@ -43,10 +44,23 @@ class Coupling:
 
 
 @dataclass(frozen=True)
+class Loop:
+    """A constraint that ties two bodies together outside the tree; `bodies` is empty where it ties others.
+
+    `what` names it in a sentence, `mend` says how to do without it.
+    """
+
+    what: str
+    mend: str
+    bodies: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Connection:
     """A joint as the file has it: any type, any axis; axis in the joint's frame.
 
-    Damping (N·m·s/rad or N·s/m) and friction (N·m or N) are reported only.
+    Damping (N·m·s/rad or N·s/m) and friction (N·m or N) are reported only. `snapped` says that entries of the
+    rotation were rounded to −1, 0 or 1.
     """
 
     name: str
@@ -59,6 +73,7 @@ class Connection:
     mimic: Mimic | None = None
     damping: float = 0.0
     friction: float = 0.0
+    snapped: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,3 +87,4 @@ class Description:
     parameters: tuple[tuple[str, float], ...] = ()
     notes: tuple[Note, ...] = field(default=())
     couplings: tuple[Coupling, ...] = ()
+    loops: tuple[Loop, ...] = ()

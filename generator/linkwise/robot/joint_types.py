@@ -1,13 +1,15 @@
 """Joint types as chains of revolute and prismatic axes."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot import transforms as geo
+from linkwise.robot import transforms
 from linkwise.robot.description import Connection
-from linkwise.robot.robot import Note, is_finite
+from linkwise.robot.notes import FLOATS, TURNS, Note
+from linkwise.robot.robot import is_finite
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 Vector = tuple[float, float, float]
@@ -22,6 +24,8 @@ Part = tuple[str, Kind, Vector]
 BALL: tuple[Part, ...] = (("yaw", "revolute", Z), ("pitch", "revolute", Y), ("roll", "revolute", X))
 FLOATING: tuple[Part, ...] = (("x", "prismatic", X), ("y", "prismatic", Y), ("z", "prismatic", Z), *BALL)
 KNOWN = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating", "ball")
+EFFECTS = {"ball": TURNS, "floating": FLOATS}
+"""What the coordinates of a joint type mean for the torques."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,7 @@ class Axis:
         return "rad" if self.kind == "revolute" else "m"
 
 
-def expand(connection: Connection, notes: list[Note]) -> list[Axis]:
+def expand(connection: Connection) -> tuple[Axis, ...]:
     """Return the axes of a joint, none for a fixed one; raises LinkwiseError for an unknown type.
 
     A floating joint is x, y, z of its parent's frame, then yaw, pitch, roll about the moved z, y, x: the
@@ -48,15 +52,27 @@ def expand(connection: Connection, notes: list[Note]) -> list[Axis]:
     turns about it.
     """
     if connection.type == "fixed":
-        return []
+        return ()
     if connection.type in SINGLE:
-        return [Axis(connection.name, "", SINGLE[connection.type], _unit(connection), True)]
+        return (Axis(connection.name, "", SINGLE[connection.type], _unit(connection), True),)
     parts = _parts(connection)
-    names = ", ".join(suffix for suffix, _, _ in parts)
-    notes.append(Note("expanded", connection.name, f"{connection.type}: {names}"))
-    return [
+    return tuple(
         Axis(f"{connection.name}_{suffix}", suffix, kind, direction, index == len(parts) - 1)
         for index, (suffix, kind, direction) in enumerate(parts)
+    )
+
+
+def expansion_notes(connections: Iterable[Connection]) -> list[Note]:
+    """Return a note for each joint that becomes several coordinates."""
+    return [
+        Note(
+            "expanded",
+            c.name,
+            f"{c.type}: {', '.join(part[0] for part in _parts(c))}",
+            EFFECTS.get(c.type, ""),
+        )
+        for c in connections
+        if c.type != "fixed" and c.type not in SINGLE
     ]
 
 
@@ -66,7 +82,7 @@ def _parts(connection: Connection) -> tuple[Part, ...]:
     if connection.type == "ball":
         return BALL
     if connection.type == "planar":
-        x, y, z = geo.transpose(geo.align_z(_unit(connection)))
+        x, y, z = transforms.transpose(transforms.align_z(_unit(connection)))
         return ("x", "prismatic", x), ("y", "prismatic", y), ("yaw", "revolute", z)
     raise LinkwiseError(
         f"joint {connection.name!r} has the unknown type {connection.type!r}; use one of {', '.join(KNOWN)}"

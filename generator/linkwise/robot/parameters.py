@@ -7,7 +7,8 @@ import sympy as sp
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.description import Body, Description
-from linkwise.robot.robot import Link, Mat3, Note, Robot, Scalar, Vec3, is_finite
+from linkwise.robot.notes import Note
+from linkwise.robot.robot import Link, Mat3, Robot, Scalar, Vec3, is_finite
 
 PROMOTED = (
     ("m_", Note("promoted", "m_…", "mass in kg")),

@@ -5,7 +5,7 @@ from importlib import resources
 from pathlib import Path
 
 from linkwise.errors import LinkwiseError, within
-from linkwise.robot.build import Options, assemble
+from linkwise.robot.build import Options, build
 from linkwise.robot.builtin.planar import planar
 from linkwise.robot.description import Description
 from linkwise.robot.readers.mjcf import read_mjcf
@@ -19,10 +19,18 @@ def read_xml(path: Path) -> Description:
     return read_mjcf(path) if root_tag(path) == "mujoco" else read_urdf(path)
 
 
-BUILT_IN = ("planar3", "planarN (N from 1 to 1000)", "puma560")
 READERS = {".toml": read_toml, ".urdf": read_urdf, ".xml": read_xml, ".mjcf": read_mjcf}
+"""Who reads a file, by the end of its name."""
+
 MAX_PLANAR = 1000
 """An arm of N joints has some N³/3 coefficients of each order: 1000 are far beyond what can be generated."""
+
+FILES = ("puma560", "torso")
+"""Built-in robots that are TOML files beside `planar`."""
+
+BUILT_IN = ("planar3", f"planarN (N from 1 to {MAX_PLANAR})", *FILES)
+DESCRIPTIONS = f"{', '.join(BUILT_IN)}, or a {', '.join(READERS)} or .py file; .xml is URDF or MJCF"
+"""All that a robot may be read from, in words."""
 
 
 def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
@@ -30,15 +38,15 @@ def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
     options = options or Options()
     with within(str(spec)):
         if match := re.fullmatch(r"planar([1-9][0-9]*)", str(spec)):
-            return assemble(planar(_joints(match[1])), options)
-        if str(spec) == "puma560":
-            with resources.as_file(resources.files("linkwise.robot.builtin") / "puma560.toml") as built_in:
-                return assemble(read_toml(built_in), options)
+            return build(planar(_joints(match[1])), options)
+        if str(spec) in FILES:
+            with resources.as_file(resources.files("linkwise.robot.builtin") / f"{spec}.toml") as built_in:
+                return build(read_toml(built_in), options)
         try:
             description = _read_file(Path(spec))
         except OSError as error:
             raise LinkwiseError(f"cannot be read: {error.strerror}") from None
-        return assemble(description, options)
+        return build(description, options)
 
 
 def _joints(digits: str) -> int:

@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 import sympy as sp
 
 from linkwise.errors import LinkwiseError
+from linkwise.robot.notes import Note
 
 Scalar: TypeAlias = float | sp.Expr
 """A number, or a SymPy expression in named parameters."""
@@ -87,29 +88,6 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Note:
-    """Something the reader did with the description, for `inspect`: what happened to whom."""
-
-    kind: Literal[
-        "merged",
-        "locked",
-        "massless",
-        "ignored",
-        "snapped",
-        "mimic",
-        "cut",
-        "expanded",
-        "unphysical",
-        "freed",
-        "damping",
-        "friction",
-        "promoted",
-    ]
-    subject: str
-    detail: str = ""
-
-
-@dataclass(frozen=True)
 class Robot:
     """A tree of links, parents before children, moved by `coordinates`; gravity in m/s²."""
 
@@ -151,5 +129,5 @@ class Robot:
 
 
 def is_finite(value: Scalar) -> bool:
-    """Whether a scalar is no NaN and no infinity; an expression counts as finite."""
+    """Whether a scalar is neither NaN nor infinite; an expression counts as finite."""
     return not isinstance(value, (int, float)) or math.isfinite(value)

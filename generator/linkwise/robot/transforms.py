@@ -98,6 +98,12 @@ def snap(rows: Sequence[Sequence[float]]) -> Rotation:
     return tuple(_row(row) for row in rows)
 
 
+def snapped(rows: Sequence[Sequence[float]]) -> tuple[Rotation, bool]:
+    """Return the rotation, snapped, and whether that changed it."""
+    rotation = snap(rows)
+    return rotation, rotation != tuple(map(tuple, rows))
+
+
 def _row(row: Sequence[float]) -> tuple[float, float, float]:
     x, y, z = (_near_whole(e) for e in row)
     return x, y, z

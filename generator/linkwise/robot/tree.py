@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.description import Connection, Description
-from linkwise.robot.robot import Note, is_finite
+from linkwise.robot.notes import Note
+from linkwise.robot.robot import is_finite
 
 
 def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
@@ -61,7 +62,7 @@ def _check_names(description: Description) -> None:
         for role, link in (("parent", c.parent), ("child", c.child)):
             if link not in known:
                 raise LinkwiseError(
-                    f"joint {c.name!r} names {link!r} as its {role}, but there is no such link"
+                    f"joint {c.name!r} has the {role} {link!r}, which is not a link; correct it or add one"
                 )
         if c.mimic and not (is_finite(c.mimic.ratio) and is_finite(c.mimic.offset)):
             raise LinkwiseError(f"joint {c.name!r} has NaN or infinity in its mimic; give numbers")
@@ -70,8 +71,8 @@ def _check_names(description: Description) -> None:
             raise LinkwiseError(f"joint {c.name!r} has NaN or infinity in its origin; give numbers")
 
 
-def cut(description: Description, root: str | None, tip: str | None, notes: list[Note]) -> Description:
-    """Keep what hangs on link `root`, and of that only the chain to link `tip`.
+def cut(description: Description, root: str | None, tip: str | None) -> Description:
+    """Keep what hangs on link `root`, and of that only the chain to link `tip`; its notes say what went.
 
     Raises LinkwiseError for names that are empty, double or unknown.
     """
@@ -79,13 +80,8 @@ def cut(description: Description, root: str | None, tip: str | None, notes: list
     known = {body.name for body in description.bodies}
     for flag, link in (("--root", root), ("--tip", tip)):
         if link is not None and link not in known:
-            raise LinkwiseError(f"{flag} names no link {link!r}; the links are {', '.join(sorted(known))}")
-    kept = known
-    if root is not None:
-        kept, frontier = {root}, [root]
-        while frontier:
-            new = [c.child for c in description.connections if c.parent in frontier and c.child not in kept]
-            kept, frontier = kept | set(new), new
+            raise LinkwiseError(f"{flag} {link!r} is not a link; the links are {', '.join(sorted(known))}")
+    kept = known if root is None else _below(description, root)
     if tip is not None:
         parent = {c.child: c.parent for c in description.connections if c.parent in kept}
         chain, at = {tip}, tip
@@ -95,9 +91,19 @@ def cut(description: Description, root: str | None, tip: str | None, notes: list
         if root is not None and root not in chain:
             raise LinkwiseError(f"--tip {tip!r} does not hang on --root {root!r}; choose links of one chain")
         kept &= chain
-    notes += [Note("cut", body.name) for body in description.bodies if body.name not in kept]
+    gone = tuple(Note("cut", body.name) for body in description.bodies if body.name not in kept)
     return replace(
         description,
+        notes=(*description.notes, *gone),
         bodies=tuple(b for b in description.bodies if b.name in kept),
         connections=tuple(c for c in description.connections if c.parent in kept and c.child in kept),
     )
+
+
+def _below(description: Description, root: str) -> set[str]:
+    """Return the links that hang on link `root`, itself included."""
+    kept, frontier = {root}, [root]
+    while frontier:
+        new = [c.child for c in description.connections if c.parent in frontier and c.child not in kept]
+        kept, frontier = kept | set(new), new
+    return kept

@@ -1,7 +1,7 @@
 """What every description becomes: coordinates, links and run-time parameters.
 
 A rigid link and a link of hand-written energies are two types, and so are the systems made of them. Both
-systems answer `name`, `coordinates`, `links`, `parameters` and `path`.
+systems answer `name`, `coordinates`, `links`, `link_names`, `parameters`, `notes` and `path`.
 """
 
 from collections.abc import Mapping
@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 import sympy as sp
 
+from linkwise.robot.notes import Note
 from linkwise.robot.robot import Coordinate, Joint, Mat3, Robot, Scalar, Vec3
 
 
@@ -56,6 +57,11 @@ class RigidSystem:
         return self.robot.coordinates
 
     @property
+    def notes(self) -> tuple[Note, ...]:
+        """What was done with the robot's description."""
+        return self.robot.notes
+
+    @property
     def parameters(self) -> dict[sp.Symbol, float]:
         """Run-time parameters and their values."""
         return {sp.Symbol(name, real=True): value for name, value in self.robot.parameters}
@@ -78,6 +84,7 @@ class EnergySystem:
     coordinates: tuple[Coordinate, ...]
     links: tuple[LinkEnergy, ...]
     parameters: Mapping[sp.Symbol, float] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
 
     @property
     def link_names(self) -> tuple[str, ...]:

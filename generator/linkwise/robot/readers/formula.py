@@ -30,7 +30,7 @@ def parse_formula(text: str, parameters: Mapping[str, float]) -> Scalar:
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise LinkwiseError(f"{text!r} is no formula; write numbers, parameters and + - * / **") from None
+        raise LinkwiseError(f"{text!r} is not a formula; write numbers, parameters and + - * / **") from None
     try:
         value = _value(tree, text, parameters)
         _check_finite(value, parameters)
@@ -80,4 +80,4 @@ def _value(node: ast.expr, text: str, parameters: Mapping[str, float]) -> Scalar
             value = _value(argument, text, parameters)
             if isinstance(value, float):
                 return FUNCTIONS[name](value)
-    raise LinkwiseError(f"{text!r} is no formula; write numbers, parameters and + - * / **")
+    raise LinkwiseError(f"{text!r} is not a formula; write numbers, parameters and + - * / **")

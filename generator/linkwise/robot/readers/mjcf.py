@@ -9,33 +9,28 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot import transforms as geo
-from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Coupling, Description
+from linkwise.extras import extra
+from linkwise.robot import transforms
+from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Description
+from linkwise.robot.readers.mjcf_equality import couplings, loops
 from linkwise.robot.readers.mjcf_unmodelled import unused
-from linkwise.robot.robot import Mat3, Note, Rotation, Vec3
+from linkwise.robot.robot import Mat3, Rotation, Vec3
 
 TYPES = ("floating", "ball", "prismatic", "revolute")
 """Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
 
-EQUALITY_OF_JOINTS = 2
-"""mjEQ_JOINT of MuJoCo's mjtEq."""
-
 
 def read_mjcf(path: Path) -> Description:
     """Read a robot; raises LinkwiseError with MuJoCo's own words, or when MuJoCo is missing."""
-    try:
-        import mujoco
-    except ImportError:
-        raise LinkwiseError("MuJoCo reads MJCF files and is missing; pip install linkwise[mjcf]") from None
+    mujoco = extra("mujoco")
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise LinkwiseError(f"MuJoCo cannot compile it: {error}") from None
-    notes: list[Note] = []
-    bodies, connections = [Body("world")], list[Connection]()
+    bodies, connections = [Body(_name(model, 0))], list[Connection]()
     anchors: list[Vec3] = [ZERO3]
     for number in range(1, model.nbody):
-        chain, body, anchor = _body(model, number, anchors, notes)
+        chain, body, anchor = _body(model, number, anchors)
         connections += chain
         bodies += [Body(c.child, invented=True) for c in chain[:-1]] + [body]
         anchors.append(anchor)
@@ -46,19 +41,9 @@ def read_mjcf(path: Path) -> Description:
         tuple(bodies),
         tuple(connections),
         (x, y, z),
-        notes=(*notes, *unused(model)),
-        couplings=_couplings(model, [c.name for c in connections if c.type != "fixed"]),
-    )
-
-
-def _couplings(model: Any, joints: list[str]) -> tuple[Coupling, ...]:
-    """Return which joint follows which by an active equality; -1 stands for a constant."""
-    return tuple(
-        Coupling(joints[int(one)], joints[int(other)] if other >= 0 else "")
-        for kind, active, one, other in zip(
-            model.eq_type, model.eq_active0, model.eq_obj1id, model.eq_obj2id, strict=True
-        )
-        if active and int(kind) == EQUALITY_OF_JOINTS
+        notes=unused(model),
+        couplings=couplings(mujoco, model, [c.name for c in connections if c.type != "fixed"]),
+        loops=loops(mujoco, model, [_name(model, number) for number in range(model.nbody)]),
     )
 
 
@@ -75,33 +60,31 @@ class _Joint:
     friction: float = 0.0
 
 
-def _body(
-    model: Any, number: int, anchors: list[Vec3], notes: list[Note]
-) -> tuple[list[Connection], Body, Vec3]:
+def _body(model: Any, number: int, anchors: list[Vec3]) -> tuple[list[Connection], Body, Vec3]:
     """Return a body behind the chain of its joints, massless bodies between them, and its frame's place.
 
     The frame sits on the last joint's anchor, which the chain leaves nothing to undo.
     """
     name, parent = _name(model, number), int(model.body_parentid[number])
-    turn = _rotation(model.body_quat[number], name, notes)
-    position = geo.add(_vector(model.body_pos[number]), _minus(anchors[parent]))
+    turn, snapped = transforms.snapped(transforms.from_quaternion(*map(float, model.body_quat[number])))
+    position = transforms.add(_vector(model.body_pos[number]), _minus(anchors[parent]))
     chain: list[Connection] = []
     joints, last, start = _joints(model, number, name), ZERO3, _name(model, parent)
     for joint in joints:
         if joint.type == "floating":
-            turn, position = IDENTITY, ZERO3
+            turn, position, snapped = IDENTITY, ZERO3, False
         x, y, z = joint.axis
-        shift = geo.add(joint.anchor, _minus(last))
+        shift = transforms.add(joint.anchor, _minus(last))
         if joint.type == "prismatic":
-            shift = geo.add(shift, (-joint.rest * x, -joint.rest * y, -joint.rest * z))
-        position = geo.add(position, geo.rotate(turn, shift))
+            shift = transforms.add(shift, (-joint.rest * x, -joint.rest * y, -joint.rest * z))
+        position = transforms.add(position, transforms.rotate(turn, shift))
         if joint.type == "revolute" and joint.rest:
-            turn = geo.compose(turn, _about(joint.axis, -joint.rest))
+            turn = transforms.compose(turn, _about(joint.axis, -joint.rest))
         child = name if joint is joints[-1] else f"{name}_{joint.name}"
-        ends, losses = (start, child), (joint.damping, joint.friction)
-        chain.append(Connection(joint.name, joint.type, *ends, turn, position, joint.axis, None, *losses))
-        turn, position, last, start = IDENTITY, ZERO3, joint.anchor, child
-    com = geo.add(_vector(model.body_ipos[number]), _minus(last))
+        place, losses = (start, child, turn, position), (joint.damping, joint.friction)
+        chain.append(Connection(joint.name, joint.type, *place, joint.axis, None, *losses, snapped))
+        turn, position, last, start, snapped = IDENTITY, ZERO3, joint.anchor, child, False
+    com = transforms.add(_vector(model.body_ipos[number]), _minus(last))
     return chain, Body(name, float(model.body_mass[number]), com, _inertia(model, number)), last
 
 
@@ -139,24 +122,18 @@ def _vector(a: Any) -> Vec3:
 
 
 def _minus(a: Vec3) -> Vec3:
-    x, y, z = (geo.times(-1.0, e) for e in a)
+    x, y, z = (transforms.times(-1.0, e) for e in a)
     return x, y, z
 
 
 def _about(axis: tuple[float, float, float], angle: float) -> Rotation:
-    align = geo.align_z(axis)
-    return geo.compose(geo.compose(align, geo.about_z(angle)), geo.transpose(align))
-
-
-def _rotation(quaternion: Any, name: str, notes: list[Note]) -> Rotation:
-    raw = geo.from_quaternion(*map(float, quaternion))
-    rotation = geo.snap(raw)
-    if rotation != tuple(map(tuple, raw)):
-        notes.append(Note("snapped", name, "rotation entries within 1e-12 of -1, 0, 1"))
-    return rotation
+    align = transforms.align_z(axis)
+    return transforms.compose(
+        transforms.compose(align, transforms.about_z(angle)), transforms.transpose(align)
+    )
 
 
 def _inertia(model: Any, number: int) -> Mat3:
     x, y, z = map(float, model.body_inertia[number])
-    frame = geo.snap(geo.from_quaternion(*map(float, model.body_iquat[number])))
-    return geo.rotate_inertia(frame, ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)))
+    frame = transforms.snap(transforms.from_quaternion(*map(float, model.body_iquat[number])))
+    return transforms.rotate_inertia(frame, ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)))

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from linkwise.robot.robot import Note
+from linkwise.robot.notes import LEFT_OUT, Note
 
 COUNTS = {
     "actuator": "nu",
@@ -26,19 +26,31 @@ VALUES = {
     "limit": "jnt_limited",
     "spring": "jnt_stiffness",
 }
-"""Arrays that act on a joint or body where they are not zero."""
+"""Arrays that act on a joint or body where they are not zero. Armature is the inertia of a motor's rotor:
+unlike the others, it belongs to rigid-body dynamics."""
 
-REMARKS = {"armature": ", not in the torques"}
-"""The inertia of a motor's rotor: unlike the others here, it belongs to rigid-body dynamics."""
+FORCES = {
+    "actuator",
+    "armature",
+    "damping",
+    "flex",
+    "fluid",
+    "friction",
+    "gravity compensation",
+    "plugin",
+    "spring",
+    "tendon",
+}
+"""What exerts forces on moving bodies while they touch nothing and stay within their limits."""
 
 
-def unused(model: Any) -> list[Note]:
+def unused(model: Any) -> tuple[Note, ...]:
     """Return a note for each kind of thing that is there, with how often."""
     counts = {what: int(getattr(model, name)) for what, name in COUNTS.items()}
     counts |= {what: sum(value != 0 for value in getattr(model, name)) for what, name in VALUES.items()}
     counts["fluid"] = int(model.opt.density != 0 or model.opt.viscosity != 0)
-    return [
-        Note("ignored", what, f"{count} ×{REMARKS.get(what, '')}")
+    return tuple(
+        Note("ignored", what, f"{count} ×", LEFT_OUT if what in FORCES else "")
         for what, count in sorted(counts.items())
         if count
-    ]
+    )

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError, within
-from linkwise.robot import transforms as geo
+from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
 from linkwise.robot.readers.formula import parse_formula
-from linkwise.robot.robot import Mat3, Note, Scalar, Vec3, is_finite
+from linkwise.robot.robot import Mat3, Scalar, Vec3, is_finite
 
 TOP = {"schema", "name", "gravity", "base", "parameters", "link", "joint"}
 LINK = {"name", "mass", "com", "inertia", "allow_unphysical"}
@@ -62,24 +62,22 @@ def read_toml(path: Path) -> Description:
     """Read a robot; raises LinkwiseError naming the table, the key and the mend."""
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (ValueError, RecursionError) as error:  # ValueError: no TOML, no UTF-8, or too many digits
+    except (ValueError, RecursionError) as error:  # ValueError: not TOML, not UTF-8, or too many digits
         raise LinkwiseError(f"malformed TOML: {error}") from None
     if type(data.get("schema")) is not int or data["schema"] != 1:
         raise LinkwiseError(f"the schema is {data.get('schema')!r}; write schema = 1 at the top")
     parameters = _parameters(data.get("parameters", {}))
     top = _Table("the file", data, TOP, parameters)
     base = top.text("base", "base")
-    notes: list[Note] = []
     bodies = tuple(_body(item, parameters) for item in _list(data, "link"))
     if base not in {body.name for body in bodies}:
         bodies = (Body(base), *bodies)
     return Description(
         top.text("name", path.stem),
         bodies,
-        tuple(_connection(item, parameters, notes) for item in _list(data, "joint")),
+        tuple(_connection(item, parameters) for item in _list(data, "joint")),
         top.vector("gravity", [0.0, 0.0, -9.81]),
         tuple(parameters.items()),
-        tuple(notes),
     )
 
 
@@ -89,7 +87,7 @@ def _parameters(data: Any) -> dict[str, float]:
     for name, value in data.items():
         if not name.isidentifier() or name == "pi":
             raise LinkwiseError(
-                f"parameter {name!r} is no usable name; use letters, digits and _, and not pi"
+                f"parameter {name!r} is not a usable name; use letters, digits and _, and not pi"
             )
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise LinkwiseError(f"parameter {name!r} must be a number")
@@ -133,13 +131,10 @@ def _inertia(table: _Table, data: Any) -> Mat3:
     return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
-def _connection(data: dict[str, Any], parameters: Mapping[str, float], notes: list[Note]) -> Connection:
+def _connection(data: dict[str, Any], parameters: Mapping[str, float]) -> Connection:
     name = data.get("name")
     table = _Table(f"joint {name!r}", data, JOINT, parameters)
-    raw = geo.from_rpy(*table.numbers("rpy", [0.0, 0.0, 0.0]))
-    rotation = geo.snap(raw)
-    if rotation != tuple(map(tuple, raw)):
-        notes.append(Note("snapped", str(name), "rotation entries within 1e-12 of -1, 0, 1"))
+    rotation, snapped = transforms.snapped(transforms.from_rpy(*table.numbers("rpy", [0.0, 0.0, 0.0])))
     return Connection(
         table.text("name"),
         table.text("type", "revolute"),
@@ -149,6 +144,7 @@ def _connection(data: dict[str, Any], parameters: Mapping[str, float], notes: li
         table.vector("xyz", [0.0, 0.0, 0.0]),
         table.numbers("axis", [0.0, 0.0, 1.0]),
         _mimic(table, data["mimic"]) if "mimic" in data else None,
+        snapped=snapped,
     )
 
 

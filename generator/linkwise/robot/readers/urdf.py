@@ -8,9 +8,9 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot import transforms as geo
+from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
-from linkwise.robot.robot import Note, Rotation
+from linkwise.robot.notes import LEFT_OUT, Note
 
 USED = {
     "robot": {"link", "joint"},
@@ -18,6 +18,8 @@ USED = {
     "joint": {"parent", "child", "origin", "axis", "mimic", "dynamics"},
 }
 """What the dynamics use of each element; every other kind of child is noted as ignored."""
+
+LOSSES = ("damping", "friction")
 
 
 def read_urdf(path: Path) -> Description:
@@ -28,11 +30,10 @@ def read_urdf(path: Path) -> Description:
     links, joints = robot.findall("link"), robot.findall("joint")
     if not links:
         raise LinkwiseError("<robot> is empty: the file has no <link>; give one that describes a robot")
-    notes: list[Note] = []
     bodies = tuple(_body(element) for element in links)
-    connections = tuple(_connection(element, notes) for element in joints)
-    notes += _ignored([robot, *links, *joints], connections)
-    return Description(robot.get("name") or path.stem, bodies, connections, notes=tuple(notes))
+    connections = tuple(_connection(element) for element in joints)
+    notes = _ignored([robot, *links, *joints], connections)
+    return Description(robot.get("name") or path.stem, bodies, connections, notes=notes)
 
 
 def root_tag(path: Path) -> str:
@@ -52,13 +53,17 @@ def _parse(path: Path) -> Element:
     return root
 
 
-def _ignored(elements: list[Element], connections: tuple[Connection, ...]) -> list[Note]:
+def _ignored(elements: list[Element], connections: tuple[Connection, ...]) -> tuple[Note, ...]:
     counts = Counter(
         str(child.tag) for element in elements for child in element if child.tag not in USED[element.tag]
     )
     counts["damping"] = sum(c.damping != 0.0 for c in connections)
     counts["friction"] = sum(c.friction != 0.0 for c in connections)
-    return [Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()) if count]
+    return tuple(
+        Note("ignored", what, f"{count} ×", LEFT_OUT if what in LOSSES else "")
+        for what, count in sorted(counts.items())
+        if count
+    )
 
 
 def _numbers(element: Element, key: str, default: str, count: int, place: str) -> tuple[float, ...]:
@@ -80,7 +85,7 @@ def _origin(parent: Element, place: str) -> tuple[list[list[float]], tuple[float
         origin = Element("origin")
     roll, pitch, yaw = _numbers(origin, "rpy", "0 0 0", 3, place)
     x, y, z = _numbers(origin, "xyz", "0 0 0", 3, place)
-    return geo.from_rpy(roll, pitch, yaw), (x, y, z)
+    return transforms.from_rpy(roll, pitch, yaw), (x, y, z)
 
 
 def _body(element: Element) -> Body:
@@ -100,17 +105,15 @@ def _body(element: Element) -> Body:
             _numbers(inertia, f"i{key}", "0", 1, place)[0] for key in ("xx", "yy", "zz", "xy", "xz", "yz")
         )
     tensor = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    turned = geo.rotate_inertia(geo.snap(rotation), tensor)
+    turned = transforms.rotate_inertia(transforms.snap(rotation), tensor)
     return Body(name, _numbers(mass, "value", "", 1, place)[0], com, turned)
 
 
-def _connection(element: Element, notes: list[Note]) -> Connection:
+def _connection(element: Element) -> Connection:
     name = element.get("name", "")
     place = f"joint {name!r}"
     raw, translation = _origin(element, place)
-    rotation: Rotation = geo.snap(raw)
-    if rotation != tuple(map(tuple, raw)):
-        notes.append(Note("snapped", name, "rotation entries within 1e-12 of -1, 0, 1"))
+    rotation, snapped = transforms.snapped(raw)
     axis = element.find("axis")
     x, y, z = _numbers(axis, "xyz", "1 0 0", 3, place) if axis is not None else (1.0, 0.0, 0.0)
     losses = element.find("dynamics")
@@ -127,6 +130,7 @@ def _connection(element: Element, notes: list[Note]) -> Connection:
         _mimic(element, place),
         _numbers(losses, "damping", "0", 1, place)[0],
         _numbers(losses, "friction", "0", 1, place)[0],
+        snapped,
     )
 
 

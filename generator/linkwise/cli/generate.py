@@ -1,0 +1,46 @@
+"""The command `generate`."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from linkwise import pipeline
+from linkwise.cli.options import RobotName, reads_robot
+from linkwise.emit.assemble import identifier
+from linkwise.emit.backend import BACKENDS
+from linkwise.package.write import check_target, write_package
+from linkwise.progress import progress
+from linkwise.robot import Options, effects
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+@reads_robot()
+def generate(
+    robot: RobotName,
+    options: Options,
+    out: Annotated[Path, typer.Option(help="Directory that gets the package")],
+    name: Annotated[str | None, typer.Option(help="Name of the package; the robot's if not given")] = None,
+    backend: Annotated[
+        list[str] | None, typer.Option(help=f"{', '.join(BACKENDS)}; may be repeated; all if not given")
+    ] = None,
+) -> None:
+    """Write the package of a robot."""
+    backends = backend or list(BACKENDS)
+    path = Path(robot)
+    request = {"robot": path.name if path.is_file() else robot, "backends": backends, **asdict(options)}
+    system = pipeline.read_system(robot, options)
+    check_target(out / (name or identifier(system.name)), system.name)
+    with progress() as report:
+        files = pipeline.generate(system, backends, name, request, report)
+    directory = out / json.loads(files["manifest.json"])["name"]
+    write_package(files, directory)
+    for effect in effects(system.notes):
+        typer.echo(f"warning: {robot}: {effect}", err=True)
+    typer.echo(
+        f"wrote {directory}: {len(system.coordinates)} joints, {len(system.links)} links, {len(files)} files"
+    )

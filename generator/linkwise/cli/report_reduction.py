@@ -1,0 +1,96 @@
+"""The command `report reduction`."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from linkwise.cli import BUDGET, Budget, Json, ReportOut
+from linkwise.cli.options import reads_robot
+from linkwise.errors import LinkwiseError
+from linkwise.output import require_writable, write_files
+from linkwise.pipeline import read_system
+from linkwise.progress import progress
+from linkwise.report import (
+    json_text,
+    measure,
+    read_seconds,
+    reduction_json,
+    reduction_markdown,
+    seconds_json,
+    seconds_markdown,
+    study,
+    study_files,
+)
+from linkwise.robot import DESCRIPTIONS, Options, read_robot
+from linkwise.robot.read import MAX_PLANAR
+from linkwise.symbolic.system import System, rigid_system
+
+CHECKED_TO = 14
+"""A planar arm is counted at least to here: the paper's ten joints, and four to confirm."""
+PLANAR_ARM = "planar arm"
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+@reads_robot(parameters="symbolic")
+def reduction(
+    options: Options,
+    robot: Annotated[
+        str, typer.Option(help=f"planar: the paper's arm; or a serial robot: {DESCRIPTIONS}")
+    ] = "planar",
+    dof: Annotated[str, typer.Option(help="Degrees of freedom, FIRST..LAST")] = "1..10",
+    measured: Annotated[bool, typer.Option("--measure", help="Time generated code too; needs torch")] = False,
+    seconds: Annotated[Path | None, typer.Option(help="Draw the times of an earlier measured.json")] = None,
+    budget: Budget = BUDGET,
+    out: ReportOut = None,
+    as_json: Json = False,
+) -> None:
+    """Draw the share of terms of τ_1 that its q̈_1 part does not need (the paper's Fig. 15)."""
+    first, last = dof_range(dof)
+    name, system, beyond = _arm(robot, last, options)
+    found = None if seconds is None else read_seconds(seconds)
+    if out is not None:
+        require_writable(out)
+    with progress() as advance:
+        result = study(name, system, first, last, beyond, budget, advance)
+        if measured and found is None:
+            found = seconds_json(name, measure(system, result.dof, advance))
+    if out is not None:
+        write_files(out, study_files(result, found))
+    if as_json:
+        measurement = {} if found is None else {"measured": found}
+        typer.echo(json_text(reduction_json(result) | measurement), nl=False)
+        return
+    typer.echo(reduction_markdown(result), nl=False)
+    if found is not None:
+        typer.echo("\n" + seconds_markdown(result, found), nl=False)
+
+
+def dof_range(text: str) -> tuple[int, int]:
+    """Parse FIRST..LAST or a single number; raises LinkwiseError for an empty or negative range."""
+    match = re.fullmatch(r"(-?\d+)(?:\.\.(-?\d+))?", text)
+    first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
+    if not 1 <= first <= last:
+        raise LinkwiseError(
+            f"--dof {text!r} is not a range; write FIRST..LAST with 1 ≤ FIRST ≤ LAST, such as 1..10"
+        )
+    return first, last
+
+
+def _arm(robot: str, last: int, options: Options) -> tuple[str, System, int]:
+    """Name of the arm, the arm, and up to how many degrees of freedom to count it."""
+    if robot == "planar":
+        arm = read_robot(f"planar{_planar_joints(last, len(options.lock))}", options)
+        return PLANAR_ARM, rigid_system(replace(arm, name=PLANAR_ARM)), CHECKED_TO
+    return Path(robot).stem, read_system(robot, options), last
+
+
+def _planar_joints(last: int, locked: int) -> int:
+    """Joints of the planar arm of which `locked` are held, so that enough move."""
+    if last > MAX_PLANAR:
+        raise LinkwiseError(f"--dof reaches {last}, but the planar arm has at most {MAX_PLANAR} joints")
+    return min(max(last, CHECKED_TO) + locked, MAX_PLANAR)

@@ -1,0 +1,53 @@
+"""The built-in robots: each can be read by its name, and shows what it is there to show."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from linkwise import check_package, generate, read_system, write_package
+from linkwise.dynamics.derive import derive, fused_kernel
+from linkwise.dynamics.kernel import decomposition_cost
+from linkwise.robot import BUILT_IN, DESCRIPTIONS, read_robot
+
+
+@pytest.mark.parametrize("name", [name.split()[0].replace("N", "7") for name in BUILT_IN])
+def test_built_in_robot_is_read_by_its_name(name: str) -> None:
+    assert read_robot(name).name == name
+
+
+def test_description_of_what_can_be_read_names_every_robot_and_format() -> None:
+    for word in (*BUILT_IN, ".toml", ".urdf", ".xml", "MJCF", ".mjcf", ".py"):
+        assert word in DESCRIPTIONS
+
+
+def test_torso_is_a_small_tree_whose_links_share_work() -> None:
+    system = read_system("torso")
+    assert [link.name for link in system.links] == [
+        "chest",
+        "left_upper_arm",
+        "left_forearm",
+        "right_upper_arm",
+        "right_forearm",
+    ]
+    assert system.path(2) == (0, 1, 2, 3, 4)
+    assert system.path(4) == (0, 1, 2, 5, 6)
+    together = fused_kernel(system)
+    assert together is not None
+    assert decomposition_cost([together]) < 0.95 * decomposition_cost(derive(system))
+
+
+def test_arms_of_the_torso_mirror_each_other() -> None:
+    links = {link.name: link for link in read_robot("torso").links}
+    for part in ("upper_arm", "forearm"):
+        left, right = links[f"left_{part}"], links[f"right_{part}"]
+        assert left.mass == right.mass
+        # The joints' axes are y: in linkwise's frames of the links z is left and right.
+        assert np.array_equal(np.multiply(left.com, (1, 1, -1)), right.com)
+        signs = np.outer((1, 1, -1), (1, 1, -1))
+        assert np.array_equal(np.multiply(left.inertia, signs), right.inertia)
+        assert np.multiply(left.inertia, 1).all()
+
+
+def test_torso_agrees_with_an_independent_recursion(tmp_path: Path) -> None:
+    write_package(generate(read_system("torso"), ["numpy"]), tmp_path / "torso")
+    assert all(result.passed for result in check_package(tmp_path / "torso", samples=20))
