@@ -43,7 +43,7 @@ class Terms:
             for at, c in enumerate(columns)
             if c.quantity == "tau"
         ]
-        return cls(robot, convention, columns, _sources(layout, row), tuple(parts), tuple(wholes))
+        return cls(robot, convention, columns, _sources(robot.model.layout, row), tuple(parts), tuple(wholes))
 
     def rows(self, quantity: Quantity) -> slice:
         """Where a quantity's columns stand; they stand together."""
