@@ -4,7 +4,6 @@ import hashlib
 import keyword
 import re
 import sys
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,6 +25,7 @@ from linkwise.symbolic.system import EnergySystem, System
 from linkwise.version import VERSION
 
 LONGEST_NAME = 60
+LINE = 100
 SHARED_RUNTIME = ("__init__.py", "dense.py", "dynamics.py", "interface.py", "quantities.py", "structure.py")
 """Files of linkwise/runtime that every package has."""
 TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}
@@ -136,8 +136,14 @@ def _parameter_lines(system: System) -> list[str]:
     """Names of the parameters as lines of a docstring, which none of their characters can end."""
     if not system.parameters:
         return ["none: generate with --parameters symbolic"]
-    text = ", ".join(ascii(symbol.name) for symbol in system.parameters)
-    return textwrap.wrap(text.replace("\\", "\\\\").replace('"', '\\"'), 100, break_long_words=False)
+    lines: list[str] = []
+    for symbol in system.parameters:
+        name = ascii(symbol.name).replace("\\", "\\\\").replace('"', '\\"')
+        if lines and len(lines[-1]) + len(name) < LINE:
+            lines[-1] += f" {name},"
+        else:
+            lines.append(f"{name},")
+    return [*lines[:-1], lines[-1].removesuffix(",")]
 
 
 def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:

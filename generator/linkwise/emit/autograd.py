@@ -26,6 +26,12 @@ class EnergyFunction:
     result: str
 
     @property
+    def signature(self) -> str:
+        """The arguments with their types."""
+        types = {"q": "Values", "qd": "Values", "p": "Parameters"}
+        return ", ".join(f"{name}: {types[name]}" for name in self.arguments.split(", "))
+
+    @property
     def calls_torch(self) -> bool:
         """Whether a line of it needs torch."""
         return any("torch." in text for text in (self.result, *(text for _, text in self.assignments)))

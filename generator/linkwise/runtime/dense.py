@@ -13,25 +13,29 @@ class Dense:
     """Spreads packed values of one robot, with tables of constants kept for each dtype and device."""
 
     def __init__(self, structure: Structure, backend: Backend[Any]) -> None:
-        self._structure = structure
+        self._layout, self._n = structure.layout, structure.n
         self._backend = backend
+        over = (structure.n, structure.N)
+        self._shapes = {
+            "acceleration": (*over, structure.n),
+            "velocity": (*over, structure.n),
+            "velocity_linear": (*over, structure.n),
+            "gravity": over,
+            "torque": over,
+        }
         self._tables: dict[Any, Any] = {}
 
     def spread(self, values: Array, field: str) -> Array:
         """Values (..., count) of a field of `Layout` over (..., n, N) or (..., n, N, n), zeros elsewhere."""
         padded = self._backend.concatenate([values, self._backend.zeros(values, 1)])
         entries = padded[..., self._table(field, values)]
-        dense: Array = entries.reshape(*values.shape[:-1], *self._shape(field))
+        dense: Array = entries.reshape(*values.shape[:-1], *self._shapes[field])
         return dense
 
     def summed(self, tau: Array) -> Array:
         """Packed torques (..., count), summed over the links: (..., n)."""
         total: Array = tau @ self._table("joint sums", tau)
         return total
-
-    def _shape(self, field: str) -> tuple[int, ...]:
-        n, links = self._structure.n, self._structure.N
-        return (n, links) if field in ("gravity", "torque") else (n, links, n)
 
     def _table(self, name: str, like: Any) -> Any:
         key = name, like.dtype, getattr(like, "device", None)
@@ -43,15 +47,15 @@ class Dense:
         return self._tables[key]
 
     def _joint_sums(self) -> NDArray[np.float64]:
-        rows = self._structure.layout.torque
-        sums = np.zeros((len(rows), self._structure.n))
+        rows = self._layout.torque
+        sums = np.zeros((len(rows), self._n))
         sums[np.arange(len(rows)), rows[:, 0]] = 1.0
         return sums
 
     def _positions(self, field: str) -> NDArray[np.intp]:
         """For each entry of the dense tensor its packed position, or that of the zero behind them."""
-        rows = getattr(self._structure.layout, field)
-        positions = np.full(self._shape(field), len(rows), dtype=np.intp)
+        rows = getattr(self._layout, field)
+        positions = np.full(self._shapes[field], len(rows), dtype=np.intp)
         positions[tuple(rows.T)] = np.arange(len(rows))
         if field == "acceleration":
             positions[rows[:, 2], rows[:, 1], rows[:, 0]] = np.arange(len(rows))

@@ -55,14 +55,14 @@ class Dynamics:
         structure: Structure,
         backend: Backend[Any],
         load: Callable[[str, Mapping[str, Any]], "Dynamics"],
-        given: Mapping[str, Any],
+        asked: tuple[str, Mapping[str, Any]],
     ) -> None:
-        """`load` makes this robot again from the back end's name and the parameters that were `given`."""
+        """`load` makes this robot again from what it was `asked` for: a back end by name, and parameters."""
         self.n, self.N = structure.n, structure.N
         self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
         self.link_names, self.layout = structure.link_names, structure.layout
         self.backend, self.parameters = backend, backend.parameters
-        self._load, self._given = load, given
+        self._load, self._asked = load, asked
         self._dense = Dense(structure, backend)
 
     def __repr__(self) -> str:
@@ -70,7 +70,7 @@ class Dynamics:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled, copied or sent to another process, it is loaded again there."""
-        return self._load, (self.backend.name, self._given)
+        return self._load, self._asked
 
     def packed(self, q: Array, qd: Array, qdd: Array) -> Packed[Array]:
         """Full decomposition without the zeros: c2, c1 (closing), g, tau, h1, (..., count) each."""

@@ -17,10 +17,12 @@ from torch import Tensor
 
 from .recording import Recording, gradient, variable
 
+Parameters = Mapping[str, Tensor]
+"""Values by name."""
 Values = Sequence[Tensor]
-"""One tensor for each coordinate of the path."""
+"""One tensor for each coordinate."""
 Matrix = Sequence[Sequence[Tensor]]
-"""One tensor for each pair (i, k) of them."""
+"""One tensor for each pair (i, k) of coordinates."""
 
 
 class PartialLagrangian(torch.nn.Module):
@@ -31,15 +33,15 @@ class PartialLagrangian(torch.nn.Module):
     linear: ClassVar[bool] = False
     """Whether the kinetic energy has terms linear in the velocities."""
 
-    def __init__(self, p: Mapping[str, Tensor]) -> None:
+    def __init__(self, p: Parameters) -> None:
         super().__init__()
         self.p = p
 
-    def kinetic(self, q: Sequence[Tensor], qd: Sequence[Tensor]) -> Any:
+    def kinetic(self, q: Values, qd: Values) -> Any:
         """Kinetic energy in J."""
         raise NotImplementedError
 
-    def potential(self, q: Sequence[Tensor]) -> Any:
+    def potential(self, q: Values) -> Any:
         """Potential energy in J."""
         raise NotImplementedError
 
