@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from linkwise.analysis.result import Analysis
+from linkwise.analysis import Analysis
 from linkwise.analysis.settings import (
     Convention,
     Derivative,
@@ -89,9 +89,9 @@ def analyze(
     as_json: Json = False,
 ) -> None:
     """Who loads whom: every torque term of a recorded movement, as a table, figures and a page."""
-    from linkwise.analysis.directory import ended_by_signal
-    from linkwise.analysis.files import Wanted, analyze_to
-    from linkwise.analysis.robot import load_robot
+    from linkwise.analysis.loaded_robot import load_robot
+    from linkwise.analysis.run import Wanted, analyze_to
+    from linkwise.output import ended_by_signal
     from linkwise.progress import progress as shown_progress
 
     reading = Reading(units, time, _pairs(mapping or []), ignore_extra, resample)
@@ -122,19 +122,14 @@ def motion(
     kind: Annotated[Kind, typer.Option(help="Which of the two motions")] = "both",
     as_json: Json = False,
 ) -> None:
-    """Write the paper's two motions (Fig. 5 and 10) for the arm of Table 2, `planar3`."""
-    from linkwise.analysis.motions import MOTIONS, RATE, write_csv
+    """Write two motions modelled on the paper's Fig. 5 and 10, for the arm of its Table 2, `planar3`."""
+    from linkwise.analysis.paper_motions import MOTIONS, RATE, write_motions
 
-    wanted = list(MOTIONS) if kind == "both" else [kind]
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        written = [
-            {"file": str(file), "samples": write_csv(file, MOTIONS[name]), "rate_hz": RATE}
-            for name in wanted
-            for file in [out / f"{name}.csv"]
-        ]
-    except OSError as error:
-        raise LinkwiseError(f"{out}: cannot be written: {error.strerror}") from error
+    wanted = list(MOTIONS.values()) if kind == "both" else [MOTIONS[kind]]
+    written = [
+        {"file": str(file), "samples": made.count, "rate_hz": RATE}
+        for file, made in zip(write_motions(out, wanted), wanted, strict=True)
+    ]
     if as_json:
         typer.echo(json.dumps(written))
         return

@@ -1,4 +1,4 @@
-"""A generated robot package, imported from its directory."""
+"""A generated robot package as the analysis uses it: names, a back end that works here, bodies, an oracle."""
 
 import hashlib
 from collections.abc import Sequence
@@ -10,21 +10,20 @@ from linkwise.errors import LinkwiseError
 from linkwise.package.load import Model, Package, open_package
 from linkwise.package.manifest import FILE, BodyEntry
 
-BACKENDS = ("native", "numpy")
-"""Back ends in the order tried: compiled C is the fastest, NumPy always works."""
-
 
 @dataclass(frozen=True)
-class Robot:
+class LoadedRobot:
     """A loaded robot: names in the order of every array, and which back end computes."""
 
     name: str
     joints: tuple[str, ...]
     units: tuple[str, ...]
+    """"rad" or "m", a joint each."""
     links: tuple[str, ...]
     backend: str
     model: Model
     bodies: tuple[BodyEntry, ...] | None
+    """Rigid bodies, parents before children; None where the energies were written by hand."""
     up: tuple[float, float, float]
     """Against gravity, in the base frame; z for a robot without gravity."""
     manifest_sha256: str
@@ -32,13 +31,16 @@ class Robot:
     """Partial torques by an independent way; None where the energies were written by hand."""
 
 
-def load_robot(directory: Path, backend: str | None = None) -> Robot:
-    """Import the package in `directory`, with `backend` or the fastest that works here."""
+def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
+    """Import the package in `directory`, with `backend` or the fastest that works here.
+
+    Raises LinkwiseError for a directory without a package, a damaged one, or no back end that loads.
+    """
     package = open_package(directory)
     manifest = package.manifest
-    chosen, model = _load(package, BACKENDS if backend is None else (backend,))
+    chosen, model = _load(package, fastest_first(package) if backend is None else (backend,))
     tree = manifest.tree
-    return Robot(
+    return LoadedRobot(
         manifest.name,
         tuple(model.joint_names),
         tuple(model.joint_units),
@@ -50,6 +52,13 @@ def load_robot(directory: Path, backend: str | None = None) -> Robot:
         hashlib.sha256((directory / FILE).read_bytes()).hexdigest(),
         NewtonEuler(manifest, tree) if tree is not None else None,
     )
+
+
+def fastest_first(package: Package) -> tuple[str, ...]:
+    """Back ends of the package in the order tried: compiled C first, then in the registry's order."""
+    from linkwise.emit.backend import BACKENDS
+
+    return tuple(sorted(package.backends, key=lambda name: "c" not in BACKENDS[name].needs))
 
 
 def _up(gravity: Sequence[float] | None) -> tuple[float, float, float]:
@@ -67,6 +76,6 @@ def _load(package: Package, backends: Sequence[str]) -> tuple[str, Model]:
         except Exception as error:  # A back end may lack its compiler, its library or its files.
             reasons.append(f"{backend}: {error}")
     raise LinkwiseError(
-        f"{package.directory}: no back end for the analysis ({'; '.join(reasons)});"
-        " generate the robot with --backend numpy"
+        f"{package.directory}: no back end for the analysis ({'; '.join(reasons) or 'the package has none'});"
+        " generate the robot again, with a back end that can be loaded here"
     )
