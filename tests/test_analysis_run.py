@@ -11,6 +11,7 @@ from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.paper_motions import MOTIONS, SIMULATED, write_motions
 from linkwise.analysis.verify import Closure
 from linkwise.errors import LinkwiseError
+from linkwise.package.load import Package
 from motion_logs import JOINTS, LEG, PLANAR3, PUMA560, smooth, write_csv, write_mot
 
 
@@ -126,6 +127,21 @@ def test_robot_directories_that_are_none(tmp_path):
         load_robot(tmp_path)
     with pytest.raises(LinkwiseError, match="no back end for the analysis"):
         load_robot(PLANAR3, "no-such")
+
+
+def test_a_back_end_that_cannot_load_gives_way_to_the_next(monkeypatch):
+    load, failing = Package.load, {"native"}
+
+    def partly(package, backend):
+        if backend in failing:
+            raise OSError("no compiler")
+        return load(package, backend)
+
+    monkeypatch.setattr(Package, "load", partly)
+    assert load_robot(PLANAR3).backend == "numpy"
+    failing |= {"numpy", "torch", "autograd"}
+    with pytest.raises(LinkwiseError, match=r"no back end for the analysis \(native: no compiler; numpy: "):
+        load_robot(PLANAR3)
 
 
 def test_motions_modelled_on_the_paper():

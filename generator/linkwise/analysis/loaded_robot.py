@@ -55,10 +55,11 @@ def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
 
 
 def fastest_first(package: Package) -> tuple[str, ...]:
-    """Back ends of the package in the order tried: compiled C first, then in the registry's order."""
-    from linkwise.emit.backend import BACKENDS
+    """Back ends of the package in the order tried: compiled C first, the others as they stand there."""
+    from linkwise.emit.backend import BACKENDS  # only here: it brings what emits, SymPy above all
 
-    return tuple(sorted(package.backends, key=lambda name: "c" not in BACKENDS[name].needs))
+    compiled = {name for name, backend in BACKENDS.items() if "c" in backend.needs}
+    return tuple(sorted(package.backends, key=lambda name: name not in compiled))
 
 
 def _up(gravity: Sequence[float] | None) -> tuple[float, float, float]:

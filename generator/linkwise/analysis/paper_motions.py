@@ -1,6 +1,6 @@
 """Two motions modelled on those of the paper's Fig. 5 and Fig. 10, made of minimum-jerk moves.
 
-The paper prints curves and no numbers: which link moves when is the paper's, how far and how fast is ours.
+Which link moves when follows the paper; how far and how fast is chosen here.
 """
 
 from collections.abc import Sequence

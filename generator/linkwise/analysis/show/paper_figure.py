@@ -134,7 +134,7 @@ def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
         borderaxespad=0,
         ncols=_legend_columns(names),
         alignment="left",
-        frameon=False,
+        handlelength=2,
         fontsize=8,
     )
     legend.set_in_layout(False)

@@ -49,7 +49,7 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
         [cause.label for cause in every],
         loc="outside lower center",
         ncols=3,
-        frameon=False,
+        handlelength=2,
         fontsize=8,
     )
     return figure  # type: ignore[no-any-return]
