@@ -39,7 +39,11 @@ def views() -> dict[str, list[set[str]]]:
 
 def emitted_templates() -> list[str]:
     loader = jinja2.PackageLoader("linkwise.templates", "")
-    return [t for t in loader.list_templates() if t.endswith(".j2") and t[:6] not in ("motion", "report")]
+    return [
+        t
+        for t in loader.list_templates()
+        if t.endswith(".j2") and t.split("/")[0] not in ("analysis", "report")
+    ]
 
 
 @pytest.mark.parametrize("template", emitted_templates())

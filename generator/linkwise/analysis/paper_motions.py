@@ -1,13 +1,16 @@
-"""The two motions of the paper's Fig. 5 and Fig. 10, made of minimum-jerk moves."""
+"""Two motions modelled on those of the paper's Fig. 5 and Fig. 10, made of minimum-jerk moves.
+
+Which link moves when follows the paper; how far and how fast is chosen here.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from linkwise.output import write_files
+from linkwise.package.load import Array
 
 RATE = 100.0
 """Sampling rate in Hz."""
@@ -27,8 +30,11 @@ class Move:
 
 
 @dataclass(frozen=True)
-class Motion:
-    """Joint angles over time, in rad: `start`, then moves; read with noise and in steps."""
+class PaperMotion:
+    """Joint angles over time, in rad: `start`, then moves, for `duration` s.
+
+    Angles are read with normal noise of standard deviation `noise` from `seed`, and in steps of `step`.
+    """
 
     name: str
     start: tuple[float, ...]
@@ -38,8 +44,13 @@ class Motion:
     step: float = 0.0
     seed: int = 5
 
+    @property
+    def count(self) -> int:
+        """Samples at the rate of `write_motions`."""
+        return len(self.samples()[0])
+
     def samples(self, rate: float = RATE) -> tuple[Array, Array]:
-        """Time (S,) in s and angles (S, joints) in rad."""
+        """Time (S,) in s and angles (S, joints) in rad, at `rate` Hz."""
         time = np.arange(round(self.duration * rate) + 1) / rate
         q = np.tile(np.array(self.start), (len(time), 1))
         for move in self.moves:
@@ -57,7 +68,7 @@ def minimum_jerk(s: Array) -> Array:
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
-RECORDED = Motion(
+RECORDED = PaperMotion(
     "recorded",
     (0.30, 0.60, 0.40),
     (
@@ -70,11 +81,11 @@ RECORDED = Motion(
     noise=5e-4,
     step=2 * np.pi / 4096,
 )
-"""Like Fig. 5: link 3 moves until about 4 s, then link 2; an encoder of 4096 steps a turn."""
+"""As in Fig. 5, link 3 moves until about 4 s, then link 2; read by an encoder of 4096 steps a turn."""
 
 # Link 2's move begins two samples after 3 s: the five-point formula looks two samples ahead, and so
 # sees rest up to and including 3 s.
-SIMULATED = Motion(
+SIMULATED = PaperMotion(
     "simulated",
     (0.30, 0.60, 0.40),
     (
@@ -85,17 +96,20 @@ SIMULATED = Motion(
     ),
     6.0,
 )
-"""Like Fig. 10: only link 3 moves until 3 s, links 2 and 3 after."""
+"""As in Fig. 10, only link 3 moves until 3 s, links 2 and 3 after."""
 
 MOTIONS = {motion.name: motion for motion in (RECORDED, SIMULATED)}
 
 
-def write_csv(path: Path, motion: Motion, joints: Sequence[str] = JOINTS) -> int:
-    """Write a motion as CSV, exactly; returns how many samples."""
+def write_motions(
+    directory: Path, motions: Sequence[PaperMotion], joints: Sequence[str] = JOINTS
+) -> tuple[Path, ...]:
+    """Write each motion to `directory`/NAME.csv, exactly: all of them, or none and LinkwiseError."""
+    return write_files(directory, {f"{motion.name}.csv": _csv(motion, joints) for motion in motions})
+
+
+def _csv(motion: PaperMotion, joints: Sequence[str]) -> bytes:
     time, q = motion.samples()
     lines = [",".join(["time", *joints])]
     lines += [",".join(map(repr, [t, *angles])) for t, angles in zip(time.tolist(), q.tolist(), strict=True)]
-    draft = path.with_name(f".{path.name}.draft")
-    draft.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    draft.replace(path)
-    return len(time)
+    return ("\n".join(lines) + "\n").encode()

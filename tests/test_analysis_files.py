@@ -4,16 +4,16 @@ import csv
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from linkwise import progress
-from linkwise.analysis import analyze, directory, tables
-from linkwise.analysis import files as files_module
-from linkwise.analysis.directory import whole_directory
-from linkwise.analysis.run import Keep, stride_for
+from linkwise.analysis import analyze, tables
+from linkwise.analysis import run as run_module
 from linkwise.analysis.settings import Lowpass, Processing
+from linkwise.analysis.stream import KeptSamples, stride_for
 from linkwise.cli.app import app
 from linkwise.errors import LinkwiseError
 from motion_logs import PLANAR3, smooth, write_csv
@@ -86,7 +86,7 @@ def test_a_former_result_is_replaced_and_nothing_else(call, log, tmp_path):
     assert sorted(file.name for file in out.iterdir()) == ["analysis.csv", "analysis.json"]
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").touch()
-    with pytest.raises(LinkwiseError, match="exists and is no former result"):
+    with pytest.raises(LinkwiseError, match="exists and is not a former result"):
         call("analyze", log, *ROBOT, "--out", tmp_path / "mine")
     assert [file.name for file in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
 
@@ -113,7 +113,7 @@ def test_a_fault_on_the_way_leaves_nothing(call, log, tmp_path, monkeypatch):
     def fail(_):
         raise LinkwiseError("page")
 
-    monkeypatch.setattr(files_module, "report", fail)
+    monkeypatch.setattr(run_module, "report", fail)
     with pytest.raises(LinkwiseError, match="page"):
         call("analyze", log, *ROBOT, "--out", tmp_path / "out")
     assert [file.name for file in tmp_path.iterdir()] == ["log.csv"]
@@ -129,13 +129,30 @@ def test_a_full_disk_is_told(call, log, tmp_path, monkeypatch):
     assert [file.name for file in tmp_path.iterdir()] == ["log.csv"]
 
 
-def test_a_failed_swap_keeps_the_former_result(tmp_path):
+def test_a_failed_exchange_keeps_the_former_result(call, log, tmp_path, monkeypatch):
     out = tmp_path / "out"
-    with whole_directory(out, "mark") as draft:
-        (draft / "mark").touch()
-    with pytest.raises(FileNotFoundError):
-        directory._swap(tmp_path / "no-draft", out)
-    assert (out / "mark").is_file()
+    call("analyze", log, *ROBOT, "--out", out, "--no-page")
+    former = (out / "analysis.json").read_bytes()
+    rename = Path.rename
+
+    def fail(path, target):
+        if target == out and not path.name.endswith(".former"):
+            raise OSError(5, "Input/output error")
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", fail)
+    with pytest.raises(LinkwiseError, match="nothing was written: Input/output error"):
+        call("analyze", log, *ROBOT, "--out", out, "--no-page", "--format", "csv")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["log.csv", "out"]
+    assert (out / "analysis.json").read_bytes() == former
+    assert (out / "analysis.parquet").is_file()
+
+
+def test_a_link_to_a_former_result_is_not_replaced(call, log, tmp_path):
+    call("analyze", log, *ROBOT, "--out", tmp_path / "out", "--no-page")
+    (tmp_path / "link").symlink_to(tmp_path / "out")
+    with pytest.raises(LinkwiseError, match="exists and is not a former result"):
+        call("analyze", log, *ROBOT, "--out", tmp_path / "link", "--no-page")
 
 
 def test_motions_are_written_and_analysed(call, tmp_path):
@@ -155,7 +172,7 @@ def test_warnings_and_left_out_columns_are_told(call, tmp_path):
 
 def test_long_logs_are_thinned_evenly():
     values = np.arange(2000.0).reshape(2, 1000)
-    keep = Keep(2, 7)
+    keep = KeptSamples(2, 7)
     for start in range(0, 1000, 13):
         keep(values[:, start : start + 13])
     np.testing.assert_array_equal(keep.values, values[:, ::7])
@@ -175,7 +192,7 @@ def test_importing_the_commands_needs_no_extra():
 
 def test_a_missing_extra_is_named(monkeypatch, log, call, tmp_path):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(LinkwiseError, match=r"needs pyarrow: pip install linkwise\[motion\]"):
+    with pytest.raises(LinkwiseError, match=r"pyarrow is needed .* pip install 'linkwise\[motion\]'"):
         call("analyze", log, *ROBOT, "--out", tmp_path / "out")
 
 

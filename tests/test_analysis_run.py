@@ -1,4 +1,4 @@
-"""The analysis against the package's own calls, and what the paper's figures show."""
+"""The analysis against the package's own calls, and what motions modelled on the paper's show."""
 
 from copy import deepcopy
 from dataclasses import replace
@@ -7,18 +7,17 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from linkwise.analysis import Lowpass, Processing, Reading, analyze, stream
-from linkwise.analysis.closure import Closure
-from linkwise.analysis.motions import MOTIONS, SIMULATED
-from linkwise.analysis.motions import write_csv as write_motion
-from linkwise.analysis.robot import load_robot
+from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.paper_motions import MOTIONS, SIMULATED, write_motions
+from linkwise.analysis.verify import Closure
 from linkwise.errors import LinkwiseError
+from linkwise.package.load import Package
 from motion_logs import JOINTS, LEG, PLANAR3, PUMA560, smooth, write_csv, write_mot
 
 
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory):
-    path = tmp_path_factory.mktemp("motion") / "simulated.csv"
-    write_motion(path, SIMULATED)
+    (path,) = write_motions(tmp_path_factory.mktemp("motion"), [SIMULATED])
     return analyze(path, PLANAR3)
 
 
@@ -38,7 +37,7 @@ def test_arrays_are_the_packages(tmp_path):
     assert result.closure.links_relative < 1e-12
 
 
-def test_partial_torques_sum_to_the_joints(simulated):
+def test_partial_torques_sum_to_the_joint_torques(simulated):
     scale = np.abs(simulated.partial_torque).sum(-1)
     error = np.abs(simulated.partial_torque.sum(-1) - simulated.torque)
     assert (error <= 1e-12 * scale).all()
@@ -130,7 +129,22 @@ def test_robot_directories_that_are_none(tmp_path):
         load_robot(PLANAR3, "no-such")
 
 
-def test_motions_of_the_paper():
+def test_a_back_end_that_cannot_load_gives_way_to_the_next(monkeypatch):
+    load, failing = Package.load, {"native"}
+
+    def partly(package, backend):
+        if backend in failing:
+            raise OSError("no compiler")
+        return load(package, backend)
+
+    monkeypatch.setattr(Package, "load", partly)
+    assert load_robot(PLANAR3).backend == "numpy"
+    failing |= {"numpy", "torch", "autograd"}
+    with pytest.raises(LinkwiseError, match=r"no back end for the analysis \(native: no compiler; numpy: "):
+        load_robot(PLANAR3)
+
+
+def test_motions_modelled_on_the_paper():
     for motion in MOTIONS.values():
         time, q = motion.samples()
         assert np.isfinite(q).all()

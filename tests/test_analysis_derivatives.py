@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from linkwise.analysis.differentiate import FIRST, SECOND, derivatives
+from linkwise.analysis.derivatives import FIRST, SECOND, derivatives
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.settings import Lowpass, Processing
 from linkwise.errors import LinkwiseError

@@ -1,16 +1,14 @@
-"""The paper's Fig. 5-9 and 10-14 as five panels below one another."""
+"""Five panels below one another, laid out like the paper's Fig. 5-9 and 10-14."""
 
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from linkwise.analysis.columns import Column, Quantity
-from linkwise.analysis.extras import extra
-from linkwise.analysis.names import short
-from linkwise.analysis.palette import colour, dash
-from linkwise.analysis.result import Analysis
-from linkwise.analysis.summary import provenance
+from linkwise.analysis.columns import Column, Quantity, load_unit
+from linkwise.analysis.result import AnalysisResult
+from linkwise.extras import extra
+from linkwise.plotstyle import colour, dash, short
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,14 +19,16 @@ PANEL, LINE = 1.75, 0.22
 
 @dataclass(frozen=True)
 class _Panel:
+    """A panel and which columns it draws."""
+
     title: str
     symbol: str
     wanted: Callable[[Column], bool]
 
 
-def paper(analysis: Analysis, i: int) -> "Figure":
+def paper(result: AnalysisResult, i: int) -> "Figure":
     """Coordinates, τ_i, and for joint i: τ_ij, τp_ij(q̇_j), τp_ij(q̈_j), j's own coordinate."""
-    robot, panels = analysis.robot, _panels(analysis, i)
+    robot, panels = result.robot, _panels(result, i)
     legends = [_legend_rows(robot.joints), _legend_rows(robot.links)]
     heights = [PANEL] * len(panels) + [LINE * (rows + 1) for rows in legends]
     figure = extra("matplotlib.figure").Figure(figsize=(7.6, sum(heights) + 0.9), layout="constrained")
@@ -38,24 +38,24 @@ def paper(analysis: Analysis, i: int) -> "Figure":
     for axis in axes[:-1]:
         axis.tick_params(labelbottom=False)
     for axis, panel in zip(axes, panels, strict=True):
-        _draw(axis, analysis, panel)
+        _draw(axis, result, panel)
     axes[-1].set_xlabel("time (s)")
-    axes[-1].set_xlim(analysis.time[0], analysis.time[-1])
+    axes[-1].set_xlim(result.time[0], result.time[-1])
     figure.align_ylabels(axes)
     for row, (title, names) in enumerate([("Joints", robot.joints), ("Links", robot.links)], len(panels)):
         _legend(figure.add_subplot(grid[row]), title, names)
-    figure.suptitle(f"{analysis.robot.name} · {analysis.source}", x=0.01, ha="left", fontsize=11)
-    foot = "\n".join([*textwrap.wrap(_left_out(analysis), 125), provenance(analysis)])
+    figure.suptitle(f"{robot.name} · {result.source}", x=0.01, ha="left", fontsize=11)
+    foot = "\n".join([*textwrap.wrap(_left_out(result), 125), result.provenance])
     figure.supxlabel(foot, x=0.01, ha="left", fontsize=7, color="#5A6270")
     return figure  # type: ignore[no-any-return]
 
 
-def _panels(analysis: Analysis, i: int) -> tuple[_Panel, ...]:
-    robot = analysis.robot
+def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:
+    robot = result.robot
     units = " or ".join(dict.fromkeys(robot.units))
-    loads = " or ".join(dict.fromkeys("N·m" if unit == "rad" else "N" for unit in robot.units))
-    on = f"on {short(robot.joints[i])} ({'N·m' if robot.units[i] == 'rad' else 'N'})"
-    own = own_joints(analysis)
+    loads = " or ".join(dict.fromkeys(map(load_unit, robot.units)))
+    on = f"on {short(robot.joints[i])} ({load_unit(robot.units[i])})"
+    own = own_joints(result)
 
     def own_term(quantity: Quantity) -> Callable[[Column], bool]:
         return lambda c: c.quantity == quantity and c.joint == i and c.cause == own[c.link or 0]
@@ -65,7 +65,7 @@ def _panels(analysis: Analysis, i: int) -> tuple[_Panel, ...]:
         _Panel(f"Joint coordinates ({units})", "$q_i$", lambda c: c.quantity == "q"),
         _Panel(f"Joint torques ({loads})", r"$\tau_i$", lambda c: c.quantity == "tau"),
         _Panel(
-            f"Partial torques {on}, by link",
+            f"Partial torques {on}, through each link",
             rf"$\tau_{{{number}j}}$",
             lambda c: c.quantity == "tau_link" and c.joint == i,
         ),
@@ -82,15 +82,15 @@ def _panels(analysis: Analysis, i: int) -> tuple[_Panel, ...]:
     )
 
 
-def own_joints(analysis: Analysis) -> tuple[int, ...]:
-    """For each link the coordinate of its own joint: the manifest's, else the last on its path."""
-    robot = analysis.robot
+def own_joints(result: AnalysisResult) -> tuple[int, ...]:
+    """Coordinate of each link's own joint: the manifest's, else the last that carries the link."""
+    robot = result.robot
     known = {body.link: body.coordinate for body in robot.bodies or ()}
     return tuple(
         known.get(
             link,
             max(
-                (c.joint or 0 for c in analysis.columns if c.quantity == "tau_link" and c.link == j),
+                (c.joint or 0 for c in result.columns if c.quantity == "tau_link" and c.link == j),
                 default=0,
             ),
         )
@@ -98,11 +98,11 @@ def own_joints(analysis: Analysis) -> tuple[int, ...]:
     )
 
 
-def _draw(axis: Any, analysis: Analysis, panel: _Panel) -> None:
-    for column, values in zip(analysis.columns, analysis.values, strict=True):
+def _draw(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
+    for column, values in zip(result.columns, result.values, strict=True):
         if panel.wanted(column):
             at = column.joint if column.link is None else column.link
-            axis.plot(analysis.time, values, **_style(at or 0))
+            axis.plot(result.time, values, **_style(at or 0))
     axis.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
     axis.set_title(panel.title)
     axis.set_ylabel(panel.symbol, fontsize=11, parse_math=True)
@@ -134,15 +134,15 @@ def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
         borderaxespad=0,
         ncols=_legend_columns(names),
         alignment="left",
-        frameon=False,
+        handlelength=2,
         fontsize=8,
     )
     legend.set_in_layout(False)
 
 
-def _left_out(analysis: Analysis) -> str:
+def _left_out(result: AnalysisResult) -> str:
     """What the last two panels do not show."""
-    own, robot = own_joints(analysis), analysis.robot
+    own, robot = own_joints(result), result.robot
     others = [name for at, name in enumerate(robot.joints) if at not in own]
     text = "The last two panels show each link's own joint only; the table and the page have every joint."
     if others:

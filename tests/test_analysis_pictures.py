@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from linkwise.analysis import analyze
 from linkwise.analysis.columns import Column
-from linkwise.analysis.names import short
-from linkwise.analysis.poses import poses
-from linkwise.analysis.robot import load_robot
+from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.show.poses import poses
 from linkwise.errors import LinkwiseError
 from linkwise.package.manifest import BodyEntry
+from linkwise.plotstyle import short
 from matplotlib.figure import Figure
 from motion_logs import JOINTS, PLANAR3, smooth, write_csv
 

@@ -4,13 +4,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from linkwise.analysis.logs.headers import open_delimited, open_storage
+from linkwise.analysis.logs.parquet import ParquetLog
 from linkwise.errors import LinkwiseError
-
-Array = NDArray[np.float64]
-BLOCK = 65536
+from linkwise.package.load import Array
 
 
 class Log(Protocol):
@@ -25,8 +22,8 @@ class Log(Protocol):
         """Whether angles are in degrees, where the file says so."""
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """Warnings about the file, complete once it has been read."""
+    def warnings(self) -> tuple[str, ...]:
+        """What looks wrong in the file and need not be."""
 
     @property
     def size(self) -> int:
@@ -36,15 +33,19 @@ class Log(Protocol):
     def first_row(self) -> int:
         """Number of the first sample as an editor or a spreadsheet counts rows, from 1."""
 
-    def read(self, columns: Sequence[int]) -> Iterator[tuple[Array, int]]:
-        """Yield blocks (rows, len(columns)), NaN possible, and how much of `size` is done."""
+    def read(self, columns: Sequence[int], rows: int = ...) -> Iterator[tuple[Array, int]]:
+        """Yield blocks (at most `rows`, len(columns)), NaN possible, and how much of `size` is done.
+
+        columns: positions in `columns`, in the order wanted. Raises LinkwiseError, naming file, row and
+        column, for what is not a number.
+        """
 
 
 def open_log(path: Path) -> Log:
-    """Open a log by its suffix: .csv, .txt or .tsv, .mot or .sto, .parquet."""
-    from linkwise.analysis.parquet_log import ParquetLog
-    from linkwise.analysis.text_log import open_delimited, open_storage
+    """Open a log by its suffix: .csv, .txt or .tsv, .mot or .sto, .parquet.
 
+    Raises LinkwiseError for a missing file, an unknown suffix, or a header that cannot be read.
+    """
     suffix = path.suffix.lower()
     if not path.is_file():
         raise LinkwiseError(f"{path}: no such file")

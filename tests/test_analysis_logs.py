@@ -6,22 +6,20 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from linkwise.analysis import text_log
-from linkwise.analysis.log import open_log
+from linkwise.analysis.logs import open_log
 from linkwise.errors import LinkwiseError
 from motion_logs import JOINTS, smooth, write_csv, write_mot
 
 
-def whole(path: Path, columns: tuple[int, ...]) -> np.ndarray:
-    return np.concatenate([block for block, _ in open_log(path).read(columns)])
+def whole(path: Path, columns: tuple[int, ...], rows: int = 1000) -> np.ndarray:
+    return np.concatenate([block for block, _ in open_log(path).read(columns, rows)])
 
 
-def test_csv_reads_back_exactly_whatever_the_block(tmp_path, monkeypatch):
+def test_csv_reads_back_exactly_whatever_the_block(tmp_path):
     table = smooth(50, 3)
     path = write_csv(tmp_path / "a.csv", table)
     np.testing.assert_array_equal(whole(path, (0, 1, 2, 3)), table)
-    monkeypatch.setattr(text_log, "BLOCK", 7)
-    np.testing.assert_array_equal(whole(path, (0, 3, 1)), table[:, [0, 3, 1]])
+    np.testing.assert_array_equal(whole(path, (0, 3, 1), rows=7), table[:, [0, 3, 1]])
 
 
 @pytest.mark.parametrize("mark", [";", "\t", ",", ", "])
@@ -33,7 +31,7 @@ def test_csv_takes_the_delimiter_of_its_header(tmp_path, mark):
     np.testing.assert_array_equal(whole(path, (0, 1)), [[0, 1.5]])
 
 
-def test_empty_cells_at_the_end_and_quoted_delimiters_are_no_more_columns(tmp_path):
+def test_empty_cells_at_the_end_and_quoted_delimiters_are_not_more_columns(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text('time,a,note\n0,1,"x, y"\n0.1,2,z,\n', encoding="utf-8")
     np.testing.assert_array_equal(whole(path, (0, 1)), [[0, 1], [0.1, 2]])
@@ -49,7 +47,7 @@ def test_opensim_storage(tmp_path):
     assert open_log(tmp_path / "b.sto").degrees is False
 
 
-def test_parquet(tmp_path, monkeypatch):
+def test_parquet(tmp_path):
     table = smooth(30, 2)
     arrays = dict(zip(("time", "a", "b"), table.T.copy(), strict=True))
     pq.write_table(pa.table(arrays), tmp_path / "a.parquet")
@@ -59,10 +57,9 @@ def test_parquet(tmp_path, monkeypatch):
     assert np.isnan(whole(tmp_path / "b.parquet", (2,))[0, 0])
 
 
-def test_size_is_reached(tmp_path, monkeypatch):
-    monkeypatch.setattr(text_log, "BLOCK", 4)
+def test_size_is_reached(tmp_path):
     log = open_log(write_csv(tmp_path / "a.csv", smooth(10, 3)))
-    done = [at for _, at in log.read((0, 1))]
+    done = [at for _, at in log.read((0, 1), rows=4)]
     assert done == sorted(done)
     assert done[-1] == log.size
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from linkwise.analysis.resample import resample
+from linkwise.analysis.even_time import resampled
 from linkwise.analysis.samples import read_samples
 from linkwise.analysis.selection import select
 from linkwise.analysis.settings import Reading
@@ -13,15 +13,15 @@ from motion_logs import JOINTS, smooth, write_csv, write_mot
 ANGLES = ("rad", "rad", "rad")
 
 
-def read(path, reading=None, units=ANGLES, spool=None):
-    return read_samples(path, JOINTS, units, reading or Reading(), silent, spool)
+def read(path, reading=None, units=ANGLES, buffer=None):
+    return read_samples(path, JOINTS, units, reading or Reading(), silent, buffer)
 
 
 def test_samples_are_the_log(tmp_path):
     table = smooth(40, 3)
     path = write_csv(tmp_path / "a.csv", table)
-    for spool in (None, tmp_path):
-        samples = read(path, spool=spool)
+    for buffer in (None, tmp_path):
+        samples = read(path, buffer=buffer)
         np.testing.assert_array_equal(samples.time, table[:, 0])
         np.testing.assert_array_equal(samples.q, table[:, 1:])
         assert samples.rate == pytest.approx(100, rel=1e-12)
@@ -47,7 +47,7 @@ def test_degrees_turn_angles_only(tmp_path):
         (60, "deg", None),
     ],
 )
-def test_unlikely_units_are_doubted(tmp_path, scale, units, warning):
+def test_unlikely_units_are_warned_of(tmp_path, scale, units, warning):
     path = write_csv(tmp_path / "a.csv", smooth(400, 3) * [1, scale, scale, scale])
     warnings = read(path, Reading(units=units)).warnings
     assert [warning in text for text in warnings] == ([True] if warning else [])
@@ -96,7 +96,7 @@ def test_time_must_be_even(tmp_path, row, time, message):
 def test_nan_is_named(tmp_path):
     table = smooth(10, 3)
     table[4, 2] = np.nan
-    with pytest.raises(LinkwiseError, match=r"a.csv: row 6, column 'joint2': nan is no sample"):
+    with pytest.raises(LinkwiseError, match=r"a.csv: row 6, column 'joint2': nan is not a sample"):
         read(write_csv(tmp_path / "a.csv", table))
 
 
@@ -110,10 +110,11 @@ def test_resampling_follows_the_signal_and_not_the_window(tmp_path):
     rng = np.random.default_rng(1)
     time = np.cumsum(0.01 * rng.uniform(0.7, 1.3, 3000))
     table = np.column_stack([time, np.sin(5 * time), np.cos(3 * time)])
-    whole = resample(table, 100.0, None)
+    whole = np.concatenate([*resampled(table, 100.0)])
     np.testing.assert_allclose(whole[:, 1], np.sin(5 * whole[:, 0]), atol=1e-7)
     np.testing.assert_allclose(np.diff(whole[:, 0]), 0.01, rtol=1e-9)
-    np.testing.assert_allclose(resample(table, 100.0, None, rows=97), whole, atol=1e-12)
+    parts = np.concatenate([*resampled(table, 100.0, rows=97)])
+    np.testing.assert_allclose(parts, whole, atol=1e-12)
     path = write_csv(tmp_path / "a.csv", table, ("joint1", "joint2"))
     samples = read_samples(path, JOINTS[:2], ANGLES[:2], Reading(resample=50), silent)
     np.testing.assert_allclose(samples.q, whole[::2, 1:][: len(samples.q)], atol=1e-12)
@@ -128,13 +129,14 @@ def test_a_rate_beyond_reason_is_refused(tmp_path):
     path = write_csv(tmp_path / "a.csv", smooth(73, 3, rate=60))
     message = r"--resample 1e\+12 Hz is more than 100 times the log's own mean rate of 60 Hz"
     with pytest.raises(LinkwiseError, match=message):
-        read(path, Reading(resample=1e12), spool=tmp_path)
+        read(path, Reading(resample=1e12), buffer=tmp_path)
     assert [file.name for file in tmp_path.iterdir()] == ["a.csv"]
 
 
 def test_resampling_reports_progress():
     seen = []
-    resample(smooth(50, 1), 200.0, None, rows=40, progress=lambda *step: seen.append(step))
+    blocks = [*resampled(smooth(50, 1), 200.0, rows=40, progress=lambda *step: seen.append(step))]
+    assert [len(block) for block in blocks] == [40, 40, 19]
     assert seen == [("resampling", 40, 99), ("resampling", 80, 99), ("resampling", 99, 99)]
 
 
@@ -154,14 +156,14 @@ def test_jitter_is_not_rounding(tmp_path):
         read(write_csv(tmp_path / "a.csv", table))
 
 
-def test_milliseconds_are_doubted(tmp_path):
+def test_milliseconds_are_warned_of(tmp_path):
     table = smooth(30, 3) * [1000, 1, 1, 1]
     (warning,) = read(write_csv(tmp_path / "a.csv", table)).warnings
     assert warning == "0.1 samples a second are few: if time is in ms, divide it by 1000"
     assert read(write_csv(tmp_path / "b.csv", smooth(30, 3, rate=10))).warnings == ()
 
 
-def test_unsaid_degrees_are_told(tmp_path):
+def test_a_header_without_a_unit_is_warned_of(tmp_path):
     path = write_mot(tmp_path / "a.mot", smooth(30, 3), JOINTS)
     said = path.read_text(encoding="utf-8")
     path.write_text(said.replace("inDegrees=yes\n", ""), encoding="utf-8")
@@ -173,7 +175,7 @@ def test_unsaid_degrees_are_told(tmp_path):
         read(path)
 
 
-def test_a_last_row_that_may_be_cut_is_doubted(tmp_path):
+def test_a_last_row_that_may_be_cut_is_warned_of(tmp_path):
     path = write_csv(tmp_path / "a.csv", np.round(smooth(30, 3) + 1.1, 2) + 0.001)
     text = path.read_text(encoding="utf-8").rstrip("\n")
     path.write_text(text, encoding="utf-8")

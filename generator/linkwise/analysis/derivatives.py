@@ -7,12 +7,12 @@ either side gives what the whole log would.
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwise.analysis.extras import extra
 from linkwise.analysis.settings import Processing
+from linkwise.extras import extra
+from linkwise.package.load import Array
 
-Array = NDArray[np.float64]
-
-# Five-point formulas: row p holds 12 times the weights of the derivative at the p-th of 5 samples.
+# Five-point formulas, from Taylor's expansion: row p holds 12 times the weights of the derivative at the
+# p-th of 5 samples, times the step (or its square).
 FIRST = np.array(
     [
         [-25, 48, -36, 16, -3],
@@ -36,7 +36,10 @@ SECOND = np.array(
 def derivatives(
     positions: Array, rate: float, start: int, stop: int, processing: Processing
 ) -> tuple[Array, Array, Array]:
-    """q, q̇, q̈ of samples start..stop, each (stop - start, n), from all positions (samples, n)."""
+    """q, q̇, q̈ of samples start..stop, each (stop - start, n), per s and s².
+
+    positions: all of them, (samples, n), at `rate` Hz; at least `processing.span` of them
+    """
     reach = processing.span - 1
     low, high = max(0, start - reach), min(len(positions), stop + reach)
     window = np.asarray(positions[low:high])

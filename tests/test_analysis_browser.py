@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 from linkwise.analysis import Processing, Reading, analyze
 from linkwise.analysis.columns import Column
-from linkwise.analysis.files import Wanted, analyze_to
-from linkwise.analysis.page import report
+from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.result import Totals
-from linkwise.analysis.robot import load_robot
+from linkwise.analysis.run import Wanted, analyze_to
+from linkwise.analysis.show.page import report
 from linkwise.progress import silent
 from motion_logs import PLANAR3, smooth, write_csv
 

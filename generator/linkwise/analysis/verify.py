@@ -1,19 +1,27 @@
-"""How well the parts of a result sum to the whole."""
+"""How far a result can be believed: its parts sum to the whole, and an independent recursion agrees."""
 
 from dataclasses import asdict, dataclass
 from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwise.analysis.columns import Column, Quantity
+from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.errors import LinkwiseError
+from linkwise.package.load import Array
 
 LIMIT = 1e-9
-"""A relative error above this is no rounding: the package does not compute what it says."""
+"""A relative error above this is not rounding: the package does not compute what it says."""
 
 AGAINST_RECURSION = 1e-6
 """The same against another way of computing, whose rounding is another."""
+
+SAMPLES = 8
+"""Samples of each block that are computed again; the recursion is slow in Python."""
+
+LARGEST = 1e6
+"""In rad or m; past it a coordinate's own rounding hides what the comparison would show."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +46,7 @@ class Closure:
         return Closure(**{name: _larger(a[name], b[name]) for name in a})
 
     def check(self) -> None:
-        """Raise LinkwiseError where the parts do not sum to the whole."""
+        """Raise LinkwiseError where the parts do not sum to the whole, or the recursion disagrees."""
         worst = np.maximum(self.terms_relative, self.links_relative)
         if not worst <= LIMIT:
             raise LinkwiseError(
@@ -57,8 +65,8 @@ def _larger(a: Any, b: Any) -> Any:
     return float(np.maximum(a, b))  # unlike Python's max, it lets no NaN pass unseen
 
 
-def residual(parts: list[NDArray[np.float64]], whole: NDArray[np.float64]) -> tuple[float, float]:
-    """Largest |Σ parts - whole| over samples, and the largest Σ |parts|."""
+def residual(parts: list[Array], whole: Array) -> tuple[float, float]:
+    """Largest |Σ parts - whole| over samples, and the largest Σ |parts|; arrays (S,)."""
     if not parts:
         return float(np.abs(whole).max(initial=0.0)), 0.0
     error = reduce(np.add, parts) - whole
@@ -66,7 +74,36 @@ def residual(parts: list[NDArray[np.float64]], whole: NDArray[np.float64]) -> tu
     return float(np.abs(error).max(initial=0.0)), float(scale.max(initial=0.0))
 
 
-def relative(pairs: list[tuple[float, float]]) -> tuple[float, float]:
+def worst_of(pairs: list[tuple[float, float]]) -> tuple[float, float]:
     """Largest error of (error, scale) pairs, absolute and relative to the largest scale."""
     error, scale = np.max(np.array([(0.0, 0.0), *pairs]), axis=0).tolist()
     return error, error / scale if scale else error
+
+
+def against_recursion(robot: LoadedRobot, columns: tuple[Column, ...], block: Array) -> Closure:
+    """τ_ij of some samples of a block (columns, S) against Newton–Euler; none for hand-written energies.
+
+    Relative errors are by unit: a joint that carries nothing but rounding is measured by its peers.
+    """
+    if robot.recursion is None:
+        return Closure()
+    at = np.unique(np.linspace(0, block.shape[1] - 1, SAMPLES).astype(int))
+
+    def dense(quantity: Quantity) -> Array:
+        return np.array([block[row, at] for row, c in enumerate(columns) if c.quantity == quantity]).T
+
+    if np.abs(dense("q")).max(initial=0.0) > LARGEST:
+        return Closure()
+    expected = robot.recursion.partial_torque(dense("q"), dense("qd"), dense("qdd"))
+    ours = np.zeros_like(expected)
+    for row, column in enumerate(columns):
+        if column.quantity == "tau_link":
+            ours[:, column.joint, column.link] = block[row, at]
+    absolute, relative = 0.0, 0.0
+    for unit in set(robot.units):
+        alike = [i for i, other in enumerate(robot.units) if other == unit]
+        error = float(np.abs(ours - expected)[:, alike].max(initial=0.0))
+        scale = float(np.abs(expected).sum(axis=2)[:, alike].max(initial=0.0))
+        absolute = max(absolute, error)
+        relative = max(relative, error / scale if scale else error)
+    return Closure(recursion_absolute=absolute, recursion_relative=relative)

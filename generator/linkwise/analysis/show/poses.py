@@ -1,17 +1,15 @@
-"""Where a robot's links stand at each instant, for the stick figure."""
+"""Where a robot's bodies stand at each instant, for the stick figure."""
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry
-
-Array = NDArray[np.float64]
 
 
 def poses(bodies: Sequence[BodyEntry], q: Array) -> tuple[Array, Array]:
-    """Origins and centres of mass in the base frame, each (S, bodies, 3), from q (S, n)."""
+    """Origins and centres of mass in the base frame, each (S, bodies, 3) in m, from q (S, n) in rad or m."""
     turns: list[Array] = []
     origins: list[Array] = []
     centres: list[Array] = []

@@ -1,26 +1,28 @@
-"""From positions, velocities and accelerations to every torque term, block by block."""
+"""From positions, velocities and accelerations to every torque term of a block of samples."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from linkwise.analysis.closure import Closure, relative, residual
-from linkwise.analysis.columns import TERMS, Column, Quantity, columns_of, mirrored
-from linkwise.analysis.robot import Robot
+from linkwise.analysis.columns import TERMS, Column, Key, Quantity, columns_of, mirrored
+from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.settings import Convention
-from linkwise.package.load import PackedLayout
+from linkwise.analysis.verify import Closure, residual, worst_of
+from linkwise.package.load import Array, PackedLayout
 
-Array = NDArray[np.float64]
 Source = tuple[int, int, int]
 """Row of the result, column of the packed values, the coordinate that multiplies (-1: none)."""
 
 
 @dataclass(frozen=True)
-class Terms:
-    """Computes blocks of the result, stored by column: (columns, samples)."""
+class Decomposer:
+    """Computes blocks of the result, stored by column: (columns, samples).
 
-    robot: Robot
+    With q̈_k and q̇_k the coordinates' motion, and index order joint i, link j, coordinate k:
+    τ_i = Σ_j τ_ij and τ_ij = Σ_k c2_ijk q̈_k + Σ_k c1_ijk q̇_k + g_ij
+    """
+
+    robot: LoadedRobot
     convention: Convention
     columns: tuple[Column, ...]
     sources: dict[Quantity, tuple[Source, ...]]
@@ -30,7 +32,7 @@ class Terms:
     """Row of each τ_i, and the rows of its τ_ij."""
 
     @classmethod
-    def of(cls, robot: Robot, convention: Convention) -> "Terms":
+    def of(cls, robot: LoadedRobot, convention: Convention) -> "Decomposer":
         """Plan where each packed value of the robot goes."""
         columns = columns_of(robot, robot.model.layout)
         row = {column.key: at for at, column in enumerate(columns)}
@@ -81,7 +83,7 @@ class Terms:
                 residual([out[row] for row in rows], out[link]) for link, rows in self.parts if link in links
             ]
             sums = [residual([out[row] for row in links], out[whole])]
-            worst |= Closure(*relative(terms), *relative(sums))
+            worst |= Closure(*worst_of(terms), *worst_of(sums))
         return worst
 
 
@@ -98,10 +100,7 @@ def _rows(
     )
 
 
-def _sources(
-    layout: PackedLayout,
-    row: dict[tuple[Quantity, int | None, int | None, int | None], int],
-) -> dict[Quantity, tuple[Source, ...]]:
+def _sources(layout: PackedLayout, row: dict[Key, int]) -> dict[Quantity, tuple[Source, ...]]:
     def plain(quantity: Quantity, pairs: list[list[int]]) -> tuple[Source, ...]:
         return tuple((row[quantity, i, j, None], at, -1) for at, (i, j) in enumerate(pairs))
 

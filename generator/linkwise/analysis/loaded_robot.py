@@ -1,4 +1,4 @@
-"""A generated robot package, imported from its directory."""
+"""A generated robot package as the analysis uses it: names, a back end that works here, bodies, an oracle."""
 
 import hashlib
 from collections.abc import Sequence
@@ -12,16 +12,18 @@ from linkwise.package.manifest import FILE, BodyEntry
 
 
 @dataclass(frozen=True)
-class Robot:
+class LoadedRobot:
     """A loaded robot: names in the order of every array, and which back end computes."""
 
     name: str
     joints: tuple[str, ...]
     units: tuple[str, ...]
+    """"rad" or "m", a joint each."""
     links: tuple[str, ...]
     backend: str
     model: Model
     bodies: tuple[BodyEntry, ...] | None
+    """Rigid bodies, parents before children; None where the energies were written by hand."""
     up: tuple[float, float, float]
     """Against gravity, in the base frame; z for a robot without gravity."""
     manifest_sha256: str
@@ -29,13 +31,16 @@ class Robot:
     """Partial torques by an independent way; None where the energies were written by hand."""
 
 
-def load_robot(directory: Path, backend: str | None = None) -> Robot:
-    """Import the package in `directory`, with `backend` or the fastest that works here."""
+def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
+    """Import the package in `directory`, with `backend` or the fastest that works here.
+
+    Raises LinkwiseError for a directory without a package, a damaged one, or no back end that loads.
+    """
     package = open_package(directory)
     manifest = package.manifest
     chosen, model = _load(package, package.fastest_first if backend is None else (backend,))
     tree = manifest.tree
-    return Robot(
+    return LoadedRobot(
         manifest.name,
         tuple(model.joint_names),
         tuple(model.joint_units),
@@ -64,6 +69,6 @@ def _load(package: Package, backends: Sequence[str]) -> tuple[str, Model]:
         except Exception as error:  # A back end may lack its compiler, its library or its files.
             reasons.append(f"{backend}: {error}")
     raise LinkwiseError(
-        f"{package.directory}: no back end for the analysis ({'; '.join(reasons)});"
-        " generate the robot with --backend numpy"
+        f"{package.directory}: no back end for the analysis ({'; '.join(reasons) or 'the package has none'});"
+        " generate the robot again, with a back end that can be loaded here"
     )

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linkwise.analysis import analyze
-from linkwise.analysis.page import TEMPLATE, report, view
-from linkwise.analysis.page_data import page_data
+from linkwise.analysis.show.page import TEMPLATE, page_data, report, view
 from linkwise.emit.render import variables
 from motion_logs import PLANAR3, smooth, write_csv
 

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.columns import Quantity
-from linkwise.analysis.extras import extra
-from linkwise.analysis.names import short
-from linkwise.analysis.palette import GRAVITY, colour
-from linkwise.analysis.result import Analysis
+from linkwise.analysis.result import AnalysisResult
+from linkwise.extras import extra
+from linkwise.plotstyle import GRAVITY, colour, short
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,9 +21,9 @@ class _Cause:
     hatch: str = ""
 
 
-def shares(analysis: Analysis, _: int) -> "Figure":
+def shares(result: AnalysisResult, _: int) -> "Figure":
     """Two bars a joint: every cause, and those of the movement alone, in % of mean magnitudes."""
-    robot = analysis.robot
+    robot = result.robot
     movement = []
     for k, joint in enumerate(robot.joints):
         movement.append(_Cause("tau_qdd", k, f"{short(joint)} acceleration", colour(k)))
@@ -35,8 +34,8 @@ def shares(analysis: Analysis, _: int) -> "Figure":
         figsize=(8.4, 1.3 + 0.42 * len(robot.joints) + 0.2 * rows), layout="constrained"
     )
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 3))
-    bars = _bars(left, analysis, every)
-    _bars(right, analysis, movement)
+    bars = _bars(left, result, every)
+    _bars(right, result, movement)
     left.set_title("everything")
     right.set_title("the movement alone, without gravity")
     left.set_yticks(range(len(robot.joints)), [short(joint) for joint in robot.joints])
@@ -44,23 +43,21 @@ def shares(analysis: Analysis, _: int) -> "Figure":
     left.set_ylabel("loaded joint")
     for axis in (left, right):
         axis.set_xlabel("% of the mean magnitude")
-    figure.suptitle(
-        f"What loads each joint · {robot.name} · {analysis.source}", x=0.01, ha="left", fontsize=11
-    )
+    figure.suptitle(f"What loads each joint · {robot.name} · {result.source}", x=0.01, ha="left", fontsize=11)
     figure.legend(
         bars,
         [cause.label for cause in every],
         loc="outside lower center",
         ncols=3,
-        frameon=False,
+        handlelength=2,
         fontsize=8,
     )
     return figure  # type: ignore[no-any-return]
 
 
-def _bars(axis: Any, analysis: Analysis, causes: list[_Cause]) -> list[Any]:
-    joints = range(len(analysis.robot.joints))
-    loads = [[_mean(analysis, i, cause) for cause in causes] for i in joints]
+def _bars(axis: Any, result: AnalysisResult, causes: list[_Cause]) -> list[Any]:
+    joints = range(len(result.robot.joints))
+    loads = [[_mean(result, i, cause) for cause in causes] for i in joints]
     wholes = [sum(row) or 1.0 for row in loads]
     starts = [0.0 for _ in joints]
     bars = []
@@ -88,11 +85,11 @@ def _bars(axis: Any, analysis: Analysis, causes: list[_Cause]) -> list[Any]:
     return bars
 
 
-def _mean(analysis: Analysis, i: int, cause: _Cause) -> float:
+def _mean(result: AnalysisResult, i: int, cause: _Cause) -> float:
     return float(
         sum(
             mean
-            for column, mean in zip(analysis.columns, analysis.totals.mean, strict=True)
+            for column, mean in zip(result.columns, result.totals.mean, strict=True)
             if column.key[:2] == (cause.quantity, i) and column.cause == cause.coordinate
         )
     )
