@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.dynamics.derive import derive
-from linkwise.emit.assemble import Derivation, checked_identifier, package_files
+from linkwise.emit.assemble import checked_identifier, package_files
 from linkwise.emit.backend import BACKENDS, chosen_backends
+from linkwise.emit.derivation import Derivation
 from linkwise.errors import LinkwiseError, within
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, read_robot

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from linkwise.errors import LinkwiseError
 
 if TYPE_CHECKING:
-    from linkwise.emit.assemble import Derivation
+    from linkwise.emit.derivation import Derivation
 
 Emitter = Callable[["Derivation"], Iterator[tuple[str, str]]]
 """Turns a derivation into files: paths inside the package and texts."""

@@ -13,8 +13,9 @@ import numpy as np
 
 from linkwise.dynamics.derive import derive
 from linkwise.dynamics.kernel import Kernel
-from linkwise.emit.assemble import Derivation, package_files
+from linkwise.emit.assemble import package_files
 from linkwise.emit.backend import chosen_backends
+from linkwise.emit.derivation import Derivation
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
 from linkwise.emit.straight_line import fetched, straight_line
