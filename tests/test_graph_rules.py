@@ -12,6 +12,7 @@ from linkwise.dynamics.euler_lagrange import euler_lagrange
 from linkwise.dynamics.kernel import lowering
 from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Graph
+from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import System
 
 BLOCKS = ("acceleration", "velocity", "gravity", "torque", "position_gradient")
@@ -20,10 +21,10 @@ BLOCKS = ("acceleration", "velocity", "gravity", "torque", "position_gradient")
 def from_the_energy(system: System, link: int) -> tuple[Graph, LinkForms]:
     """Forms by differentiating the link's Lagrangian, its definitions lowered one after another."""
     lower, x = lowering(system)
-    for energy in system.lineage(link):
+    for energy in lineage(link_energies(system), link):
         lower.define(energy.twist.definitions)
     kinetic = lower(energy.kinetic)
-    for energy in system.lineage(link):
+    for energy in lineage(link_energies(system), link):
         lower.define(energy.height.definitions)
     lagrangian = lower.graph.sub(kinetic, lower(energy.potential))
     return lower.graph, euler_lagrange(lower.graph, lagrangian, system.path(link), x)

@@ -10,34 +10,43 @@ import pytest
 from linkwise.dynamics.derive import derive
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
+from linkwise.plotstyle import styled
 from linkwise.progress import silent
-from linkwise.report import style
-from linkwise.report.fit import fit, held_against
-from linkwise.report.operations import link_operations
-from linkwise.report.plots import Reading, _readings, reduction_images
-from linkwise.report.polynomial import count_polynomial
-from linkwise.report.readings import readings
-from linkwise.report.reduction import PAPER, Point, curve
-from linkwise.report.seconds import Timing, row_view
-from linkwise.report.study import study, verdicts
-from linkwise.report.study_text import page
+from linkwise.report import (
+    PAPER,
+    CurvePoint,
+    SavingsLine,
+    Timing,
+    count_polynomial,
+    curve,
+    draw_savings,
+    fit,
+    held_against,
+    link_operations,
+    reduction_images,
+    reduction_markdown,
+    savings_lines,
+    study,
+    verdicts,
+)
+from linkwise.report.seconds import row_view
 from linkwise.robot import Options, read_robot
-from linkwise.symbolic.link_energy import link_energies
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import System, rigid_system
+from matplotlib.figure import Figure
 
 GOLDEN = json.loads((Path(__file__).parent / "data" / "term_counts.json").read_text())
 
 
 def planar(n: int) -> System:
-    return link_energies(read_robot(f"planar{n}", Options(parameters="symbolic")))
+    return rigid_system(read_robot(f"planar{n}", Options(parameters="symbolic")))
 
 
 @pytest.fixture(scope="module")
-def points() -> tuple[Point, ...]:
+def points() -> tuple[CurvePoint, ...]:
     return curve(planar(14), 14, 10**6, silent)
 
 
-def test_counts_are_the_goldens(points: tuple[Point, ...]) -> None:
+def test_counts_are_the_goldens(points: tuple[CurvePoint, ...]) -> None:
     ten = points[:10]
     assert [p.dof for p in ten] == GOLDEN["n"]
     assert [p.total for p in ten] == GOLDEN["total"]
@@ -45,7 +54,7 @@ def test_counts_are_the_goldens(points: tuple[Point, ...]) -> None:
     assert [round(p.reduction, 6) for p in ten] == GOLDEN["reduction"]
 
 
-def test_the_fit_and_the_papers_curve_meet_the_points(points: tuple[Point, ...]) -> None:
+def test_the_fit_and_the_papers_curve_meet_the_points(points: tuple[CurvePoint, ...]) -> None:
     dof, y = [p.dof for p in points[:10]], [p.reduction for p in points[:10]]
     free, paper = fit(dof, y), held_against(0.95, 0.44, dof, y)
     assert free is not None
@@ -55,7 +64,7 @@ def test_the_fit_and_the_papers_curve_meet_the_points(points: tuple[Point, ...])
     assert paper.largest == pytest.approx(0.0155, abs=1e-4)
 
 
-def test_polynomials_from_eight_counts_foretell_the_next_six(points: tuple[Point, ...]) -> None:
+def test_polynomials_from_eight_counts_predict_the_next_six(points: tuple[CurvePoint, ...]) -> None:
     total = count_polynomial([p.total for p in points[:8]])
     kept = count_polynomial([p.kept for p in points[:8]])
     assert total is not None
@@ -71,14 +80,14 @@ def test_no_polynomial_is_claimed_without_counts_to_confirm_it() -> None:
     assert count_polynomial([3, 14, 44, 112, 247, 490, 896]) is None
 
 
-def test_emitted_code_saves_less_than_the_terms_promise(points: tuple[Point, ...]) -> None:
+def test_emitted_code_saves_less_than_the_terms_promise(points: tuple[CurvePoint, ...]) -> None:
     ten = points[9]
     assert ten.operations_reduction < ten.written_reduction < ten.reduction
     assert ten.part.shared < ten.part.written
 
 
 def test_operations_hold_the_product_with_the_motion_and_the_sum_over_links(
-    points: tuple[Point, ...],
+    points: tuple[CurvePoint, ...],
 ) -> None:
     costs = list(link_operations(planar(10), (0,), PAPER))
     rows = [cost.rows[0] for cost in costs]
@@ -101,29 +110,25 @@ def test_what_is_timed_is_the_part_and_the_whole() -> None:
     np.testing.assert_allclose(module["extract"](q, qd, qdd, p), part, rtol=1e-12, atol=1e-12)
 
 
-def test_further_counts_stop_at_the_budget_without_a_word() -> None:
+def test_further_counts_stop_at_the_budget_silently() -> None:
     assert len(curve(planar(14), 3, 150, silent, beyond=14)) == 4
     assert len(curve(planar(4), 3, 10**6, silent, beyond=14)) == 4
 
 
-def drawn(lines: Sequence[Reading]) -> Any:
+def drawn(lines: Sequence[SavingsLine]) -> Any:
     """Axes of the comparison, drawn with the plots' own settings."""
-    axes: list[Any] = []
-
-    def draw(figure: Any) -> None:
-        _readings(figure, "arm", lines)
-        axes.append(figure.axes[0])
-
-    style.images("readings", draw, (6.3, 4.0))
-    return axes[0]
+    with styled():
+        figure = Figure(figsize=(6.3, 4.0), layout="constrained")
+        draw_savings(figure, "arm", lines)
+        return figure.axes[0]
 
 
 def test_the_comparison_is_titled_by_what_is_shown_and_its_legend_tells_dashes() -> None:
     result = study("arm", planar(9), 1, 4, 9, 10**6, silent)
     timings = [Timing(n, method, 1.0, 2.0, 3.0) for n in (1, 2) for method in ("closed form", "autograd")]
-    assert drawn(readings(result)).get_title("left") == "arm: one question read in terms and operations"
-    measured = drawn(readings(result, timings))
-    assert measured.get_title("left") == "arm: one question read in terms, operations and seconds"
+    assert drawn(savings_lines(result)).get_title("left") == "arm: savings in terms and operations"
+    measured = drawn(savings_lines(result, timings))
+    assert measured.get_title("left") == "arm: savings in terms, operations and seconds"
     legend = measured.get_legend()
     for line in legend.get_lines():
         length = legend.handlelength * legend.prop.get_size()
@@ -137,12 +142,12 @@ def test_the_study_says_where_the_claim_holds() -> None:
     assert "Stronger: 5 DoF.** 5.2 redundant" in said
     assert "Holds: 10 DoF.** 15.9 redundant" in said
     assert "falls like 10/n^2" in said
-    assert "Weaker in emitted code" in said
+    assert "Weaker: emitted code" in said
 
 
 def test_page_and_plots_are_the_same_bytes_each_time() -> None:
     first, again = (study("arm", planar(9), 2, 4, 9, 10**6, silent) for _ in range(2))
-    assert page(first) == page(again)
+    assert reduction_markdown(first) == reduction_markdown(again)
     assert reduction_images(first) == reduction_images(again)
     assert b"<dc:date>" not in reduction_images(first)["reduction.svg"]
 

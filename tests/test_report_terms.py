@@ -13,17 +13,19 @@ from linkwise.dynamics.kernel import Kernel
 from linkwise.errors import LinkwiseError
 from linkwise.expression.graph import FUNCTIONS, Node, reachable
 from linkwise.progress import silent
-from linkwise.report import laurent
-from linkwise.report.count import count_terms
-from linkwise.report.laurent import Laurent
-from linkwise.report.question import Question
-from linkwise.report.survey import LinkTorques, link_torques
-from linkwise.report.terms import terms_report
-from linkwise.report.terms_text import data, page
+from linkwise.report import (
+    LinkTorques,
+    TermQuery,
+    count_terms,
+    link_torques,
+    terms_json,
+    terms_markdown,
+    terms_report,
+)
+from linkwise.report.laurent import Laurent, exponents
 from linkwise.robot import Options, read_robot
 from linkwise.robot.robot import Coordinate
-from linkwise.symbolic.link_energy import link_energies
-from linkwise.symbolic.system import LinkEnergy, System
+from linkwise.symbolic.system import EnergySystem, LinkEnergy, System, rigid_system
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 from sympy.simplify.fu import TR8
 
@@ -37,7 +39,7 @@ ARITHMETIC = {
 
 
 def symbolic(name: str) -> System:
-    return link_energies(read_robot(name, Options(parameters="symbolic")))
+    return rigid_system(read_robot(name, Options(parameters="symbolic")))
 
 
 def spring_pendulum() -> System:
@@ -50,7 +52,7 @@ def spring_pendulum() -> System:
         LinkEnergy("bob", kinetic + w * a.qd * sp.sin(2 * a.q), -m * g * length * sp.cos(a.q)),
     )
     values = dict.fromkeys((m, c, k, length, w, g), 1.0)
-    return System("spring_pendulum", (x, a), links, values)
+    return EnergySystem("spring_pendulum", (x, a), links, values)
 
 
 def values_at_random(system: System, seed: int) -> dict[str, float]:
@@ -69,7 +71,7 @@ def evaluated_expansion(p: Laurent, found: LinkTorques, system: System, at: dict
     value += [bare[name] if name in bare else at[name] for name in x.names]
     total = 0j
     for key, c in p.terms.items():
-        powers = zip(value, laurent.exponents(key, x.digits), strict=True)
+        powers = zip(value, exponents(key, x.digits), strict=True)
         total += c * math.prod(v**e for v, e in powers if e)
     return total / p.denominator
 
@@ -124,12 +126,12 @@ def sympy_counts(n: int) -> tuple[int, int]:
 
 @pytest.mark.parametrize("n", [2, 3])
 def test_counts_equal_those_of_an_independent_derivation(n: int) -> None:
-    row = terms_report(symbolic(f"planar{n}"), Question(), 10**6, False, silent).rows[-1]
+    row = terms_report(symbolic(f"planar{n}"), TermQuery(), 10**6, False, silent).rows[-1]
     assert (row.count.total, row.kept) == sympy_counts(n)
 
 
 def test_every_term_is_in_a_bucket_and_off_path_torques_have_none() -> None:
-    report = terms_report(symbolic("puma560"), Question(joint=None), 10**6, False, silent)
+    report = terms_report(symbolic("puma560"), TermQuery(joint=None), 10**6, False, silent)
     for row in report.rows:
         count = row.count
         if row.link is not None and row.link < row.joint:
@@ -143,15 +145,15 @@ def twisted(cosine: float, sine: float) -> System:
     robot = read_robot("planar3", Options(parameters="symbolic"))
     turn = ((1.0, 0.0, 0.0), (0.0, cosine, -sine), (0.0, sine, cosine))
     links = [replace(link, joint=replace(link.joint, rotation=turn)) for link in robot.links[1:]]
-    return link_energies(replace(robot, links=(robot.links[0], *links)))
+    return rigid_system(replace(robot, links=(robot.links[0], *links)))
 
 
 def test_rounded_rotations_leave_no_spurious_terms() -> None:
-    exact = terms_report(twisted(0.6, 0.8), Question(), 10**6, False, silent)
-    rounded = terms_report(twisted(math.cos(0.7), math.sin(0.7)), Question(), 10**6, False, silent)
+    exact = terms_report(twisted(0.6, 0.8), TermQuery(), 10**6, False, silent)
+    rounded = terms_report(twisted(math.cos(0.7), math.sin(0.7)), TermQuery(), 10**6, False, silent)
     assert [row.count for row in rounded.rows] == [row.count for row in exact.rows]
-    nearly = terms_report(twisted(5e-12, 1.0), Question(None), 10**6, False, silent)
-    square = terms_report(twisted(0.0, 1.0), Question(None), 10**6, False, silent)
+    nearly = terms_report(twisted(5e-12, 1.0), TermQuery(None), 10**6, False, silent)
+    square = terms_report(twisted(0.0, 1.0), TermQuery(None), 10**6, False, silent)
     assert [row.count for row in nearly.rows] == [row.count for row in square.rows]
     assert "decimals" in nearly.form
     assert "exact" in square.form
@@ -161,15 +163,15 @@ def test_an_angle_offset_leaves_no_spurious_terms() -> None:
     a, m = Coordinate("a"), sp.Symbol("m", real=True)
     sine, cosine = sp.sin(a.q + 0.3), sp.cos(a.q + 0.3)
     arm = LinkEnergy("arm", m * (sine**2 + cosine**2) * a.qd**2 / 2, m * cosine)
-    report = terms_report(System("offset", (a,), (arm,), {m: 1.0}), Question(), 100, False, silent)
+    report = terms_report(EnergySystem("offset", (a,), (arm,), {m: 1.0}), TermQuery(), 100, False, silent)
     # m q̈, and cos 0.3 and sin 0.3 times one wave each.
     assert report.rows[0].count.total == 3
 
 
 def test_beyond_the_budget_the_report_says_how_far_it_got() -> None:
     with pytest.raises(LinkwiseError, match=r"'link5' needs more than 300 terms, after 4 of 6 links"):
-        terms_report(symbolic("puma560"), Question(), 300, False, silent)
-    report = terms_report(symbolic("puma560"), Question(), 300, True, silent)
+        terms_report(symbolic("puma560"), TermQuery(), 300, False, silent)
+    report = terms_report(symbolic("puma560"), TermQuery(), 300, True, silent)
     assert not report.complete
     assert (report.counted, report.wanted) == (4, 6)
     assert report.rows[-1].count.total == sum(row.count.total for row in report.rows[:-1])
@@ -177,7 +179,7 @@ def test_beyond_the_budget_the_report_says_how_far_it_got() -> None:
 
 def test_a_robot_whose_first_link_exceeds_the_budget_is_refused() -> None:
     with pytest.raises(LinkwiseError, match=r"planar3: link 'link1' needs more than 1 terms, after 0"):
-        terms_report(symbolic("planar3"), Question(), 1, True, silent)
+        terms_report(symbolic("planar3"), TermQuery(), 1, True, silent)
 
 
 @pytest.mark.parametrize(
@@ -191,20 +193,20 @@ def test_a_robot_whose_first_link_exceeds_the_budget_is_refused() -> None:
 )
 def test_an_energy_without_terms_is_refused_by_name(energy: sp.Expr, complaint: str) -> None:
     a = Coordinate("a")
-    system = System("odd", (a,), (LinkEnergy("arm", a.qd**2, energy * a.q),))
+    system = EnergySystem("odd", (a,), (LinkEnergy("arm", a.qd**2, energy * a.q),))
     with pytest.raises(LinkwiseError, match=f"link 'arm': .*{complaint}"):
-        terms_report(system, Question(), 10**6, False, silent)
+        terms_report(system, TermQuery(), 10**6, False, silent)
 
 
 def test_equal_parameters_on_two_links_are_collected_in_their_sum() -> None:
-    numeric = link_energies(read_robot("planar2", Options(parameters="numeric")))
-    *links, total = terms_report(numeric, Question(), 10**6, False, silent).rows
+    numeric = rigid_system(read_robot("planar2", Options(parameters="numeric")))
+    *links, total = terms_report(numeric, TermQuery(), 10**6, False, silent).rows
     assert total.count.total < sum(row.count.total for row in links)
 
 
 def test_the_part_kept_is_counted_with_its_motion() -> None:
-    leg = link_energies(read_robot(Path(__file__).parent / "data" / "leg.toml", Options("symbolic")))
-    report = terms_report(leg, Question(), 10**6, False, silent)
+    leg = rigid_system(read_robot(Path(__file__).parent / "data" / "leg.toml", Options("symbolic")))
+    report = terms_report(leg, TermQuery(), 10**6, False, silent)
     # Each segment adds m q̈ to the force along the first slide; together (m1 + m2 + m3 + m4) q̈.
     parts = [cost.rows[0].part for cost in report.operations]
     assert [part and part.shared for part in parts] == [1, 1, 1, 1]
@@ -212,10 +214,10 @@ def test_the_part_kept_is_counted_with_its_motion() -> None:
     assert (part.shared, part.written) == (4, 4)
     each = [cost.rows[0].torque for cost in report.operations]
     assert torque.shared == sum(t.shared for t in each if t) + 3
-    said = page(report)
+    said = terms_markdown(report)
     assert "| τ_1,4, the part kept alone | 1 | 1 |" in said
     assert "| τ_1 over all links, the part kept alone | 4 | 4 |" in said
-    assert data(report)["operations_of_sums"]["1"]["kept"]["after_sharing"] == 4
+    assert terms_json(report)["operations_of_sums"]["1"]["kept"]["after_sharing"] == 4
 
 
 @pytest.mark.parametrize(
@@ -228,8 +230,8 @@ def test_a_part_costs_what_its_product_costs(order: int, coordinate: int, operat
     m, k = sp.symbols("m k", real=True)
     energy = LinkEnergy("arm", m * a.qd**2 / 2 + a.qd * b.qd, k * sp.sin(a.q))
     tail = LinkEnergy("tail", c.qd**2, sp.S.Zero)
-    system = System("odd", (a, b, c), (energy, tail), {m: 1.0, k: 1.0})
-    (cost,) = terms_report(system, Question(0, 0, coordinate, order), 100, False, silent).operations
+    system = EnergySystem("odd", (a, b, c), (energy, tail), {m: 1.0, k: 1.0})
+    (cost,) = terms_report(system, TermQuery(0, 0, coordinate, order), 100, False, silent).operations
     part = cost.rows[0].part
     assert (part and part.shared) == operations
 

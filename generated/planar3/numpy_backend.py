@@ -17,6 +17,7 @@ class NumpyBackend:
     """Answers with NumPy arrays of the caller's dtype."""
 
     name = "numpy"
+    takes_tensors = False
 
     def __init__(self, parameters, links):
         self.links = links

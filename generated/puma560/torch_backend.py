@@ -16,6 +16,7 @@ class TorchBackend:
     """Answers with tensors of the caller's dtype and device; gradients flow through motion and parameters."""
 
     name = "torch"
+    takes_tensors = True
 
     def __init__(self, parameters, links=()):
         self.links = links

@@ -1,23 +1,34 @@
-"""The way of the data: description -> energies -> graph -> text -> package. It only reads the description."""
+"""The way of the data, from a description to the files of a package.
+
+    robot file ─read_robot─▶ Robot ─rigid_system─▶ RigidSystem ─┐
+    energies in Python ─read_energies───────────▶ EnergySystem ─┤
+                                                                ▼
+    derive         closed forms, a kernel a link: by the rigid-link rule, which differentiates nothing, or by
+                   Euler–Lagrange from energies that a user wrote
+    package_files  their text in each back end, the runtime, the manifest
+
+SymPy energies of rigid links take no part in this: they are worked out for what shows or differentiates them,
+the autograd back end, formulas and reports.
+"""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from linkwise.dynamics.derive import derive
-from linkwise.emit.assemble import Derivation, identifier, manifest, shared_files
-from linkwise.emit.backend import BACKENDS
+from linkwise.emit.assemble import checked_identifier, package_files
+from linkwise.emit.backend import BACKENDS, chosen_backends
+from linkwise.emit.derivation import Derivation
 from linkwise.errors import LinkwiseError, within
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, read_robot
 from linkwise.robot.robot import Robot
-from linkwise.symbolic.link_energy import link_energies
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import System, rigid_system
 from linkwise.symbolic.user_energies import read_energies
 
 
 def read_system(spec: str | Path, options: Options | None = None) -> System:
-    """Coordinates and link energies of a built-in robot, a robot's file, or a Python file of energies."""
+    """System of a built-in robot, a robot's file, or a Python file of energies; raises LinkwiseError."""
     options = options or Options()
     if Path(spec).suffix == ".py" and Path(spec).is_file():
         with within(str(spec)):
@@ -25,7 +36,7 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
             if rigid:
                 raise LinkwiseError(f"energies in Python take no {', '.join(rigid)}; change the energies")
             return read_energies(Path(spec), options.parameters == "symbolic")
-    return link_energies(read_robot(spec, options))
+    return rigid_system(read_robot(spec, options))
 
 
 def generate(
@@ -40,28 +51,7 @@ def generate(
     `request` goes into the manifest, so that a reader sees how to make the package again.
     Raises LinkwiseError for a name or back end that cannot be.
     """
-    system = link_energies(robot) if isinstance(robot, Robot) else robot
-    chosen = _chosen(backends)
-    package = name if name is not None else identifier(system.name)
-    if package != identifier(package):
-        raise LinkwiseError(
-            f"--name {package[:80]!r} is no module name of its own; use up to 60 letters a-z, digits and _"
-        )
-    derivation = Derivation(system, derive(system, progress), package, request or {})
-    files: dict[str, str] = {}
-    for number, backend in enumerate(chosen):
-        progress("emit", number, len(chosen))
-        files.update(BACKENDS[backend].files(derivation))
-    progress("emit", len(chosen), len(chosen))
-    files.update(shared_files(derivation, [b for b in chosen if BACKENDS[b].module]))
-    files["manifest.json"] = manifest(derivation, files)
-    return files
-
-
-def _chosen(backends: Iterable[str]) -> tuple[str, ...]:
-    names = list(backends)
-    for name in names:
-        if name not in BACKENDS:
-            raise LinkwiseError(f"no back end {name!r}; choose among {', '.join(BACKENDS)}")
-    names += [needed for name in names for needed in BACKENDS[name].needs]
-    return tuple(name for name in BACKENDS if name in names)
+    system = rigid_system(robot) if isinstance(robot, Robot) else robot
+    chosen, package = chosen_backends(backends), checked_identifier(name, system.name)
+    kernels = derive(system, progress)
+    return package_files(Derivation(system, kernels, package, request or {}), chosen, progress)

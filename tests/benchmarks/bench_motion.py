@@ -4,7 +4,7 @@
     python tests/benchmarks/bench_motion.py ten-hours ROBOT_DIRECTORY
 
 The first writes a smooth synthetic log of N samples (1,000,000) as CSV and analyses it to Parquet, with
-the page and the paper's figure; the second does so for 10 h at 100 Hz, filtered. Prints seconds, samples
+the page and the five-panel figure; the second does so for 10 h at 100 Hz, filtered. Prints seconds, samples
 a second, the largest resident memory and the size of what was written.
 """
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from linkwise.pipeline import read_system
 from linkwise.progress import silent
-from linkwise.report.survey import RunningCount, link_torques
+from linkwise.report import RunningCount, link_torques
 from linkwise.robot import Options
 
 BUDGET = 10**7

@@ -1,7 +1,6 @@
 """From a recorded movement to who loads whom: torque analysis of motion logs."""
 
-from linkwise.analysis.result import Analysis
-from linkwise.analysis.run import analyze
+from linkwise.analysis.run import Analysis, analyze
 from linkwise.analysis.settings import Lowpass, Processing, Reading
 
 __all__ = ["Analysis", "Lowpass", "Processing", "Reading", "analyze"]

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from linkwise.analysis.robot import PackedLayout, Robot
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.package.load import PackedLayout
 
 Quantity = Literal["time", "q", "qd", "qdd", "tau", "tau_link", "tau_qdd", "tau_qd", "tau_gravity"]
 MEANING: dict[Quantity, str] = {
@@ -12,13 +13,16 @@ MEANING: dict[Quantity, str] = {
     "qd": "joint velocity",
     "qdd": "joint acceleration",
     "tau": "joint torque, all links together",
-    "tau_link": "partial torque: on the joint, due to the motion of the link",
+    "tau_link": "partial torque: on the joint, through the link",
     "tau_qdd": "propagation torque: on the joint, through the link, by the cause's acceleration",
     "tau_qd": "propagation torque: on the joint, through the link, by the cause's velocity",
-    "tau_gravity": "gravity and other potentials of the link on the joint",
+    "tau_gravity": "on the joint, through the link, by gravity and other potentials",
 }
 TERMS: tuple[Quantity, ...] = ("tau_qdd", "tau_qd", "tau_gravity")
 """The parts that sum to a partial torque."""
+
+Key = tuple[Quantity, int | None, int | None, int | None]
+"""What identifies a column, without names: quantity, joint, link, cause."""
 
 
 @dataclass(frozen=True)
@@ -33,45 +37,39 @@ class Column:
     cause: int | None = None
 
     @property
-    def key(self) -> tuple[Quantity, int | None, int | None, int | None]:
+    def key(self) -> Key:
         """What identifies the column, without names."""
         return self.quantity, self.joint, self.link, self.cause
 
 
-def escaped(name: str) -> str:
-    """A joint's or link's name as a part of a column's: no slash in it, and still one to one."""
-    return name.replace("%", "%25").replace("/", "%2F")
+def load_unit(unit: str) -> str:
+    """Unit of the load on a joint whose coordinate is in `unit`, "rad" or "m"."""
+    return "N·m" if unit == "rad" else "N"
 
 
-def columns_of(robot: Robot, layout: PackedLayout) -> tuple[Column, ...]:
+def columns_of(robot: LoadedRobot, layout: PackedLayout) -> tuple[Column, ...]:
     """Columns in order: time, motion, τ_i, τ_ij, then the terms; what is identically 0 has none."""
-    unit = {"rad": "N·m", "m": "N"}
     out = [Column("time", "time", "s")]
     motions: tuple[tuple[Quantity, str], ...] = (("q", ""), ("qd", "/s"), ("qdd", "/s²"))
     for quantity, suffix in motions:
         for i, joint in enumerate(robot.joints):
-            out.append(Column(quantity, f"{quantity}/{escaped(joint)}", robot.units[i] + suffix, i))
+            out.append(Column(quantity, f"{quantity}/{_escaped(joint)}", robot.units[i] + suffix, i))
     for i, joint in enumerate(robot.joints):
-        out.append(Column("tau", f"tau/{escaped(joint)}", unit[robot.units[i]], i))
+        out.append(Column("tau", f"tau/{_escaped(joint)}", load_unit(robot.units[i]), i))
 
-    def load(quantity: Quantity, i: int, j: int, k: int | None = None) -> None:
-        parts = [
-            quantity,
-            robot.joints[i],
-            robot.links[j],
-            *([robot.joints[k]] if k is not None else []),
-        ]
-        name = "/".join(map(escaped, parts)).replace("tau_link/", "tau/", 1)
-        out.append(Column(quantity, name, unit[robot.units[i]], i, j, k))
+    def load(quantity: Quantity, prefix: str, i: int, j: int, k: int | None = None) -> None:
+        parts = [robot.joints[i], robot.links[j], *([robot.joints[k]] if k is not None else [])]
+        name = "/".join([prefix, *map(_escaped, parts)])
+        out.append(Column(quantity, name, load_unit(robot.units[i]), i, j, k))
 
     for i, j in sorted(map(tuple, layout.torque.tolist())):
-        load("tau_link", i, j)
+        load("tau_link", "tau", i, j)
     for i, j, k, _ in mirrored(layout):
-        load("tau_qdd", i, j, k)
+        load("tau_qdd", "tau_qdd", i, j, k)
     for i, j, k in sorted(map(tuple, layout.velocity.tolist())):
-        load("tau_qd", i, j, k)
+        load("tau_qd", "tau_qd", i, j, k)
     for i, j in sorted(map(tuple, layout.gravity.tolist())):
-        load("tau_gravity", i, j)
+        load("tau_gravity", "tau_gravity", i, j)
     return tuple(out)
 
 
@@ -81,3 +79,8 @@ def mirrored(layout: PackedLayout) -> list[tuple[int, int, int, int]]:
     for source, (i, j, k) in enumerate(layout.acceleration.tolist()):
         rows |= {(i, j, k, source), (k, j, i, source)}
     return sorted(rows)
+
+
+def _escaped(name: str) -> str:
+    """A joint's or link's name as a part of a column's: no slash in it, and still one to one."""
+    return name.replace("%", "%25").replace("/", "%2F")

@@ -1,22 +1,20 @@
 """The zero-phase low-pass over a log of any length, in place.
 
 `scipy.signal.sosfiltfilt` wants the whole log at once. Here its two passes, forwards and backwards,
-run over blocks and carry the filter's state from one to the next: memory stays flat, and the result
+go over blocks and carry the filter's state from one to the next: memory stays flat, and the result
 is sosfiltfilt's, sample for sample, for every block length.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from linkwise.analysis.extras import extra
 from linkwise.analysis.settings import Lowpass
 from linkwise.errors import LinkwiseError
-
-Array = NDArray[np.float64]
+from linkwise.extras import extra
+from linkwise.package.load import Array
 
 
 def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536) -> None:
-    """Filter q (samples, n) in place; `rate` in Hz, `rows` the block length.
+    """Filter q (samples, n) in place; `rate` in Hz, `rows` the length of a block.
 
     Raises LinkwiseError for a cutoff at or above half the rate, or a log shorter than the padding.
     """
@@ -37,15 +35,15 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536) -> None
     blocks = [(at, min(at + rows, len(q))) for at in range(0, len(q), rows)]
 
     state = rest * (front[0] if pad else q[0])
-    _, state = _run(sos, front, state)
+    _, state = _passed(sos, front, state)
     for start, stop in blocks:
-        q[start:stop], state = _run(sos, q[start:stop], state)
-    back, _ = _run(sos, back, state)
+        q[start:stop], state = _passed(sos, q[start:stop], state)
+    back, _ = _passed(sos, back, state)
 
     state = rest * (back[-1] if pad else q[-1])
-    _, state = _run(sos, back[::-1], state)
+    _, state = _passed(sos, back[::-1], state)
     for start, stop in reversed(blocks):
-        backwards, state = _run(sos, q[start:stop][::-1], state)
+        backwards, state = _passed(sos, q[start:stop][::-1], state)
         q[start:stop] = backwards[::-1]
 
 
@@ -55,7 +53,7 @@ def padding_length(sos: Array) -> int:
     return int(3 * taps)
 
 
-def _run(sos: Array, x: Array, state: Array) -> tuple[Array, Array]:
+def _passed(sos: Array, x: Array, state: Array) -> tuple[Array, Array]:
     if not len(x):
         return x, state
     with np.errstate(over="ignore", invalid="ignore"):
@@ -64,7 +62,10 @@ def _run(sos: Array, x: Array, state: Array) -> tuple[Array, Array]:
 
 
 def _extension(edge: Array, padding: str) -> Array:
-    """What stands before edge[0], (len(edge) - 1, n): turned about the end, mirrored, or held."""
+    """What is taken to stand before edge[0], (len(edge) - 1, n).
+
+    "odd" turns the samples about the end, "even" mirrors them, else the end's value is held.
+    """
     beyond: Array = edge[:0:-1]
     if padding == "odd":
         beyond = 2 * edge[0] - beyond

@@ -1,22 +1,19 @@
-"""The result of an analysis as named arrays."""
+"""The result of an analysis: named arrays, and the record of how they were made."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from linkwise.analysis.closure import Closure
-from linkwise.analysis.columns import Column, Quantity
-from linkwise.analysis.extras import extra
-from linkwise.analysis.robot import Robot
-from linkwise.analysis.settings import Processing, Reading
+from linkwise.analysis.columns import MEANING, Column, Quantity
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.settings import Processing, Reading, choices
+from linkwise.analysis.verify import Closure
 from linkwise.errors import LinkwiseError
+from linkwise.package.load import Array
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
+SCHEMA = 1
+"""Version of the record's fields."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,39 +25,44 @@ class Totals:
 
 
 @dataclass(frozen=True, eq=False)
-class Analysis:
+class AnalysisResult:
     """Who loads whom: S samples of every torque term, SI units; index order joint, link, cause.
 
     `values` (columns, S) holds what `columns` names; terms that are identically 0 have no column.
     With a `stride` above 1 only every stride-th of `total` samples is kept; `totals` and `closure`
-    cover all of them.
+    cover all of them. n joints, N links.
     """
 
-    robot: Robot
+    robot: LoadedRobot
     reading: Reading
     processing: Processing
     source: str
+    """Name of the log."""
     rate: float
+    """Samples a second."""
     columns: tuple[Column, ...]
     values: Array
     totals: Totals
     closure: Closure
     ignored: tuple[str, ...]
+    """Columns of the log that no joint has."""
     warnings: tuple[str, ...]
     total: int
     stride: int = 1
 
     def __getitem__(self, name: str) -> Array:
-        """One column (S,) by its name, as in the Parquet file: "tau/joint1/link2"."""
-        for at, column in enumerate(self.columns):
+        """One column (S,) by its name, as in the Parquet file: "tau/joint1/link2"; else LinkwiseError."""
+        for column, values in zip(self.columns, self.values, strict=True):
             if column.name == name:
-                return self._row(at)
+                found: Array = values
+                return found
         raise LinkwiseError(f"no column {name!r}; there are {[c.name for c in self.columns]}")
 
     @property
     def time(self) -> Array:
         """Time (S,) in s."""
-        return self._row(0)
+        row: Array = self.values[0]
+        return row
 
     @property
     def q(self) -> Array:
@@ -69,12 +71,12 @@ class Analysis:
 
     @property
     def qd(self) -> Array:
-        """Joint velocities (S, n)."""
+        """Joint velocities (S, n) in rad/s or m/s."""
         return self._dense("qd", 1)
 
     @property
     def qdd(self) -> Array:
-        """Joint accelerations (S, n)."""
+        """Joint accelerations (S, n) in rad/s² or m/s²."""
         return self._dense("qdd", 1)
 
     @property
@@ -84,42 +86,75 @@ class Analysis:
 
     @property
     def partial_torque(self) -> Array:
-        """τ_ij (S, n, N)."""
+        """τ_ij (S, n, N), on joint i through link j, in N·m or N."""
         return self._dense("tau_link", 2)
 
     @property
     def acceleration(self) -> Array:
-        """τp_ij(q̈_k) (S, n, N, n)."""
+        """τp_ij(q̈_k) (S, n, N, n), the part of τ_ij by the acceleration of coordinate k."""
         return self._dense("tau_qdd", 3)
 
     @property
     def velocity(self) -> Array:
-        """τp_ij(q̇_k) (S, n, N, n), in the convention asked for."""
+        """τp_ij(q̇_k) (S, n, N, n), the part by its velocity, in the convention asked for."""
         return self._dense("tau_qd", 3)
 
     @property
     def gravity(self) -> Array:
-        """g_ij (S, n, N)."""
+        """g_ij (S, n, N), the part by gravity and other potentials."""
         return self._dense("tau_gravity", 2)
 
-    def figure(self, name: str = "paper") -> "Figure":
-        """A matplotlib figure: "paper" (its five panels) or "shares"."""
-        from linkwise.analysis.figures import draw
-
-        extra("matplotlib.pyplot")  # switches on a notebook's display of figures
-        return draw(self, name)
+    @property
+    def provenance(self) -> str:
+        """One line that says how the motion was derived."""
+        made = self.processing
+        parts = [f"{self.total:,} samples at {self.rate:.6g} Hz", f"{made.derivative} derivative"]
+        if made.derivative == "savitzky-golay":
+            parts[-1] += f" (window {made.window}, degree {made.degree})"
+        parts.append(
+            f"zero-phase Butterworth {made.lowpass.cutoff:g} Hz, order 2x{made.lowpass.order},"
+            f" {made.lowpass.padding} padding"
+            if made.lowpass is not None
+            else "no filter"
+        )
+        parts += [f"{made.edges} edges", f"{made.convention} convention"]
+        if self.stride > 1:
+            parts.append(f"one sample in {self.stride} shown")
+        return " · ".join(parts)
 
     def record(self) -> dict[str, Any]:
         """Everything but the samples, as plain data: choices, closure, columns and their totals."""
-        from linkwise.analysis.summary import summary
-
-        return summary(self)
-
-    def _row(self, at: int) -> Array:
-        row: Array = self.values[at]
-        return row
+        robot = self.robot
+        return {
+            "schema": SCHEMA,
+            "log": self.source,
+            "robot": {
+                "name": robot.name,
+                "joints": list(robot.joints),
+                "links": list(robot.links),
+                "backend": robot.backend,
+                "manifest_sha256": robot.manifest_sha256,
+            },
+            **choices(self.reading, self.processing),
+            "rate_hz": self.rate,
+            "samples": self.total,
+            "closure": asdict(self.closure),
+            "ignored_columns": list(self.ignored),
+            "warnings": list(self.warnings),
+            "columns": [
+                {
+                    "name": column.name,
+                    "unit": column.unit,
+                    "meaning": MEANING[column.quantity],
+                    "mean_magnitude": float(mean),
+                    "peak_magnitude": float(peak),
+                }
+                for column, mean, peak in zip(self.columns, self.totals.mean, self.totals.peak, strict=True)
+            ],
+        }
 
     def _dense(self, quantity: Quantity, rank: int) -> Array:
+        """Return a quantity's columns as one array (S, n, N, n)[: rank + 1], zeros where none is."""
         n, links = len(self.robot.joints), len(self.robot.links)
         out = np.zeros((len(self.time), n, links, n)[: rank + 1])
         for column, values in zip(self.columns, self.values, strict=True):

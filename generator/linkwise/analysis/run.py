@@ -1,27 +1,59 @@
 """`analyze`: from a log and a robot to arrays in memory, or to a directory of files."""
 
+import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from linkwise.analysis.filtering import lowpass
-from linkwise.analysis.result import Analysis
-from linkwise.analysis.robot import Robot, load_robot
+from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.samples import Samples, read_samples
-from linkwise.analysis.settings import Processing, Reading
-from linkwise.analysis.stream import Run, Sink, run, span_of
-from linkwise.analysis.terms import Terms
-from linkwise.errors import within
+from linkwise.analysis.settings import Processing, Reading, choices
+from linkwise.analysis.show import check_figure, draw, figure_png
+from linkwise.analysis.show.page import NUMBERS, SAMPLES, report
+from linkwise.analysis.stream import KeptSamples, Sink, Streamed, span_of, stream, stride_for
+from linkwise.analysis.tables import Format, open_table
+from linkwise.analysis.torques import Decomposer
+from linkwise.errors import LinkwiseError, within
+from linkwise.extras import extra
+from linkwise.output import whole_directory
+from linkwise.package.load import Array
 from linkwise.progress import Progress, silent
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RECORD = "analysis.json"
+"""The record, and the mark by which a directory is known to hold a former result."""
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis(AnalysisResult):
+    """What `analyze` returns: an `AnalysisResult` that draws itself."""
+
+    def figure(self, name: str = "paper") -> "Figure":
+        """A matplotlib figure: "paper", "paper:JOINT" for another loaded joint than the first, or "shares".
+
+        "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
+        """
+        extra("matplotlib.pyplot")  # switches on a notebook's display of figures
+        return draw(self, name)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which files to write: the table's format, figures by name, and whether the page."""
+
+    table: Format = "parquet"
+    figures: tuple[str, ...] = ()
+    page: bool = True
 
 
 def analyze(
     log: str | Path,
-    robot: str | Path | Robot,
+    robot: str | Path | LoadedRobot,
     reading: Reading | None = None,
     processing: Processing | None = None,
     progress: Progress = silent,
@@ -30,10 +62,64 @@ def analyze(
 
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
-    loaded = robot if isinstance(robot, Robot) else load_robot(Path(robot))
-    job = prepare(Path(log), loaded, reading or Reading(), processing or Processing(), progress)
-    kept = Keep(len(job.terms.columns), 1)
+    loaded = robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot))
+    job = _prepared(Path(log), loaded, reading or Reading(), processing or Processing(), progress)
+    kept = KeptSamples(len(job.decomposer.columns), 1)
     return job.analysis(job.run(kept, progress), kept)
+
+
+def analyze_to(
+    out: Path,
+    log: Path,
+    robot: LoadedRobot,
+    reading: Reading,
+    processing: Processing,
+    wanted: Wanted,
+    progress: Progress,
+) -> tuple[Analysis, Sequence[Path]]:
+    """Analyse a log of any length with flat memory; `out` appears when everything is done.
+
+    Returns the analysis thinned to what a page shows, and the files written. Raises LinkwiseError, as
+    `analyze` does, and where `out` holds something else than a former result or cannot be written.
+    """
+    for name in wanted.figures:
+        check_figure(name, robot)
+    with whole_directory(out, _refuse_unless_result) as draft:
+        job = _prepared(log, robot, reading, processing, progress, draft)
+        columns = job.decomposer.columns
+        kept = KeptSamples(len(columns), stride_for(job.count, len(columns), NUMBERS, SAMPLES))
+        note = json.dumps({"log": log.name, "robot": robot.name, **choices(reading, processing)})
+        with open_table(draft / f"analysis.{wanted.table}", columns, note) as table:
+
+            def sink(block: Array) -> None:
+                kept(block)
+                table(block)
+
+            analysis = job.analysis(job.run(sink, progress), kept)
+        _write_beside_table(draft, analysis, wanted)
+        names = sorted(file.name for file in draft.iterdir())
+    return analysis, [out / name for name in names]
+
+
+def _write_beside_table(draft: Path, analysis: Analysis, wanted: Wanted) -> None:
+    """Write the record, the figures and the page."""
+    text = json.dumps(analysis.record(), indent=1, ensure_ascii=False, allow_nan=False)
+    (draft / RECORD).write_text(text + "\n", encoding="utf-8")
+    for name in wanted.figures:
+        file = draft / f"{name.replace(':', '-').replace('/', '-')}.png"
+        file.write_bytes(figure_png(analysis, name))
+    if wanted.page:
+        (draft / "report.html").write_text(report(analysis), encoding="utf-8")
+
+
+def _refuse_unless_result(target: Path) -> None:
+    """Raise LinkwiseError unless `target` is an empty directory or, by its record, a former result."""
+    folder = target.is_dir() and not target.is_symlink()
+    if folder and ((target / RECORD).is_file() or next(target.iterdir(), None) is None):
+        return
+    raise LinkwiseError(
+        f"{target}: exists and is not a former result (it has no {RECORD}); give another --out"
+    )
 
 
 @dataclass(frozen=True)
@@ -44,12 +130,12 @@ class Job:
     reading: Reading
     processing: Processing
     samples: Samples
-    terms: Terms
+    decomposer: Decomposer
 
-    def run(self, sink: Sink, progress: Progress) -> Run:
+    def run(self, sink: Sink, progress: Progress) -> Streamed:
         """Analyse every sample, handing the blocks to `sink`."""
         with within(self.source):
-            return run(self.samples, self.terms, self.processing, sink, progress)
+            return stream(self.samples, self.decomposer, self.processing, sink, progress)
 
     @property
     def count(self) -> int:
@@ -57,15 +143,15 @@ class Job:
         start, stop = span_of(self.samples, self.processing)
         return stop - start
 
-    def analysis(self, done: Run, kept: "Keep") -> Analysis:
+    def analysis(self, done: Streamed, kept: KeptSamples) -> Analysis:
         """The samples kept, with what is known of them all."""
         return Analysis(
-            self.terms.robot,
+            self.decomposer.robot,
             self.reading,
             self.processing,
             self.source,
             self.samples.rate,
-            self.terms.columns,
+            self.decomposer.columns,
             kept.values,
             done.totals,
             done.closure,
@@ -76,43 +162,18 @@ class Job:
         )
 
 
-def prepare(
+def _prepared(
     log: Path,
-    robot: Robot,
+    robot: LoadedRobot,
     reading: Reading,
     processing: Processing,
     progress: Progress,
-    spool: Path | None = None,
+    buffer: Path | None = None,
 ) -> Job:
-    """Read and filter a log; `spool`, a directory, keeps the samples on disk, not in memory."""
-    samples = read_samples(log, robot.joints, robot.units, reading, progress, spool)
+    """Read and filter a log; `buffer`, a directory, keeps the samples on disk, not in memory."""
+    samples = read_samples(log, robot.joints, robot.units, reading, progress, buffer)
     with within(str(log)):
         span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
-    return Job(log.name, reading, processing, samples, Terms.of(robot, processing.convention))
-
-
-class Keep:
-    """A sink that keeps every `stride`-th sample, the first of all included."""
-
-    def __init__(self, columns: int, stride: int) -> None:
-        self.stride = stride
-        self._blocks: list[Array] = [np.empty((columns, 0))]
-        self._seen = 0
-
-    def __call__(self, block: Array) -> None:
-        """Take a block (columns, samples)."""
-        first = -self._seen % self.stride
-        self._seen += block.shape[1]
-        self._blocks.append(block if self.stride == 1 else block[:, first :: self.stride].copy())
-
-    @property
-    def values(self) -> Array:
-        """All samples kept so far, (columns, kept)."""
-        return np.concatenate(self._blocks, axis=1)
-
-
-def stride_for(samples: int, columns: int, numbers: int, most: int) -> int:
-    """Smallest stride that keeps at most `most` samples and `numbers` numbers in all."""
-    return max(1, -(-samples // max(2, min(most, numbers // columns))))
+    return Job(log.name, reading, processing, samples, Decomposer.of(robot, processing.convention))

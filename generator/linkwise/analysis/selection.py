@@ -1,10 +1,16 @@
-"""Which column of a log is the time, and which is which joint."""
+"""Which column of a log is the time, which is which joint, and in which unit its angles are."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from linkwise.analysis.logs import Log
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
+
+MANY_TURNS = 4 * math.pi
+"""An angle past two turns in radians is more likely one in degrees."""
 
 
 @dataclass(frozen=True)
@@ -22,22 +28,16 @@ class Selection:
 
 
 def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> Selection:
-    """Match columns to joints by --map, else by name; none may be left over unknowingly."""
+    """Match columns to joints by `reading.mapping`, else by name.
+
+    Raises LinkwiseError for a joint without a column, a column used twice, and a column without a joint
+    where that was not allowed.
+    """
     for name in columns:
         if list(columns).count(name) > 1:
             raise LinkwiseError(f"column {name!r} stands twice in the header; rename one")
     time = _time(columns, reading)
-    source = {joint: joint for joint in joints}
-    for column, joint in reading.mapping:
-        if joint not in source:
-            raise LinkwiseError(
-                f"--map {column}={joint}: the robot has no joint {joint!r}; its joints are {_list(joints)}"
-            )
-        if column not in columns:
-            raise LinkwiseError(
-                f"--map {column}={joint}: the log has no column {column!r}; it has {_list(columns)}"
-            )
-        source[joint] = column
+    source = _mapped(columns, joints, reading)
     missing = [joint for joint, column in source.items() if column not in columns]
     free = [c for c in columns if c not in source.values() and c != columns[time]]
     if missing:
@@ -57,6 +57,45 @@ def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> S
     return Selection(time, found, tuple(free))
 
 
+def radians_per_unit(log: Log, reading: Reading) -> float:
+    """Factor that brings the log's angles to radians; LinkwiseError where file and user disagree."""
+    told = None if reading.units is None else reading.units == "deg"
+    if told is not None and log.degrees is not None and told != log.degrees:
+        raise LinkwiseError(
+            f"--units {reading.units} contradicts the file's"
+            f" inDegrees={'yes' if log.degrees else 'no'}; leave --units out"
+        )
+    return math.pi / 180 if (log.degrees if told is None else told) else 1.0
+
+
+def unit_warnings(
+    log: Log, path: Path, reading: Reading, peaks: Sequence[tuple[str, float]]
+) -> tuple[str, ...]:
+    """Warnings about the unit of angles: not told in a file that ought to, or unlikely by their size.
+
+    peaks: column and largest magnitude, as written in the log, of every angle
+    """
+    if not peaks:
+        return ()
+    warnings = []
+    if path.suffix.lower() in {".mot", ".sto"} and log.degrees is None and reading.units is None:
+        warnings.append(
+            "the header has no inDegrees: angles are taken for radians; say so with --units rad or deg"
+        )
+    in_radians = radians_per_unit(log, reading) == 1.0
+    column, peak = max(peaks, key=lambda item: item[1])
+    if in_radians and peak > MANY_TURNS:
+        warnings.append(
+            f"column {column!r} reaches {peak:.4g} rad, {peak / math.tau:.1f} turns: if that is"
+            " degrees, pass --units deg"
+        )
+    if not in_radians and 0 < peak <= math.pi:
+        warnings.append(
+            f"no angle exceeds {peak:.4g} degrees ({column!r}): if that is radians, pass --units rad"
+        )
+    return tuple(warnings)
+
+
 def _time(columns: Sequence[str], reading: Reading) -> int:
     if reading.time is not None:
         if reading.time not in columns:
@@ -68,6 +107,22 @@ def _time(columns: Sequence[str], reading: Reading) -> int:
     raise LinkwiseError(
         f"no column 'time' in {_list(columns)}; say which one holds seconds with --time COLUMN"
     )
+
+
+def _mapped(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> dict[str, str]:
+    """Name of each joint's column, in the robot's order."""
+    source = {joint: joint for joint in joints}
+    for column, joint in reading.mapping:
+        if joint not in source:
+            raise LinkwiseError(
+                f"--map {column}={joint}: the robot has no joint {joint!r}; its joints are {_list(joints)}"
+            )
+        if column not in columns:
+            raise LinkwiseError(
+                f"--map {column}={joint}: the log has no column {column!r}; it has {_list(columns)}"
+            )
+        source[joint] = column
+    return source
 
 
 def _list(names: Sequence[str]) -> str:

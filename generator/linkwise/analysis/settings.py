@@ -1,4 +1,4 @@
-"""How a log is read and its movement derived: the user's choices, recorded in every output."""
+"""How a log is read and its movement derived: the user's choices, as recorded in every output."""
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
@@ -14,11 +14,12 @@ Convention = Literal["closing", "gradient"]
 
 @dataclass(frozen=True)
 class Reading:
-    """How columns become joint coordinates.
+    """How columns become joint coordinates. Raises LinkwiseError for a rate that cannot be.
 
-    `units` is the angles' unit; None takes the file's own word (`inDegrees`), else radians. Lengths
-    are metres always. `mapping` holds (column, joint) pairs; other joints take the column of their
-    name.
+    `units` is the angles' unit; None takes what the file says (`inDegrees`), else radians. Lengths
+    are always metres. `time` names the column of the time, in s; None takes "time" or "t". `mapping`
+    holds (column, joint) pairs; other joints take the column of their name. `ignore_extra` leaves out
+    columns that no joint has.
     """
 
     units: Units | None = None
@@ -37,8 +38,9 @@ class Reading:
 class Lowpass:
     """A Butterworth low-pass run forwards and backwards, so without a shift in time.
 
-    `cutoff` is in Hz, `order` that of one pass: both have twice the order and -6 dB at the cutoff.
-    `padding` says how the log is continued past its ends while filtering.
+    `cutoff` is in Hz, `order` that of one pass: both together have twice the order and -6 dB at the cutoff.
+    `padding` says how the log is continued past its ends while filtering. Raises LinkwiseError for values
+    that cannot be.
     """
 
     cutoff: float
@@ -57,8 +59,10 @@ class Processing:
     """How velocities and accelerations come from the samples, and the convention of the terms.
 
     The low-pass, if any, is applied to q before it is differentiated; both are linear, so away from
-    the ends this is the paper's filter after the derivative. `window` and `degree` are
-    Savitzky–Golay's.
+    the ends this equals the paper's filter after the derivative. `window` (in samples) and `degree` are
+    Savitzky–Golay's. `edges` says whether samples near the ends get one-sided formulas or are cut off.
+    `convention` "closing" makes velocity terms sum to the torque; "gradient" is the paper's Eq. 1, twice
+    that. Raises LinkwiseError for values that cannot be.
     """
 
     derivative: Derivative = "five-point"
@@ -83,8 +87,8 @@ class Processing:
         return 5 if self.derivative == "five-point" else self.window
 
 
-def record(reading: Reading, processing: Processing) -> dict[str, Any]:
-    """All choices as plain data, for the outputs."""
+def choices(reading: Reading, processing: Processing) -> dict[str, Any]:
+    """All choices as plain data, to record in the outputs."""
     kept = asdict(processing)
     if processing.derivative == "five-point":
         del kept["window"], kept["degree"]

@@ -1,23 +1,21 @@
-"""A whole log, block by block: each is differentiated, analysed, summed up and handed on."""
+"""A whole log, block by block: each is differentiated, decomposed, checked, summed up and handed on."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from linkwise.analysis.closure import Closure
-from linkwise.analysis.differentiate import derivatives
-from linkwise.analysis.independent import against_recursion
+from linkwise.analysis.derivatives import derivatives
 from linkwise.analysis.result import Totals
 from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
-from linkwise.analysis.terms import Terms
+from linkwise.analysis.torques import Decomposer
+from linkwise.analysis.verify import Closure, against_recursion
 from linkwise.errors import LinkwiseError
+from linkwise.package.load import Array
 from linkwise.progress import Progress
 
-Array = NDArray[np.float64]
 Sink = Callable[[Array], None]
 """Takes one block (columns, samples) after the other; the block is the sink's own."""
 
@@ -28,8 +26,33 @@ BLOCK_BYTES = 48 << 20
 """Size of a block handed on, about: some three of them are in memory at any time."""
 
 
+class KeptSamples:
+    """A sink that keeps every `stride`-th sample, the first of all included."""
+
+    def __init__(self, columns: int, stride: int) -> None:
+        self.stride = stride
+        self._blocks: list[Array] = [np.empty((columns, 0))]
+        self._seen = 0
+
+    def __call__(self, block: Array) -> None:
+        """Take a block (columns, samples)."""
+        first = -self._seen % self.stride
+        self._seen += block.shape[1]
+        self._blocks.append(block if self.stride == 1 else block[:, first :: self.stride].copy())
+
+    @property
+    def values(self) -> Array:
+        """All samples kept so far, (columns, kept)."""
+        return np.concatenate(self._blocks, axis=1)
+
+
+def stride_for(samples: int, columns: int, numbers: int, most: int) -> int:
+    """Smallest stride that keeps at most `most` samples and `numbers` numbers in all."""
+    return max(1, -(-samples // max(2, min(most, numbers // columns))))
+
+
 @dataclass(frozen=True)
-class Run:
+class Streamed:
     """What is known once every block is done."""
 
     totals: Totals
@@ -49,28 +72,33 @@ def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
     return cut, count - cut
 
 
-def run(samples: Samples, terms: Terms, processing: Processing, sink: Sink, progress: Progress) -> Run:
-    """Send every block to `sink`, which works in a thread beside the computation."""
+def stream(
+    samples: Samples, decomposer: Decomposer, processing: Processing, sink: Sink, progress: Progress
+) -> Streamed:
+    """Send every block to `sink`, which works in a thread beside the computation.
+
+    Raises LinkwiseError for too few samples, results that overflow, and a robot whose torques do not add up.
+    """
     start, stop = span_of(samples, processing)
-    total = np.zeros(len(terms.columns))
-    peak = np.zeros(len(terms.columns))
+    total = np.zeros(len(decomposer.columns))
+    peak = np.zeros(len(decomposer.columns))
     closure = Closure()
     with ThreadPoolExecutor(1) as writer, np.errstate(over="ignore", invalid="ignore"):
         pending: Future[None] | None = None
-        for first, last in _blocks(start, stop, len(terms.columns)):
-            block = np.empty((len(terms.columns), last - first))
+        for first, last in _blocks(start, stop, len(decomposer.columns)):
+            block = np.empty((len(decomposer.columns), last - first))
             for at in range(first, last, INNER):
                 end = min(at + INNER, last)
                 q, qd, qdd = derivatives(samples.q, samples.rate, at, end, processing)
                 out = block[:, at - first : end - first]
-                closure |= terms.fill(out, samples.time[at:end], q, qd, qdd)
+                closure |= decomposer.fill(out, samples.time[at:end], q, qd, qdd)
                 magnitude = np.abs(out)
                 added = magnitude.sum(axis=1)
                 if not np.isfinite(added).all():
-                    raise _overflow(samples, terms, out, at)
+                    raise _overflow(samples, decomposer, out, at)
                 total += added
                 np.maximum(peak, magnitude.max(axis=1), out=peak)
-            closure |= against_recursion(terms.robot, terms.columns, block)
+            closure |= against_recursion(decomposer.robot, decomposer.columns, block)
             closure.check()
             if pending is not None:
                 pending.result()
@@ -78,29 +106,29 @@ def run(samples: Samples, terms: Terms, processing: Processing, sink: Sink, prog
             progress("analysing", last - start, stop - start)
         if pending is not None:
             pending.result()
-    return Run(Totals(total / (stop - start), peak), closure, stop - start)
+    return Streamed(Totals(total / (stop - start), peak), closure, stop - start)
 
 
-def _overflow(samples: Samples, terms: Terms, out: Array, start: int) -> LinkwiseError:
-    """Say where the first result that is no number stands, by time; columns come cause before effect."""
+def _overflow(samples: Samples, decomposer: Decomposer, out: Array, start: int) -> LinkwiseError:
+    """Say where the first result that is not finite stands, by time; columns come cause before effect."""
     bad = ~np.isfinite(out)
     at = int(bad.any(axis=0).argmax())
     column = int(bad[:, at].argmax()) if bad.any() else int(np.abs(out).max(axis=1).argmax())
     row = "" if samples.first_row is None else f"row {samples.first_row + start + at}, "
     return LinkwiseError(
-        f"{row}time {samples.time[start + at]:.6g} s: result column {terms.columns[column].name!r} is"
-        f" {out[column, at]:.3g}; the log's values are too large{_largest(samples, terms, start + at)}"
+        f"{row}time {samples.time[start + at]:.6g} s: result column {decomposer.columns[column].name!r} is"
+        f" {out[column, at]:.3g}; the log's values are too large{_largest(samples, decomposer, start + at)}"
     )
 
 
-def _largest(samples: Samples, terms: Terms, at: int) -> str:
-    """The largest coordinate near a sample."""
+def _largest(samples: Samples, decomposer: Decomposer, at: int) -> str:
+    """Tell of the largest coordinate near a sample."""
     first = max(0, at - INNER)
     near = np.abs(samples.q[first : at + INNER])
     near[~np.isfinite(near)] = 0.0  # a filter can make everything so
     row, joint = np.unravel_index(int(np.argmax(near)), near.shape)
     where = f"row {samples.first_row + first + row}" if samples.first_row is not None else "a sample nearby"
-    return f": {terms.robot.joints[joint]!r} comes to {near[row, joint]:.3g} in {where}"
+    return f": {decomposer.robot.joints[joint]!r} comes to {near[row, joint]:.3g} in {where}"
 
 
 def _blocks(start: int, stop: int, columns: int) -> Iterator[tuple[int, int]]:

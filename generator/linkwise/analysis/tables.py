@@ -6,17 +6,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Protocol, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
 from linkwise.analysis.columns import MEANING, Column
-from linkwise.analysis.extras import extra
+from linkwise.extras import extra
+from linkwise.package.load import Array
 
-Array = NDArray[np.float64]
 Format = Literal["parquet", "csv"]
 
 
-class Table(Protocol):
+class ResultTable(Protocol):
     """A sink that is closed at the end."""
 
     def __enter__(self) -> Self:
@@ -34,8 +31,8 @@ class Table(Protocol):
         """Write a block (columns, samples)."""
 
 
-def open_table(path: Path, columns: Sequence[Column], note: str) -> Table:
-    """Open `path`, .parquet or .csv; `note`, JSON, is kept in a Parquet file's schema."""
+def open_table(path: Path, columns: Sequence[Column], note: str) -> ResultTable:
+    """Open `path`, .parquet or .csv, to write; `note`, JSON, is kept in a Parquet file's schema."""
     return CsvTable(path, columns) if path.suffix == ".csv" else ParquetTable(path, columns, note)
 
 
@@ -46,7 +43,7 @@ class ParquetTable:
         self._arrow = arrow = extra("pyarrow")
         fields = [arrow.field(c.name, arrow.float64(), False, _metadata(c)) for c in columns]
         self._schema = arrow.schema(fields, {"linkwise": note})
-        # Torques hardly repeat: a dictionary would only cost time. Long rests do compress.
+        # Torques hardly repeat, so that a dictionary would only cost time; long rests do compress.
         self._writer: Any = extra("pyarrow.parquet").ParquetWriter(
             path, self._schema, compression="snappy", use_dictionary=False, write_statistics=False
         )

@@ -1,6 +1,6 @@
 """Proof that a generated package is right."""
 
 from linkwise.check.checks import check_package
-from linkwise.check.result import Result
+from linkwise.check.compare import Result
 
 __all__ = ["Result", "check_package"]

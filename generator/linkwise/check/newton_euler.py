@@ -1,25 +1,25 @@
-"""Recursive Newton–Euler over a package's skeleton: an oracle that shares nothing with the generator.
+"""Recursive Newton–Euler over a package's rigid bodies: an oracle that shares nothing with the generator.
 
 Plain vectors in the world's axes, forces at centres of mass, one link at a time; the textbook recursion.
 """
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
+
+from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
 Array = NDArray[np.float64]
 
 
 class NewtonEuler:
-    """Partial torques from `skeleton` and `conventions.gravity` of a manifest."""
+    """Partial torques of the rigid bodies of a manifest, whose `tree` is given beside it."""
 
-    def __init__(self, manifest: dict[str, Any]) -> None:
-        self.bodies = manifest["skeleton"]
-        self.gravity = np.array(manifest["conventions"]["gravity"])
-        self.n = len(manifest["joints"])
-        index = {body["link"]: b for b, body in enumerate(self.bodies)}
-        self.links = [index[link["name"]] for link in manifest["links"]]
+    def __init__(self, manifest: Manifest, tree: RigidTree) -> None:
+        self.bodies: tuple[BodyEntry, ...] = tree.bodies
+        self.gravity = np.array(tree.gravity)
+        self.n = len(manifest.joints)
+        index = {body.link: b for b, body in enumerate(self.bodies)}
+        self.links = [index[link.name] for link in manifest.links]
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
         """τ_ij, shape (samples, n, N), for inputs of shape (samples, n)."""
@@ -28,18 +28,18 @@ class NewtonEuler:
         tau = np.zeros((samples, self.n, len(self.links)))
         for j, at in enumerate(self.links):
             body, (rotation, _, omega, alpha, com, a_com, _) = self.bodies[at], motion[at]
-            inertia = rotation @ np.array(body["inertia"]) @ rotation.transpose(0, 2, 1)
-            force = body["mass"] * a_com
+            inertia = rotation @ np.array(body.inertia) @ rotation.transpose(0, 2, 1)
+            force = body.mass * a_com
             moment = (inertia @ alpha[..., None])[..., 0] + np.cross(
                 omega, (inertia @ omega[..., None])[..., 0]
             )
             back: int | None = at
             while back is not None:
                 upper, (_, origin, _, _, _, _, axis) = self.bodies[back], motion[back]
-                turns = upper["kind"] == "revolute"
+                turns = upper.kind == "revolute"
                 about = moment + np.cross(com - origin, force) if turns else force
-                tau[:, upper["coordinate"], j] += upper["ratio"] * np.einsum("si,si->s", axis, about)
-                back = upper["parent"]
+                tau[:, upper.coordinate, j] += upper.ratio * np.einsum("si,si->s", axis, about)
+                back = upper.parent
         return tau
 
     def _forward(self, q: Array, qd: Array, qdd: Array, gravity: Array) -> list[tuple[Array, ...]]:
@@ -50,26 +50,26 @@ class NewtonEuler:
         origins: list[tuple[Array, ...]] = []
         motion: list[tuple[Array, ...]] = []
         for body in self.bodies:
-            up = ground if body["parent"] is None else origins[body["parent"]]
+            up = ground if body.parent is None else origins[body.parent]
             rotation, position, omega, alpha, a = up
-            k, ratio = body["coordinate"], body["ratio"]
+            k, ratio = body.coordinate, body.ratio
             turn, rate, change = (ratio * x[:, k : k + 1] for x in (q, qd, qdd))
-            arm = rotation @ np.array(body["translation"])
-            rotation = rotation @ np.array(body["rotation"])
+            arm = rotation @ np.array(body.translation)
+            rotation = rotation @ np.array(body.rotation)
             axis = rotation[:, :, 2]
             slide, slide_rate, slide_change = zero, zero, zero
-            if body["kind"] == "prismatic":
+            if body.kind == "prismatic":
                 slide, slide_rate, slide_change = turn * axis, rate * axis, change * axis
             arm = arm + slide
             a = a + np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm))
             a = a + 2 * np.cross(omega, slide_rate) + slide_change
             position = position + arm
-            if body["kind"] == "revolute":
+            if body.kind == "revolute":
                 alpha = alpha + change * axis + np.cross(omega, rate * axis)
                 omega = omega + rate * axis
                 rotation = rotation @ _about_z(turn[:, 0])
             origins.append((rotation, position, omega, alpha, a))
-            lever = rotation @ np.array(body["com"])
+            lever = rotation @ np.array(body.com)
             a_com = a + np.cross(alpha, lever) + np.cross(omega, np.cross(omega, lever))
             motion.append((rotation, position, omega, alpha, position + lever, a_com, axis))
         return motion

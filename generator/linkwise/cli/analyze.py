@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
-from linkwise.analysis.directory import ended_by_signal
-from linkwise.analysis.files import Wanted, analyze_to
-from linkwise.analysis.result import Analysis
-from linkwise.analysis.robot import load_robot
+from linkwise.analysis import Analysis
+from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.run import Wanted, analyze_to
 from linkwise.analysis.settings import (
     Convention,
     Derivative,
@@ -24,6 +23,7 @@ from linkwise.analysis.settings import (
 from linkwise.analysis.tables import Format
 from linkwise.cli import Json
 from linkwise.errors import LinkwiseError
+from linkwise.output import ended_by_signal
 from linkwise.progress import progress as shown_progress
 
 UNITS = {"reading": "B", "resampling": "samples", "analysing": "samples"}

@@ -39,7 +39,7 @@ def generate(
         files = pipeline.generate(system, backends, name, request, report)
     directory = out / json.loads(files["manifest.json"])["name"]
     write_package(files, directory)
-    for effect in effects(system.robot.notes if system.robot else ()):
+    for effect in effects(system.notes):
         typer.echo(f"warning: {robot}: {effect}", err=True)
     typer.echo(
         f"wrote {directory}: {len(system.coordinates)} joints, {len(system.links)} links, {len(files)} files"

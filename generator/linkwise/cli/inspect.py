@@ -10,10 +10,10 @@ import typer
 from linkwise import pipeline
 from linkwise.cli import Json
 from linkwise.cli.options import RobotName, reads_robot
-from linkwise.emit.assemble import skeleton
+from linkwise.emit.assemble import rigid_tree
 from linkwise.errors import LinkwiseError
 from linkwise.robot import Options
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import EnergySystem, System
 
 LOSSES = ("damping", "friction")
 """Kinds of notes that are shown on request."""
@@ -36,7 +36,7 @@ def inspect(
 ) -> None:
     """Show a robot's joints, links and parameters, and what was merged, locked or ignored."""
     system = pipeline.read_system(robot, options)
-    if joint_friction and system.robot is None:
+    if joint_friction and isinstance(system, EnergySystem):
         raise LinkwiseError(f"{robot}: energies in Python take no --joint-friction; leave it out")
     data = inspection(system, () if joint_friction else LOSSES)
     typer.echo(json.dumps(data, indent=1) if as_json else table(data))
@@ -44,21 +44,21 @@ def inspect(
 
 def inspection(system: System, hidden: Collection[str] = LOSSES) -> dict[str, Any]:
     """Joints, links, parameters and the notes of the kinds that are not hidden, ready for JSON."""
-    bodies = {link["link"]: link for link in skeleton(system) or []}
-    notes = system.robot.notes if system.robot is not None else ()
+    tree = rigid_tree(system)
+    mass = {body.link: body.mass for body in tree.bodies} if tree else {}
     return {
         "name": system.name,
         "joints": [{"name": c.name, "unit": c.unit} for c in system.coordinates],
         "links": [
             {
-                "name": link.name,
+                "name": name,
                 "path": [system.coordinates[k].name for k in system.path(j)],
-                "mass": bodies[link.name]["mass"] if link.name in bodies else None,
+                "mass": mass.get(name),
             }
-            for j, link in enumerate(system.links)
+            for j, name in enumerate(system.link_names)
         ],
         "parameters": {s.name: float(v) for s, v in system.parameters.items()},
-        "notes": [asdict(note) for note in notes if note.kind not in hidden],
+        "notes": [asdict(note) for note in system.notes if note.kind not in hidden],
     }
 
 

@@ -6,9 +6,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from linkwise.analysis.motions import MOTIONS, RATE, write_csv
+from linkwise.analysis.paper_motions import MOTIONS, RATE, write_motions
 from linkwise.cli import Json
-from linkwise.errors import LinkwiseError
 
 Kind = Literal["recorded", "simulated", "both"]
 
@@ -21,17 +20,12 @@ def motion(
     kind: Annotated[Kind, typer.Option(help="Which of the two motions")] = "both",
     as_json: Json = False,
 ) -> None:
-    """Write the paper's two motions (Fig. 5 and 10) for the arm of Table 2, `planar3`."""
-    wanted = list(MOTIONS) if kind == "both" else [kind]
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        written = [
-            {"file": str(file), "samples": write_csv(file, MOTIONS[name]), "rate_hz": RATE}
-            for name in wanted
-            for file in [out / f"{name}.csv"]
-        ]
-    except OSError as error:
-        raise LinkwiseError(f"{out}: cannot be written: {error.strerror}") from error
+    """Write two motions modelled on the paper's Fig. 5 and 10, for the arm of its Table 2, `planar3`."""
+    wanted = list(MOTIONS.values()) if kind == "both" else [MOTIONS[kind]]
+    written = [
+        {"file": str(file), "samples": made.count, "rate_hz": RATE}
+        for file, made in zip(write_motions(out, wanted), wanted, strict=True)
+    ]
     if as_json:
         typer.echo(json.dumps(written))
         return

@@ -10,16 +10,23 @@ import typer
 from linkwise.cli import BUDGET, Budget, Json, ReportOut
 from linkwise.cli.options import reads_robot
 from linkwise.errors import LinkwiseError
+from linkwise.output import require_writable, write_files
 from linkwise.pipeline import read_system
 from linkwise.progress import progress
-from linkwise.report import measured_text, study_text
-from linkwise.report import seconds as timing
-from linkwise.report.files import json_text, require_writable, write_all
-from linkwise.report.publish import study_files
-from linkwise.report.study import study
-from linkwise.robot import DESCRIPTIONS, Options
+from linkwise.report import (
+    json_text,
+    measure,
+    read_seconds,
+    reduction_json,
+    reduction_markdown,
+    seconds_json,
+    seconds_markdown,
+    study,
+    study_files,
+)
+from linkwise.robot import DESCRIPTIONS, Options, read_robot
 from linkwise.robot.read import MAX_PLANAR
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import System, rigid_system
 
 CHECKED_TO = 14
 """A planar arm is counted at least to here: the paper's ten joints, and four to confirm."""
@@ -45,22 +52,22 @@ def reduction(
     """Draw the share of terms of τ_1 that its q̈_1 part does not need (the paper's Fig. 15)."""
     first, last = dof_range(dof)
     name, system, beyond = _arm(robot, last, options)
-    found = None if seconds is None else measured_text.read(seconds)
+    found = None if seconds is None else read_seconds(seconds)
     if out is not None:
         require_writable(out)
     with progress() as advance:
         result = study(name, system, first, last, beyond, budget, advance)
         if measured and found is None:
-            found = measured_text.data(name, timing.measure(system, result.dof, advance))
+            found = seconds_json(name, measure(system, result.dof, advance))
     if out is not None:
-        write_all(out, study_files(result, found))
+        write_files(out, study_files(result, found))
     if as_json:
         measurement = {} if found is None else {"measured": found}
-        typer.echo(json_text(study_text.data(result) | measurement), nl=False)
+        typer.echo(json_text(reduction_json(result) | measurement), nl=False)
         return
-    typer.echo(study_text.page(result), nl=False)
+    typer.echo(reduction_markdown(result), nl=False)
     if found is not None:
-        typer.echo("\n" + measured_text.page(result, found), nl=False)
+        typer.echo("\n" + seconds_markdown(result, found), nl=False)
 
 
 def dof_range(text: str) -> tuple[int, int]:
@@ -77,8 +84,8 @@ def dof_range(text: str) -> tuple[int, int]:
 def _arm(robot: str, last: int, options: Options) -> tuple[str, System, int]:
     """Name of the arm, the arm, and up to how many degrees of freedom to count it."""
     if robot == "planar":
-        arm = read_system(f"planar{_planar_joints(last, len(options.lock))}", options)
-        return PLANAR_ARM, replace(arm, name=PLANAR_ARM), CHECKED_TO
+        arm = read_robot(f"planar{_planar_joints(last, len(options.lock))}", options)
+        return PLANAR_ARM, rigid_system(replace(arm, name=PLANAR_ARM)), CHECKED_TO
     return Path(robot).stem, read_system(robot, options), last
 
 

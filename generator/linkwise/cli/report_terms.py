@@ -7,13 +7,19 @@ import typer
 from linkwise.cli import BUDGET, Budget, Json, ReportOut
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.errors import LinkwiseError
+from linkwise.output import require_writable, write_files
 from linkwise.pipeline import read_system
 from linkwise.progress import progress
-from linkwise.report import terms_text
-from linkwise.report.files import json_text, require_writable, write_all
-from linkwise.report.publish import terms_files
-from linkwise.report.question import Question, position
-from linkwise.report.terms import terms_report
+from linkwise.report import (
+    TermQuery,
+    json_text,
+    position,
+    progress_line,
+    terms_files,
+    terms_json,
+    terms_markdown,
+    terms_report,
+)
 from linkwise.robot import Options
 
 app = typer.Typer(add_completion=False)
@@ -39,8 +45,8 @@ def terms(
     if order not in (0, 1, 2):
         raise LinkwiseError(f"--order is {order}; choose 2 for acceleration, 1 for velocity, 0 for gravity")
     system = read_system(robot, options)
-    joints, links = [c.name for c in system.coordinates], [part.name for part in system.links]
-    question = Question(
+    joints, links = [c.name for c in system.coordinates], system.link_names
+    query = TermQuery(
         None if joint == "all" else position(joint, joints, "--joint"),
         None if link == "all" else position(link, links, "--link"),
         position(coordinate, joints, "--coordinate"),
@@ -49,9 +55,9 @@ def terms(
     if out is not None:
         require_writable(out)
     with progress() as advance:
-        result = terms_report(system, question, budget, partial, advance)
+        result = terms_report(system, query, budget, partial, advance)
     if out is not None:
-        write_all(out, terms_files(result))
-    typer.echo(json_text(terms_text.data(result)) if as_json else terms_text.page(result), nl=False)
+        write_files(out, terms_files(result))
+    typer.echo(json_text(terms_json(result)) if as_json else terms_markdown(result), nl=False)
     if not result.complete:
-        typer.echo(terms_text.progress_line(result), err=True)
+        typer.echo(progress_line(result), err=True)

@@ -7,7 +7,7 @@ from linkwise.dynamics.frame_search import MAX_AXES, FrameSearch
 from linkwise.dynamics.kernel import Kernel, lowering, parameter_nodes
 from linkwise.errors import within
 from linkwise.progress import Progress, silent
-from linkwise.symbolic.system import LinkEnergy, System
+from linkwise.symbolic.system import EnergySystem, System
 
 MAX_FUSED = 4000
 """Largest sum of squared path lengths for a fused kernel."""
@@ -15,12 +15,12 @@ MAX_FUSED = 4000
 
 def link_kernel(system: System, link: int) -> Kernel:
     """Closed forms of one link from its own path alone, whatever else the robot has."""
-    energy = system.links[link]
-    with within(f"link {energy.name!r}"):
-        if energy.body is None:
-            return _energy_kernel(system, energy, system.path(link))
-        tree = [(f - 1, joint) for f, joint in enumerate(energy.body.joints)]
-        search = FrameSearch(system, [energy], tree, [range(len(tree))])
+    with within(f"link {system.links[link].name!r}"):
+        if isinstance(system, EnergySystem):
+            return _energy_kernel(system, link)
+        rigid = system.links[link]
+        tree = [(f - 1, joint) for f, joint in enumerate(rigid.joints)]
+        search = FrameSearch(system, [link], tree, [range(len(tree))])
         _, axes, origin = min([*search.central(MAX_AXES), *search.framed(MAX_AXES)], key=itemgetter(0))
         return search.build(axes, origin)
 
@@ -30,22 +30,23 @@ def fused_kernel(system: System) -> Kernel | None:
 
     None for energies of a user's own, and for a robot so large that finding the frame takes too long.
     """
-    if system.robot is None or len(system.links) < 2:
+    if isinstance(system, EnergySystem) or len(system.links) < 2:
         return None
-    tree = [(-1 if k.parent is None else k.parent, k.joint) for k in system.robot.links]
-    chains = [energy.body.chain for energy in system.links if energy.body is not None]
+    chains = [link.chain for link in system.links]
     if sum(len(chain) ** 2 for chain in chains) > MAX_FUSED:
         return None
-    search = FrameSearch(system, system.links, tree, chains)
+    tree = [(-1 if k.parent is None else k.parent, k.joint) for k in system.robot.links]
+    search = FrameSearch(system, range(len(chains)), tree, chains)
     _, axes, origin = min(search.framed(MAX_AXES - 1), key=itemgetter(0))
     return search.build(axes, origin, gradient=False)
 
 
-def _energy_kernel(system: System, energy: LinkEnergy, path: tuple[int, ...]) -> Kernel:
+def _energy_kernel(system: EnergySystem, link: int) -> Kernel:
     lower, x = lowering(system)
+    energy, path = system.links[link], system.path(link)
     lagrangian = lower.graph.sub(lower(energy.kinetic), lower(energy.potential))
     forms = euler_lagrange(lower.graph, lagrangian, path, x)
-    return Kernel(lower.graph, x, parameter_nodes(system, lower), (forms,))
+    return Kernel(lower.graph, x, parameter_nodes(system, lower), (forms,), ())
 
 
 def derive(system: System, progress: Progress = silent) -> tuple[Kernel, ...]:

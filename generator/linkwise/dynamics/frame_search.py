@@ -4,12 +4,13 @@ from collections.abc import Iterator, Sequence
 from operator import itemgetter
 
 from linkwise.dynamics.kernel import Kernel, lowering, parameter_nodes
+from linkwise.dynamics.link_motion import Origin
 from linkwise.dynamics.principal_axes import principal_axes
-from linkwise.dynamics.rigid_link import Origin, rigid_forms
+from linkwise.dynamics.rigid_link import rigid_forms
 from linkwise.dynamics.screws import CommonAxes, Orientation
 from linkwise.expression.count import count_operations
 from linkwise.robot.robot import Joint
-from linkwise.symbolic.system import LinkEnergy, System
+from linkwise.symbolic.system import RigidLink, RigidSystem
 
 MAX_AXES, MAX_ORIGINS = 4, 3
 
@@ -18,23 +19,27 @@ Attempt = tuple[int, CommonAxes, Origin]
 
 
 class FrameSearch:
-    """Common frames for some links of a tree, by what their decomposition costs."""
+    """Common frames for some links of a tree, by what their decomposition costs.
+
+    links: their indices in the system; chains: of each its path in `tree`, which lists (parent, joint)
+    """
 
     def __init__(
-        self, system: System, links: Sequence[LinkEnergy], tree: Tree, chains: Sequence[Sequence[int]]
+        self, system: RigidSystem, links: Sequence[int], tree: Tree, chains: Sequence[Sequence[int]]
     ) -> None:
         self.system, self.tree, self.chains = system, tree, chains
-        self.bodies = [energy.body for energy in links if energy.body is not None]
+        self.links = [system.links[j] for j in links]
 
     def build(self, axes: CommonAxes, origin: Origin, gradient: bool = True) -> Kernel:
         """Kernel in a common frame, with or without the position gradient."""
         lower, x = lowering(self.system)
-        turn = Orientation(lower, self.tree, self.bodies[0].gravity, axes, x)
+        turn = Orientation(lower, self.tree, self.system.robot.gravity, axes, x)
         forms = tuple(
-            rigid_forms(turn, body, chain, origin, gradient)
-            for body, chain in zip(self.bodies, self.chains, strict=True)
+            rigid_forms(turn, link, chain, origin, gradient)
+            for link, chain in zip(self.links, self.chains, strict=True)
         )
-        return Kernel(lower.graph, x, parameter_nodes(self.system, lower), forms)
+        frame = _axes_in_words(turn, axes), _origin_in_words(turn, origin, self.links[0])
+        return Kernel(lower.graph, x, parameter_nodes(self.system, lower), forms, frame)
 
     def attempt(self, axes: CommonAxes, origin: Origin) -> Attempt:
         """Operations of a common frame, and the frame."""
@@ -54,9 +59,9 @@ class FrameSearch:
 
     def central(self, most_axes: int) -> Iterator[Attempt]:
         """Origins in the one link's centre of mass, with principal axes too; the best one also by points."""
-        chain, body = self.chains[0], self.bodies[0]
+        chain, link = self.chains[0], self.links[0]
         axes = list(_axes(chain, most_axes))
-        if principal := principal_axes(body):
+        if principal := principal_axes(link.inertia):
             axes.append(CommonAxes(chain[-1], turned=principal))
         tried = [self.attempt(candidate, Origin()) for candidate in axes]
         yield from tried
@@ -78,3 +83,26 @@ def _spread(items: Sequence[int], most: int) -> list[int]:
     near = list(items[: most // 2])
     step = (len(items) - 1 - len(near)) / (most - len(near) - 1)
     return near + [items[round(len(near) + step * k)] for k in range(most - len(near))]
+
+
+def _axes_in_words(turn: Orientation, axes: CommonAxes) -> str:
+    if axes.turned:
+        return "the link's principal axes"
+    if axes.frame < 0:
+        return "the base's"
+    joint = turn.labels[axes.frame]
+    return (
+        f"of the frame before joint {joint} turns"
+        if axes.before
+        else f"of the frame that joint {joint} turns"
+    )
+
+
+def _origin_in_words(turn: Orientation, origin: Origin, link: RigidLink) -> str:
+    if origin.frame is None:
+        text = "the link's centre of mass, moving with it"
+        number = isinstance(link.mass, (int, float)) and link.mass >= 0
+        return f"{text}; lengths are times the square root of its mass" if number else text
+    if origin.frame < 0:
+        return "the base's, at rest"
+    return f"where joint {turn.labels[origin.frame]} is at the instant, at rest"

@@ -14,12 +14,16 @@ from linkwise.symbolic.system import System
 
 @dataclass(frozen=True)
 class Kernel:
-    """A graph, its inputs, the nodes of the parameters by symbol, and the forms of the links it computes."""
+    """A graph, its inputs, the nodes of the parameters by symbol, and the forms of the links it computes.
+
+    frame: the common frame of its vectors in words, axes and origin; empty for hand-written energies
+    """
 
     graph: Graph
     inputs: Inputs
     parameters: dict[sp.Symbol, Node]
     forms: tuple[LinkForms, ...]
+    frame: tuple[str, ...]
 
 
 def lowering(system: System) -> tuple[Lowering, Inputs]:

@@ -6,17 +6,16 @@ on every machine, which those of a linear-algebra library are not.
 
 import math
 
-from linkwise.robot.robot import Rotation
-from linkwise.symbolic.system import RigidBody
+from linkwise.robot.robot import Mat3, Rotation
 
 SWEEPS = 12
 
 
-def principal_axes(body: RigidBody) -> Rotation | None:
+def principal_axes(inertia: Mat3) -> Rotation | None:
     """Rotation from the link's frame to its principal axes; None if they agree or depend on parameters."""
-    if not all(isinstance(entry, (int, float)) for row in body.inertia for entry in row):
+    if not all(isinstance(entry, (int, float)) for row in inertia for entry in row):
         return None
-    m = [[float(entry) for entry in row] for row in body.inertia]
+    m = [[float(entry) for entry in row] for row in inertia]
     if m[0][1] == m[0][2] == m[1][2] == 0.0:
         return None
     axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]

@@ -1,5 +1,6 @@
 """Screws: motions (ω, v) and forces (N, f) about one origin, and the directions of a tree of joints."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -49,8 +50,9 @@ class Orientation:
     """Rotations, joint axes and angular motion in common axes, shared by every link of a kernel.
 
     `tree` lists (parent, joint), parents first; parent −1 is the base. Dictionaries are keyed by frame, lists
-    by joint: z the axis times the joint's ratio (0 for a prismatic one), zd = ω × z and zdd = α × z + ω × zd
-    with the angular velocity ω and acceleration α before the joint, slide the direction of a prismatic joint.
+    by joint: labels the number of its coordinate, from 1, z the axis times the joint's ratio (0 for a
+    prismatic one), zd = ω × z and zdd = α × z + ω × zd with the angular velocity ω and acceleration α before
+    the joint, slide the direction of a prismatic joint.
     """
 
     def __init__(
@@ -62,11 +64,12 @@ class Orientation:
         x: Inputs,
     ) -> None:
         self.g, self.lower, self.x, self.tree = lower.graph, lower, x, tree
+        self.labels = _labels(tree)
         self._fixed = [self._constant(joint.rotation) for _, joint in tree]
-        self._turns = [self._turn(joint) for _, joint in tree]
+        self._turns = [self._turn(f, joint) for f, (_, joint) in enumerate(tree)]
         self.rotations = self._orient(axes)
         gx, gy, gz = (lower(a) for a in gravity)
-        self.gravity = vec.named(self.g, "a", vec.apply(self.g, self.rotations[-1], (gx, gy, gz)))
+        self.gravity = vec.named(self.g, "ag", vec.apply(self.g, self.rotations[-1], (gx, gy, gz)))
         none = vec.zero(self.g)
         self.omega: dict[int, Vector] = {-1: none}
         self.alpha: dict[int, Vector] = {-1: none}
@@ -81,13 +84,14 @@ class Orientation:
         a, b, c = ((self.g.const(r[0]), self.g.const(r[1]), self.g.const(r[2])) for r in rotation)
         return a, b, c
 
-    def _turn(self, joint: Joint) -> Matrix:
+    def _turn(self, f: int, joint: Joint) -> Matrix:
         """Rz(ratio · q) of a revolute joint, the identity of a prismatic one."""
         g = self.g
         if joint.kind == "prismatic":
             return vec.identity(g)
         angle = g.mul(g.const(joint.ratio), self.x.q[joint.coordinate])
-        s, c = g.call("sin", angle), g.call("cos", angle)
+        s = g.name(g.call("sin", angle), f"s{self.labels[f]}")
+        c = g.name(g.call("cos", angle), f"c{self.labels[f]}")
         return ((c, g.neg(s), g.zero), (s, c, g.zero), (g.zero, g.zero, g.one))
 
     def _orient(self, axes: CommonAxes) -> dict[int, Matrix]:
@@ -106,10 +110,13 @@ class Orientation:
             if f not in rotations:
                 fixed = vec.product(g, rotations[parent], self._fixed[f])
                 rotations[f] = vec.product(g, fixed, self._turns[f])
+        for f, label in enumerate(self.labels):
+            for name, column in zip("zxy", (2, 0, 1), strict=True):
+                vec.named(g, f"{name}{label}", vec.transpose(rotations[f])[column])
         return rotations
 
     def _advance(self, f: int) -> None:
-        g, (parent, joint), label = self.g, self.tree[f], f + 1
+        g, (parent, joint), label = self.g, self.tree[f], self.labels[f]
         none = vec.zero(g)
         direction = vec.scale(g, g.const(joint.ratio), vec.transpose(self.rotations[f])[2])
         revolute = joint.kind == "revolute"
@@ -122,7 +129,17 @@ class Orientation:
         self.zdd.append(vec.add(g, vec.cross(g, alpha, z), vec.cross(g, omega, zd)))
         self.slide.append(none if revolute else direction)
         self.omega[f] = vec.named(g, f"w{label}", vec.add(g, omega, vec.scale(g, qd, z)))
-        self.alpha[f] = vec.add(g, alpha, vec.scale(g, qdd, z), vec.scale(g, qd, zd))
+        rate = vec.add(g, alpha, vec.scale(g, qdd, z), vec.scale(g, qd, zd))
+        self.alpha[f] = vec.named(g, f"wd{label}", rate)
+
+    def label_before(self, f: int) -> str:
+        """Label of the joint that carries joint f; 0 for the base."""
+        parent = self.tree[f][0]
+        return self.labels[parent] if parent >= 0 else "0"
+
+    def rate(self, f: int) -> Node:
+        """q̇ of joint f's coordinate."""
+        return self.x.qd[self.tree[f][1].coordinate]
 
     def offset(self, f: int) -> Vector:
         """From the parent frame's origin to frame f's, in the parent's axes."""
@@ -132,3 +149,20 @@ class Orientation:
             return x, y, z
         slide = g.mul(g.const(joint.ratio), self.x.q[joint.coordinate])
         return vec.add(g, (x, y, z), vec.scale(g, slide, vec.transpose(self._fixed[f])[2]))
+
+
+def _labels(tree: Sequence[tuple[int, Joint]]) -> list[str]:
+    """Number of each joint's coordinate, from 1; joints that follow one coordinate are 3, 3b, 3c, …"""
+    labels: list[str] = []
+    seen: Counter[int] = Counter()
+    for _, joint in tree:
+        k = joint.coordinate
+        seen[k] += 1
+        labels.append(f"{k + 1}" + ("" if seen[k] == 1 else _letter(seen[k])))
+    return labels
+
+
+def _letter(number: int) -> str:
+    """2 → b, 3 → c, …, 27 → aa."""
+    head, last = divmod(number - 1, 26)
+    return (_letter(head) if head else "") + chr(ord("a") + last)

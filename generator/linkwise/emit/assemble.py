@@ -1,46 +1,47 @@
 """Everything of a generated package that is not one back end: names, loading, shared calls, manifest."""
 
 import hashlib
-import json
 import keyword
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from importlib import resources
 
 import sympy as sp
 
-from linkwise.dynamics.derive import fused_kernel
-from linkwise.dynamics.kernel import Kernel, decomposition_cost
+from linkwise import runtime
+from linkwise.dynamics.kernel import decomposition_cost
+from linkwise.emit.backend import BackendFiles, Loading
+from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
-from linkwise.symbolic.system import System
+from linkwise.errors import LinkwiseError
+from linkwise.package.manifest import FILE, BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
+from linkwise.progress import Progress, silent
+from linkwise.robot.robot import Scalar, Vec3
+from linkwise.symbolic.system import EnergySystem, System
 from linkwise.version import VERSION
 
-SCHEMA = 1
 LONGEST_NAME = 60
+LINE = 100
+SHARED_RUNTIME = ("__init__.py", "dense.py", "dynamics.py", "interface.py", "quantities.py", "structure.py")
+"""Files of linkwise/runtime that every package has."""
 TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}
 
 
-@dataclass(frozen=True)
-class Derivation:
-    """What every back end emits from: the system, one kernel a link, and the request that led to it."""
-
-    system: System
-    kernels: tuple[Kernel, ...]
-    package: str
-    request: Mapping[str, Any]
-
-    @cached_property
-    def fused(self) -> Kernel | None:
-        """Kernel of all links together, if there is one; found when first asked for."""
-        return fused_kernel(self.system)
-
-    @property
-    def linear(self) -> frozenset[int]:
-        """Links whose energy has terms linear in the velocities."""
-        return frozenset(j for j, k in enumerate(self.kernels) if k.forms[0].velocity_linear)
+def package_files(
+    derivation: Derivation, backends: Sequence[BackendFiles], progress: Progress = silent
+) -> dict[str, str]:
+    """Files of a package with these back ends: {path inside the package: text}."""
+    files: dict[str, str] = {}
+    emitters = list(dict.fromkeys(emitter for backend in backends for emitter in backend.emits))
+    for number, emitter in enumerate(emitters):
+        progress("emit", number, len(emitters))
+        files.update(emitter(derivation))
+    progress("emit", len(emitters), len(emitters))
+    files.update(shared_files(derivation, backends))
+    files[FILE] = manifest(derivation, files).text()
+    return files
 
 
 def identifier(name: str) -> str:
@@ -51,14 +52,24 @@ def identifier(name: str) -> str:
     return text
 
 
-def shared_files(derivation: Derivation, backends: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Files that serve every back end; `backends` are those that `load` is to know."""
-    from linkwise.emit.backend import BACKENDS
+def checked_identifier(name: str | None, robot: str) -> str:
+    """The package name asked for, or one made of the robot's; raises LinkwiseError for one that cannot be."""
+    package = name if name is not None else identifier(robot)
+    if package != identifier(package):
+        raise LinkwiseError(
+            f"--name {package[:80]!r} is not a usable module name; use up to 60 letters a-z, digits and _"
+        )
+    return package
 
-    system = derivation.system
-    shared = {"version": VERSION}
+
+def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iterator[tuple[str, str]]:
+    """Files that serve every back end, and the runtime files of those `chosen`, which `load` is to know."""
+    loadable = {backend: backend.loading for backend in chosen if backend.loading}
+    fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
+    system, shared = derivation.system, {"version": VERSION}
     names = {
         **shared,
+        "name": repr(derivation.package),
         "joints": [ascii(c.name) for c in system.coordinates],
         "units": [repr(c.unit) for c in system.coordinates],
         "links": [ascii(link.name) for link in system.links],
@@ -66,89 +77,103 @@ def shared_files(derivation: Derivation, backends: Sequence[str]) -> Iterator[tu
         "linear": repr(tuple(sorted(derivation.linear))),
         "parameters": [(ascii(s.name), repr(float(v))) for s, v in system.parameters.items()],
     }
-    load = {
+    init = {
         **shared,
-        "backends": tuple(backends),
-        "default": repr(backends[0]) if backends else "None",
-        "docs": [(name, BACKENDS[name].doc) for name in backends],
-        "modules": {name: BACKENDS[name].module for name in backends},
+        "package": derivation.package,
+        "default": next((backend.name for backend in loadable), ""),
+        "makers": [Maker.of(backend, loading) for backend, loading in loadable.items()],
+        "fastest_first": [backend.name for backend, _ in fastest_first],
+        "parameters": _parameter_lines(system),
     }
-    yield "__init__.py", render("package/init.py.j2", {**shared, "package": derivation.package})
+    yield "__init__.py", render("package/init.py.j2", init)
     yield "names.py", render("package/names.py.j2", names)
-    yield "load.py", render("package/load.py.j2", load)
-    yield "dynamics.py", render("package/dynamics.py.j2", shared)
-    yield "packing.py", render("package/packing.py.j2", shared)
-    if backends:
-        yield "numpy_backend.py", render("package/numpy_backend.py.j2", shared)
+    yield "py.typed", ""
+    copied = {name for backend in loadable for name in backend.runtime}
+    for name in sorted(copied.union(SHARED_RUNTIME)):
+        yield f"runtime/{name}", resources.files(runtime).joinpath(name).read_text(encoding="utf-8")
 
 
-def manifest(derivation: Derivation, files: Mapping[str, str]) -> str:
-    """JSON text: what was generated, from what, what it costs, and the SHA-256 of every file."""
+@dataclass(frozen=True)
+class Maker:
+    """A function of the package's __init__.py that makes one back end."""
+
+    name: str
+    doc: str
+    imports: tuple[str, ...]
+    made: str
+
+    @classmethod
+    def of(cls, backend: BackendFiles, loading: Loading) -> "Maker":
+        """Its class comes from runtime/, and is the first word of the expression."""
+        made = loading.made.partition("(")[0]
+        imported = f"from .runtime.{loading.module} import {made}"
+        return cls(backend.name, backend.doc, (*loading.imports, imported), loading.made)
+
+
+def _parameter_lines(system: System) -> list[str]:
+    """Names of the parameters as lines of a docstring, which none of their characters can end."""
+    if not system.parameters:
+        return ["none: generate with --parameters symbolic"]
+    lines: list[str] = []
+    for symbol in system.parameters:
+        name = ascii(symbol.name).replace("\\", "\\\\").replace('"', '\\"')
+        if lines and len(lines[-1]) + len(name) < LINE:
+            lines[-1] += f" {name},"
+        else:
+            lines.append(f"{name},")
+    return [*lines[:-1], lines[-1].removesuffix(",")]
+
+
+def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
+    """What was generated, from what, what it costs, and the SHA-256 of every file."""
     system = derivation.system
-    fused = derivation.fused if "c/fused.inc" in files else None
-    data = {
-        "schema": SCHEMA,
-        "name": derivation.package,
-        "robot": system.name,
-        "generator": {"linkwise": VERSION, "sympy": sp.__version__},
-        "request": dict(derivation.request),
-        "joints": [{"name": c.name, "unit": c.unit} for c in system.coordinates],
-        "links": [
-            {
-                "name": link.name,
-                "path": list(system.path(j)),
-                "operations": decomposition_cost([derivation.kernels[j]]),
-            }
-            for j, link in enumerate(system.links)
-        ],
-        "fused_operations": decomposition_cost([fused]) if fused else None,
-        "parameters": {s.name: float(v) for s, v in system.parameters.items()},
-        "units": {
-            "angle": "rad",
-            "length": "m",
-            "mass": "kg",
-            "time": "s",
-            "torque": "N m",
-            "force": "N",
-        },
-        "conventions": {
-            "index_order": "joint i, link j, coordinate k",
-            "velocity": "closing: c1 = 1/2 d(tau)/d(qd) of the quadratic part; sum over k closes to tau_ij",
-            "gravity": list(_floats(system)),
-        },
-        "skeleton": skeleton(system),
-        "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(files.items())},
-    }
-    return json.dumps(data, indent=1) + "\n"
+    shared = derivation.fused if "c/fused.inc" in files else None
+    return Manifest(
+        derivation.package,
+        system.name,
+        {"linkwise": VERSION, "sympy": sp.__version__},
+        dict(derivation.request),
+        tuple(JointEntry(c.name, c.unit) for c in system.coordinates),
+        tuple(
+            LinkEntry(name, system.path(j), decomposition_cost([kernel]))
+            for j, (name, kernel) in enumerate(zip(system.link_names, derivation.kernels, strict=True))
+        ),
+        decomposition_cost([shared]) if shared else None,
+        {s.name: float(v) for s, v in system.parameters.items()},
+        rigid_tree(system),
+        {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(files.items())},
+    )
 
 
-def _value(system: System, scalar: Any) -> float:
-    return float(sp.sympify(scalar).xreplace(dict(system.parameters)))
-
-
-def _floats(system: System) -> Iterator[float]:
-    if system.robot is not None:
-        for entry in system.robot.gravity:
-            yield _value(system, entry)
-
-
-def skeleton(system: System) -> list[dict[str, Any]] | None:
-    """Return where the links are, numbers only, to draw and to check; None for a user's own energies."""
-    if system.robot is None:
+def rigid_tree(system: System) -> RigidTree | None:
+    """Return where the bodies are, numbers only, to draw and to check; None for a user's own energies."""
+    if isinstance(system, EnergySystem):
         return None
-    return [
-        {
-            "link": link.name,
-            "parent": link.parent,
-            "joint": link.joint.name,
-            "kind": link.joint.kind,
-            "coordinate": link.joint.coordinate,
-            "ratio": link.joint.ratio,
-            "rotation": [list(row) for row in link.joint.rotation],
-            "translation": [_value(system, p) for p in link.joint.translation],
-            "mass": _value(system, link.mass),
-            "com": [_value(system, c) for c in link.com],
-            "inertia": [[_value(system, entry) for entry in row] for row in link.inertia],
-        }
-        for link in system.robot.links
-    ]
+    robot = system.robot
+    values = dict(system.parameters)
+
+    def number(scalar: Scalar) -> float:
+        return float(sp.sympify(scalar).xreplace(values))
+
+    def numbers(a: Vec3) -> tuple[float, float, float]:
+        return number(a[0]), number(a[1]), number(a[2])
+
+    return RigidTree(
+        numbers(robot.gravity),
+        tuple(
+            BodyEntry(
+                link.name,
+                link.parent,
+                link.joint.name,
+                link.joint.kind,
+                link.joint.coordinate,
+                link.joint.ratio,
+                link.joint.rotation,  # type: ignore[arg-type]
+                numbers(link.joint.translation),
+                number(link.mass),
+                numbers(link.com),
+                (numbers(link.inertia[0]), numbers(link.inertia[1]), numbers(link.inertia[2])),
+            )
+            for link in robot.links
+        ),
+    )

@@ -1,37 +1,126 @@
-"""Lagrangians as torch modules, one file a link, and the machinery that differentiates them."""
+"""Lagrangians as torch modules, one file a link; a rigid link's energies continue those of its parent."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from linkwise.emit.energies import Function, energy_functions
+import sympy as sp
+
+from linkwise.dynamics.kernel import lowering
+from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
-from linkwise.symbolic.system import System
+from linkwise.emit.straight_line import Code, fetched, straight_line
+from linkwise.symbolic.link_energy import Steps, StepwiseEnergy, link_energies
+from linkwise.symbolic.system import EnergySystem, System
 from linkwise.version import VERSION
+
+
+@dataclass(frozen=True)
+class EnergyFunction:
+    """One emitted function: its signature, the lines that fetch its inputs, its code and its result."""
+
+    name: str
+    arguments: str
+    doc: str
+    inputs: tuple[str, ...]
+    assignments: tuple[tuple[str, str], ...]
+    result: str
+
+    @property
+    def signature(self) -> str:
+        """The arguments with their types."""
+        types = {"q": "Values", "qd": "Values", "p": "Parameters"}
+        return ", ".join(f"{name}: {types[name]}" for name in self.arguments.split(", "))
+
+    @property
+    def calls_torch(self) -> bool:
+        """Whether a line of it needs torch."""
+        return any("torch." in text for text in (self.result, *(text for _, text in self.assignments)))
 
 
 def autograd_files(system: System, linear: frozenset[int]) -> Iterator[tuple[str, str]]:
     """Paths inside the package and texts."""
-    for j, energy in enumerate(system.links):
-        functions = energy_functions(system, j)
+    energies = link_energies(system)
+    for j, energy in enumerate(energies):
+        functions = _functions(system, energies, j)
         view = {
             "number": j + 1,
             "version": VERSION,
-            "twist": energy.body is not None,
-            "uses_torch": any(_calls(function) for function in functions),
+            "twist": not isinstance(system, EnergySystem),
+            "uses_torch": any(function.calls_torch for function in functions),
             "parent": None if energy.parent is None else energy.parent + 1,
             "name": ascii(energy.name),
             "functions": functions,
             "path": repr(system.path(j)),
             "linear": j in linear,
         }
-        yield f"autograd/link_{j + 1}.py", render("autograd/link.py.j2", view)
-    shared = {"version": VERSION}
-    yield "autograd/partial_lagrangian.py", render("autograd/partial_lagrangian.py.j2", shared)
+        yield f"energies/link_{j + 1}.py", render("energies/link.py.j2", view)
     init = {"version": VERSION, "numbers": range(1, len(system.links) + 1)}
-    yield "autograd/__init__.py", render("autograd/init.py.j2", init)
+    yield "energies/__init__.py", render("energies/init.py.j2", init)
 
 
-def _calls(function: Function) -> bool:
-    """Whether the function's code calls torch."""
-    return any("torch." in text for _, text in function.code.assignments) or any(
-        "torch." in text for text in function.code.outputs
+def _functions(system: System, energies: Sequence[StepwiseEnergy], link: int) -> list[EnergyFunction]:
+    """Functions twist, height, kinetic and potential of a link; hand-written energies have the last two."""
+    energy = energies[link]
+    kinetic = _energy(system, energy.kinetic, "kinetic", "q, qd, p", "twist", energy.twist.exports)
+    potential = _energy(system, energy.potential, "potential", "q, p", "height", energy.height.exports)
+    if isinstance(system, EnergySystem):
+        return [kinetic, potential]
+    parent = None if energy.parent is None else energies[energy.parent]
+    before = (Steps(), Steps()) if parent is None else (parent.twist, parent.height)
+    call = f"link_{(energy.parent or 0) + 1}"
+    return [
+        _state(
+            system,
+            "twist",
+            "q, qd, p",
+            (before[0], f"{call}.twist(q, qd, p)"),
+            energy.twist,
+            "Velocity of the link's frame",
+        ),
+        _state(
+            system,
+            "height",
+            "q, p",
+            (before[1], f"{call}.height(q, p)"),
+            energy.height,
+            "Gravity seen from the link's frame",
+        ),
+        kinetic,
+        potential,
+    ]
+
+
+def _state(
+    system: System, name: str, arguments: str, before: tuple[Steps, str], steps: Steps, doc: str
+) -> EnergyFunction:
+    """Function of what is carried along the chain; `before` is the parent's, and the call that gives it."""
+    given, call = before
+    lower = lowering(system)[0]
+    lower.symbols |= {symbol: lower.graph.symbol(symbol.name) for symbol in given.exports}
+    lower.define(steps.definitions)
+    code = straight_line(
+        lower.graph, [lower.symbols[symbol] for symbol in steps.exports], PythonPrinter("torch")
     )
+    what = ", ".join(symbol.name for symbol in steps.exports) or "nothing but numbers"
+    inputs = (*_unpacked(given.exports, call, code), *fetched(system, code))
+    result = f"({', '.join(code.outputs)}{',' if len(code.outputs) == 1 else ''})"
+    return EnergyFunction(name, arguments, f"{doc}: {what}.", inputs, code.assignments, result)
+
+
+def _energy(
+    system: System, expr: sp.Expr, name: str, arguments: str, state: str, exports: Sequence[sp.Symbol]
+) -> EnergyFunction:
+    lower = lowering(system)[0]
+    lower.symbols |= {symbol: lower.graph.symbol(symbol.name) for symbol in exports}
+    code = straight_line(lower.graph, [lower(expr)], PythonPrinter("torch"))
+    inputs = (*_unpacked(exports, f"{state}({arguments})", code), *fetched(system, code))
+    doc = f"{name.capitalize()} energy in J."
+    return EnergyFunction(name, arguments, doc, inputs, code.assignments, code.outputs[0])
+
+
+def _unpacked(symbols: Sequence[sp.Symbol], call: str, code: Code) -> tuple[str, ...]:
+    """Return the line that takes over another function's results, if any is used."""
+    if not any(symbol.name in code.symbols for symbol in symbols):
+        return ()
+    names = ", ".join(symbol.name if symbol.name in code.symbols else "_" for symbol in symbols)
+    return (f"({names},) = {call}" if len(symbols) == 1 else f"{names} = {call}",)

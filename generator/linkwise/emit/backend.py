@@ -1,80 +1,147 @@
-"""Back ends: each turns a derivation into files; adding one adds an entry here and touches nothing else."""
+"""The registry of back ends: adding one adds an entry here and touches no other line.
 
-from collections.abc import Callable, Iterator
+An entry is read by the command line too, so that this file imports what emits only when it emits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from linkwise.emit.assemble import Derivation
-from linkwise.emit.autograd import autograd_files
-from linkwise.emit.c.sources import c_files, packed_sizes
-from linkwise.emit.closed_forms import closed_form_files
-from linkwise.emit.formulas import formula_files
-from linkwise.emit.render import render
+from linkwise.errors import LinkwiseError
 
-Files = Iterator[tuple[str, str]]
+if TYPE_CHECKING:
+    from linkwise.emit.derivation import Derivation
+
+Emitter = Callable[["Derivation"], Iterator[tuple[str, str]]]
+"""Turns a derivation into files: paths inside the package and texts."""
 
 
 @dataclass(frozen=True)
-class Backend:
-    """How a back end's files are made; `module` is what `load` imports, empty where nothing loads."""
+class Loading:
+    """How the package's `load` makes the back end: the class in runtime/, and what it is made of."""
+
+    module: str
+    """Module in runtime/ that holds the class."""
+    made: str
+    """Expression over the imported names, ROBOT, and `values` of the parameters."""
+    imports: tuple[str, ...]
+    """Statements before it."""
+    speed: int
+    """Rank among the back ends that compute, 1 the fastest for a large batch."""
+
+
+@dataclass(frozen=True)
+class BackendFiles:
+    """What a back end adds to a package."""
 
     name: str
-    module: str
     doc: str
-    files: Callable[[Derivation], Files]
+    emits: tuple[Emitter, ...]
+    """What is written for the robot; two back ends with one emitter share its files."""
+    runtime: tuple[str, ...] = ()
+    """Files copied from linkwise/runtime, beside those of every package."""
+    loading: Loading | None = None
+    """None where nothing loads."""
     needs: tuple[str, ...] = ()
+    """Other back ends without which it cannot be."""
 
 
-def _runtime(name: str) -> Files:
+def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.closed_forms import closed_form_files
+
+    return closed_form_files(d.system, d.kernels)
+
+
+def _energies(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.autograd import autograd_files
+
+    return autograd_files(d.system, d.linear)
+
+
+def _c(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.c.sources import c_files
+
+    return c_files(d)
+
+
+def _native(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.render import render
     from linkwise.version import VERSION
 
-    yield f"{name}.py", render(f"package/{name}.py.j2", {"version": VERSION})
+    for name in ("native_backend", "native_build", "native_torch"):
+        view = {"version": VERSION} | ({"package": d.package} if name == "native_build" else {})
+        yield f"runtime/{name}.py", render(f"package/{name}.py.j2", view)
 
 
-def _autograd(d: Derivation) -> Files:
-    yield from autograd_files(d.system, d.linear)
-    yield from _runtime("autograd_backend")
-    yield from _runtime("torch_backend")
+def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.formulas import formula_files
+
+    return formula_files(d)
 
 
-def _torch(d: Derivation) -> Files:
-    yield from closed_form_files(d.system, d.kernels, "torch")
-    yield from _runtime("torch_backend")
+LINKS = "from .forms import LINKS"
 
-
-def _numpy(d: Derivation) -> Files:
-    yield from closed_form_files(d.system, d.kernels, "numpy")
-
-
-def _native(d: Derivation) -> Files:
-    from linkwise.version import VERSION
-
-    shared = {"version": VERSION}
-    build = {**shared, "package": d.package}
-    sizes = {**shared, "sizes": packed_sizes(d.kernels), "n": len(d.system.coordinates)}
-    yield "native_build.py", render("package/native_build.py.j2", build)
-    yield "native_backend.py", render("package/native_backend.py.j2", sizes)
-    yield "native_torch.py", render("package/native_torch.py.j2", shared)
-
-
-BACKENDS: dict[str, Backend] = {
+BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend
     for backend in (
-        Backend("numpy", "numpy_backend", "closed forms on NumPy arrays", _numpy),
-        Backend("torch", "torch_backend", "closed forms on torch tensors", _torch),
-        Backend(
+        BackendFiles(
+            "numpy",
+            "closed forms on NumPy arrays",
+            emits=(_forms,),
+            runtime=("arguments.py", "numpy_backend.py"),
+            loading=Loading("numpy_backend", "NumpyBackend(ROBOT, LINKS, values)", (LINKS,), speed=2),
+        ),
+        BackendFiles(
+            "torch",
+            "closed forms on torch tensors",
+            emits=(_forms,),
+            runtime=("arguments.py", "torch_backend.py"),
+            loading=Loading("torch_backend", "TorchBackend(ROBOT, LINKS, values)", (LINKS,), speed=3),
+        ),
+        BackendFiles(
             "autograd",
-            "autograd_backend",
             "each link's Lagrangian, differentiated by torch",
-            _autograd,
+            emits=(_energies,),
+            runtime=(
+                "arguments.py",
+                "autograd_backend.py",
+                "partial_lagrangian.py",
+                "recording.py",
+                "torch_backend.py",
+            ),
+            loading=Loading(
+                "autograd_backend",
+                "AutogradBackend(ROBOT, links, values)",
+                ("from .energies import links",),
+                speed=4,
+            ),
         ),
-        Backend(
+        BackendFiles(
             "native",
-            "native_backend",
             "the C code, compiled by this system's compiler",
-            _native,
-            ("c", "torch"),
+            emits=(_native,),
+            runtime=("arguments.py", "numpy_backend.py"),
+            loading=Loading(
+                "native_backend",
+                'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values)',
+                ("from pathlib import Path", LINKS),
+                speed=1,
+            ),
+            needs=("c", "torch"),
         ),
-        Backend("c", "", "closed forms in C99, to compile into a program of your own", c_files),
-        Backend("formulas", "", "closed forms to read, for small robots", formula_files),
+        BackendFiles("c", "closed forms in C99, to compile into a program of your own", emits=(_c,)),
+        BackendFiles("formulas", "closed forms to read, for small robots", emits=(_formulas,)),
     )
 }
+
+
+def chosen_backends(names: Iterable[str]) -> tuple[BackendFiles, ...]:
+    """Back ends by name and those that they need, in this order; raises LinkwiseError for an unknown name."""
+    wanted = list(names)
+    for name in wanted:
+        if name not in BACKENDS:
+            raise LinkwiseError(f"no back end {name!r}; choose among {', '.join(BACKENDS)}")
+    wanted += [needed for name in wanted for needed in BACKENDS[name].needs]
+    return tuple(backend for name, backend in BACKENDS.items() if name in wanted)

@@ -1,78 +1,87 @@
-"""Closed forms as Python functions over NumPy arrays or torch tensors, one file a link."""
+"""Closed forms as Python functions over an array namespace, NumPy or torch, one file a link."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from linkwise.dynamics.coefficients import LinkForms
 from linkwise.dynamics.kernel import Kernel
-from linkwise.emit.energies import fetched
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
-from linkwise.emit.straight_line import straight_line
+from linkwise.emit.straight_line import fetched, straight_line
+from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Node
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 
+Rows = Sequence[tuple[str, Node]]
+"""Labels of outputs, such as c2(1, 3, 2) for joint, link and coordinate, and their nodes."""
+
 
 @dataclass(frozen=True)
 class FormFunction:
-    """One emitted function; each group of outputs is packed into an array of its own."""
+    """One emitted function; each group of its results is a tuple of (expression, label)."""
 
     name: str
     doc: str
+    cost: str
     inputs: tuple[str, ...]
     assignments: tuple[tuple[str, str], ...]
-    groups: tuple[str, ...]
+    groups: tuple[tuple[tuple[str, str], ...], ...]
 
 
-def closed_form_files(system: System, kernels: Sequence[Kernel], library: str) -> Iterator[tuple[str, str]]:
-    """Paths inside the package and texts; `library` is numpy or torch."""
-    folder, prefix = f"{library}_forms", {"numpy": "np", "torch": "torch"}[library]
-    imported = "import numpy as np" if library == "numpy" else "import torch"
+def closed_form_files(system: System, kernels: Sequence[Kernel]) -> Iterator[tuple[str, str]]:
+    """Paths inside the package and texts."""
     for j, kernel in enumerate(kernels):
+        path = kernel.forms[0].path
         view = {
             "number": j + 1,
             "version": VERSION,
-            "import_library": imported,
-            "name": ascii(system.links[j].name),
-            "path": repr(kernel.forms[0].path),
-            "functions": list(_functions(system, kernel, PythonPrinter(prefix))),
+            "name": ascii(system.link_names[j]),
+            "path": repr(path),
+            "frame": kernel.frame,
+            "functions": list(_functions(system, kernel, j + 1)),
         }
-        yield f"{folder}/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
+        yield f"forms/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
     numbers = range(1, len(kernels) + 1)
-    init = {"library": library, "version": VERSION, "numbers": numbers}
-    yield f"{folder}/__init__.py", render("closed_forms/init.py.j2", init)
+    yield "forms/__init__.py", render("closed_forms/init.py.j2", {"version": VERSION, "numbers": numbers})
 
 
-def _functions(system: System, kernel: Kernel, printer: PythonPrinter) -> Iterator[FormFunction]:
-    forms = kernel.forms[0]
-    groups: Mapping[str, tuple[str, list[Sequence[Node]]]] = {
-        "decomposition": (
-            "c2_ik for i <= k, c1_ik, g_i, tau_i, and the part of c1 linear in qd.",
-            [
-                list(forms.acceleration.values()),
-                list(forms.velocity.values()),
-                list(forms.gravity.values()),
-                list(forms.torque.values()),
-                forms.linear_block(kernel.graph.zero),
-            ],
-        ),
-        "torque": ("tau_i.", [list(forms.torque.values())]),
-        "position_gradient": (
-            "c0_ik = d(tau_i)/d(q_k).",
-            [list(forms.position_gradient.values())],
-        ),
+def _functions(system: System, kernel: Kernel, j: int) -> Iterator[FormFunction]:
+    groups = labelled(kernel, kernel.forms[0], j)
+    whole = [groups[name] for name in ("c2", "c1", "g", "tau", "h1") if groups[name]]
+    doc = "Return c2 (for i <= k: it is symmetric), c1, g and tau"
+    if groups["h1"]:
+        doc += ", and h1, c1's part by energy terms linear in qd"
+    yield _function(system, kernel, "decomposition", doc, whole)
+    yield _function(system, kernel, "torque", "Return tau", [groups["tau"]])
+    yield _function(system, kernel, "position_gradient", "Return c0 = d(tau)/d(q)", [groups["c0"]])
+
+
+def labelled(kernel: Kernel, forms: LinkForms, j: int) -> dict[str, Rows]:
+    """Outputs of link j, counted from 1, by quantity; h1 is empty without linear energy terms."""
+
+    def triples(name: str, nodes: dict[tuple[int, int], Node]) -> Rows:
+        return [(f"{name}({i + 1}, {j}, {k + 1})", node) for (i, k), node in nodes.items()]
+
+    def pairs(name: str, nodes: dict[int, Node]) -> Rows:
+        return [(f"{name}({i + 1}, {j})", node) for i, node in nodes.items()]
+
+    linear = dict(zip(forms.velocity, forms.linear_block(kernel.graph.zero), strict=False))
+    return {
+        "c2": triples("c2", forms.acceleration),
+        "c1": triples("c1", forms.velocity),
+        "g": pairs("g", forms.gravity),
+        "tau": pairs("tau", forms.torque),
+        "h1": triples("h1", linear),
+        "c0": triples("c0", forms.position_gradient),
     }
-    for name, (doc, outputs) in groups.items():
-        code = straight_line(kernel.graph, [node for group in outputs for node in group], printer)
-        texts = iter(code.outputs)
-        packed = tuple(_tuple([next(texts) for _ in group]) for group in outputs)
-        yield FormFunction(name, doc, fetched(system, code, "[..., {}]"), code.assignments, packed)
 
 
-def _tuple(texts: Sequence[str]) -> str:
-    """Tuple display, one entry a line where it is long."""
-    if len(texts) == 0:
-        return "()"
-    if sum(map(len, texts)) < 60:
-        return f"({', '.join(texts)},)"
-    return "(\n" + "".join(f"            {text},\n" for text in texts) + "        )"
+def _function(system: System, kernel: Kernel, name: str, doc: str, groups: Sequence[Rows]) -> FormFunction:
+    nodes = [node for rows in groups for _, node in rows]
+    code = straight_line(kernel.graph, nodes, PythonPrinter("xp"))
+    cost = count_operations(kernel.graph, nodes)
+    texts = iter(code.outputs)
+    results = tuple(tuple((next(texts), label) for label, _ in rows) for rows in groups)
+    spent = f"{cost.arithmetic} additions and multiplications, {cost.functions} sines and cosines"
+    return FormFunction(name, doc, spent, fetched(system, code, "[..., {}]"), code.assignments, results)

@@ -1,7 +1,5 @@
 """One node to text, in the syntax of each target language."""
 
-from typing import ClassVar
-
 from linkwise.expression.graph import Entry
 
 ATOM, PRODUCT, SUM = 3, 2, 1
@@ -13,7 +11,7 @@ class Printer:
     """Infix arithmetic, as Python and C share it; a subclass says how constants and functions look."""
 
     def constant(self, value: float) -> str:
-        """Text of a number; repr keeps every digit."""
+        """Text of a number that is not negative; repr keeps every digit."""
         return repr(value)
 
     def function(self, name: str) -> str:
@@ -21,51 +19,37 @@ class Printer:
         raise NotImplementedError
 
     def print(self, entry: Entry, operands: tuple[Text, ...]) -> Text:
-        """Text of one node from its operands' texts; an unknown kind of node raises AttributeError."""
-        return getattr(self, f"_{entry[0]}")(entry, operands)  # type: ignore[no-any-return]
-
-    def _const(self, entry: Entry, _: tuple[Text, ...]) -> Text:
-        value = entry[1]
-        return self.constant(value), ATOM if value >= 0 else SUM
-
-    def _symbol(self, entry: Entry, _: tuple[Text, ...]) -> Text:
-        return entry[1], ATOM
-
-    def _add(self, _: Entry, operands: tuple[Text, ...]) -> Text:
-        (a, _pa), (b, pb) = operands
-        return f"{a} + {_wrap(b, pb, SUM) if b.startswith('-') else b}", SUM
-
-    def _sub(self, _: Entry, operands: tuple[Text, ...]) -> Text:
-        (a, _pa), (b, pb) = operands
-        return f"{a} - {_wrap(b, pb, PRODUCT)}", SUM
-
-    def _mul(self, _: Entry, operands: tuple[Text, ...]) -> Text:
-        (a, pa), (b, pb) = operands
-        return f"{_wrap(a, pa, PRODUCT)} * {_wrap(b, pb, ATOM)}", PRODUCT
-
-    def _div(self, _: Entry, operands: tuple[Text, ...]) -> Text:
-        (a, pa), (b, pb) = operands
-        return f"{_wrap(a, pa, PRODUCT)} / {_wrap(b, pb, ATOM)}", PRODUCT
-
-    def _neg(self, _: Entry, operands: tuple[Text, ...]) -> Text:
-        ((a, pa),) = operands
-        return f"-{_wrap(a, pa, PRODUCT)}", SUM
-
-    def _call(self, entry: Entry, operands: tuple[Text, ...]) -> Text:
-        return f"{self.function(entry[1])}({operands[0][0]})", ATOM
+        """Text of one node from its operands' texts; raises ValueError for an unknown kind of node."""
+        match entry[0], operands:
+            case "const", _:
+                value: float = entry[1]
+                return (self.constant(value), ATOM) if value >= 0 else (f"-{self.constant(-value)}", SUM)
+            case "symbol", _:
+                return entry[1], ATOM
+            case "add", ((a, _), (b, pb)):
+                return f"{a} + {_wrap(b, pb, SUM) if b.startswith('-') else b}", SUM
+            case "sub", ((a, _), (b, pb)):
+                return f"{a} - {_wrap(b, pb, PRODUCT)}", SUM
+            case "mul", ((a, pa), (b, pb)):
+                return f"{_wrap(a, pa, PRODUCT)} * {_wrap(b, pb, ATOM)}", PRODUCT
+            case "div", ((a, pa), (b, pb)):
+                return f"{_wrap(a, pa, PRODUCT)} / {_wrap(b, pb, ATOM)}", PRODUCT
+            case "neg", ((a, pa),):
+                return f"-{_wrap(a, pa, PRODUCT)}", SUM
+            case "call", ((a, _),):
+                return f"{self.function(entry[1])}({a})", ATOM
+        raise ValueError(f"no text is known for a node {entry[0]!r} of {len(operands)} operands")
 
 
 class PythonPrinter(Printer):
-    """Calls into an array library, such as `np` or `torch`."""
+    """Calls into an array namespace: `torch`, or `xp`, which stands for NumPy or torch."""
 
-    RENAMED: ClassVar = {"np": {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}}
-
-    def __init__(self, library: str) -> None:
-        self.library = library
+    def __init__(self, namespace: str) -> None:
+        self.namespace = namespace
 
     def function(self, name: str) -> str:
-        """Text of a function of the library."""
-        return f"{self.library}.{self.RENAMED.get(self.library, {}).get(name, name)}"
+        """Text of a function of the namespace; NumPy 2 and torch call all of them alike."""
+        return f"{self.namespace}.{name}"
 
 
 class CPrinter(Printer):
@@ -73,7 +57,7 @@ class CPrinter(Printer):
 
     def constant(self, value: float) -> str:
         """Text of a number in R()."""
-        return f"R({value!r})" if value >= 0 else f"-R({-value!r})"
+        return f"R({value!r})"
 
     def function(self, name: str) -> str:
         """Text of a function in F()."""

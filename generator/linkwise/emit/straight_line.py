@@ -4,11 +4,13 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.printer import ATOM, Printer, Text
-from linkwise.expression.graph import Graph, Node, operands, reachable
+from linkwise.expression.graph import Entry, Graph, Node, operands, reachable
+from linkwise.symbolic.system import System
 
 MAX_WIDTH = 88
-"""An expression that would grow longer than this gets a name."""
+"""Characters of an expression; parts of a longer one get names."""
 
 
 @dataclass(frozen=True)
@@ -33,39 +35,76 @@ def straight_line(
     """
     given = given or {}
     order = reachable(graph, outputs, given)
-    uses = Counter(operand for node in order if node not in given for operand in operands(graph.nodes[node]))
-    kept = set(outputs)
-    leaves = (graph.nodes[node][1] for node in order if graph.nodes[node][0] == "symbol")
-    names = _Names([*leaves, *given.values()])
-    texts: dict[Node, Text] = {}
-    latest: dict[Node, int] = {}
-    assignments: list[tuple[str, str]] = []
-    symbols = set()
+    writer = _Writer(graph, order, outputs, printer, given)
     for node in order:
-        entry = graph.nodes[node]
-        if node in given:
-            texts[node], latest[node] = (given[node], ATOM), 0
-            symbols.add(given[node])
-            continue
-        text, precedence = printer.print(entry, tuple(texts[o] for o in operands(entry)))
-        if entry[0] == "symbol":
-            symbols.add(text)
-        latest[node] = max((latest[o] for o in operands(entry)), default=0)
-        leaf = entry[0] in ("const", "symbol", "neg")
-        shared = uses[node] + (node in kept) > 1 or node in graph.names
-        shared = shared or (len(text) > MAX_WIDTH and node not in kept)
-        if shared and not leaf:
-            name = names.take(graph.names.get(node))
-            assignments.append((name, text))
-            text, precedence = name, ATOM
-            latest[node] = len(assignments)
-        texts[node] = text, precedence
+        writer.write(node)
     return Code(
-        tuple(assignments),
-        tuple(texts[o][0] for o in outputs),
-        tuple(latest[o] for o in outputs),
-        frozenset(symbols),
+        tuple(writer.assignments),
+        tuple(writer.texts[o][0] for o in outputs),
+        tuple(writer.latest[o] for o in outputs),
+        frozenset(writer.symbols),
     )
+
+
+class _Writer:
+    """Texts of nodes in turn, operands before users, and the assignments that they rest on."""
+
+    def __init__(
+        self,
+        graph: Graph,
+        order: Sequence[Node],
+        outputs: Sequence[Node],
+        printer: Printer,
+        given: Mapping[Node, str],
+    ) -> None:
+        self.graph, self.printer, self.given = graph, printer, given
+        computed = [node for node in order if node not in given]
+        self.uses = Counter(o for node in computed for o in operands(graph.nodes[node])) + Counter(outputs)
+        leaves = (graph.nodes[node][1] for node in order if graph.nodes[node][0] == "symbol")
+        self.names = _Names([*leaves, *given.values()])
+        self.texts: dict[Node, Text] = {}
+        self.latest: dict[Node, int] = {}
+        self.assignments: list[tuple[str, str]] = []
+        self.symbols: set[str] = set()
+
+    def write(self, node: Node) -> None:
+        """Find the text of a node; it is a variable where it is used twice or has a name."""
+        entry = self.graph.nodes[node]
+        if node in self.given or entry[0] == "symbol":
+            name = self.given.get(node, entry[1])
+            self.texts[node], self.latest[node] = (name, ATOM), 0
+            self.symbols.add(name)
+            return
+        self.texts[node] = self._short(entry)
+        self.latest[node] = max((self.latest[o] for o in operands(entry)), default=0)
+        if entry[0] not in ("const", "neg") and (self.uses[node] > 1 or node in self.graph.names):
+            self._assign(node)
+
+    def _short(self, entry: Entry) -> Text:
+        """Text of an entry; where it would be long, its longest operands become variables first."""
+        while True:
+            text = self.printer.print(entry, tuple(self.texts[o] for o in operands(entry)))
+            longest = max(operands(entry), key=lambda o: len(self.texts[o][0]), default=None)
+            if len(text[0]) <= MAX_WIDTH or longest is None or self.texts[longest][1] == ATOM:
+                return text
+            self._assign(longest)
+
+    def _assign(self, node: Node) -> None:
+        name = self.names.take(self.graph.names.get(node))
+        self.assignments.append((name, self.texts[node][0]))
+        self.texts[node], self.latest[node] = (name, ATOM), len(self.assignments)
+
+
+def fetched(system: System, code: Code, subscript: str = "[{}]") -> tuple[str, ...]:
+    """Lines that take coordinates, velocities and parameters out of q, qd, qdd and p, in Python."""
+    lines = []
+    for prefix in ("q", "qd", "qdd"):
+        used = [k for k in range(len(system.coordinates)) if f"{prefix}{k + 1}" in code.symbols]
+        lines += [f"{prefix}{k + 1} = {prefix}{subscript.format(k)}" for k in used]
+    for symbol, name in parameter_names(system).items():
+        if name in code.symbols:
+            lines.append(f"{name} = p[{symbol.name!a}]")
+    return tuple(lines)
 
 
 class _Names:

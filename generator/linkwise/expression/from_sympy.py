@@ -7,7 +7,7 @@ import sympy as sp
 from linkwise.errors import LinkwiseError
 from linkwise.expression.graph import FUNCTIONS, Graph, Node
 from linkwise.robot.robot import Scalar
-from linkwise.symbolic.system import Definition
+from linkwise.symbolic.link_energy import Definition
 
 SYMPY_FUNCTIONS: dict[type, str] = {getattr(sp, name): name for name in FUNCTIONS if name != "sqrt"}
 

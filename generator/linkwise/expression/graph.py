@@ -3,17 +3,22 @@
 A node is an index into `Graph.nodes`; an entry is `(op, a, b)`. Operands of `add`, `sub`, `mul`, `div` and
 `neg` are nodes; a `const` holds its value, a `symbol` its name, a `call` its function's name and argument.
 Construction folds constants, drops zeros and ones, and pulls signs outward, so that x − y and y − x, or
-(−x)·y and x·y, share their work.
+(−x)·y and x·y, share their work. A number stands for the decimal that it prints as: 0.6 · 0.125 folds to
+0.075, not to 0.07499999999999998, and what is emitted is short wherever the robot's numbers are.
 """
 
 import math
 from collections.abc import Callable, Container, Iterable
+from decimal import Context, Decimal
 from typing import Any
 
 Node = int
 Entry = tuple[str, Any, Any]
 Vector = tuple[Node, Node, Node]
 Matrix = tuple[Vector, Vector, Vector]
+
+DECIMAL = Context(prec=40, traps=[])
+"""Exact for the product of two floats as they print; infinity and NaN come out as such."""
 
 FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sin": math.sin,
@@ -38,6 +43,7 @@ class Graph:
         self.nodes: list[Entry] = []
         self.names: dict[Node, str] = {}
         self._index: dict[Entry, Node] = {}
+        self._decimals: dict[Node, Decimal] = {}
         self.zero = self.const(0.0)
         self.one = self.const(1.0)
 
@@ -57,7 +63,17 @@ class Graph:
 
     def const(self, value: float) -> Node:
         """Node of a number; −0.0 becomes 0.0."""
-        return self._node("const", float(value) + 0.0, None)
+        return self._decimal(Decimal(repr(float(value))))
+
+    def _decimal(self, value: Decimal) -> Node:
+        """Node of the float nearest to a decimal; constants fold by the decimals behind them."""
+        node = self._node("const", float(value) + 0.0, None)
+        self._decimals.setdefault(node, value)
+        return node
+
+    def _fold(self, operation: Callable[[Decimal, Decimal], Decimal], a: Node, b: Node) -> Node:
+        """Node of an operation on two constants."""
+        return self._decimal(operation(self._decimals[a], self._decimals[b]))
 
     def symbol(self, name: str) -> Node:
         """Node of an input."""
@@ -72,7 +88,7 @@ class Graph:
         """−a."""
         op, x, y = self.nodes[a]
         if op == "const":
-            return self.const(-x)
+            return self._decimal(DECIMAL.minus(self._decimals[a]))
         if op == "neg":
             return int(x)
         if op == "sub" and ("sub", y, x) in self._index:
@@ -88,15 +104,15 @@ class Graph:
         op_a, xa, _ = self.nodes[a]
         op_b, xb, _ = self.nodes[b]
         if op_a == "const" and op_b == "const":
-            return self.const(xa + xb)
+            return self._fold(DECIMAL.add, a, b) if xa + xb else self.zero
         if op_b == "neg":
             return self.neg(self.add(xa, xb)) if op_a == "neg" else self.sub(a, xb)
         if op_a == "neg":
             return self.sub(b, xa)
         if op_a == "const" and xa < 0.0:
-            return self.sub(b, self.const(-xa))
+            return self.sub(b, self.neg(a))
         if op_b == "const" and xb < 0.0:
-            return self.sub(a, self.const(-xb))
+            return self.sub(a, self.neg(b))
         if a == b:
             return self.mul(self.const(2.0), a)
         return self._node("add", a, b) if a < b else self._node("add", b, a)
@@ -112,13 +128,13 @@ class Graph:
         op_a, xa, _ = self.nodes[a]
         op_b, xb, _ = self.nodes[b]
         if op_a == "const" and op_b == "const":
-            return self.const(xa - xb)
+            return self._fold(DECIMAL.subtract, a, b)
         if op_b == "neg":
             return self.add(a, xb)
         if op_a == "neg":
             return self.neg(self.add(xa, b))
         if op_b == "const" and xb < 0.0:
-            return self.add(a, self.const(-xb))
+            return self.add(a, self.neg(b))
         swapped = self._index.get(("sub", b, a))
         if swapped is not None:
             return self.neg(swapped)
@@ -138,11 +154,11 @@ class Graph:
             a, b, op_a, xa, op_b, xb = b, a, op_b, xb, op_a, xa
         if op_a == "const":
             if op_b == "const":
-                return self.const(xa * xb)
+                return self._fold(DECIMAL.multiply, a, b)
             if xa < 0.0:
-                return self.neg(self.mul(self.const(-xa), b))
-            if op_b == "mul" and (inner := self.value(xb)) is not None:
-                return self.mul(self.const(xa * inner), self.nodes[b][2])
+                return self.neg(self.mul(self.neg(a), b))
+            if op_b == "mul" and self.value(xb) is not None:
+                return self.mul(self._fold(DECIMAL.multiply, a, xb), self.nodes[b][2])
         if op_a == "neg":
             return self.neg(self.mul(xa, b))
         if op_b == "neg":
@@ -157,7 +173,7 @@ class Graph:
         if divisor == 0.0:
             raise ZeroDivisionError("an expression divides by zero")
         if divisor is not None:
-            return self.mul(a, self.const(1.0 / divisor))
+            return self.mul(a, self._fold(DECIMAL.divide, self.one, b))
         if a == self.zero:
             return a
         if self.nodes[a][0] == "neg":
@@ -168,6 +184,8 @@ class Graph:
         """function(a), one of FUNCTIONS; odd and even functions shed the sign of `a`."""
         value = self.value(a)
         if value is not None:
+            if function == "sqrt":
+                return self._decimal(DECIMAL.sqrt(self._decimals[a]))
             return self.const(FUNCTIONS[function](value))
         if self.nodes[a][0] == "neg":
             if function == "cos":

@@ -30,6 +30,11 @@ def sub(g: Graph, a: Vector, b: Vector) -> Vector:
     return g.sub(a[0], b[0]), g.sub(a[1], b[1]), g.sub(a[2], b[2])
 
 
+def minus(g: Graph, a: Vector) -> Vector:
+    """−a."""
+    return g.neg(a[0]), g.neg(a[1]), g.neg(a[2])
+
+
 def scale(g: Graph, factor: Node, a: Vector) -> Vector:
     """factor · a."""
     return g.mul(factor, a[0]), g.mul(factor, a[1]), g.mul(factor, a[2])

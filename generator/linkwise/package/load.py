@@ -1,24 +1,110 @@
-"""Import of a generated package from its directory."""
+"""A generated package, imported from its folder, and its back ends with NumPy arrays in and out."""
 
 import hashlib
 import importlib.util
 import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.errors import LinkwiseError
+from linkwise.package.manifest import FILE, Manifest
+
+Array = NDArray[np.float64]
+
+
+class PackedLayout(Protocol):
+    """Index rows of packed values: (i, j, k) joint, link, cause; or (i, j)."""
+
+    acceleration: NDArray[np.intp]
+    velocity: NDArray[np.intp]
+    gravity: NDArray[np.intp]
+    torque: NDArray[np.intp]
+
+
+class Model(Protocol):
+    """A robot on one of its back ends; arrays (..., n) of float64 in, arrays out."""
+
+    joint_names: Sequence[str]
+    joint_units: Sequence[str]
+    link_names: Sequence[str]
+    layout: PackedLayout
+    backend: Any
+
+    def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """τ_ij (..., n, N)."""
+
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """τ_i (..., n)."""
+
+    def coefficients(self, q: Array, qd: Array) -> Any:
+        """c2, c1 (..., n, N, n) and g (..., n, N)."""
+
+    def propagation(self, q: Array, qd: Array, qdd: Array, convention: str = "closing") -> Any:
+        """Each coefficient times its motion."""
+
+    def packed(self, q: Array, qd: Array, qdd: Array) -> Any:
+        """All coefficients that are not identically 0, and τ_ij."""
+
+    def position_gradient(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """c0 (..., n, N, n)."""
+
+
+@dataclass(frozen=True)
+class Package:
+    """A generated package: its folder, its manifest, and its imported module."""
+
+    directory: Path
+    manifest: Manifest
+    module: ModuleType
+
+    @property
+    def backends(self) -> tuple[str, ...]:
+        """Names of the back ends that can be loaded."""
+        return tuple(self.module.BACKENDS)
+
+    @property
+    def fastest_first(self) -> tuple[str, ...]:
+        """The same, the fastest for large batches first."""
+        return tuple(self.module.FASTEST_FIRST)
+
+    def load(self, backend: str) -> Model:
+        """Model on a back end; passes on whatever the package raises, a missing library say."""
+        dynamics = self.module.load(backend)
+        model: Model = TensorModel(dynamics) if dynamics.backend.takes_tensors else dynamics
+        return model
+
+
+def open_package(directory: Path) -> Package:
+    """Read and import the package in `directory`; raises LinkwiseError for one that cannot be."""
+    manifest = Manifest.read(directory)
+    try:
+        return Package(directory, manifest, import_package(directory))
+    except Exception as error:  # a damaged file may raise anything
+        reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        raise LinkwiseError(
+            f"{directory}: cannot be imported ({reason}); generate the robot again"
+        ) from error
 
 
 def import_package(directory: Path) -> ModuleType:
-    """Import a package from its directory, under a name of its own; nothing is put on sys.path."""
+    """Import a package from its folder, under a name of its own; nothing is put on sys.path."""
     path = directory.resolve()
-    digest = hashlib.sha256(str(path).encode() + (path / "manifest.json").read_bytes()).hexdigest()[:16]
+    # Of place and content, so that a package generated anew is imported anew.
+    digest = hashlib.sha256(str(path).encode() + (path / FILE).read_bytes()).hexdigest()[:16]
     name = f"_linkwise_{digest}"
     if name in sys.modules:
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(
         name, path / "__init__.py", submodule_search_locations=[str(path)]
     )
-    assert spec is not None
-    assert spec.loader is not None
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path / '__init__.py'} is not a Python module")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
@@ -27,3 +113,30 @@ def import_package(directory: Path) -> ModuleType:
         del sys.modules[name]
         raise
     return module
+
+
+class TensorModel:
+    """A model whose back end takes torch tensors, asked with and answering in NumPy arrays."""
+
+    def __init__(self, dynamics: Any) -> None:
+        self._dynamics = dynamics
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._dynamics, name)
+        return _answering(found) if callable(found) else found
+
+
+def _answering(call: Any) -> Any:
+    def answer(*motion: Array, **options: Any) -> Any:
+        import torch
+
+        result = call(*(torch.from_numpy(np.array(m)) for m in motion), **options)
+        if isinstance(result, tuple):
+            return type(result)(*map(_array, result))
+        return _array(result)
+
+    return answer
+
+
+def _array(value: Any) -> Any:
+    return value.detach().numpy() if hasattr(value, "detach") else value

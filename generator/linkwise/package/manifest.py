@@ -1,83 +1,186 @@
-"""A package's manifest, read and checked entry by entry."""
+"""`manifest.json` of a generated package: what it is of, from what it was made, and how to make it again."""
 
 import json
 import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from linkwise.errors import LinkwiseError
 
+SCHEMA = 2
+FILE = "manifest.json"
+UNITS = {"angle": "rad", "length": "m", "mass": "kg", "time": "s", "torque": "N m", "force": "N"}
+CONVENTIONS = {
+    "index_order": "joint i, link j, coordinate k",
+    "velocity": "closing: c1 = 1/2 d(tau)/d(qd) of the quadratic part; sum over k closes to tau_ij",
+}
 
-def read_manifest(directory: Path) -> dict[str, Any]:
-    """Return a package's manifest; raises LinkwiseError when there is none, or a damaged one."""
-    path = directory / "manifest.json"
-    if not path.is_file():
-        raise LinkwiseError(f"{directory} holds no manifest.json; give the directory of a generated package")
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise LinkwiseError(f"{path} cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
-        raise LinkwiseError(f"{path} is no JSON ({error}); generate the package again") from None
-    if not isinstance(data, dict) or data.get("schema") != 1:
-        raise LinkwiseError(f"{path} has another schema; generate the package again")
-    fault = _fault(data)
-    if fault:
-        raise LinkwiseError(f"{path} is damaged: {fault}; generate the package again")
+Row = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class JointEntry:
+    """A coordinate's name and unit."""
+
+    name: str
+    unit: Literal["rad", "m"]
+
+
+@dataclass(frozen=True)
+class LinkEntry:
+    """A link's name, the coordinates that move it (counted from 0), and its decomposition's operations."""
+
+    name: str
+    path: tuple[int, ...]
+    operations: int
+
+
+@dataclass(frozen=True)
+class BodyEntry:
+    """A moving frame on its parent's, as `linkwise.robot.robot.Joint` places it, and the mass it carries.
+
+    parent: index of an earlier body, None for the ground; coordinate: index of a joint of the manifest
+    translation, com in m, mass in kg, inertia about the centre of mass in kg·m², in the body's own axes
+    """
+
+    link: str
+    parent: int | None
+    joint: str
+    kind: Literal["revolute", "prismatic"]
+    coordinate: int
+    ratio: float
+    rotation: tuple[Row, Row, Row]
+    translation: Row
+    mass: float
+    com: Row
+    inertia: tuple[Row, Row, Row]
+
+
+@dataclass(frozen=True)
+class RigidTree:
+    """The rigid bodies, parents before children, and gravity in m/s² in the base's axes."""
+
+    gravity: Row
+    bodies: tuple[BodyEntry, ...]
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a package is of; `tree` is None for energies that a user wrote.
+
+    request: the options of `generate`; files: the SHA-256 of every other file, by its path in the package
+    shared_operations: those of the kernel in which links share work; None without such a kernel
+    """
+
+    name: str
+    robot: str
+    generator: Mapping[str, str]
+    request: Mapping[str, Any]
+    joints: tuple[JointEntry, ...]
+    links: tuple[LinkEntry, ...]
+    shared_operations: int | None
+    parameters: Mapping[str, float]
+    tree: RigidTree | None
+    files: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        """Raise ValueError where entries contradict each other."""
+        count = len(self.joints)
+        if not count or not self.links:
+            raise ValueError("there must be a joint and a link")
+        for link in self.links:
+            if not all(0 <= k < count for k in link.path):
+                raise ValueError(f"the path of link {link.name!r} names a joint that is not there")
+        if self.tree is not None:
+            _check_tree(self.tree, count, {link.name for link in self.links})
+
+    def text(self) -> str:
+        """JSON, one entry of a list a line."""
+        data = {"schema": SCHEMA, **asdict(self), "units": UNITS, "conventions": CONVENTIONS}
+        return "{\n" + ",\n".join(f' "{key}": {_lines(value)}' for key, value in data.items()) + "\n}\n"
+
+    @classmethod
+    def read(cls, directory: Path) -> "Manifest":
+        """Manifest of the package in `directory`; raises LinkwiseError for none, or for a damaged one."""
+        path = directory / FILE
+        if not path.is_file():
+            raise LinkwiseError(
+                f"{directory}: no generated robot there (no {FILE}); make one with `linkwise generate`"
+            )
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+            if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+                raise ValueError(f"its schema is not {SCHEMA}")
+            manifest: Manifest = _decoded(cls, data, "")
+        except OSError as error:
+            raise LinkwiseError(f"{path} cannot be read: {error.strerror}") from error
+        except (ValueError, RecursionError) as error:
+            reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+            raise LinkwiseError(f"{path} is damaged: {reason}; generate the robot again") from error
+        return manifest
+
+
+def _check_tree(tree: RigidTree, count: int, links: set[str]) -> None:
+    for index, body in enumerate(tree.bodies):
+        if not 0 <= body.coordinate < count:
+            raise ValueError(f"body {index} of the tree hangs on no joint")
+        if body.parent is not None and not 0 <= body.parent < index:
+            raise ValueError(f"the parent of body {index} of the tree is no earlier body")
+    lost = sorted(links - {body.link for body in tree.bodies})
+    if lost:
+        raise ValueError(f"link {lost[0]!r} is not in the tree")
+
+
+def _lines(value: Any) -> str:
+    """JSON of one entry; the items of a list or an object that holds some stand on lines of their own."""
+    if isinstance(value, Mapping) and value:
+        return "{\n" + ",\n".join(f"  {json.dumps(k)}: {_items(v)}" for k, v in value.items()) + "\n }"
+    return _items(value)
+
+
+def _items(value: Any) -> str:
+    if isinstance(value, (list, tuple)) and value and isinstance(value[0], Mapping):
+        return "[\n" + ",\n".join(f"  {json.dumps(item)}" for item in value) + "\n ]"
+    return json.dumps(value)
+
+
+def _decoded(kind: Any, data: Any, place: str) -> Any:
+    """Return JSON data as a value of the annotated type `kind`; raises ValueError that names the place."""
+    inner = get_args(kind)
+    if isinstance(kind, type) and is_dataclass(kind):
+        _require(isinstance(data, dict), place, "an object")
+        hints = get_type_hints(kind)
+        lost = [name for name in hints if name not in data]
+        _require(not lost, place, f"an object with {', '.join(lost)}")
+        return kind(**{name: _decoded(hint, data[name], f"{place}.{name}") for name, hint in hints.items()})
+    if get_origin(kind) is UnionType:  # X | None
+        return None if data is None else _decoded(inner[0], data, place)
+    if get_origin(kind) is tuple:
+        endless = inner[-1] is Ellipsis
+        expected = "a list" if endless else f"a list of {len(inner)}"
+        _require(isinstance(data, list) and (endless or len(data) == len(inner)), place, expected)
+        kinds = inner[:1] * len(data) if endless else inner
+        return tuple(
+            _decoded(k, item, f"{place}[{n}]") for n, (k, item) in enumerate(zip(kinds, data, strict=True))
+        )
+    if get_origin(kind) is Literal:
+        _require(data in inner, place, " or ".join(map(repr, inner)))
+        return data
+    if get_origin(kind) is Mapping:
+        _require(isinstance(data, dict), place, "an object")
+        return {key: _decoded(inner[1], item, f"{place}.{key}") for key, item in data.items()}
+    if kind is float:
+        number = isinstance(data, (int, float)) and not isinstance(data, bool)
+        _require(number and math.isfinite(data), place, "a finite number")
+        return float(data)
+    if kind is not Any:
+        _require(type(data) is kind, place, {int: "a whole number", str: "a string"}[kind])
     return data
 
 
-def _fault(data: dict[str, Any]) -> str:
-    """Return which entry is missing or of a wrong kind, or an empty string."""
-    kinds = {"files": dict, "request": dict, "conventions": dict, "joints": list, "links": list}
-    for key, kind in kinds.items():
-        if not isinstance(data.get(key), kind):
-            return f"{key!r} is no {'list' if kind is list else 'object'}"
-    count = len(data["joints"])
-    if not count or not all(isinstance(_get(joint, "name"), str) for joint in data["joints"]):
-        return "'joints' must be a list of objects with a name"
-    for link in data["links"]:
-        if not isinstance(_get(link, "name"), str) or not _indices(_get(link, "path"), count):
-            return "'links' must be a list of objects with a name and a path of joints"
-    if "skeleton" not in data:
-        return "'skeleton' is missing"
-    return _skeleton_fault(data, count) if data["skeleton"] is not None else ""
-
-
-def _skeleton_fault(data: dict[str, Any], count: int) -> str:
-    if not _array(data["conventions"].get("gravity"), 3):
-        return "'conventions' has no gravity of three numbers"
-    if not isinstance(data["skeleton"], list):
-        return "'skeleton' is no list"
-    for number, body in enumerate(data["skeleton"]):
-        for key, shape in (("rotation", (3, 3)), ("inertia", (3, 3)), ("translation", (3,)), ("com", (3,))):
-            if not _array(_get(body, key), *shape):
-                return f"{key!r} of body {number} of the skeleton is no array of {3 ** len(shape)} numbers"
-        for key in ("mass", "ratio"):
-            if not _array(body.get(key)):
-                return f"{key!r} of body {number} of the skeleton is no number"
-        if not _indices([body.get("coordinate")], count) or body.get("kind") not in (
-            "revolute",
-            "prismatic",
-        ):
-            return f"body {number} of the skeleton hangs on no joint"
-        if "parent" not in body or (body["parent"] is not None and not _indices([body["parent"]], number)):
-            return f"'parent' of body {number} of the skeleton is no earlier body"
-    bodies = [body.get("link") for body in data["skeleton"]]
-    lost = [link["name"] for link in data["links"] if link["name"] not in bodies]
-    return f"link {lost[0]!r} is not in the skeleton" if lost else ""
-
-
-def _get(item: Any, key: str) -> Any:
-    return item.get(key) if isinstance(item, dict) else None
-
-
-def _indices(items: Any, count: int) -> bool:
-    return isinstance(items, list) and all(type(item) is int and 0 <= item < count for item in items)
-
-
-def _array(item: Any, *shape: int) -> bool:
-    """Whether an entry is a list of lists of finite numbers of this shape; of none, one number."""
-    if shape:
-        return isinstance(item, list) and len(item) == shape[0] and all(_array(i, *shape[1:]) for i in item)
-    return isinstance(item, (int, float)) and not isinstance(item, bool) and math.isfinite(item)
+def _require(met: bool, place: str, expected: str) -> None:
+    if not met:
+        raise ValueError(f"{place.lstrip('.') or 'the whole'} is not {expected}")

@@ -1,13 +1,13 @@
-"""Writing a package: all of it or nothing."""
+"""Writing a package: all of it or nothing, over an earlier package of the same robot only."""
 
 import json
-import shutil
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError
+from linkwise.output import whole_directory
+from linkwise.package.manifest import FILE
 
 
 def check_target(directory: Path, robot: str) -> None:
@@ -20,9 +20,11 @@ def check_target(directory: Path, robot: str) -> None:
             return
         entries = list(directory.rglob("*"))
     except OSError as error:
-        raise _unwritable(directory, error) from None
-    earlier = _manifest(directory)
-    listed = {"manifest.json", *earlier.get("files", {})}
+        raise LinkwiseError(
+            f"cannot write to {directory}: {error.strerror}; choose another --out or --name"
+        ) from error
+    earlier = _earlier(directory)
+    listed = {FILE, *earlier.get("files", {})}
     files = {
         path.relative_to(directory).as_posix()
         for path in entries
@@ -30,7 +32,7 @@ def check_target(directory: Path, robot: str) -> None:
     }
     if directory.is_symlink() or not directory.is_dir() or (files and not files <= listed):
         raise LinkwiseError(
-            f"{directory} exists and is no generated package, or holds files of its own; choose another "
+            f"{directory} exists and is not a generated package, or holds files of its own; choose another "
             "--out or --name"
         )
     if files and earlier.get("robot") != robot:
@@ -40,18 +42,14 @@ def check_target(directory: Path, robot: str) -> None:
         )
 
 
-def _unwritable(place: Path, error: OSError) -> LinkwiseError:
-    return LinkwiseError(f"cannot write to {place}: {error.strerror}; choose another --out or --name")
-
-
-def _manifest(directory: Path) -> dict[str, Any]:
-    """Return the manifest of a generated package, or an empty dictionary."""
+def _earlier(directory: Path) -> dict[str, Any]:
+    """Return what the manifest of a generated package of any version says, or an empty dictionary."""
     try:
-        data = json.loads((directory / "manifest.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        data = json.loads((directory / FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
         return {}
     own = isinstance(data, dict) and isinstance(data.get("files"), dict)
-    return data if own and "linkwise" in data.get("generator", {}) else {}
+    return data if own and "linkwise" in (data.get("generator") or {}) else {}
 
 
 def write_package(files: Mapping[str, str], directory: Path) -> None:
@@ -59,23 +57,9 @@ def write_package(files: Mapping[str, str], directory: Path) -> None:
 
     Raises LinkwiseError when the place is not writable or holds something else, see `check_target`.
     """
-    check_target(directory, json.loads(files["manifest.json"])["robot"])
-    try:
-        directory.parent.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(prefix=f".{directory.name[:40]}-", dir=directory.parent))
-    except OSError as error:
-        raise _unwritable(directory.parent, error) from None
-    try:
+    robot = json.loads(files[FILE])["robot"]
+    with whole_directory(directory, lambda target: check_target(target, robot)) as draft:
         for path, text in files.items():
-            target = staging / "new" / path
+            target = draft / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(text, encoding="utf-8")
-        if directory.exists():
-            directory.rename(staging / "old")
-        (staging / "new").rename(directory)
-    except OSError as error:
-        if (staging / "old").exists() and not directory.exists():
-            (staging / "old").rename(directory)
-        raise _unwritable(directory, error) from None
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)

@@ -11,13 +11,23 @@ from fractions import Fraction
 import sympy as sp
 
 from linkwise.errors import LinkwiseError
-from linkwise.report import laurent
-from linkwise.report.laurent import Laurent
-from linkwise.robot.robot import Coordinate
-from linkwise.symbolic.system import Definition
+from linkwise.report.laurent import (
+    LIMIT,
+    ONE,
+    ZERO,
+    ExponentError,
+    Laurent,
+    add,
+    at_digit,
+    constant,
+    multiply,
+    power,
+)
+from linkwise.robot import Coordinate
+from linkwise.symbolic.link_energy import Definition
 
 ROUNDING = 1e-9
-"""Where a fixed angle is no right angle, smaller shares of the largest coefficient are rounding."""
+"""Where a fixed angle is not a right angle, smaller shares of the largest coefficient are rounding."""
 
 
 class Variables:
@@ -29,19 +39,19 @@ class Variables:
 
     def z(self, k: int) -> int:
         """Monomial exp(i q_k)."""
-        return laurent.at_digit(1 + k)
+        return at_digit(1 + k)
 
     def qd(self, k: int) -> int:
         """Monomial q̇_k."""
-        return laurent.at_digit(1 + self.n + k)
+        return at_digit(1 + self.n + k)
 
     def qdd(self, k: int) -> int:
         """Monomial q̈_k."""
-        return laurent.at_digit(1 + 2 * self.n + k)
+        return at_digit(1 + 2 * self.n + k)
 
     def other(self, name: str) -> int:
         """Monomial of a parameter or a bare coordinate; new names get the next digit."""
-        return laurent.at_digit(self._other.setdefault(name, 1 + 3 * self.n + len(self._other)))
+        return at_digit(self._other.setdefault(name, 1 + 3 * self.n + len(self._other)))
 
     def digit_of(self, name: str) -> int | None:
         """Digit of a parameter or bare coordinate, None if it never turned up."""
@@ -83,9 +93,9 @@ class Expansion:
         if expr.is_Symbol:
             return Laurent({self.variables.other(expr.name): 1}, 1, 1)
         if expr.is_Rational or expr.is_Float:
-            return laurent.constant(exact(expr))
+            return constant(exact(expr))
         if expr.is_Add:
-            return laurent.add(self(term) for term in expr.args)
+            return add(self(term) for term in expr.args)
         if expr.is_Mul:
             return self._product([self(factor) for factor in expr.args])
         if expr.is_Pow:
@@ -93,7 +103,7 @@ class Expansion:
         if expr.func in (sp.sin, sp.cos):
             return self._wave(expr)
         if expr.is_number:
-            return laurent.constant(Fraction(repr(float(expr))))
+            return constant(Fraction(repr(float(expr))))
         raise LinkwiseError(
             f"{expr.func.__name__}(…) cannot be expanded into terms; counts need sums and "
             "products of sines, cosines, velocities and parameters"
@@ -104,7 +114,7 @@ class Expansion:
         factors.sort(key=len, reverse=True)
         result = factors[0]
         for factor in factors[1:]:
-            result = laurent.multiply(result, factor, self.budget)
+            result = multiply(result, factor, self.budget)
         return result
 
     def _power(self, expr: sp.Expr) -> Laurent:
@@ -114,7 +124,7 @@ class Expansion:
                 f"the power ({expr.base})**({exponent}) cannot be expanded into terms; "
                 "counts need whole exponents, and single parameters below a fraction line"
             )
-        return laurent.power(base, int(exponent), self.budget)
+        return power(base, int(exponent), self.budget)
 
     def _wave(self, expr: sp.Expr) -> Laurent:
         """Sine or cosine of a whole combination of angles: (z^a ± z^−a)/2, the sine over i."""
@@ -132,14 +142,14 @@ class Expansion:
                     f"{expr} cannot be expanded into terms; counts need sines and cosines of whole "
                     "combinations of the joint angles"
                 )
-        if bound > laurent.LIMIT:
-            raise laurent.ExponentError
-        sine = Laurent({key + 1: -1, -key + 1: 1}, 2, bound) if key else laurent.ZERO
-        cosine = Laurent({key: 1, -key: 1}, 2, bound) if key else laurent.ONE
+        if bound > LIMIT:
+            raise ExponentError
+        sine = Laurent({key + 1: -1, -key + 1: 1}, 2, bound) if key else ZERO
+        cosine = Laurent({key: 1, -key: 1}, 2, bound) if key else ONE
         s, c = snapped(math.sin(phase)), snapped(math.cos(phase))
         if expr.func == sp.sin:
-            return laurent.add([sine.scaled(c), cosine.scaled(s)])
-        return laurent.add([cosine.scaled(c), sine.scaled(-s)])
+            return add([sine.scaled(c), cosine.scaled(s)])
+        return add([cosine.scaled(c), sine.scaled(-s)])
 
 
 def exact(number: sp.Expr) -> Fraction:

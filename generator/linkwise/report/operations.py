@@ -11,7 +11,7 @@ from linkwise.dynamics.derive import link_kernel
 from linkwise.dynamics.kernel import Kernel
 from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Graph, Node, operands, reachable
-from linkwise.report.question import Question
+from linkwise.report.term_count import TermQuery
 from linkwise.symbolic.system import System
 
 ARITHMETIC = frozenset({"add", "sub", "mul", "div"})
@@ -53,48 +53,50 @@ class LinkOperations:
     rows: dict[int, PartOperations]
 
 
-def link_operations(system: System, joints: tuple[int, ...], question: Question) -> Iterator[LinkOperations]:
+def link_operations(system: System, joints: tuple[int, ...], query: TermQuery) -> Iterator[LinkOperations]:
     """Operations of each link's own kernel, link after link."""
     for j in range(len(system.links)):
         kernel = link_kernel(system, j)
         forms = kernel.forms[0]
-        everything = operations(kernel.graph, list(forms.decomposition()))
-        rows = {i: _row(kernel, i, question) for i in joints if i in forms.path}
+        everything = cost_of(kernel.graph, list(forms.decomposition()))
+        rows = {i: _row(kernel, i, query) for i in joints if i in forms.path}
         yield LinkOperations(j, everything, rows)
 
 
-def _row(kernel: Kernel, i: int, question: Question) -> PartOperations:
-    graph, k = kernel.graph, question.coordinate
-    factor = coefficient(kernel, i, question)
-    motion = (graph.one, kernel.inputs.qd[k], kernel.inputs.qdd[k])[question.order]
+def _row(kernel: Kernel, i: int, query: TermQuery) -> PartOperations:
+    graph, k = kernel.graph, query.coordinate
+    factor = coefficient(kernel, i, query)
+    motion = (graph.one, kernel.inputs.qd[k], kernel.inputs.qdd[k])[query.order]
     torque = kernel.forms[0].torque[i]
-    return PartOperations(*(_cost(graph, node) for node in (torque, factor, graph.mul(factor, motion))))
+    return PartOperations(
+        *(_cost_of_one(graph, node) for node in (torque, factor, graph.mul(factor, motion)))
+    )
 
 
-def coefficient(kernel: Kernel, i: int, question: Question) -> Node:
+def coefficient(kernel: Kernel, i: int, query: TermQuery) -> Node:
     """Node of the coefficient asked for; zero where its coordinate is off the path."""
-    forms, k = kernel.forms[0], question.coordinate
-    if question.order == 0:
+    forms, k = kernel.forms[0], query.coordinate
+    if query.order == 0:
         return forms.gravity[i]
     if k not in forms.path:
         return kernel.graph.zero
-    if question.order == 1:
+    if query.order == 1:
         return forms.velocity[i, k]
     return forms.acceleration[min(i, k), max(i, k)]
 
 
-def _cost(graph: Graph, node: Node) -> Operations | None:
-    return None if node == graph.zero else operations(graph, [node])
+def _cost_of_one(graph: Graph, node: Node) -> Operations | None:
+    return None if node == graph.zero else cost_of(graph, [node])
 
 
-def summed(costs: Sequence[LinkOperations], i: int, question: Question) -> tuple[Operations, Operations]:
+def summed(costs: Sequence[LinkOperations], i: int, query: TermQuery) -> tuple[Operations, Operations]:
     """Cost of τ_i = Σ_j τ_ij and of its part, each link computed by itself; zeros are not added."""
     rows = [cost.rows[i] for cost in costs if i in cost.rows]
     torque = _sum([row.torque for row in rows if row.torque])
     parts = [row.part for row in rows if row.part]
     if len(parts) < 2:
         return torque, _sum(parts)
-    product = Operations(1, 1) if question.order else NO_OPERATIONS
+    product = Operations(1, 1) if query.order else NO_OPERATIONS
     return torque, _sum([row.coefficient for row in rows if row.coefficient]) + product
 
 
@@ -103,7 +105,7 @@ def _sum(terms: Sequence[Operations]) -> Operations:
     return sum(terms, Operations(additions, additions))
 
 
-def operations(graph: Graph, outputs: list[Node]) -> Operations:
+def cost_of(graph: Graph, outputs: list[Node]) -> Operations:
     """Cost of `outputs`, with and without sharing."""
     cost: dict[Node, int] = {}
     for node in reachable(graph, outputs):

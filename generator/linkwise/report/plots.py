@@ -1,25 +1,71 @@
 """The plots of the reports."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from linkwise.report import style
-from linkwise.report.extras import report_extra
-from linkwise.report.fit import Saturation
-from linkwise.report.study import Study
-from linkwise.report.terms import TermsReport
+from linkwise.extras import extra
+from linkwise.plotstyle import BLUE, GREEN, INK, PURPLE, SKY, VERMILION, saved, short, styled
+from linkwise.report.curve_fit import Saturation
+from linkwise.report.reduction_curve import Study
+from linkwise.report.seconds import Timing
+from linkwise.report.torque_terms import TermsReport, TorqueTerms
 
 STEPS = 200
 """Points of a drawn curve."""
 DARKEST = 0.42
 """Shade of the largest count, on which dark figures still read well."""
+DPI, MOST_PIXELS = 200, 60_000
+"""Resolution of a plot, less where its longer side would have more pixels than matplotlib can draw."""
+
+
+def _images(name: str, draw: Callable[[Any], None], size: tuple[float, float]) -> dict[str, bytes]:
+    """Return `name`.svg and `name`.png of what `draw` puts on a figure of `size` in inches."""
+    with styled():
+        figure = extra("matplotlib.figure").Figure(figsize=size, layout="constrained")
+        draw(figure)
+        dpi = min(DPI, int(MOST_PIXELS / max(size)))
+        return {f"{name}.{kind}": saved(figure, kind, dpi) for kind in ("svg", "png")}
+
+
+def reduction_images(result: Study) -> dict[str, bytes]:
+    """Fig. 15: counted points, the fit and the paper's curve, with what each curve misses below."""
+    return _images("reduction", lambda figure: _draw_reduction(figure, result), (6.3, 4.9))
+
+
+def _draw_reduction(figure: Any, result: Study) -> None:
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    dof, y = result.dof, [p.reduction for p in result.points]
+    curves: list[tuple[Saturation, str, str, str, str]] = [(result.paper, "paper", VERMILION, "--", "s")]
+    if result.fitted is not None:
+        curves.append((result.fitted, "fit", GREEN, "-", "^"))
+    n = [dof[0] + (dof[-1] - dof[0]) * step / STEPS for step in range(STEPS + 1)]
+    for curve, name, color, dash, marker in curves:
+        label = f"{name}: {curve.a:.3g} (1 − exp(−{curve.rate:.3g} n)),  RMSE {curve.rmse:.4f}"
+        above.plot(n, [curve(x) for x in n], color=color, linestyle=dash, label=label)
+        below.plot(dof, curve.residuals, color=color, linestyle=dash, marker=marker, markersize=4)
+    points = {"markersize": 6, "markeredgecolor": "white", "zorder": 3}
+    above.plot(dof, y, "o", color=BLUE, label="counted terms", **points)
+    above.set_ylabel("reduction rate  1 − kept / total")
+    above.set_ylim(-0.02, 1.02)
+    above.legend(loc="lower right")
+    above.set_title(f"{short(result.robot)}: terms of τ₁ that the part with q̈₁ does not need")
+    below.margins(y=0.15)
+    below.axhline(0.0, color=INK, linewidth=0.8)
+    below.set_ylabel("counted\n− curve")
+    _whole_numbers(below, dof)
+
+
+def _whole_numbers(axes: Any, dof: Sequence[int]) -> None:
+    step = 1 if len(dof) <= 15 else 5
+    axes.set_xticks([n for n in dof if step == 1 or n % step == 0 or n == 1])
+    axes.set_xlabel("degrees of freedom  n")
 
 
 @dataclass(frozen=True)
-class Reading:
-    """One line of the comparison: reduction by degrees of freedom, in things of one kind."""
+class SavingsLine:
+    """What the q̈_1 part of τ_1 saves, by degrees of freedom; `kind` is terms, operations or seconds."""
 
     kind: str
     label: str
@@ -30,79 +76,44 @@ class Reading:
     dash: str | tuple[int, tuple[int, int]]
 
 
-def reduction_images(result: Study) -> dict[str, bytes]:
-    """Fig. 15: counted points, the fit and the paper's curve, with what each curve misses below."""
-    return style.images("reduction", lambda figure: _reduction(figure, result), (6.3, 4.9))
-
-
-def _reduction(figure: Any, result: Study) -> None:
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    dof, y = result.dof, [p.reduction for p in result.points]
-    curves: list[tuple[Saturation, str, str, str, str]] = [
-        (result.paper, "paper", style.VERMILION, "--", "s")
+def savings_lines(result: Study, timings: Sequence[Timing] = ()) -> tuple[SavingsLine, ...]:
+    """Lines of the comparison; the measured ones only where there are timings."""
+    points, dof = result.points, result.dof
+    terms = tuple(p.reduction for p in points)
+    written = tuple(p.written_reduction for p in points)
+    emitted = tuple(p.operations_reduction for p in points)
+    long = (0, (5, 1))
+    lines = [
+        SavingsLine("terms", "terms, as in the paper", dof, terms, BLUE, "o", "-"),
+        SavingsLine("operations", "operations, nothing shared", dof, written, SKY, "v", long),
+        SavingsLine("operations", "operations as emitted", dof, emitted, VERMILION, "s", "--"),
     ]
-    if result.fitted is not None:
-        curves.append((result.fitted, "fit", style.GREEN, "-", "^"))
-    n = [dof[0] + (dof[-1] - dof[0]) * step / STEPS for step in range(STEPS + 1)]
-    for curve, name, color, dash, marker in curves:
-        label = f"{name}: {curve.a:.3g} (1 − exp(−{curve.rate:.3g} n)),  RMSE {curve.rmse:.4f}"
-        above.plot(n, [curve(x) for x in n], color=color, linestyle=dash, label=label)
-        below.plot(dof, curve.residuals, color=color, linestyle=dash, marker=marker, markersize=4)
-    above.plot(
-        dof,
-        y,
-        "o",
-        color=style.BLUE,
-        markersize=6,
-        markeredgecolor="white",
-        label="counted terms",
-        zorder=3,
-    )
-    above.set_ylabel("reduction rate  1 − kept / total")
-    above.set_ylim(-0.02, 1.02)
-    above.legend(loc="lower right")
-    above.set_title(f"{result.robot}: terms of τ₁ that the part with q̈₁ does not need", loc="left")
-    below.margins(y=0.15)
-    below.axhline(0.0, color=style.INK, linewidth=0.8)
-    below.set_ylabel("counted\n− curve")
-    _whole_numbers(below, dof)
+    for method, *look in (("closed form", GREEN, "^", "-."), ("autograd", PURPLE, "D", ":")):
+        chosen = [t for t in timings if t.method == method]
+        if chosen:
+            n, y = tuple(t.dof for t in chosen), tuple(t.reduction for t in chosen)
+            lines.append(SavingsLine("seconds", f"seconds, {method}", n, y, *look))
+    return tuple(lines)
 
 
-def readings_images(name: str, robot: str, readings: Sequence[Reading]) -> dict[str, bytes]:
-    """Draw the same question asked of terms, of operations and of seconds."""
-    return style.images(name, lambda figure: _readings(figure, robot, readings), (6.3, 4.0))
+def savings_images(name: str, robot: str, lines: Sequence[SavingsLine]) -> dict[str, bytes]:
+    """Draw what is saved in terms, in operations and in seconds, as files called `name`."""
+    return _images(name, lambda figure: draw_savings(figure, robot, lines), (6.3, 4.0))
 
 
-def _readings(figure: Any, robot: str, readings: Sequence[Reading]) -> None:
+def draw_savings(figure: Any, robot: str, lines: Sequence[SavingsLine]) -> None:
+    """Draw the comparison on an empty figure."""
     axes = figure.subplots()
-    for reading in readings:
-        axes.plot(
-            reading.dof,
-            reading.reduction,
-            color=reading.color,
-            marker=reading.marker,
-            linestyle=reading.dash,
-            markersize=5.5,
-            markeredgecolor="white",
-            label=reading.label,
-        )
+    for line in lines:
+        look = {"color": line.color, "marker": line.marker, "linestyle": line.dash, "label": line.label}
+        axes.plot(line.dof, line.reduction, markersize=5.5, markeredgecolor="white", **look)
     axes.set_ylabel("saved by the q̈₁ part of τ₁ alone")
-    axes.set_ylim(min(0.0, *(min(r.reduction) - 0.05 for r in readings)), 1.02)
+    axes.set_ylim(min(0.0, *(min(line.reduction) - 0.05 for line in lines)), 1.02)
     axes.yaxis.set_major_formatter(lambda value, _: f"{100 * value:.0f} %")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
-    axes.set_title(f"{robot}: one question read in {_listed([r.kind for r in readings])}", loc="left")
-    _whole_numbers(axes, readings[0].dof)
-
-
-def _listed(kinds: Sequence[str]) -> str:
-    *before, last = dict.fromkeys(kinds)
-    return f"{', '.join(before)} and {last}" if before else last
-
-
-def _whole_numbers(axes: Any, dof: Sequence[int]) -> None:
-    step = 1 if len(dof) <= 15 else 5
-    axes.set_xticks([n for n in dof if step == 1 or n % step == 0 or n == 1])
-    axes.set_xlabel("degrees of freedom  n")
+    *before, last = dict.fromkeys(line.kind for line in lines)
+    axes.set_title(f"{short(robot)}: savings in {', '.join(before)} and {last}")
+    _whole_numbers(axes, lines[0].dof)
 
 
 def terms_images(report: TermsReport) -> dict[str, bytes]:
@@ -110,24 +121,19 @@ def terms_images(report: TermsReport) -> dict[str, bytes]:
     rows = len({row.joint for row in report.rows})
     columns = len({row.link for row in report.rows})
     size = max(4.2, 1.2 + 0.95 * columns), max(1.7, 1.0 + 0.62 * rows)
-    return style.images("terms", lambda figure: _terms(figure, report), size)
+    return _images("terms", lambda figure: _draw_terms(figure, report), size)
 
 
-def _terms(figure: Any, report: TermsReport) -> None:
+def _draw_terms(figure: Any, report: TermsReport) -> None:
     axes = figure.subplots()
     joints = sorted({row.joint for row in report.rows})
     links = sorted({row.link for row in report.rows if row.link is not None})
     columns: list[int | None] = [*links, *([None] if len(links) > 1 else [])]
     darkest = max(math.log1p(row.count.total) for row in report.rows) or 1.0
     for row in report.rows:
-        if row.link not in columns:
-            continue
-        x, y = columns.index(row.link), joints.index(row.joint)
-        shade = DARKEST * math.log1p(row.count.total) / darkest
-        axes.add_patch(_square(x, y, shade, row.link is None))
-        if row.count.total:
-            axes.text(x, y - 0.13, f"{row.count.total:,}", ha="center", va="center")
-            axes.text(x, y + 0.2, f"({row.kept:,})", ha="center", va="center", fontsize=7.5)
+        if row.link in columns:
+            shade = DARKEST * math.log1p(row.count.total) / darkest
+            _draw_cell(axes, columns.index(row.link), joints.index(row.joint), row, shade)
     axes.set_xlim(-0.5, len(columns) - 0.5)
     axes.set_ylim(len(joints) - 0.5, -0.5)
     axes.set_xticks(range(len(columns)), ["all" if j is None else f"link {j + 1}" for j in columns])
@@ -135,18 +141,18 @@ def _terms(figure: Any, report: TermsReport) -> None:
     axes.grid(visible=False)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
-    axes.set_title(f"{report.robot}: terms of $τ_{{ij}}$ (in brackets: {report.question})", loc="left")
+    axes.set_title(f"{short(report.robot)}: terms of τᵢⱼ (in brackets: {report.query})")
 
 
-def _square(x: int, y: int, shade: float, is_sum: bool) -> Any:
-    patches = report_extra("matplotlib.patches")
-    edge = style.INK if is_sum else "white"
-    return patches.Rectangle(
-        (x - 0.46, y - 0.46), 0.92, 0.92, facecolor=_blue(shade), edgecolor=edge, linewidth=0.8
+def _draw_cell(axes: Any, x: int, y: int, row: TorqueTerms, shade: float) -> None:
+    """Draw one count on its shade, and below it in brackets what is kept; a sum over links gets a frame."""
+    edge = INK if row.link is None else "white"
+    # White at shade 0 to a dark blue at 1; its lightness alone tells the number.
+    blue = 1.0 - shade, 1.0 - 0.8 * shade, 1.0 - 0.45 * shade
+    place = (x - 0.46, y - 0.46), 0.92, 0.92
+    axes.add_patch(
+        extra("matplotlib.patches").Rectangle(*place, facecolor=blue, edgecolor=edge, linewidth=0.8)
     )
-
-
-def _blue(shade: float) -> tuple[float, float, float]:
-    """White at 0 to a dark blue at 1; its lightness alone tells the number."""
-    red, green, blue = 1.0 - shade, 1.0 - 0.8 * shade, 1.0 - 0.45 * shade
-    return red, green, blue
+    if row.count.total:
+        axes.text(x, y - 0.13, f"{row.count.total:,}", ha="center", va="center")
+        axes.text(x, y + 0.2, f"({row.kept:,})", ha="center", va="center", fontsize=7.5)

@@ -2,32 +2,33 @@
 
 import importlib
 import math
-import platform
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
+
+import numpy as np
 
 from linkwise.dynamics.derive import derive
 from linkwise.dynamics.kernel import Kernel
-from linkwise.emit.energies import fetched
+from linkwise.emit.assemble import package_files
+from linkwise.emit.backend import chosen_backends
+from linkwise.emit.derivation import Derivation
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
-from linkwise.emit.straight_line import straight_line
+from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.expression.graph import Node
-from linkwise.pipeline import generate
+from linkwise.extras import extra
+from linkwise.package.load import Package, open_package
+from linkwise.package.write import write_package
 from linkwise.progress import Progress
-from linkwise.report.extras import report_extra
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import EnergySystem, System, rigid_system
 
 BATCH = 1024
 REPEATS, SHORTEST = 7, 0.02
 """Runs of which the fastest counts, and the least time of one run in s."""
-PACKAGE = "linkwise_measured"
 
 
 @dataclass(frozen=True)
@@ -53,13 +54,15 @@ class Timing:
 
 def measure(system: System, dof: tuple[int, ...], progress: Progress) -> tuple[Timing, ...]:
     """Time the arms of the first 1..n links of a serial arm, for each n of `dof`."""
-    torch = report_extra("torch", "torch")
+    torch = extra("torch")
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     timings: list[Timing] = []
     try:
         for done, n in enumerate(dof):
-            timings += _of_arm(first_links(system, n), n)
+            with tempfile.TemporaryDirectory() as folder:
+                package = _generated(first_links(system, n), Path(folder) / "measured")
+                timings += [_closed_form(package, n), _autograd(package, n)]
             progress("measure", done + 1, len(dof))
     finally:
         torch.set_num_threads(threads)
@@ -68,44 +71,56 @@ def measure(system: System, dof: tuple[int, ...], progress: Progress) -> tuple[T
 
 def first_links(system: System, n: int) -> System:
     """Return the serial arm of the first n links."""
+    if isinstance(system, EnergySystem):
+        return replace(system, coordinates=system.coordinates[:n], links=system.links[:n])
     robot = system.robot
-    if robot is not None:
-        robot = replace(robot, coordinates=robot.coordinates[:n], links=robot.links[:n])
-    return replace(system, coordinates=system.coordinates[:n], links=system.links[:n], robot=robot)
+    return rigid_system(replace(robot, coordinates=robot.coordinates[:n], links=robot.links[:n]))
 
 
-def machine() -> dict[str, str]:
-    """Where the seconds were measured."""
-    versions = {name: report_extra(name, "torch").__version__ for name in ("numpy", "torch")}
-    return {"machine": platform.machine(), "python": platform.python_version(), **versions}
+def _generated(system: System, directory: Path) -> Package:
+    """Return the package of `system`, with one module more: row.py, which computes τ_1 alone."""
+    derivation = Derivation(system, derive(system), directory.name, {})
+    files = package_files(derivation, chosen_backends(("numpy", "autograd")))
+    files["row.py"] = render("report/row.py.j2", row_view(system, derivation.kernels))
+    write_package(files, directory)
+    return open_package(directory)
 
 
-def _of_arm(system: System, n: int) -> Iterator[Timing]:
-    numpy, torch = report_extra("numpy", "torch"), report_extra("torch", "torch")
-    random = numpy.random.default_rng(n)
-    q, qd, qdd = (random.standard_normal((BATCH, n)) for _ in range(3))
-    kernels = derive(system)
-    files = generate(system, ["numpy", "autograd"], name=PACKAGE)
-    files["row.py"] = render("report/row.py.j2", row_view(system, kernels))
-    with tempfile.TemporaryDirectory() as folder:
-        package = _imported(files, Path(folder) / PACKAGE)
-        closed, auto = package.load("numpy"), package.load("autograd")
-        row = importlib.import_module(f"{PACKAGE}.row")
-        p = closed.parameters
-        times = _fastest(
+def _closed_form(package: Package, n: int) -> Timing:
+    q, qd, qdd = _motion(n)
+    robot = package.module.load("numpy")
+    row = importlib.import_module(f"{package.module.__name__}.row")
+    p = robot.parameters
+    return Timing(
+        n,
+        "closed form",
+        *_fastest(
             lambda: row.extract(q, qd, qdd, p),
             lambda: row.whole(q, qd, qdd, p),
-            lambda: closed.coefficients(q, qd),
-        )
-        yield Timing(n, "closed form", *times)
-        tq, tqd, tqdd = (torch.from_numpy(a) for a in (q, qd, qdd))
-        times = _fastest(
-            lambda: sum(_second(torch, module, tq, tqd) for module in auto.backend.modules) * tqdd[..., :1],
-            lambda: auto.inverse_dynamics(tq, tqd, tqdd),
-            lambda: auto.coefficients(tq, tqd),
-        )
-        yield Timing(n, "autograd", *times)
-    _forget()
+            lambda: robot.coefficients(q, qd),
+        ),
+    )
+
+
+def _autograd(package: Package, n: int) -> Timing:
+    torch = extra("torch")
+    q, qd, qdd = (torch.from_numpy(a) for a in _motion(n))
+    robot = package.module.load("autograd")
+    lagrangians = robot.backend.modules
+    return Timing(
+        n,
+        "autograd",
+        *_fastest(
+            lambda: sum(_second(torch, module, q, qd) for module in lagrangians) * qdd[..., :1],
+            lambda: robot.inverse_dynamics(q, qd, qdd),
+            lambda: robot.coefficients(q, qd),
+        ),
+    )
+
+
+def _motion(n: int) -> Iterator[Any]:
+    random = np.random.default_rng(n)
+    return (random.standard_normal((BATCH, n)) for _ in range(3))
 
 
 def _second(torch: Any, lagrangian: Any, q: Any, qd: Any) -> Any:
@@ -146,25 +161,6 @@ def row_view(system: System, kernels: tuple[Kernel, ...]) -> dict[str, Any]:
 def _function(system: System, kernel: Kernel, name: str, output: Node) -> RowFunction:
     code = straight_line(kernel.graph, [output], PythonPrinter("np"))
     return RowFunction(name, fetched(system, code, "[..., {}]"), code.assignments, code.outputs[0])
-
-
-def _imported(files: dict[str, str], folder: Path) -> ModuleType:
-    for path, text in files.items():
-        target = folder / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(text, encoding="utf-8")
-    sys.path.insert(0, str(folder.parent))
-    try:
-        return importlib.import_module(PACKAGE)
-    finally:
-        sys.path.remove(str(folder.parent))
-
-
-def _forget() -> None:
-    """Drop the measured package, so that the next arm's is imported afresh."""
-    for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
-        del sys.modules[name]
-    importlib.invalidate_caches()
 
 
 def _fastest(*calls: Callable[[], object]) -> list[float]:

@@ -5,6 +5,7 @@ D_i L = Σ_s ∂²L/∂q̇_i∂q_s q̇_s + Σ_s ∂²L/∂q̇_i∂q̇_s q̈_s �
 
 import sympy as sp
 
+from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import System
 
 
@@ -12,11 +13,12 @@ def lagrangian(system: System, link: int) -> sp.Expr:
     """L_j with the named definitions written out; grows with the chain, so for small robots only."""
     twist: dict[sp.Symbol, sp.Expr] = {}
     height: dict[sp.Symbol, sp.Expr] = {}
-    for energy in system.lineage(link):
+    energies = link_energies(system)
+    for energy in lineage(energies, link):
         for known, steps in ((twist, energy.twist), (height, energy.height)):
             for symbol, expr in steps.definitions:
                 known[symbol] = expr.xreplace(known)
-    energy = system.links[link]
+    energy = energies[link]
     return energy.kinetic.xreplace(twist) - energy.potential.xreplace(height)
 
 

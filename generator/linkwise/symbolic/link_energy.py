@@ -10,18 +10,46 @@ with E the rotation and p the translation of the joint, after which
 Every component that is not a number gets a name, so no expression grows with the length of the chain.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import sympy as sp
 
-from linkwise.robot.robot import Coordinate, Joint, Mat3, Robot, Scalar, Vec3
-from linkwise.symbolic.system import Definition, LinkEnergy, RigidBody, Steps, System
+from linkwise.robot.robot import Coordinate, Joint, Mat3, Scalar, Vec3
+from linkwise.symbolic.system import EnergySystem, System
 
 HALF = sp.Rational(1, 2)
 
+Definition: TypeAlias = tuple[sp.Symbol, sp.Expr]
+
 
 @dataclass(frozen=True)
-class _Motion:
+class Steps:
+    """Named definitions in order, each in terms of earlier ones; links further out may use `exports`."""
+
+    definitions: tuple[Definition, ...] = ()
+    exports: tuple[sp.Symbol, ...] = ()
+
+
+@dataclass(frozen=True)
+class StepwiseEnergy:
+    """One link's kinetic and potential energy in J, in steps that keep every expression short.
+
+    `kinetic` may use the symbols of `twist`, `potential` those of `height`: they continue the exports of link
+    `parent`, so that a long chain is never written out. Energies that a user wrote have no steps.
+    """
+
+    name: str
+    kinetic: sp.Expr
+    potential: sp.Expr
+    parent: int | None = None
+    twist: Steps = Steps()
+    height: Steps = Steps()
+
+
+@dataclass(frozen=True)
+class _FrameState:
     """State carried along the path, in the frame of the link reached."""
 
     omega: Vec3
@@ -57,15 +85,17 @@ class _Namer:
         return Steps(tuple(self.definitions), tuple(s for s in state if isinstance(s, sp.Symbol)))
 
 
-def link_energies(robot: Robot) -> System:
-    """Write the energy of every link that carries mass; parents' definitions are continued, not repeated."""
-    states: dict[int, _Motion] = {}
+def link_energies(system: System) -> tuple[StepwiseEnergy, ...]:
+    """Energy of every link; that of a rigid link continues its parent's steps and does not repeat them."""
+    if isinstance(system, EnergySystem):
+        return tuple(StepwiseEnergy(link.name, link.kinetic, link.potential) for link in system.links)
+    robot = system.robot
+    states: dict[int, _FrameState] = {}
     position: dict[int, int] = {}
-    links: list[LinkEnergy] = []
-    heavy = [index for index, link in enumerate(robot.links) if not link.massless]
-    start = _Motion((0, 0, 0), (0, 0, 0), robot.gravity, sp.S.Zero)
-    for number, index in enumerate(heavy):
-        link, chain = robot.links[index], robot.chain(index)
+    energies: list[StepwiseEnergy] = []
+    start = _FrameState((0, 0, 0), (0, 0, 0), exact(robot.gravity), sp.S.Zero)
+    for number, rigid in enumerate(system.links):
+        chain, index = rigid.chain, rigid.chain[-1]
         ancestors = [at for at in chain[:-1] if at in states]
         parent = ancestors[-1] if ancestors else None
         steps = chain[chain.index(parent) + 1 :] if parent is not None else chain
@@ -75,21 +105,36 @@ def link_energies(robot: Robot) -> System:
             label = f"{number + 1}" if at == index else f"{number + 1}{_letters(steps.index(at))}"
             state = _step(state, robot.links[at].joint, robot.coordinates, label, twist, height)
         states[index], position[index] = state, number
-        m, c, a = link.mass, link.com, state.gravity
-        potential = m * (state.height - sum(x * y for x, y in zip(a, c, strict=True)))
-        links.append(
-            LinkEnergy(
-                link.name,
-                _kinetic(state, m, c, link.inertia),
+        (mass, _, _), com = exact((rigid.mass, 0, 0)), exact(rigid.com)
+        inertia = exact(rigid.inertia[0]), exact(rigid.inertia[1]), exact(rigid.inertia[2])
+        potential = mass * (state.height - _dot(state.gravity, com))
+        energies.append(
+            StepwiseEnergy(
+                rigid.name,
+                _kinetic(state, mass, com, inertia),
                 sp.sympify(potential),
                 position[parent] if parent is not None else None,
                 twist.steps(*state.omega, *state.v),
-                height.steps(*a, state.height),
-                RigidBody(chain, robot.joints_to(index), m, c, link.inertia, robot.gravity),
+                height.steps(*state.gravity, state.height),
             )
         )
-    parameters = {sp.Symbol(name, real=True): value for name, value in robot.parameters}
-    return System(robot.name, robot.coordinates, tuple(links), parameters, robot)
+    return tuple(energies)
+
+
+def lineage(energies: Sequence[StepwiseEnergy], link: int) -> tuple[StepwiseEnergy, ...]:
+    """Return the energies whose steps that of link `link` builds on, oldest first, itself last."""
+    chain: list[StepwiseEnergy] = []
+    at: int | None = link
+    while at is not None:
+        chain.append(energies[at])
+        at = energies[at].parent
+    return tuple(reversed(chain))
+
+
+def exact(a: Sequence[Scalar]) -> Vec3:
+    """Fractions for floats, as they print: 0.6 · 0.125 is then 0.075 and not the float beside it."""
+    x, y, z = (sp.Rational(repr(float(e))) if isinstance(e, (int, float)) else e for e in a)
+    return x, y, z
 
 
 def _letters(index: int) -> str:
@@ -99,34 +144,36 @@ def _letters(index: int) -> str:
 
 
 def _step(
-    state: _Motion,
+    state: _FrameState,
     joint: Joint,
     coordinates: tuple[Coordinate, ...],
     label: str,
     twist: _Namer,
     height: _Namer,
-) -> _Motion:
+) -> _FrameState:
     coordinate = coordinates[joint.coordinate]
-    angle, rate = joint.ratio * coordinate.q, joint.ratio * coordinate.qd
-    if joint.ratio == 1.0:
-        angle, rate = coordinate.q, coordinate.qd
-    axis = joint.rotation[0][2], joint.rotation[1][2], joint.rotation[2][2]
-    p = joint.translation
+    ratio, _, _ = exact((joint.ratio, 0, 0))
+    angle, rate = ratio * coordinate.q, ratio * coordinate.qd
+    rotation = exact(joint.rotation[0]), exact(joint.rotation[1]), exact(joint.rotation[2])
+    axis = rotation[0][2], rotation[1][2], rotation[2][2]
+    p = exact(joint.translation)
     if joint.kind == "prismatic":
-        p = _map(lambda t, z: t + _times(z, angle), p, axis)
+        p = _map(lambda t, z: t + z * angle, p, axis)
     moved = _map(lambda a, b: a + b, state.v, _cross(state.omega, p))
-    omega = _transposed(joint.rotation, state.omega)
-    v = _transposed(joint.rotation, moved)
-    gravity = _transposed(joint.rotation, state.gravity)
-    u = state.height - sum(x * y for x, y in zip(state.gravity, p, strict=True))
+    omega = _transposed(rotation, state.omega)
+    v = _transposed(rotation, moved)
+    gravity = _transposed(rotation, state.gravity)
+    u = state.height - _dot(state.gravity, p)
     spin = (0, 0, rate)
     if joint.kind == "revolute":
-        omega = _map(lambda a, b: a + b, _turned(twist, label, angle, omega), spin)
-        v = _turned(twist, label, angle, v)
-        gravity = _turned(height, label, angle, gravity)
+        # s3 is the sine of joint 3 itself, s3_5 that of the joint before link 5 which follows it otherwise.
+        turn = f"{joint.coordinate + 1}" if joint.ratio == 1.0 else f"{joint.coordinate + 1}_{label}"
+        omega = _map(lambda a, b: a + b, _turned(twist, turn, angle, omega), spin)
+        v = _turned(twist, turn, angle, v)
+        gravity = _turned(height, turn, angle, gravity)
     else:
         v = _map(lambda a, b: a + b, v, spin)
-    return _Motion(
+    return _FrameState(
         twist.vector(f"w{label}", omega),
         twist.vector(f"v{label}", v),
         height.vector(f"a{label}", gravity),
@@ -144,7 +191,7 @@ def _turned(namer: _Namer, label: str, angle: sp.Expr, a: Vec3) -> Vec3:
     return c * a[0] + s * a[1], c * a[1] - s * a[0], a[2]
 
 
-def _kinetic(state: _Motion, m: Scalar, c: Vec3, inertia: Mat3) -> sp.Expr:
+def _kinetic(state: _FrameState, m: Scalar, c: Vec3, inertia: Mat3) -> sp.Expr:
     """½ m v·v + m v·(ω × c) + ½ ω·I ω, I = inertia about the frame's origin (parallel axes)."""
     w, v = state.omega, state.v
     cc = _dot(c, c)
@@ -162,13 +209,6 @@ def _map(function, a: Vec3, b: Vec3) -> Vec3:  # type: ignore[no-untyped-def]
     return x, y, z
 
 
-def _times(number: float, a: Scalar) -> Scalar:
-    """number · a, without leaving factors 0.0 and 1.0 behind."""
-    if number == 0.0:
-        return sp.S.Zero
-    return a if number == 1.0 else -a if number == -1.0 else number * a
-
-
 def _dot(a: Vec3, b: Vec3) -> sp.Expr:
     return sum((x * y for x, y in zip(a, b, strict=True)), sp.S.Zero)
 
@@ -181,7 +221,7 @@ def _cross(a: Vec3, b: Vec3) -> Vec3:
     )
 
 
-def _transposed(rotation: tuple[tuple[float, ...], ...], a: Vec3) -> Vec3:
+def _transposed(rotation: Mat3, a: Vec3) -> Vec3:
     """Return rotationᵀ a."""
-    x, y, z = (sum(_times(rotation[i][k], a[i]) for i in range(3)) for k in range(3))
+    x, y, z = (sum(rotation[i][k] * a[i] for i in range(3)) for k in range(3))
     return x, y, z

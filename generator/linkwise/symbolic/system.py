@@ -1,4 +1,8 @@
-"""What every description becomes: coordinates, and one energy a link."""
+"""What every description becomes: coordinates, links and run-time parameters.
+
+A rigid link and a link of hand-written energies are two types, and so are the systems made of them. Both
+systems answer `name`, `coordinates`, `links`, `link_names`, `parameters`, `notes` and `path`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,76 +10,104 @@ from typing import TypeAlias
 
 import sympy as sp
 
+from linkwise.robot.notes import Note
 from linkwise.robot.robot import Coordinate, Joint, Mat3, Robot, Scalar, Vec3
-
-Definition: TypeAlias = tuple[sp.Symbol, sp.Expr]
 
 
 @dataclass(frozen=True)
-class RigidBody:
-    """The facts behind a rigid link's energy, which the rigid-link rule works from.
+class RigidLink:
+    """A rigid body that carries mass, and the joints between it and the base.
 
-    `chain` holds the indices of the robot's links from the root to this one, `joints` their joints.
+    chain: indices of the robot's links from the root to this one; joints: theirs
+    mass in kg, com in m, inertia about it in kg·m², in the axes of the last joint's frame
     """
 
+    name: str
     chain: tuple[int, ...]
     joints: tuple[Joint, ...]
     mass: Scalar
     com: Vec3
     inertia: Mat3
-    gravity: Vec3
-
-
-@dataclass(frozen=True)
-class Steps:
-    """Named definitions in order, each in terms of earlier ones; links further out may use `exports`."""
-
-    definitions: tuple[Definition, ...] = ()
-    exports: tuple[sp.Symbol, ...] = ()
 
 
 @dataclass(frozen=True)
 class LinkEnergy:
-    """One link's kinetic and potential energy in J; L_j = kinetic − potential.
-
-    `kinetic` may use the symbols of `twist`, `potential` those of `height`: named steps that continue the
-    exports of link `parent`, so that a long chain never has to be written out. Energies written by a user
-    need none. `body` is there for a rigid link only.
-    """
+    """One link's kinetic and potential energy in J, as a user writes them; L_j = kinetic − potential."""
 
     name: str
     kinetic: sp.Expr
     potential: sp.Expr
-    parent: int | None = None
-    twist: Steps = Steps()
-    height: Steps = Steps()
-    body: RigidBody | None = None
 
 
 @dataclass(frozen=True)
-class System:
-    """Coordinates, links and run-time parameters: all that derivation and emission know of a robot."""
+class RigidSystem:
+    """A robot, and those of its links that carry mass; made by `rigid_system`."""
+
+    robot: Robot
+    links: tuple[RigidLink, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        return self.robot.name
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """Coordinates of the robot."""
+        return self.robot.coordinates
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What was done with the robot's description."""
+        return self.robot.notes
+
+    @property
+    def parameters(self) -> dict[sp.Symbol, float]:
+        """Run-time parameters and their values."""
+        return {sp.Symbol(name, real=True): value for name, value in self.robot.parameters}
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of the links."""
+        return tuple(link.name for link in self.links)
+
+    def path(self, link: int) -> tuple[int, ...]:
+        """path(j): the coordinates that move link `link`, in ascending order."""
+        return tuple(sorted({joint.coordinate for joint in self.links[link].joints}))
+
+
+@dataclass(frozen=True)
+class EnergySystem:
+    """Links whose energies a user wrote."""
 
     name: str
     coordinates: tuple[Coordinate, ...]
     links: tuple[LinkEnergy, ...]
     parameters: Mapping[sp.Symbol, float] = field(default_factory=dict)
-    robot: Robot | None = None
+    notes: tuple[Note, ...] = ()
 
-    def lineage(self, link: int) -> tuple[LinkEnergy, ...]:
-        """Return the links whose definitions link `link` builds on, oldest first, itself last."""
-        chain: list[LinkEnergy] = []
-        at: int | None = link
-        while at is not None:
-            chain.append(self.links[at])
-            at = self.links[at].parent
-        return tuple(reversed(chain))
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of the links."""
+        return tuple(link.name for link in self.links)
 
     def path(self, link: int) -> tuple[int, ...]:
-        """path(j): the coordinates that move link `link`, in ascending order."""
-        body = self.links[link].body
-        if body is not None:
-            return tuple(sorted({joint.coordinate for joint in body.joints}))
+        """path(j): the coordinates that the energy of link `link` depends on, in ascending order."""
         energy = self.links[link]
         used = energy.kinetic.free_symbols | energy.potential.free_symbols
         return tuple(k for k, c in enumerate(self.coordinates) if used & {c.q, c.qd})
+
+
+System: TypeAlias = RigidSystem | EnergySystem
+"""All that derivation and emission know of a robot."""
+
+
+def rigid_system(robot: Robot) -> RigidSystem:
+    """System of a robot's links; those without mass have no Lagrangian and are only passed through."""
+    links = []
+    for index, link in enumerate(robot.links):
+        if not link.massless:
+            chain = robot.chain(index)
+            joints = tuple(robot.links[at].joint for at in chain)
+            links.append(RigidLink(link.name, chain, joints, link.mass, link.com, link.inertia))
+    return RigidSystem(robot, tuple(links))

@@ -10,7 +10,7 @@ import sympy as sp
 
 from linkwise.errors import LinkwiseError, within
 from linkwise.robot.robot import Coordinate, is_finite
-from linkwise.symbolic.system import LinkEnergy, System
+from linkwise.symbolic.system import EnergySystem, LinkEnergy
 
 
 def energy_system(
@@ -19,7 +19,7 @@ def energy_system(
     links: Iterable[LinkEnergy],
     parameters: Mapping[sp.Symbol, float] | None = None,
     symbolic: bool = False,
-) -> System:
+) -> EnergySystem:
     """System from link energies, checked: every symbol known, degree at most 2 in the velocities.
 
     `parameters` gives each other symbol its value; they become numbers unless `symbolic`. Velocity terms of
@@ -34,10 +34,10 @@ def energy_system(
     for link in links:
         with within(f"link {link.name!r}"):
             checked.append(_checked(link, coordinates, values, symbolic))
-    return System(name, coordinates, tuple(checked), values if symbolic else {})
+    return EnergySystem(name, coordinates, tuple(checked), values if symbolic else {})
 
 
-def read_energies(path: Path, symbolic: bool = False) -> System:
+def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
     """Run a Python file that defines `coordinates`, `links` and perhaps `parameters`, as `energy_system`."""
     try:
         scope: dict[str, Any] = runpy.run_path(str(path))

@@ -66,14 +66,14 @@ def decomposition(package: Package) -> tuple[list[object], list[object]]:
 
 
 def energies(package: Package, q: object, qd: object) -> list[tuple[object, object]]:
-    """Kinetic and potential energy of each link, from the manifest's skeleton."""
+    """Kinetic and potential energy of each link, from the manifest's bodies."""
     import casadi as ca
 
-    gravity = ca.DM(package.manifest["conventions"]["gravity"])
+    gravity = ca.DM(package.manifest["tree"]["gravity"])
     frames: list[tuple[object, ...]] = []
     found = []
     axis = ca.DM([0, 0, 1])
-    for link in package.manifest["skeleton"]:
+    for link in package.manifest["tree"]["bodies"]:
         rest = ca.DM.eye(3), ca.DM.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3)
         turn, place, spin, speed = rest if link["parent"] is None else frames[link["parent"]]
         arm = ca.DM(link["translation"])

@@ -35,7 +35,7 @@ class Package:
     def operations(self) -> int:
         """Additions and multiplications of all links."""
         links = sum(link["operations"] for link in self.manifest["links"])
-        return int(self.manifest["fused_operations"] or links)
+        return int(self.manifest["shared_operations"] or links)
 
     @property
     def outputs(self) -> int:
@@ -58,7 +58,7 @@ def prepare(case: Case, work: Path) -> Package:
     cache = work / "cache" / case.name
     shutil.rmtree(cache, ignore_errors=True)
     os.environ["LINKWISE_CACHE"] = str(cache)
-    build = importlib.import_module(f"{case.name}.native_build")
+    build = importlib.import_module(f"{case.name}.runtime.native_build")
     libraries, compiled = {}, {}
     for real in ("double", "float"):
         start = time.perf_counter()

@@ -79,8 +79,8 @@ def measure(package: Package, work: Path) -> Peer:
 
 def description(package: Package) -> str:
     """The robot as peers/pinocchio.cpp reads it."""
-    links = package.manifest["skeleton"]
-    lines = [" ".join(map(repr, [len(links), *package.manifest["conventions"]["gravity"]]))]
+    links = package.manifest["tree"]["bodies"]
+    lines = [" ".join(map(repr, [len(links), *package.manifest["tree"]["gravity"]]))]
     for k, link in enumerate(links):
         if link["coordinate"] != k or link["ratio"] != 1.0:
             raise ValueError(f"{package.name}: the peer knows only one joint of its own for each link")
@@ -97,14 +97,14 @@ def chain(package: Package, links: list[int], only: int | None) -> Any:
 
     model, index = pin.Model(), {}
     for j in links:
-        link = package.manifest["skeleton"][j]
+        link = package.manifest["tree"]["bodies"][j]
         joint = pin.JointModelPZ() if link["kind"] == "prismatic" else pin.JointModelRZ()
         place = pin.SE3(np.array(link["rotation"]), np.array(link["translation"]))
         index[j] = model.addJoint(index.get(link["parent"], 0), joint, place, str(j))
         if only in (None, j):
             body = pin.Inertia(link["mass"], np.array(link["com"]), np.array(link["inertia"]))
             model.appendBodyToJoint(index[j], body, pin.SE3.Identity())
-    model.gravity.linear = np.array(package.manifest["conventions"]["gravity"])
+    model.gravity.linear = np.array(package.manifest["tree"]["gravity"])
     return model
 
 

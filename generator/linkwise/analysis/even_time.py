@@ -1,0 +1,107 @@
+"""Even time: whether a log has it, up to the digits its times are written in, and how to bring it about."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from linkwise.errors import LinkwiseError
+from linkwise.extras import extra
+from linkwise.package.load import Array
+from linkwise.progress import Progress, silent
+
+TOLERANCE = 1e-3
+"""How far a time step may be from the mean one, as a share of it."""
+
+GAP, GAP_BEFORE_RESAMPLING = 1.5, 10.0
+"""Times the usual step; a longer one is a hole in the log. Splines bridge somewhat longer ones."""
+
+OVERLAP = 64
+"""Knots seen past a window. A knot's influence on a cubic spline at least halves from one to the
+next, so what is cut away is below 2⁻⁶⁴ of the signal."""
+
+MOST = 100
+"""How many times the log's own rate is still a plausible wish, and not a slip of the finger."""
+
+
+def even_rate(time: Array, first_row: int, strict: bool) -> float:
+    """Sampling rate in Hz of `time` (S,) in s, whose first row in the log has the number `first_row`.
+
+    Raises LinkwiseError that names the rows for time that does not increase and for gaps; where `strict`,
+    for uneven time too, which is else left to `resampled`.
+    """
+    if len(time) < 2:
+        raise LinkwiseError(f"{len(time)} samples; a movement needs 5 or more")
+    steps = np.diff(time)
+    _refuse_backwards(time, steps, first_row)
+    usual = float(np.median(steps))
+    worst = int(np.argmax(steps))
+    if steps[worst] > (GAP if strict else GAP_BEFORE_RESAMPLING) * usual:
+        raise LinkwiseError(
+            f"rows {first_row + worst} to {first_row + worst + 1}, time column: a gap of"
+            f" {steps[worst]:.6g} s where steps are {usual:.6g} s; fill it or cut the log there"
+        )
+    mean = (time[-1] - time[0]) / (len(time) - 1)
+    off = np.abs(steps - mean)
+    if strict and off.max() > TOLERANCE * mean:
+        step = _rounded_step(time)
+        if step is not None:
+            return 1 / step
+        at = int(np.argmax(off))
+        raise LinkwiseError(
+            f"row {first_row + at + 1}, time column: a step of {steps[at]:.6g} s where the mean is"
+            f" {mean:.6g} s; bring the log to an even rate with --resample {1 / mean:.6g}"
+        )
+    return float(1 / mean)
+
+
+def _refuse_backwards(time: Array, steps: Array, first_row: int) -> None:
+    if steps.min() > 0:
+        return
+    at = int(np.argmax(steps <= 0))
+    what = "repeats" if steps[at] == 0 else "runs back to"
+    raise LinkwiseError(
+        f"row {first_row + at + 1}, time column: time {what} {time[at + 1]:.12g} s; sort the rows"
+        " and keep one for each time"
+    )
+
+
+def _rounded_step(time: Array) -> float | None:
+    """Step of the even grid that the times are, rounded to the last digit they are given in, if they are.
+
+    60 Hz in milliseconds has steps of 16 and 17 ms, and that is even time. Digits coarser than a third
+    of a step explain too much to count.
+    """
+    at = np.arange(len(time))
+    step, start = np.polyfit(at, time - time[0], 1)
+    off = np.ptp(time - time[0] - start - step * at)
+    for digit in 10.0 ** -np.arange(10):
+        if digit < step / 3 and np.abs(time - np.round(time / digit) * digit).max() < 1e-3 * digit:
+            return float(step) if off < 1.1 * digit else None
+    return None
+
+
+def resampled(samples: Array, rate: float, rows: int = 65536, progress: Progress = silent) -> Iterator[Array]:
+    """Yield blocks (at most `rows`, 1 + n) of cubic splines through the samples at `rate` Hz.
+
+    samples: (S, 1 + n), time in s first; the first time is kept. Splines are made window by window.
+    Raises LinkwiseError for too few samples and for a rate far above the log's own.
+    """
+    spline = extra("scipy.interpolate").CubicSpline
+    time = samples[:, 0]
+    own = (len(time) - 1) / (time[-1] - time[0])
+    if rate > MOST * own:
+        raise LinkwiseError(
+            f"--resample {rate:g} Hz is more than {MOST} times the log's own mean rate of {own:.6g} Hz;"
+            " lower it"
+        )
+    count = int(np.floor((time[-1] - time[0]) * rate * (1 + 1e-12))) + 1
+    if len(samples) < 4 or count < 5:
+        raise LinkwiseError(f"{len(samples)} samples give {count} at {rate:g} Hz; 5 or more are needed")
+    for start in range(0, count, rows):
+        at = time[0] + np.arange(start, min(start + rows, count)) / rate
+        low = max(0, int(np.searchsorted(time, at[0])) - OVERLAP)
+        high = min(len(time), int(np.searchsorted(time, at[-1])) + OVERLAP)
+        window = np.asarray(samples[low:high])
+        values = spline(window[:, 0], window[:, 1:], axis=0)(np.minimum(at, time[-1]))
+        yield np.column_stack([at, values])
+        progress("resampling", start + len(at), count)

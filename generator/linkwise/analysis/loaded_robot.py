@@ -1,0 +1,74 @@
+"""A generated robot package as the analysis uses it: names, a back end that works here, bodies, an oracle."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from linkwise.check.newton_euler import NewtonEuler
+from linkwise.errors import LinkwiseError
+from linkwise.package.load import Model, Package, open_package
+from linkwise.package.manifest import FILE, BodyEntry
+
+
+@dataclass(frozen=True)
+class LoadedRobot:
+    """A loaded robot: names in the order of every array, and which back end computes."""
+
+    name: str
+    joints: tuple[str, ...]
+    units: tuple[str, ...]
+    """"rad" or "m", a joint each."""
+    links: tuple[str, ...]
+    backend: str
+    model: Model
+    bodies: tuple[BodyEntry, ...] | None
+    """Rigid bodies, parents before children; None where the energies were written by hand."""
+    up: tuple[float, float, float]
+    """Against gravity, in the base frame; z for a robot without gravity."""
+    manifest_sha256: str
+    recursion: NewtonEuler | None = None
+    """Partial torques by an independent way; None where the energies were written by hand."""
+
+
+def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
+    """Import the package in `directory`, with `backend` or the fastest that works here.
+
+    Raises LinkwiseError for a directory without a package, a damaged one, or no back end that loads.
+    """
+    package = open_package(directory)
+    manifest = package.manifest
+    chosen, model = _load(package, package.fastest_first if backend is None else (backend,))
+    tree = manifest.tree
+    return LoadedRobot(
+        manifest.name,
+        tuple(model.joint_names),
+        tuple(model.joint_units),
+        tuple(model.link_names),
+        chosen,
+        model,
+        tree.bodies if tree is not None else None,
+        _up(tree.gravity if tree is not None else None),
+        hashlib.sha256((directory / FILE).read_bytes()).hexdigest(),
+        NewtonEuler(manifest, tree) if tree is not None else None,
+    )
+
+
+def _up(gravity: Sequence[float] | None) -> tuple[float, float, float]:
+    if not gravity or not any(gravity):
+        return 0.0, 0.0, 1.0
+    x, y, z = (-float(component) for component in gravity)
+    return x, y, z
+
+
+def _load(package: Package, backends: Sequence[str]) -> tuple[str, Model]:
+    reasons = []
+    for backend in backends:
+        try:
+            return backend, package.load(backend)
+        except Exception as error:  # A back end may lack its compiler, its library or its files.
+            reasons.append(f"{backend}: {error}")
+    raise LinkwiseError(
+        f"{package.directory}: no back end for the analysis ({'; '.join(reasons) or 'the package has none'});"
+        " generate the robot again, with a back end that can be loaded here"
+    )

@@ -1,0 +1,94 @@
+"""What stands above the numbers of a text log: CSV's one header line, OpenSim's lines up to `endheader`."""
+
+import re
+from pathlib import Path
+
+from linkwise.analysis.logs.text import TextLog, split_cells
+from linkwise.errors import LinkwiseError
+
+TAIL = 1 << 16
+"""Bytes at the end of a file that are searched for a last row cut off."""
+
+
+def open_delimited(path: Path) -> TextLog:
+    """Open a CSV file: one header line; comma, semicolon or tab, whichever the header has.
+
+    Raises LinkwiseError for a file without a header.
+    """
+    with path.open(encoding="utf-8-sig") as handle:
+        header = handle.readline()
+    unquoted = re.sub(r'"[^"]*"', "", header)
+    delimiter = next((mark for mark in ",;\t" if mark in unquoted), ",")
+    columns = tuple(name.strip() for name in split_cells(header, delimiter))
+    if not any(columns):
+        raise LinkwiseError(f"{path}: row 1: no header; name the columns there, the time first")
+    if all(_is_number(name) for name in columns):
+        raise LinkwiseError(f"{path}: row 1 holds numbers; put a header of column names above it")
+    return TextLog(path, columns, 2, delimiter, warnings=_warnings_of_the_end(path, delimiter))
+
+
+def open_storage(path: Path) -> TextLog:
+    """Open an OpenSim .mot or .sto file with what its header says: inDegrees, nRows and nColumns.
+
+    Raises LinkwiseError for a header that is cut off or contradicts itself.
+    """
+    facts, names, row = _storage_header(path)
+    columns = tuple(name.strip() for name in split_cells(names.rstrip(), "\t" if "\t" in names else None))
+    if not any(columns):
+        raise LinkwiseError(f"{path}: row {row}: no column names after 'endheader'")
+    promised = _count(path, facts, "nColumns")
+    if promised is not None and promised != len(columns):
+        raise LinkwiseError(
+            f"{path}: row {row}: {len(columns)} column names where the header promises nColumns={promised}"
+        )
+    told = facts.get("indegrees")
+    degrees = None if told is None else {"yes": True, "no": False}.get(told.lower())
+    if told is not None and degrees is None:
+        raise LinkwiseError(f"{path}: inDegrees={told!r} in the header is neither yes nor no")
+    rows = _count(path, facts, "nRows")
+    # Values are padded with blanks, so any run of blanks parts them, whatever parts the names.
+    return TextLog(path, columns, row + 1, None, degrees, rows, _warnings_of_the_end(path, None))
+
+
+def _storage_header(path: Path) -> tuple[dict[str, str], str, int]:
+    """Facts `key=value`, by key in lower case, the line of column names, and its number."""
+    facts: dict[str, str] = {}
+    with path.open(encoding="utf-8-sig") as handle:
+        for row, line in enumerate(handle, 1):
+            key, _, value = line.partition("=")
+            facts[key.strip().lower()] = value.strip()
+            if line.strip().lower() == "endheader":
+                return facts, handle.readline(), row + 1
+    raise LinkwiseError(f"{path}: no line 'endheader'; the file is cut off or not OpenSim's")
+
+
+def _count(path: Path, facts: dict[str, str], key: str) -> int | None:
+    text = facts.get(key.lower())
+    if text is None:
+        return None
+    if not text.isdecimal():
+        raise LinkwiseError(f"{path}: {key}={text!r} in the header is not a count")
+    return int(text)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _warnings_of_the_end(path: Path, delimiter: str | None) -> tuple[str, ...]:
+    """A warning if the last row has no line end, and its last number fewer digits than all before it."""
+    with path.open("rb") as handle:
+        handle.seek(max(0, path.stat().st_size - TAIL))
+        *rows, last = handle.read().decode("utf-8", "replace").split("\n")
+    ends = [(row.split(delimiter) or [""])[-1].strip() for row in [*rows[-20:], last]]
+    lengths = [len(end) for end in ends]
+    if not last.strip() or len(ends) < 3 or lengths[-1] >= min(lengths[1:-1]):
+        return ()
+    return (
+        f"the last row has no line end, and its last number {ends[-1]!r} is shorter than those before:"
+        " the file may be cut off there",
+    )

@@ -1,0 +1,93 @@
+"""`report.html`: the analysis as one file that needs no network."""
+
+import base64
+import json
+from typing import Any
+
+import numpy as np
+
+from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.poses import poses
+from linkwise.emit.render import render
+from linkwise.extras import extra
+from linkwise.package.load import Array
+from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
+
+NUMBERS, SAMPLES = 500_000, 1500
+"""What a page holds at most; longer logs are thinned out, and the page says so."""
+
+TEMPLATE = "analysis/report.html.j2"
+
+
+def report(result: AnalysisResult) -> str:
+    """HTML of the page for a result already thinned to what a page can hold."""
+    return render(TEMPLATE, view(result))
+
+
+def view(result: AnalysisResult) -> dict[str, str]:
+    """What the template needs: a title (escaped there), the data, and plotly's script."""
+    return {
+        "title": f"{result.robot.name} · {result.source}",
+        "data": page_data(result),
+        "plotly": extra("plotly.offline").get_plotlyjs(),
+    }
+
+
+def page_data(result: AnalysisResult) -> str:
+    """JSON with numbers as base64 of little-endian float64: the table's, to the last bit.
+
+    No `<` stands in it: a name such as `</script>` cannot end the element it is embedded in.
+    """
+    robot = result.robot
+    data = {
+        "robot": robot.name,
+        "log": result.source,
+        "provenance": result.provenance,
+        "rate": result.rate,
+        "samples": len(result.time),
+        "total": result.total,
+        "stride": result.stride,
+        "convention": result.processing.convention,
+        "joints": [{"name": n, "unit": u} for n, u in zip(robot.joints, robot.units, strict=True)],
+        "links": list(robot.links),
+        "columns": [
+            {
+                "quantity": c.quantity,
+                "name": c.name,
+                "unit": c.unit,
+                "i": c.joint,
+                "j": c.link,
+                "k": c.cause,
+            }
+            for c in result.columns
+        ],
+        "values": _encode(result.values),
+        "mean": result.totals.mean.tolist(),
+        "peak": result.totals.peak.tolist(),
+        "colours": list(COLOURS),
+        "coloursDark": list(ON_DARK),
+        "gravityColour": GRAVITY,
+        "bodies": _bodies(result),
+    }
+    text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
+    """Poses at every sample shown: origins and centres of mass, (samples, bodies, 3) each, in m."""
+    bodies = result.robot.bodies
+    if not bodies:
+        return None
+    origins, centres = poses(bodies, result.q)
+    return {
+        "parents": [-1 if body.parent is None else body.parent for body in bodies],
+        "links": [body.link for body in bodies],
+        "coordinates": [body.coordinate for body in bodies],
+        "up": list(result.robot.up),
+        "origins": _encode(origins),
+        "centres": _encode(centres),
+    }
+
+
+def _encode(values: Array) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, "<f8").tobytes()).decode("ascii")

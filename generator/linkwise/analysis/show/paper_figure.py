@@ -1,0 +1,150 @@
+"""Five panels below one another, laid out like the paper's Fig. 5-9 and 10-14."""
+
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from linkwise.analysis.columns import Column, Quantity, load_unit
+from linkwise.analysis.result import AnalysisResult
+from linkwise.extras import extra
+from linkwise.plotstyle import colour, dash, short
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PANEL, LINE = 1.75, 0.22
+"""Heights in inches of a panel and of a legend's line."""
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """A panel and which columns it draws."""
+
+    title: str
+    symbol: str
+    wanted: Callable[[Column], bool]
+
+
+def paper(result: AnalysisResult, i: int) -> "Figure":
+    """Coordinates, τ_i, and for joint i: τ_ij, τp_ij(q̇_j), τp_ij(q̈_j), j's own coordinate."""
+    robot, panels = result.robot, _panels(result, i)
+    legends = [_legend_rows(robot.joints), _legend_rows(robot.links)]
+    heights = [PANEL] * len(panels) + [LINE * (rows + 1) for rows in legends]
+    figure = extra("matplotlib.figure").Figure(figsize=(7.6, sum(heights) + 0.9), layout="constrained")
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    axes = [figure.add_subplot(grid[0])]
+    axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(1, len(panels))]
+    for axis in axes[:-1]:
+        axis.tick_params(labelbottom=False)
+    for axis, panel in zip(axes, panels, strict=True):
+        _draw(axis, result, panel)
+    axes[-1].set_xlabel("time (s)")
+    axes[-1].set_xlim(result.time[0], result.time[-1])
+    figure.align_ylabels(axes)
+    for row, (title, names) in enumerate([("Joints", robot.joints), ("Links", robot.links)], len(panels)):
+        _legend(figure.add_subplot(grid[row]), title, names)
+    figure.suptitle(f"{robot.name} · {result.source}", x=0.01, ha="left", fontsize=11)
+    foot = "\n".join([*textwrap.wrap(_left_out(result), 125), result.provenance])
+    figure.supxlabel(foot, x=0.01, ha="left", fontsize=7, color="#5A6270")
+    return figure  # type: ignore[no-any-return]
+
+
+def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:
+    robot = result.robot
+    units = " or ".join(dict.fromkeys(robot.units))
+    loads = " or ".join(dict.fromkeys(map(load_unit, robot.units)))
+    on = f"on {short(robot.joints[i])} ({load_unit(robot.units[i])})"
+    own = own_joints(result)
+
+    def own_term(quantity: Quantity) -> Callable[[Column], bool]:
+        return lambda c: c.quantity == quantity and c.joint == i and c.cause == own[c.link or 0]
+
+    number = i + 1
+    return (
+        _Panel(f"Joint coordinates ({units})", "$q_i$", lambda c: c.quantity == "q"),
+        _Panel(f"Joint torques ({loads})", r"$\tau_i$", lambda c: c.quantity == "tau"),
+        _Panel(
+            f"Partial torques {on}, through each link",
+            rf"$\tau_{{{number}j}}$",
+            lambda c: c.quantity == "tau_link" and c.joint == i,
+        ),
+        _Panel(
+            f"Propagation torques {on}: each link's own joint only, velocity",
+            rf"$\tau^p_{{{number}j}}(\dot q_j)$",
+            own_term("tau_qd"),
+        ),
+        _Panel(
+            f"Propagation torques {on}: each link's own joint only, acceleration",
+            rf"$\tau^p_{{{number}j}}(\ddot q_j)$",
+            own_term("tau_qdd"),
+        ),
+    )
+
+
+def own_joints(result: AnalysisResult) -> tuple[int, ...]:
+    """Coordinate of each link's own joint: the manifest's, else the last that carries the link."""
+    robot = result.robot
+    known = {body.link: body.coordinate for body in robot.bodies or ()}
+    return tuple(
+        known.get(
+            link,
+            max(
+                (c.joint or 0 for c in result.columns if c.quantity == "tau_link" and c.link == j),
+                default=0,
+            ),
+        )
+        for j, link in enumerate(robot.links)
+    )
+
+
+def _draw(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
+    for column, values in zip(result.columns, result.values, strict=True):
+        if panel.wanted(column):
+            at = column.joint if column.link is None else column.link
+            axis.plot(result.time, values, **_style(at or 0))
+    axis.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+    axis.set_title(panel.title)
+    axis.set_ylabel(panel.symbol, fontsize=11, parse_math=True)
+
+
+def _style(at: int) -> dict[str, Any]:
+    return {"color": colour(at), "linestyle": dash(at), "linewidth": 1.5}
+
+
+def _legend_columns(names: Sequence[str]) -> int:
+    """As many as fit beside one another."""
+    return max(1, min(6, 100 // (max(len(short(name)) for name in names) + 6)))
+
+
+def _legend_rows(names: Sequence[str]) -> int:
+    return -(-len(names) // _legend_columns(names))
+
+
+def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
+    """One legend for all panels that show these names, on an axis of its own."""
+    line = extra("matplotlib.lines").Line2D
+    axis.set_axis_off()
+    legend = axis.legend(
+        [line([], [], **_style(at)) for at in range(len(names))],
+        [short(name) for name in names],
+        title=title,
+        loc="upper left",
+        bbox_to_anchor=(0, 1),
+        borderaxespad=0,
+        ncols=_legend_columns(names),
+        alignment="left",
+        handlelength=2,
+        fontsize=8,
+    )
+    legend.set_in_layout(False)
+
+
+def _left_out(result: AnalysisResult) -> str:
+    """What the last two panels do not show."""
+    own, robot = own_joints(result), result.robot
+    others = [name for at, name in enumerate(robot.joints) if at not in own]
+    text = "The last two panels show each link's own joint only; the table and the page have every joint."
+    if others:
+        text += f" Not in them, as they carry no link with mass directly: {', '.join(map(short, others))}."
+    return text

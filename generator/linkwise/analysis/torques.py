@@ -1,0 +1,114 @@
+"""From positions, velocities and accelerations to every torque term of a block of samples."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from linkwise.analysis.columns import TERMS, Column, Key, Quantity, columns_of, mirrored
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.settings import Convention
+from linkwise.analysis.verify import Closure, residual, worst_of
+from linkwise.package.load import Array, PackedLayout
+
+Source = tuple[int, int, int]
+"""Row of the result, column of the packed values, the coordinate that multiplies (-1: none)."""
+
+
+@dataclass(frozen=True)
+class Decomposer:
+    """Computes blocks of the result, stored by column: (columns, samples).
+
+    With q̈_k and q̇_k the coordinates' motion, and index order joint i, link j, coordinate k:
+    τ_i = Σ_j τ_ij and τ_ij = Σ_k c2_ijk q̈_k + Σ_k c1_ijk q̇_k + g_ij
+    """
+
+    robot: LoadedRobot
+    convention: Convention
+    columns: tuple[Column, ...]
+    sources: dict[Quantity, tuple[Source, ...]]
+    parts: tuple[tuple[int, tuple[int, ...]], ...]
+    """Row of each τ_ij, and the rows of its terms."""
+    wholes: tuple[tuple[int, tuple[int, ...]], ...]
+    """Row of each τ_i, and the rows of its τ_ij."""
+
+    @classmethod
+    def of(cls, robot: LoadedRobot, convention: Convention) -> "Decomposer":
+        """Plan where each packed value of the robot goes."""
+        columns = columns_of(robot, robot.model.layout)
+        row = {column.key: at for at, column in enumerate(columns)}
+        parts = [
+            (at, _rows(columns, TERMS, joint=c.joint, link=c.link))
+            for at, c in enumerate(columns)
+            if c.quantity == "tau_link"
+        ]
+        wholes = [
+            (at, _rows(columns, ("tau_link",), joint=c.joint))
+            for at, c in enumerate(columns)
+            if c.quantity == "tau"
+        ]
+        return cls(robot, convention, columns, _sources(robot.model.layout, row), tuple(parts), tuple(wholes))
+
+    def rows(self, quantity: Quantity) -> slice:
+        """Where a quantity's columns stand; they stand together."""
+        found = [at for at, column in enumerate(self.columns) if column.quantity == quantity]
+        return slice(found[0], found[-1] + 1) if found else slice(0, 0)
+
+    def fill(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> Closure:
+        """Fill `out` (columns, S) from time (S,) and q, qd, qdd (S, n); say how well it closes."""
+        packed = self.robot.model.packed(q, qd, qdd)
+        out[0] = time
+        out[self.rows("q")], out[self.rows("qd")], out[self.rows("qdd")] = q.T, qd.T, qdd.T
+        out[self.rows("tau")] = self.robot.model.inverse_dynamics(q, qd, qdd).T
+        for row, source, _ in self.sources["tau_link"]:
+            out[row] = packed.torque[..., source]
+        for row, source, k in self.sources["tau_qdd"]:
+            np.multiply(packed.acceleration[..., source], qdd[:, k], out=out[row])
+        for row, source, k in self.sources["tau_qd"]:
+            np.multiply(packed.velocity[..., source], qd[:, k], out=out[row])
+        for row, source, _ in self.sources["tau_gravity"]:
+            out[row] = packed.gravity[..., source]
+        closure = self._closure(out)
+        if self.convention == "gradient":
+            velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
+            for column, values in zip(self.columns, out, strict=True):
+                if column.quantity == "tau_qd":
+                    values[:] = velocity[:, column.joint, column.link, column.cause]
+        return closure
+
+    def _closure(self, out: Array) -> Closure:
+        """Check the closing sums; by joint, for one may be in N·m and another in N."""
+        worst = Closure()
+        for whole, links in self.wholes:
+            terms = [
+                residual([out[row] for row in rows], out[link]) for link, rows in self.parts if link in links
+            ]
+            sums = [residual([out[row] for row in links], out[whole])]
+            worst |= Closure(*worst_of(terms), *worst_of(sums))
+        return worst
+
+
+def _rows(
+    columns: tuple[Column, ...],
+    quantities: tuple[Quantity, ...],
+    joint: int | None,
+    link: int | None = None,
+) -> tuple[int, ...]:
+    return tuple(
+        at
+        for at, c in enumerate(columns)
+        if c.quantity in quantities and c.joint == joint and link in (None, c.link)
+    )
+
+
+def _sources(layout: PackedLayout, row: dict[Key, int]) -> dict[Quantity, tuple[Source, ...]]:
+    def plain(quantity: Quantity, pairs: list[list[int]]) -> tuple[Source, ...]:
+        return tuple((row[quantity, i, j, None], at, -1) for at, (i, j) in enumerate(pairs))
+
+    return {
+        "tau_link": plain("tau_link", layout.torque.tolist()),
+        "tau_gravity": plain("tau_gravity", layout.gravity.tolist()),
+        "tau_qdd": tuple((row["tau_qdd", i, j, k], at, k) for i, j, k, at in mirrored(layout)),
+        "tau_qd": tuple(
+            (row["tau_qd", i, j, k], at, k) for at, (i, j, k) in enumerate(layout.velocity.tolist())
+        ),
+    }

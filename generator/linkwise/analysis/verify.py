@@ -1,0 +1,109 @@
+"""How far a result can be believed: its parts sum to the whole, and an independent recursion agrees."""
+
+from dataclasses import asdict, dataclass
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from linkwise.analysis.columns import Column, Quantity
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.errors import LinkwiseError
+from linkwise.package.load import Array
+
+LIMIT = 1e-9
+"""A relative error above this is not rounding: the package does not compute what it says."""
+
+AGAINST_RECURSION = 1e-6
+"""The same against another way of computing, whose rounding is another."""
+
+SAMPLES = 8
+"""Samples of each block that are computed again; the recursion is slow in Python."""
+
+LARGEST = 1e6
+"""In rad or m; past it a coordinate's own rounding hides what the comparison would show."""
+
+
+@dataclass(frozen=True)
+class Closure:
+    """Largest errors of Σ_k τp_ij + g_ij against τ_ij (terms) and of Σ_j τ_ij against τ_i (links).
+
+    Absolute in N·m (N), relative to the largest sum of magnitudes in the same block of samples. Packages
+    may sum τ_i from the τ_ij, so both sums say only that nothing was lost; `recursion` is the largest
+    error of τ_ij against an independent Newton–Euler recursion, None where the energies are hand-written.
+    """
+
+    terms_absolute: float = 0.0
+    terms_relative: float = 0.0
+    links_absolute: float = 0.0
+    links_relative: float = 0.0
+    recursion_absolute: float | None = None
+    recursion_relative: float | None = None
+
+    def __or__(self, other: "Closure") -> "Closure":
+        """The larger of both, error by error."""
+        a, b = asdict(self), asdict(other)
+        return Closure(**{name: _larger(a[name], b[name]) for name in a})
+
+    def check(self) -> None:
+        """Raise LinkwiseError where the parts do not sum to the whole, or the recursion disagrees."""
+        worst = np.maximum(self.terms_relative, self.links_relative)
+        if not worst <= LIMIT:
+            raise LinkwiseError(
+                f"the robot's torques do not close (relative error {worst:.2g}); run `linkwise check` on it"
+            )
+        if self.recursion_relative is not None and not self.recursion_relative <= AGAINST_RECURSION:
+            raise LinkwiseError(
+                "the robot's partial torques are not those of the Newton-Euler recursion (relative error"
+                f" {self.recursion_relative:.2g}); run `linkwise check` on it"
+            )
+
+
+def _larger(a: Any, b: Any) -> Any:
+    if a is None or b is None:
+        return b if a is None else a
+    return float(np.maximum(a, b))  # unlike Python's max, it lets no NaN pass unseen
+
+
+def residual(parts: list[Array], whole: Array) -> tuple[float, float]:
+    """Largest |Σ parts - whole| over samples, and the largest Σ |parts|; arrays (S,)."""
+    if not parts:
+        return float(np.abs(whole).max(initial=0.0)), 0.0
+    error = reduce(np.add, parts) - whole
+    scale = reduce(np.add, map(np.abs, parts))
+    return float(np.abs(error).max(initial=0.0)), float(scale.max(initial=0.0))
+
+
+def worst_of(pairs: list[tuple[float, float]]) -> tuple[float, float]:
+    """Largest error of (error, scale) pairs, absolute and relative to the largest scale."""
+    error, scale = np.max(np.array([(0.0, 0.0), *pairs]), axis=0).tolist()
+    return error, error / scale if scale else error
+
+
+def against_recursion(robot: LoadedRobot, columns: tuple[Column, ...], block: Array) -> Closure:
+    """τ_ij of some samples of a block (columns, S) against Newton–Euler; none for hand-written energies.
+
+    Relative errors are by unit: a joint that carries nothing but rounding is measured by its peers.
+    """
+    if robot.recursion is None:
+        return Closure()
+    at = np.unique(np.linspace(0, block.shape[1] - 1, SAMPLES).astype(int))
+
+    def dense(quantity: Quantity) -> Array:
+        return np.array([block[row, at] for row, c in enumerate(columns) if c.quantity == quantity]).T
+
+    if np.abs(dense("q")).max(initial=0.0) > LARGEST:
+        return Closure()
+    expected = robot.recursion.partial_torque(dense("q"), dense("qd"), dense("qdd"))
+    ours = np.zeros_like(expected)
+    for row, column in enumerate(columns):
+        if column.quantity == "tau_link":
+            ours[:, column.joint, column.link] = block[row, at]
+    absolute, relative = 0.0, 0.0
+    for unit in set(robot.units):
+        alike = [i for i, other in enumerate(robot.units) if other == unit]
+        error = float(np.abs(ours - expected)[:, alike].max(initial=0.0))
+        scale = float(np.abs(expected).sum(axis=2)[:, alike].max(initial=0.0))
+        absolute = max(absolute, error)
+        relative = max(relative, error / scale if scale else error)
+    return Closure(recursion_absolute=absolute, recursion_relative=relative)

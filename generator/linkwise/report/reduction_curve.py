@@ -1,0 +1,147 @@
+"""The cost-reduction curve (Fig. 15): y(n) = 1 − kept(n)/total(n), over an arm's first n links."""
+
+from dataclasses import dataclass
+
+from linkwise.errors import LinkwiseError
+from linkwise.progress import Progress
+from linkwise.report.curve_fit import (
+    PAPER_A,
+    PAPER_RATE,
+    CountPolynomial,
+    Saturation,
+    count_polynomial,
+    fit,
+    held_against,
+)
+from linkwise.report.expanded_torques import form_of, link_torques
+from linkwise.report.laurent import BudgetExceededError
+from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations, link_operations, summed
+from linkwise.report.term_count import RunningCount, TermQuery
+from linkwise.symbolic.system import System
+
+PAPER = TermQuery(joint=0, link=None, coordinate=0, order=2)
+"""The paper's: from τ_1, what contains q̈_1."""
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """The arm of the first `dof` links: Σ_j τ_1j against what its q̈_1 part alone takes."""
+
+    dof: int
+    total: int
+    kept: int
+    torque: Operations
+    part: Operations
+    everything: Operations
+
+    @property
+    def reduction(self) -> float:
+        """Share of terms that need no computing."""
+        return 1.0 - self.kept / self.total
+
+    @property
+    def redundant_per_kept(self) -> float:
+        """Terms computed in vain for each one that is wanted."""
+        return (self.total - self.kept) / self.kept
+
+    @property
+    def operations_reduction(self) -> float:
+        """Share of the emitted operations of τ_1 that need no computing."""
+        return _saved(self.part.shared, self.torque.shared)
+
+    @property
+    def written_reduction(self) -> float:
+        """The same with every shared expression written out wherever it is used."""
+        return _saved(self.part.written, self.torque.written)
+
+
+def _saved(part: int, whole: int) -> float:
+    """1 − part/whole; nothing is saved of a torque that takes no operation."""
+    return 1.0 - part / whole if whole else 0.0
+
+
+@dataclass(frozen=True)
+class Study:
+    """The curve of one arm, with fits. The polynomials rest on points beyond those asked for too."""
+
+    robot: str
+    form: str
+    points: tuple[CurvePoint, ...]
+    fitted: Saturation | None
+    paper: Saturation
+    total: CountPolynomial | None
+    kept: CountPolynomial | None
+
+    @property
+    def dof(self) -> tuple[int, ...]:
+        """Degrees of freedom of the points."""
+        return tuple(point.dof for point in self.points)
+
+
+def study(
+    name: str, system: System, first: int, last: int, beyond: int, budget: int, progress: Progress
+) -> Study:
+    """Count the links of a serial arm, to `beyond` where possible, and report on first..last under `name`."""
+    every = curve(system, last, budget, progress, beyond)
+    points = every[first - 1 : last]
+    dof, y = [p.dof for p in points], [p.reduction for p in points]
+    return Study(
+        name,
+        form_of(system),
+        points,
+        fit(dof, y),
+        held_against(PAPER_A, PAPER_RATE, dof, y),
+        count_polynomial([p.total for p in every]),
+        count_polynomial([p.kept for p in every]),
+    )
+
+
+def curve(
+    system: System, last: int, budget: int, progress: Progress, beyond: int = 0
+) -> tuple[CurvePoint, ...]:
+    """Points for 1..last links, and to `beyond` as far as links and budget reach.
+
+    Raises LinkwiseError for a tree, or where 1..last is beyond the links or the budget.
+
+    A link's torques depend on nothing behind it: the arm of n links is that of n − 1 and one more.
+    """
+    most = max(last, min(beyond, len(system.links)))
+    _require_serial(system, last, most)
+    running = RunningCount(len(system.coordinates))
+    costs: list[LinkOperations] = []
+    everything = NO_OPERATIONS
+    points: list[CurvePoint] = []
+    links = link_operations(system, (0,), PAPER)
+    try:
+        for found, cost in zip(link_torques(system, (0,), budget, progress, most), links, strict=False):
+            running.add(found.torques[0], found.variables)
+            costs.append(cost)
+            everything += cost.everything
+            whole, part = summed(costs, 0, PAPER)
+            total, kept = running.count.total, running.count.kept(PAPER)
+            if not kept:
+                raise LinkwiseError(
+                    f"{system.name}: no term of τ_1 contains q̈_1; the curve needs a first link with inertia"
+                )
+            points.append(CurvePoint(len(points) + 1, total, kept, whole, part, everything))
+    except BudgetExceededError as error:
+        if len(points) >= last:
+            return tuple(points)
+        raise LinkwiseError(
+            f"{system.name}: {len(points) + 1} links need more than {budget} terms; "
+            f"ask for at most {len(points)}, or raise --budget"
+        ) from error
+    return tuple(points)
+
+
+def _require_serial(system: System, last: int, most: int) -> None:
+    if last > len(system.links):
+        raise LinkwiseError(
+            f"{system.name}: --dof reaches {last}, but {len(system.links)} links move; reduce it"
+        )
+    for j in range(most):
+        if system.path(j) != tuple(range(j + 1)):
+            raise LinkwiseError(
+                f"{system.name}: link {system.link_names[j]!r} is not moved by joints 1..{j + 1}; "
+                "the curve needs a serial arm with one moving link a joint"
+            )

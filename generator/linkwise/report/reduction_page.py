@@ -1,0 +1,184 @@
+"""The cost-reduction study as data and as a page, with verdicts on the paper's claim."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from linkwise.emit.render import render
+from linkwise.report.curve_fit import PAPER_A, PAPER_RATE, CountPolynomial, Saturation, held_against
+from linkwise.report.reduction_curve import CurvePoint, Study
+
+DIGITS = 6
+"""Decimals of a rate: more would be noise in a file that is compared byte for byte."""
+CLOSE = 0.02
+"""RMSE up to which a curve is said to describe the points."""
+PAPER_DOF = 10
+"""Most degrees of freedom that the paper fitted its curve to."""
+PAPER_REDUNDANT = {5: 3, 10: 16}
+"""Redundant terms for each kept one that the paper states, by degrees of freedom."""
+
+
+def reduction_json(result: Study) -> dict[str, Any]:
+    """Return the whole study as JSON values."""
+    return {
+        "schema": 1,
+        "robot": result.robot,
+        "form": result.form,
+        "query": "terms of tau_1 = sum over links of tau_1j; kept: those that contain qdd_1",
+        "points": [point_row(point) for point in result.points],
+        "fit": _saturation(result.fitted),
+        "paper": _saturation(result.paper),
+        "polynomials": {"total": _polynomial(result.total), "kept": _polynomial(result.kept)},
+        "verdicts": [text.replace("**", "") for text in verdicts(result)],
+    }
+
+
+def point_row(point: CurvePoint) -> dict[str, Any]:
+    """Return one point as JSON values; its keys head the columns of the table."""
+    return {
+        "dof": point.dof,
+        "terms": point.total,
+        "kept": point.kept,
+        "reduction": round(point.reduction, DIGITS),
+        "operations": point.torque.shared,
+        "operations_written_out": point.torque.written,
+        "kept_operations": point.part.shared,
+        "kept_operations_written_out": point.part.written,
+        "operations_reduction": round(point.operations_reduction, DIGITS),
+        "written_out_reduction": round(point.written_reduction, DIGITS),
+        "decomposition_operations": point.everything.shared,
+    }
+
+
+def _saturation(curve: Saturation | None) -> dict[str, Any] | None:
+    if curve is None:
+        return None
+    return {
+        "A": round(curve.a, DIGITS),
+        "lambda": round(curve.rate, DIGITS),
+        "rmse": round(curve.rmse, DIGITS),
+        "residuals": [round(r, DIGITS) for r in curve.residuals],
+    }
+
+
+def _polynomial(found: CountPolynomial | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "newton_coefficients": list(found.coefficients),
+        "fitted_to_dof": found.fitted,
+        "checked_to_dof": found.checked,
+    }
+
+
+def reduction_markdown(result: Study, pictures: bool = False) -> str:
+    """Return the study as Markdown; with pictures where they lie beside it."""
+    view = {
+        "pictures": pictures,
+        "robot": result.robot,
+        "form": result.form,
+        "dof": f"{result.dof[0]}..{result.dof[-1]}",
+        "verdicts": list(verdicts(result)),
+        "points": [_line(point, result, at) for at, point in enumerate(result.points)],
+        "polynomials": [
+            (name, str(p), p.fitted, p.checked)
+            for name, p in (("total", result.total), ("kept", result.kept))
+            if p is not None
+        ],
+        "costs": [_costs(point) for point in result.points],
+    }
+    return render("report/reduction.md.j2", view)
+
+
+def _line(point: CurvePoint, result: Study, at: int) -> tuple[str, ...]:
+    fitted = "–" if result.fitted is None else f"{result.fitted.residuals[at]:+.4f}"
+    return (
+        str(point.dof),
+        str(point.total),
+        str(point.kept),
+        f"{point.reduction:.4f}",
+        f"{point.redundant_per_kept:.1f}",
+        fitted,
+        f"{result.paper.residuals[at]:+.4f}",
+    )
+
+
+def _costs(point: CurvePoint) -> tuple[str, ...]:
+    return (
+        str(point.dof),
+        str(point.torque.shared),
+        str(point.part.shared),
+        f"{point.operations_reduction:.4f}",
+        str(point.torque.written),
+        str(point.part.written),
+        f"{point.written_reduction:.4f}",
+        str(point.everything.shared),
+    )
+
+
+def verdicts(result: Study) -> Iterator[str]:
+    """Say where the paper's claim holds, and where it is weaker or stronger, by the points."""
+    yield _curve_verdict(result)
+    for point in result.points:
+        if point.dof in PAPER_REDUNDANT:
+            yield _redundancy_verdict(point)
+    if result.total is not None and result.kept is not None:
+        yield _limit_verdict(result.total, result.kept)
+    yield _operations_verdict(result.points[-1])
+
+
+def _curve_verdict(result: Study) -> str:
+    """Hold the paper's curve against the joints it was fitted to, and say where it is further out."""
+    inside = [p for p in result.points if p.dof <= PAPER_DOF] or list(result.points)
+    outside = result.points[len(inside) :]
+    paper = held_against(PAPER_A, PAPER_RATE, [p.dof for p in inside], [p.reduction for p in inside])
+    verdict = "Holds" if paper.rmse <= CLOSE else "Does not hold here"
+    text = (
+        f"**{verdict}: the curve.** {PAPER_A} (1 − exp(−{PAPER_RATE} n)) misses the counted points of "
+        f"n = {inside[0].dof}..{inside[-1].dof} by at most {paper.largest:.4f} (RMSE {paper.rmse:.4f})"
+    )
+    if outside:
+        text += f" and the further ones by up to {max(map(abs, result.paper.residuals[len(inside) :])):.4f}"
+    if result.fitted is None:
+        return text + "."
+    return text + (
+        f"; a free fit to all points, A = {result.fitted.a:.4f} and λ = {result.fitted.rate:.4f}, misses "
+        f"them by at most {result.fitted.largest:.4f} (RMSE {result.fitted.rmse:.4f})."
+    )
+
+
+def _redundancy_verdict(point: CurvePoint) -> str:
+    stated, found = PAPER_REDUNDANT[point.dof], point.redundant_per_kept
+    verdict = "Holds" if round(found) == stated else "Stronger" if found > stated else "Weaker"
+    return (
+        f"**{verdict}: {point.dof} DoF.** {found:.1f} redundant terms for each kept one; "
+        f"the paper says about {stated}."
+    )
+
+
+def _limit_verdict(total: CountPolynomial, kept: CountPolynomial) -> str:
+    """Hold the limit of the exact curve against the paper's: its words say 1, its curve ends at A."""
+    excess = total.degree - kept.degree
+    counts = f"Both counts are polynomials in n (degrees {total.degree} and {kept.degree})"
+    if excess <= 0:
+        return (
+            f"**Weaker: many DoF.** {counts}: y has a limit below 1, where the paper says that it tends to 1."
+        )
+    scale = float(kept.leading / total.leading)
+    beyond = next((n for n in range(1, 1000) if 1 - kept(n) / total(n) > PAPER_A), None)
+    passed = "" if beyond is None else f", which y passes at {beyond} DoF"
+    return (
+        f"**Holds: many DoF.** {counts}: 1 − y falls like {scale:.4g}/n^{excess}, and y tends to 1, as the "
+        f"paper says. The exponential is a fit, not a law: it ends at A = {PAPER_A}{passed}."
+    )
+
+
+def _operations_verdict(last: CurvePoint) -> str:
+    verdict = "Weaker" if last.operations_reduction < last.reduction else "Stronger"
+    return (
+        f"**{verdict}: emitted code.** At {last.dof} DoF the part kept takes "
+        f"{last.part.shared} operations, the product with q̈_1 among them, and the whole "
+        f"{last.torque.shared}: "
+        f"{last.operations_reduction:.1%} are saved, against {last.reduction:.1%} of the terms. "
+        "Emitted code computes once what an expanded sum repeats; with nothing shared "
+        f"{last.written_reduction:.1%} of the operations would be saved."
+    )

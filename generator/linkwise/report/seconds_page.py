@@ -1,0 +1,98 @@
+"""Measured seconds as data and as a page; read back, they draw the same plot again."""
+
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from linkwise.emit.render import render
+from linkwise.errors import LinkwiseError
+from linkwise.extras import extra
+from linkwise.report.reduction_curve import Study
+from linkwise.report.seconds import BATCH, Timing
+
+DIGITS = 4
+
+
+def seconds_json(robot: str, timings: Sequence[Timing]) -> dict[str, Any]:
+    """Return the measurement, and where it was made, as JSON values; times in µs a sample."""
+    rows = [{**asdict(t), "reduction": t.reduction} for t in timings]
+    return {
+        "schema": 1,
+        "robot": robot,
+        "unit": "microseconds a sample",
+        "batch": BATCH,
+        "threads": 1,
+        "dtype": "float64",
+        "machine": platform.machine(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "torch": extra("torch").__version__,
+        "timings": [
+            {k: round(v, DIGITS) if isinstance(v, float) else v for k, v in row.items()} for row in rows
+        ],
+    }
+
+
+def read_seconds(path: Path) -> dict[str, Any]:
+    """Read an earlier measurement; raises LinkwiseError for a file that is not one."""
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        timings_of(found)
+    except OSError as error:
+        raise LinkwiseError(f"{path}: cannot be read ({error.strerror}); give --seconds FILE") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise LinkwiseError(
+            f"{path}: not a measurement; give the measured.json that --measure writes"
+        ) from error
+    return found
+
+
+def timings_of(found: dict[str, Any]) -> tuple[Timing, ...]:
+    """Return the timings of a measurement's data."""
+    return tuple(
+        Timing(
+            int(t["dof"]),
+            str(t["method"]),
+            float(t["extract"]),
+            float(t["whole"]),
+            float(t["everything"]),
+        )
+        for t in found["timings"]
+    )
+
+
+def seconds_markdown(result: Study, found: dict[str, Any], pictures: bool = False) -> str:
+    """Return the measurement as Markdown; with its picture where that lies beside it."""
+    timings = timings_of(found)
+    methods = dict.fromkeys(t.method for t in timings)
+    view = {
+        "pictures": pictures,
+        "robot": found["robot"],
+        "batch": found["batch"],
+        "machine": ", ".join(f"{k} {found[k]}" for k in ("machine", "python", "numpy", "torch")),
+        "verdicts": [_verdict(result, [t for t in timings if t.method == m]) for m in methods],
+        "rows": [_line(t) for t in timings],
+    }
+    return render("report/measured.md.j2", view)
+
+
+def _verdict(result: Study, timings: Sequence[Timing]) -> str:
+    last = timings[-1]
+    terms = {p.dof: p.reduction for p in result.points}.get(last.dof)
+    text = (
+        f"**{last.method.capitalize()}**: at {last.dof} DoF extracting saves {last.reduction:.1%} of the time"
+    )
+    if terms is None:
+        return text + "."
+    verdict = "weaker" if last.reduction < terms else "stronger"
+    return f"{text}, {verdict} than the {terms:.1%} of the terms."
+
+
+def _line(t: Timing) -> tuple[str, ...]:
+    times = (f"{v:.3f}" for v in (t.extract, t.whole, t.everything))
+    return (str(t.dof), t.method, *times, f"{t.reduction:.3f}")

@@ -1,0 +1,233 @@
+"""The page in a real browser: no error, the slider moves the map, the numbers are the file's."""
+
+import json
+import shutil
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from linkwise.analysis import Processing, Reading, analyze
+from linkwise.analysis.columns import Column
+from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.result import Totals
+from linkwise.analysis.run import Wanted, analyze_to
+from linkwise.analysis.show.page import report
+from linkwise.progress import silent
+from motion_logs import PLANAR3, smooth, write_csv
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def driver():
+    webdriver = pytest.importorskip("selenium.webdriver", reason="no selenium here")
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    service = shutil.which("chromedriver")
+    if browser is None or service is None:
+        pytest.skip("no chromium with chromedriver here: apt-get install chromium-driver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = browser
+    for flag in ("headless=new", "no-sandbox", "disable-gpu", "disable-background-networking"):
+        options.add_argument(f"--{flag}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options, webdriver.ChromeService(service))
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory) -> Path:
+    """A result of 2,000 samples, so that the page shows every second one."""
+    place = tmp_path_factory.mktemp("page")
+    log = write_csv(place / "a<b>.csv", smooth(2000, 3))
+    robot = load_robot(PLANAR3)
+    analyze_to(place / "out", log, robot, Reading(), Processing(), Wanted(), silent)
+    return place / "out"
+
+
+@pytest.fixture
+def page(driver, result):
+    driver.get((result / "report.html").as_uri())
+    yield driver
+    assert driver.get_log("browser") == []
+
+
+def choose(page, name, value):
+    page.execute_script(
+        "const e = document.getElementById(arguments[0]); e.value = arguments[1];"
+        "e.dispatchEvent(new Event('input', {bubbles: true}));"
+        "e.dispatchEvent(new Event('change', {bubbles: true}));",
+        name,
+        str(value),
+    )
+
+
+def shown_map(page):
+    z, numbers = page.execute_script(
+        "const {z, meta} = document.getElementById('map').data[0]; return [z, meta]"
+    )
+    return z, numbers
+
+
+def test_it_says_what_it_shows(page):
+    assert page.title == "planar3 · a<b>.csv"
+    note = page.find_element("id", "reduced").text
+    assert "of 2,000 samples the page shows one in 2, 1,000 in all" in note
+
+
+def test_slider_moves_the_map_to_the_files_numbers(page, result):
+    table = pq.read_table(result / "analysis.parquet")
+    seen = []
+    for at in (0, 123, 999):
+        choose(page, "slider", at)
+        row = {name: table[name][2 * at].as_py() for name in table.column_names}
+        z, numbers = shown_map(page)
+        seen.append(z)
+        for i in range(3):
+            for k in range(3):
+                for column, quantity in ((k, "tau_qdd"), (3 + k, "tau_qd")):
+                    terms = [
+                        row.get(f"{quantity}/joint{i + 1}/link{j + 1}/joint{k + 1}", 0.0) for j in range(3)
+                    ]
+                    assert numbers[i][column] == pytest.approx(sum(terms), rel=1e-13, abs=1e-300)
+        assert page.find_element("id", "now").text == f"{row['time']:.2f} s"
+    assert seen[0] != seen[1] != seen[2]
+
+
+def test_numbers_in_the_table_are_the_files(page, result):
+    table = pq.read_table(result / "analysis.parquet")
+    choose(page, "slider", 321)
+    choose(page, "joint", 0)
+    choose(page, "link", 2)
+    choose(page, "order", "everything")
+    cells = page.execute_script(
+        "return [...document.querySelectorAll('#numbers td[data-value]')]"
+        ".map((td) => [JSON.parse(td.dataset.columns), Number(td.dataset.value), td.textContent])"
+    )
+    assert len(cells) == 8  # three accelerations, three velocities, gravity, and their sum
+    for (name,), value, text in cells:
+        assert value == table[name][642].as_py()
+        assert float(text) == pytest.approx(value, rel=6e-3)
+    assert cells[-1][0] == ["tau/joint1/link3"]
+    assert sum(value for _, value, _ in cells[:-1]) == pytest.approx(cells[-1][1], rel=1e-12)
+
+
+def test_curves_are_linked_to_the_slider(page):
+    choose(page, "slider", 700)
+    share = page.execute_script(
+        "const area = document.querySelector('#curves .nsewdrag').getBoundingClientRect();"
+        "const line = document.getElementById('cursor').getBoundingClientRect();"
+        "return (line.left + line.width / 2 - area.left) / area.width"
+    )
+    assert share == pytest.approx(700 / 999, abs=2e-3)
+    page.execute_script("document.getElementById('map').emit('plotly_click', {points: [{x: 2, y: 1}]})")
+    assert page.find_element("id", "joint").get_attribute("value") == "1"
+    assert page.find_element("id", "curves-title").text == "On joint2, through all links, by cause"
+    page.execute_script("document.getElementById('curves').emit('plotly_click', {points: [{x: 3.3}]})")
+    assert page.find_element("id", "slider").get_attribute("value") == "165"
+
+
+def test_keyboard(page):
+    body = page.find_element("tag name", "body")
+    slider = page.find_element("id", "slider")
+    body.send_keys("\ue011")  # Home
+    body.send_keys("\ue014")  # right
+    assert slider.get_attribute("value") == "1"
+    body.send_keys("\ue010")  # End
+    assert slider.get_attribute("value") == "999"
+    body.send_keys(" ")  # from the end it plays from the start
+    play = page.find_element("id", "play")
+    assert play.get_attribute("aria-pressed") == "true"
+    page.execute_async_script("setTimeout(arguments[0], 400)")
+    body.send_keys(" ")
+    assert play.get_attribute("aria-pressed") == "false"
+    assert 1 < int(slider.get_attribute("value")) < 500
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_phone_width_and_colour_scheme(page, scheme):
+    feature = {"name": "prefers-color-scheme", "value": scheme}
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [feature]})
+    size = {"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": True}
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    page.refresh()
+    widths = "return [document.documentElement.scrollWidth, document.getElementById('map').clientWidth]"
+    full, plot = page.execute_script(widths)
+    assert full == 390
+    assert 300 < plot < 390
+    ink = page.execute_script("return getComputedStyle(document.body).color")
+    assert (sum(map(int, ink[4:-1].split(","))) > 400) == (scheme == "dark")
+    page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_downloads(page, result, tmp_path):
+    page.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
+    for button in ("save-curves-csv", "save-map-png"):
+        page.execute_script("document.getElementById(arguments[0]).click()", button)
+    page.execute_async_script("setTimeout(arguments[0], 1500)")
+    written = {file.suffix: file for file in tmp_path.iterdir()}
+    assert written[".png"].read_bytes()[:4] == b"\x89PNG"
+    saved = np.genfromtxt(written[".csv"], delimiter=",", skip_header=1)
+    table = pq.read_table(result / "analysis.parquet")
+    np.testing.assert_array_equal(saved[:, 0], table["time"].to_numpy()[::2])
+    record = json.loads((result / "analysis.json").read_text(encoding="utf-8"))
+    assert record["samples"] == 2 * len(saved)
+
+
+def crowd(place, count=14):
+    """A page of as many joints, one with a name of 80 letters, where k loads i through link k."""
+    place.mkdir()
+    analysis = analyze(write_csv(place / "a.csv", smooth(40, 3)), PLANAR3)
+    names = tuple(
+        f"spine_joint_{i}" if i != 4 else f"{'name_from_a_drawing_' * 4}"[:79] + "4" for i in range(14)
+    )
+    robot = replace(analysis.robot, joints=names, links=names, units=("rad",) * count, bodies=None)
+    columns = [Column("time", "time", "s")] + [
+        Column("tau_qdd", f"tau_qdd/{i}/{k}/{k}", "N·m", i, k, k) for i in range(count) for k in range(count)
+    ]
+    values = np.vstack([analysis.values[0], np.sin(np.arange(count * count)[:, None] + np.arange(40) / 9)])
+    totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
+    made = replace(analysis, robot=robot, columns=tuple(columns), values=values, totals=totals)
+    (place / "report.html").write_text(report(made), encoding="utf-8")
+    return names, (place / "report.html").as_uri()
+
+
+TICKS = (
+    "return [...document.querySelectorAll('#map .' + arguments[0] + ' text')]"
+    ".map((text) => [text.textContent, text.getBoundingClientRect()])"
+    ".map(([text, box]) => [text, box.left, box.right, box.top, box.bottom])"
+)
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_many_joints_and_long_names_fit(driver, tmp_path, width):
+    names, address = crowd(tmp_path / "page")
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    driver.get(address)
+    full, plot, area = driver.execute_script(
+        "return [document.documentElement.scrollWidth, document.getElementById('map').clientWidth,"
+        "document.querySelector('#map .nsewdrag').getBoundingClientRect().width]"
+    )
+    assert full <= width
+    assert area > 0.5 * plot
+    columns = driver.execute_script(TICKS, "xtick")
+    assert [text for text, *_ in columns][:2] == (["q̈ 1", "q̈ 3"] if width < 500 else ["q̈ 1", "q̈ 2"])
+    for (_, _, right, _, _), (_, left, _, _, _) in pairwise(columns):
+        assert right <= left + 1
+    rows = driver.execute_script(TICKS, "ytick")
+    assert len(rows) == 14
+    assert "…" in rows[4][0]
+    for (_, _, _, _, bottom), (_, _, _, top, _) in pairwise(sorted(rows, key=lambda row: row[3])):
+        assert bottom <= top + 1
+    hover, colours = driver.execute_script(
+        "return [document.getElementById('map').data[0].customdata[4][4],"
+        "document.getElementById('curves').data.map((trace) => trace.line.color)]"
+    )
+    assert hover[:2] == [names[4], f"{names[4]} q̈"]
+    assert len(set(colours)) == 14
+    assert driver.get_log("browser") == []
+    driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

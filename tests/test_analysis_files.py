@@ -1,0 +1,217 @@
+"""What `linkwise analyze` and `linkwise motion` write, and that nothing half-written stays."""
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from linkwise import progress
+from linkwise.analysis import analyze, tables
+from linkwise.analysis import run as run_module
+from linkwise.analysis.settings import Lowpass, Processing
+from linkwise.analysis.stream import KeptSamples, stride_for
+from linkwise.cli.app import app
+from linkwise.errors import LinkwiseError
+from motion_logs import PLANAR3, smooth, write_csv
+from typer.testing import CliRunner
+
+ROBOT = ("--robot", str(PLANAR3))
+
+
+@pytest.fixture
+def call():
+    def run(*arguments):
+        result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+        if isinstance(result.exception, LinkwiseError):
+            raise result.exception
+        assert result.exit_code == 0, result.output
+        return result
+
+    return run
+
+
+@pytest.fixture
+def log(tmp_path):
+    return write_csv(tmp_path / "log.csv", smooth(120, 3))
+
+
+def test_parquet_holds_the_analysis(call, log, tmp_path):
+    call("analyze", log, *ROBOT, "--out", tmp_path / "out", "--no-page", "--cutoff", 9)
+    table = pq.read_table(tmp_path / "out" / "analysis.parquet")
+    expected = analyze(log, PLANAR3, processing=Processing(lowpass=Lowpass(9.0)))
+    assert table.column_names == [column.name for column in expected.columns]
+    np.testing.assert_array_equal(np.array([c.to_numpy() for c in table.columns]), expected.values)
+    meta = table.schema.field("tau_qd/joint1/link3/joint2").metadata
+    assert meta[b"unit"].decode() == "N·m"
+    assert (meta[b"joint"], meta[b"link"], meta[b"cause"]) == (b"0", b"2", b"1")
+    note = json.loads(table.schema.metadata[b"linkwise"])
+    assert note["processing"]["lowpass"] == {"cutoff": 9.0, "order": 2, "padding": "odd"}
+    record = json.loads((tmp_path / "out" / "analysis.json").read_text(encoding="utf-8"))
+    assert record == json.loads(json.dumps(expected.record()))
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["log.csv", "out"]
+
+
+def test_csv_reads_back_exactly(call, log, tmp_path):
+    call("analyze", log, *ROBOT, "--out", tmp_path / "out", "--no-page", "--format", "csv")
+    with (tmp_path / "out" / "analysis.csv").open(encoding="utf-8", newline="") as handle:
+        header, *rows = csv.reader(handle)
+    expected = analyze(log, PLANAR3)
+    assert header == [column.name for column in expected.columns]
+    np.testing.assert_array_equal(np.array(rows, float).T, expected.values)
+
+
+def test_everything_and_json(call, log, tmp_path):
+    out = tmp_path / "out"
+    result = call(
+        "analyze", log, *ROBOT, "--out", out, "--figure", "paper", "--figure", "paper:joint2", "--json"
+    )
+    assert json.loads(result.stdout)["closure"]["terms_relative"] < 1e-12
+    assert sorted(file.name for file in out.iterdir()) == [
+        "analysis.json",
+        "analysis.parquet",
+        "paper-joint2.png",
+        "paper.png",
+        "report.html",
+    ]
+
+
+def test_a_former_result_is_replaced_and_nothing_else(call, log, tmp_path):
+    out = tmp_path / "out"
+    call("analyze", log, *ROBOT, "--out", out, "--no-page")
+    call("analyze", log, *ROBOT, "--out", out, "--no-page", "--format", "csv")
+    assert sorted(file.name for file in out.iterdir()) == ["analysis.csv", "analysis.json"]
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").touch()
+    with pytest.raises(LinkwiseError, match="exists and is not a former result"):
+        call("analyze", log, *ROBOT, "--out", tmp_path / "mine")
+    assert [file.name for file in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--cutoff", "50"), "log.csv: --cutoff 50 Hz is not below half"),
+        (("--figure", "pie"), "--figure pie: give one of paper, shares"),
+        (("--figure", "paper:hip"), "with a joint of joint1"),
+        (("--map", "joint1"), "--map joint1: write it as COLUMN=JOINT"),
+        (("--backend", "abacus"), "no back end"),
+        (("--window", "9"), "--window and --degree go with --derivative savitzky-golay"),
+        (("--padding", "even"), "--filter-order and --padding go with --cutoff"),
+    ],
+)
+def test_mistakes_leave_nothing(call, log, tmp_path, options, message):
+    with pytest.raises(LinkwiseError, match=message):
+        call("analyze", log, *ROBOT, "--out", tmp_path / "out", *options)
+    assert [file.name for file in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_a_fault_on_the_way_leaves_nothing(call, log, tmp_path, monkeypatch):
+    def fail(_):
+        raise LinkwiseError("page")
+
+    monkeypatch.setattr(run_module, "report", fail)
+    with pytest.raises(LinkwiseError, match="page"):
+        call("analyze", log, *ROBOT, "--out", tmp_path / "out")
+    assert [file.name for file in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_a_full_disk_is_told(call, log, tmp_path, monkeypatch):
+    def fill(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(tables.ParquetTable, "__call__", fill)
+    with pytest.raises(LinkwiseError, match=r"nothing was written: .*No space left on device"):
+        call("analyze", log, *ROBOT, "--out", tmp_path / "out")
+    assert [file.name for file in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_a_failed_exchange_keeps_the_former_result(call, log, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    call("analyze", log, *ROBOT, "--out", out, "--no-page")
+    former = (out / "analysis.json").read_bytes()
+    rename = Path.rename
+
+    def fail(path, target):
+        if target == out and not path.name.endswith(".former"):
+            raise OSError(5, "Input/output error")
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", fail)
+    with pytest.raises(LinkwiseError, match="nothing was written: Input/output error"):
+        call("analyze", log, *ROBOT, "--out", out, "--no-page", "--format", "csv")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["log.csv", "out"]
+    assert (out / "analysis.json").read_bytes() == former
+    assert (out / "analysis.parquet").is_file()
+
+
+def test_a_link_to_a_former_result_is_not_replaced(call, log, tmp_path):
+    call("analyze", log, *ROBOT, "--out", tmp_path / "out", "--no-page")
+    (tmp_path / "link").symlink_to(tmp_path / "out")
+    with pytest.raises(LinkwiseError, match="exists and is not a former result"):
+        call("analyze", log, *ROBOT, "--out", tmp_path / "link", "--no-page")
+
+
+def test_motions_are_written_and_analysed(call, tmp_path):
+    written = json.loads(call("motion", "--out", tmp_path, "--json").stdout)
+    assert [entry["samples"] for entry in written] == [801, 601]
+    for entry in written:
+        call("analyze", entry["file"], *ROBOT, "--out", tmp_path / "out", "--no-page")
+
+
+def test_warnings_and_left_out_columns_are_told(call, tmp_path):
+    table = np.column_stack([smooth(20, 3) * [1, 90, 90, 90], np.zeros(20)])
+    log = write_csv(tmp_path / "a.csv", table, ("joint1", "joint2", "joint3", "emg"))
+    result = call("analyze", log, *ROBOT, "--out", tmp_path / "out", "--no-page", "--ignore-extra")
+    assert "if that is degrees, pass --units deg" in result.stderr
+    assert "left out: emg" in result.stderr
+
+
+def test_long_logs_are_thinned_evenly():
+    values = np.arange(2000.0).reshape(2, 1000)
+    keep = KeptSamples(2, 7)
+    for start in range(0, 1000, 13):
+        keep(values[:, start : start + 13])
+    np.testing.assert_array_equal(keep.values, values[:, ::7])
+    assert stride_for(1000, 10, 500_000, 1500) == 1
+    assert stride_for(1501, 10, 500_000, 1500) == 2
+    assert stride_for(10_000, 1000, 500_000, 1500) == 20
+
+
+def test_importing_the_commands_needs_no_extra():
+    code = (
+        "import sys, linkwise.cli.motion;"
+        "print({'scipy', 'pyarrow', 'matplotlib', 'plotly'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
+
+
+def test_a_missing_extra_is_named(monkeypatch, log, call, tmp_path):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(LinkwiseError, match=r"pyarrow is needed .* pip install 'linkwise\[motion\]'"):
+        call("analyze", log, *ROBOT, "--out", tmp_path / "out")
+
+
+def test_progress_in_plain_lines(capsys):
+    with progress.progress() as report:
+        for done in range(0, 1001, 10):
+            report("analysing", done, 1000)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [f"analysing: {percent}%" for percent in range(0, 101, 10)]
+
+
+def test_progress_bar_tells_the_rate(monkeypatch, capsys):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "120")
+    with progress.progress({"reading": "B"}) as report:
+        for done in (100, 500, 1000):
+            report("reading", done, 1000)
+    text = capsys.readouterr().err
+    assert "reading" in text
+    assert "B/s" in text
+    assert "left" in text

@@ -1,0 +1,129 @@
+"""Readers of CSV, OpenSim storage and Parquet, and what they refuse."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from linkwise.analysis.logs import open_log
+from linkwise.errors import LinkwiseError
+from motion_logs import JOINTS, smooth, write_csv, write_mot
+
+
+def whole(path: Path, columns: tuple[int, ...], rows: int = 1000) -> np.ndarray:
+    return np.concatenate([block for block, _ in open_log(path).read(columns, rows)])
+
+
+def test_csv_reads_back_exactly_whatever_the_block(tmp_path):
+    table = smooth(50, 3)
+    path = write_csv(tmp_path / "a.csv", table)
+    np.testing.assert_array_equal(whole(path, (0, 1, 2, 3)), table)
+    np.testing.assert_array_equal(whole(path, (0, 3, 1), rows=7), table[:, [0, 3, 1]])
+
+
+@pytest.mark.parametrize("mark", [";", "\t", ",", ", "])
+def test_csv_takes_the_delimiter_of_its_header(tmp_path, mark):
+    path = tmp_path / "a.csv"
+    text = f'\ufefftime{mark}"left, knee"\r\n0{mark}1.5\r\n\n'
+    path.write_text(text, encoding="utf-8", newline="")
+    assert open_log(path).columns == ("time", "left, knee")
+    np.testing.assert_array_equal(whole(path, (0, 1)), [[0, 1.5]])
+
+
+def test_empty_cells_at_the_end_and_quoted_delimiters_are_not_more_columns(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text('time,a,note\n0,1,"x, y"\n0.1,2,z,\n', encoding="utf-8")
+    np.testing.assert_array_equal(whole(path, (0, 1)), [[0, 1], [0.1, 2]])
+
+
+def test_opensim_storage(tmp_path):
+    table = np.round(smooth(9, 2), 8)
+    path = write_mot(tmp_path / "a.mot", table, ("hip", "knee"))
+    log = open_log(path)
+    assert (log.columns, log.degrees, log.first_row) == (("time", "hip", "knee"), True, 11)
+    np.testing.assert_array_equal(whole(path, (0, 1, 2)), table)
+    write_mot(tmp_path / "b.sto", table, ("hip", "knee"), inDegrees="no")
+    assert open_log(tmp_path / "b.sto").degrees is False
+
+
+def test_parquet(tmp_path):
+    table = smooth(30, 2)
+    arrays = dict(zip(("time", "a", "b"), table.T.copy(), strict=True))
+    pq.write_table(pa.table(arrays), tmp_path / "a.parquet")
+    np.testing.assert_array_equal(whole(tmp_path / "a.parquet", (2, 0)), table[:, [2, 0]])
+    arrays["b"] = pa.array([None] + [1] * 29)
+    pq.write_table(pa.table(arrays), tmp_path / "b.parquet")
+    assert np.isnan(whole(tmp_path / "b.parquet", (2,))[0, 0])
+
+
+def test_size_is_reached(tmp_path):
+    log = open_log(write_csv(tmp_path / "a.csv", smooth(10, 3)))
+    done = [at for _, at in log.read((0, 1), rows=4)]
+    assert done == sorted(done)
+    assert done[-1] == log.size
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (["0,1,2,3", "0.1,1,x,3"], r"row 3, column 'joint2': 'x' is not a number"),
+        (["0,1,2,3", "0.1,1,,3"], r"row 3, column 'joint2': empty; fill the gap"),
+        (["0,1,2,3", "0.1,1"], r"row 3: 2 cells where the header names 4; the file is cut off"),
+        (["0,1,2,3", "", "0.1,1,2,3"], r"row 3: blank row"),
+        (["0,1,2,3", "0,1,1,5,2,3"], r"row 3: 6 cells where the header names 4; is there a comma"),
+    ],
+)
+def test_faulty_cells_are_named_by_row_and_column(tmp_path, lines, message):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([",".join(["time", *JOINTS]), *lines]) + "\n", encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=message):
+        whole(path, (0, 1, 2, 3))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "row 1: no header"),
+        ("0,1\n1,2\n", "row 1 holds numbers; put a header"),
+    ],
+)
+def test_missing_header(tmp_path, text, message):
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=message):
+        open_log(tmp_path / "a.csv")
+
+
+def test_cut_off_files(tmp_path):
+    path = write_mot(tmp_path / "a.mot", smooth(5, 1), ("hip",), nRows="9")
+    with pytest.raises(LinkwiseError, match=r"nRows=9 but 5 rows follow \(the last is row 15\)"):
+        whole(path, (0, 1))
+    write_mot(path, smooth(5, 1), ("hip",), nColumns="4")
+    with pytest.raises(LinkwiseError, match="2 column names where the header promises nColumns=4"):
+        open_log(path)
+    path.write_text("Coordinates\nnRows=3\n", encoding="utf-8")
+    with pytest.raises(LinkwiseError, match="no line 'endheader'"):
+        open_log(path)
+    pq.write_table(pa.table({"time": [0.0, 1.0]}), tmp_path / "a.parquet")
+    data = (tmp_path / "a.parquet").read_bytes()
+    (tmp_path / "a.parquet").write_bytes(data[:-20])
+    with pytest.raises(LinkwiseError, match="not Parquet, or cut off"):
+        open_log(tmp_path / "a.parquet")
+
+
+def test_other_files(tmp_path):
+    (tmp_path / "a.xlsx").write_bytes(b"")
+    with pytest.raises(LinkwiseError, match="unknown suffix; give a"):
+        open_log(tmp_path / "a.xlsx")
+    with pytest.raises(LinkwiseError, match="no such file"):
+        open_log(tmp_path / "b.csv")
+    (tmp_path / "a.csv").write_bytes(b"time,\xff\n")
+    with pytest.raises(LinkwiseError, match="not UTF-8"):
+        open_log(tmp_path / "a.csv")
+
+
+def test_a_decimal_comma_is_named(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time;joint1\n0;1\n0,01;2\n", encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=r"row 3, column 'time': '0,01' has a decimal comma"):
+        whole(path, (0, 1))

@@ -1,0 +1,55 @@
+"""The page's template and the data in it."""
+
+import base64
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linkwise.analysis import analyze
+from linkwise.analysis.show.page import TEMPLATE, page_data, report, view
+from linkwise.emit.render import variables
+from motion_logs import PLANAR3, smooth, write_csv
+
+EVIL = '</script><script>alert("1")</script>&<!--'
+
+
+@pytest.fixture(scope="module")
+def analysis(tmp_path_factory):
+    return analyze(write_csv(tmp_path_factory.mktemp("a") / "a.csv", smooth(80, 3)), PLANAR3)
+
+
+def test_template_and_view_agree(analysis):
+    assert variables(TEMPLATE) == set(view(analysis))
+
+
+def test_numbers_are_the_tables_to_the_last_bit(analysis):
+    data = json.loads(page_data(analysis))
+    values = np.frombuffer(base64.b64decode(data["values"]), "<f8")
+    np.testing.assert_array_equal(values.reshape(analysis.values.shape), analysis.values)
+    origins = np.frombuffer(base64.b64decode(data["bodies"]["origins"]), "<f8")
+    assert origins.shape == (80 * 3 * 3,)
+    assert data["bodies"]["up"] == [0, 9.80665, 0]
+
+
+def test_names_cannot_end_their_element(analysis):
+    robot = replace(analysis.robot, name=EVIL, joints=(EVIL, "b", "c"), links=("a", EVIL, "c"))
+    html = report(replace(analysis, robot=robot, source=EVIL))
+    assert EVIL not in html
+    assert "alert(" not in html.replace('alert(\\"1', "").replace("alert(&#34;1", "")
+    block = re.search(r'<script type="application/json" id="data">(.*?)</script>', html, re.S)
+    data = json.loads(block[1])
+    assert (data["robot"], data["joints"][0]["name"], data["links"][1]) == (EVIL, EVIL, EVIL)
+
+
+def test_page_is_one_file(analysis):
+    html = report(analysis)
+    head = html[: html.index('id="data"')]
+    assert not re.search(r"(src|href)=", head)
+    assert "default-src 'none'" in head
+
+
+def test_robot_without_geometry(analysis):
+    robot = replace(analysis.robot, bodies=None)
+    assert json.loads(page_data(replace(analysis, robot=robot)))["bodies"] is None

@@ -1,0 +1,186 @@
+"""Columns matched to joints, units, time and gaps."""
+
+import numpy as np
+import pytest
+from linkwise.analysis.even_time import resampled
+from linkwise.analysis.samples import read_samples
+from linkwise.analysis.selection import select
+from linkwise.analysis.settings import Reading
+from linkwise.errors import LinkwiseError
+from linkwise.progress import silent
+from motion_logs import JOINTS, smooth, write_csv, write_mot
+
+ANGLES = ("rad", "rad", "rad")
+
+
+def read(path, reading=None, units=ANGLES, buffer=None):
+    return read_samples(path, JOINTS, units, reading or Reading(), silent, buffer)
+
+
+def test_samples_are_the_log(tmp_path):
+    table = smooth(40, 3)
+    path = write_csv(tmp_path / "a.csv", table)
+    for buffer in (None, tmp_path):
+        samples = read(path, buffer=buffer)
+        np.testing.assert_array_equal(samples.time, table[:, 0])
+        np.testing.assert_array_equal(samples.q, table[:, 1:])
+        assert samples.rate == pytest.approx(100, rel=1e-12)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.csv"]
+
+
+def test_degrees_turn_angles_only(tmp_path):
+    table = np.round(smooth(9, 3) * [1, 50, 50, 50], 8)
+    path = write_mot(tmp_path / "a.mot", table, JOINTS)
+    q = read(path, units=("m", "rad", "rad")).q
+    np.testing.assert_array_equal(q[:, 0], table[:, 1])
+    np.testing.assert_allclose(q[:, 1:], np.radians(table[:, 2:]), rtol=1e-15)
+    with pytest.raises(LinkwiseError, match="--units rad contradicts the file's inDegrees=yes"):
+        read(path, Reading(units="rad"))
+
+
+@pytest.mark.parametrize(
+    ("scale", "units", "warning"),
+    [
+        (60, None, "reaches 54 rad, 8.6 turns: if that is degrees, pass --units deg"),
+        (1, "deg", "if that is radians, pass --units rad"),
+        (1, None, None),
+        (60, "deg", None),
+    ],
+)
+def test_unlikely_units_are_warned_of(tmp_path, scale, units, warning):
+    path = write_csv(tmp_path / "a.csv", smooth(400, 3) * [1, scale, scale, scale])
+    warnings = read(path, Reading(units=units)).warnings
+    assert [warning in text for text in warnings] == ([True] if warning else [])
+
+
+@pytest.mark.parametrize(
+    ("columns", "reading", "message"),
+    [
+        (("time", "joint1", "joint2"), {}, "no column for joint 'joint3'; name it with --map"),
+        (("time", *JOINTS, "emg"), {}, "no joint for column 'emg'; .* --ignore-extra"),
+        (("stamp", *JOINTS), {}, "no column 'time' .* --time COLUMN"),
+        (("time", *JOINTS, "joint1"), {}, "column 'joint1' stands twice"),
+        (("time", *JOINTS), {"mapping": (("a", "joint1"),)}, "the log has no column 'a'"),
+        (("time", *JOINTS), {"mapping": (("joint1", "x"),)}, "the robot has no joint 'x'"),
+        (("time", *JOINTS[1:]), {"mapping": (("time", "joint1"),)}, "'time' is asked to be"),
+        (("time", *JOINTS), {"time": "t"}, "--time t: no such column"),
+    ],
+)
+def test_columns_that_do_not_fit(columns, reading, message):
+    with pytest.raises(LinkwiseError, match=message):
+        select(columns, JOINTS, Reading(**reading))
+
+
+def test_columns_by_map_time_and_leave():
+    reading = Reading(time="clock", mapping=(("q3", "joint3"),), ignore_extra=True)
+    found = select(("joint2", "q3", "emg", "clock", "joint1"), JOINTS, reading)
+    assert (found.time, found.joints, found.ignored) == (3, (4, 0, 1), ("emg",))
+
+
+@pytest.mark.parametrize(
+    ("row", "time", "message"),
+    [
+        (5, 0.04, r"row 7, time column: time repeats 0.04 s; sort"),
+        (5, 0.01, r"row 7, time column: time runs back to 0.01 s"),
+        (5, 0.053, r"row \d+, time column: a step of .* --resample"),
+        (slice(5, None), None, r"rows 6 to 7, time column: a gap of 1.01 s where steps are 0.01 s"),
+    ],
+)
+def test_time_must_be_even(tmp_path, row, time, message):
+    table = smooth(10, 3)
+    table[row, 0] = table[row, 0] + 1 if time is None else time
+    with pytest.raises(LinkwiseError, match=message):
+        read(write_csv(tmp_path / "a.csv", table))
+
+
+def test_nan_is_named(tmp_path):
+    table = smooth(10, 3)
+    table[4, 2] = np.nan
+    with pytest.raises(LinkwiseError, match=r"a.csv: row 6, column 'joint2': nan is not a sample"):
+        read(write_csv(tmp_path / "a.csv", table))
+
+
+def test_rounded_time_is_even_enough(tmp_path):
+    table = smooth(200, 3, rate=60)
+    table[:, 0] = np.round(table[:, 0], 6)
+    assert read(write_csv(tmp_path / "a.csv", table)).rate == pytest.approx(60, rel=1e-6)
+
+
+def test_resampling_follows_the_signal_and_not_the_window(tmp_path):
+    rng = np.random.default_rng(1)
+    time = np.cumsum(0.01 * rng.uniform(0.7, 1.3, 3000))
+    table = np.column_stack([time, np.sin(5 * time), np.cos(3 * time)])
+    whole = np.concatenate([*resampled(table, 100.0)])
+    np.testing.assert_allclose(whole[:, 1], np.sin(5 * whole[:, 0]), atol=1e-7)
+    np.testing.assert_allclose(np.diff(whole[:, 0]), 0.01, rtol=1e-9)
+    parts = np.concatenate([*resampled(table, 100.0, rows=97)])
+    np.testing.assert_allclose(parts, whole, atol=1e-12)
+    path = write_csv(tmp_path / "a.csv", table, ("joint1", "joint2"))
+    samples = read_samples(path, JOINTS[:2], ANGLES[:2], Reading(resample=50), silent)
+    np.testing.assert_allclose(samples.q, whole[::2, 1:][: len(samples.q)], atol=1e-12)
+
+
+def test_too_short(tmp_path):
+    with pytest.raises(LinkwiseError, match="1 samples; a movement needs 5"):
+        read(write_csv(tmp_path / "a.csv", smooth(1, 3)))
+
+
+def test_a_rate_beyond_reason_is_refused(tmp_path):
+    path = write_csv(tmp_path / "a.csv", smooth(73, 3, rate=60))
+    message = r"--resample 1e\+12 Hz is more than 100 times the log's own mean rate of 60 Hz"
+    with pytest.raises(LinkwiseError, match=message):
+        read(path, Reading(resample=1e12), buffer=tmp_path)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.csv"]
+
+
+def test_resampling_reports_progress():
+    seen = []
+    blocks = [*resampled(smooth(50, 1), 200.0, rows=40, progress=lambda *step: seen.append(step))]
+    assert [len(block) for block in blocks] == [40, 40, 19]
+    assert seen == [("resampling", 40, 99), ("resampling", 80, 99), ("resampling", 99, 99)]
+
+
+@pytest.mark.parametrize(("rate", "digits"), [(60, 3), (60, 4), (240, 3)])
+def test_time_rounded_to_its_last_digit_is_even(tmp_path, rate, digits):
+    table = smooth(300, 3, rate=rate)
+    table[:, 0] = np.round(table[:, 0], digits)
+    assert read(write_csv(tmp_path / "a.csv", table)).rate == pytest.approx(rate, rel=1e-4)
+
+
+def test_jitter_is_not_rounding(tmp_path):
+    table = smooth(300, 3, rate=60)
+    table[:, 0] = np.round(table[:, 0], 3)
+    table[100:, 0] += 0.001
+    table[200:, 0] += 0.001
+    with pytest.raises(LinkwiseError, match=r"time column: a step of .* --resample"):
+        read(write_csv(tmp_path / "a.csv", table))
+
+
+def test_milliseconds_are_warned_of(tmp_path):
+    table = smooth(30, 3) * [1000, 1, 1, 1]
+    (warning,) = read(write_csv(tmp_path / "a.csv", table)).warnings
+    assert warning == "0.1 samples a second are few: if time is in ms, divide it by 1000"
+    assert read(write_csv(tmp_path / "b.csv", smooth(30, 3, rate=10))).warnings == ()
+
+
+def test_a_header_without_a_unit_is_warned_of(tmp_path):
+    path = write_mot(tmp_path / "a.mot", smooth(30, 3), JOINTS)
+    said = path.read_text(encoding="utf-8")
+    path.write_text(said.replace("inDegrees=yes\n", ""), encoding="utf-8")
+    (warning,) = read(path).warnings
+    assert warning.startswith("the header has no inDegrees: angles are taken for radians")
+    assert read(path, Reading(units="rad")).warnings == ()
+    path.write_text(said.replace("inDegrees=yes", "inDegrees=maybe"), encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=r"a.mot: inDegrees='maybe' in the header is neither yes nor no"):
+        read(path)
+
+
+def test_a_last_row_that_may_be_cut_is_warned_of(tmp_path):
+    path = write_csv(tmp_path / "a.csv", np.round(smooth(30, 3) + 1.1, 2) + 0.001)
+    text = path.read_text(encoding="utf-8").rstrip("\n")
+    path.write_text(text, encoding="utf-8")
+    assert read(path).warnings == ()
+    path.write_text(text[:-2], encoding="utf-8")
+    (warning,) = read(path).warnings
+    assert "the last row has no line end" in warning
+    assert "may be cut off" in warning

@@ -1,0 +1,108 @@
+"""The house keeps its order: imports run downwards, no circle, and every name stands for one thing."""
+
+import ast
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+HOUSE = Path(__file__).parents[1] / "generator/linkwise"
+
+ROOMS = (
+    "cli",
+    "pipeline",
+    "report",
+    "analysis",
+    "check",
+    "emit",
+    "runtime",
+    "package",
+    "dynamics",
+    "expression",
+    "symbolic",
+    "robot",
+    "output",
+    "plotstyle",
+    "extras",
+    "progress",
+    "errors",
+    "version",
+)
+"""From the top of the house to its ground: a room imports from rooms below it only."""
+
+FACE = {"__init__", "__main__"}
+"""Public names and nothing else: they may look into every room."""
+
+MODULES = sorted(path for path in HOUSE.rglob("*.py") if path.name != "__init__.py")
+
+
+def name_of(path: Path) -> str:
+    parts = path.relative_to(HOUSE).with_suffix("").parts
+    return ".".join(("linkwise", *(part for part in parts if part != "__init__")))
+
+
+def imports(path: Path) -> Iterator[str]:
+    """Modules of the house that a file imports, at its top, inside functions, or for types only."""
+    package = name_of(path).split(".")[: -1 if path.name != "__init__.py" else None]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.split(".")[0] == "linkwise")
+        elif isinstance(node, ast.ImportFrom):
+            start = package[: len(package) - node.level + 1] if node.level else []
+            source = ".".join([*start, *(node.module or "").split(".")]).rstrip(".")
+            if source.split(".")[0] == "linkwise":
+                for alias in node.names:
+                    inner = HOUSE.joinpath(*source.split(".")[1:], alias.name)
+                    is_module = inner.with_suffix(".py").is_file() or inner.is_dir()
+                    yield f"{source}.{alias.name}" if is_module else source
+
+
+def room_of(module: str) -> str:
+    return [*module.split("."), "__init__"][1]
+
+
+def all_files() -> list[Path]:
+    return sorted(HOUSE.rglob("*.py"))
+
+
+def test_every_room_is_in_the_list() -> None:
+    assert {room_of(name_of(path)) for path in all_files()} - FACE <= set(ROOMS)
+
+
+@pytest.mark.parametrize("path", all_files(), ids=name_of)
+def test_imports_run_downwards_only(path: Path) -> None:
+    room = room_of(name_of(path))
+    if room in FACE:
+        return
+    upwards = [
+        module
+        for module in imports(path)
+        if room_of(module) != room
+        and (room_of(module) in FACE or ROOMS.index(room_of(module)) < ROOMS.index(room))
+    ]
+    assert not upwards, f"{name_of(path)} imports {', '.join(upwards)}, which is not below {room}"
+
+
+def test_no_circle_of_modules_even_inside_a_room() -> None:
+    below = {name_of(path): set(imports(path)) - {name_of(path)} for path in all_files()}
+    while leaves := [name for name, needs in below.items() if not needs & below.keys()]:
+        for name in leaves:
+            del below[name]
+    assert not below, f"these import each other in a circle: {', '.join(sorted(below))}"
+
+
+def test_every_module_name_is_used_once() -> None:
+    # A room may be named like its main module: robot/robot.py.
+    counts = Counter(path.stem for path in MODULES)
+    assert not [name for name, count in counts.items() if count > 1]
+
+
+def test_every_class_name_is_used_once() -> None:
+    counts = Counter(
+        node.name
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef)
+    )
+    assert not [name for name, count in counts.items() if count > 1]
