@@ -232,8 +232,8 @@ BAD_ARGUMENTS = {
     "lock at nan": (("planar2", "--lock", "joint1=nan"), "is not of the form JOINT=VALUE"),
     "lock of no joint": (("planar2", "--lock", "elbow=0"), "--lock 'elbow' is not a moving joint"),
     "back end": (("planar2", "--backend", "fortran"), "no back end 'fortran'; choose among numpy"),
-    "name": (("planar2", "--name", "../arm"), "'../arm' is no module name"),
-    "keyword": (("planar2", "--name", "class"), "'class' is no module name"),
+    "name": (("planar2", "--name", "../arm"), "'../arm' is not a usable module name"),
+    "keyword": (("planar2", "--name", "class"), "'class' is not a usable module name"),
     "parameters": (
         ("planar2", "--parameters", "some"),
         "'some' is not one of 'numeric', 'symbolic'",
@@ -259,7 +259,7 @@ def test_unphysical_body_passes_on_request(linkwise: Run, tmp_path: Path) -> Non
     assert linkwise(*arguments).returncode == 0
 
 
-def test_generate_never_replaces_what_is_no_package(linkwise: Run, tmp_path: Path) -> None:
+def test_generate_never_replaces_what_is_not_a_package(linkwise: Run, tmp_path: Path) -> None:
     (tmp_path / "out/planar2").mkdir(parents=True)
     (tmp_path / "out/planar2/thesis.txt").write_text("mine")
     done = linkwise("generate", "planar2", "--out", "out", "--backend", "c")
@@ -268,7 +268,7 @@ def test_generate_never_replaces_what_is_no_package(linkwise: Run, tmp_path: Pat
     assert (tmp_path / "out/planar2/thesis.txt").read_text() == "mine"
 
 
-def test_check_of_no_package_says_so(linkwise: Run, tmp_path: Path) -> None:
+def test_check_of_a_folder_without_a_package_says_so(linkwise: Run, tmp_path: Path) -> None:
     done = linkwise("check", tmp_path)
     assert done.returncode == 2
     assert "no manifest.json" in done.stderr

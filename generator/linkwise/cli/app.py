@@ -14,7 +14,7 @@ COMMANDS = {
     "check": "Prove a package right: hashes, back ends, an independent recursion, closure, structure.",
     "inspect": "Show a robot's joints, links and parameters, and what was merged, locked or ignored.",
     "analyze": "Who loads whom: every torque term of a recorded movement, as a table, figures and a page.",
-    "motion": "Write two motions modelled on the paper's Fig. 5 and 10, for `planar3`.",
+    "motion": "Write two motions modelled on the paper's Fig. 5 and 10, for the arm of Table 2, `planar3`.",
 }
 REPORTS = {
     "terms": "Count terms and operations of the partial torques, and those that one bucket needs.",

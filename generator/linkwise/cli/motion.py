@@ -20,7 +20,7 @@ def motion(
     kind: Annotated[Kind, typer.Option(help="Which of the two motions")] = "both",
     as_json: Json = False,
 ) -> None:
-    """Write two motions modelled on the paper's Fig. 5 and 10, for the arm of its Table 2, `planar3`."""
+    """Write two motions modelled on the paper's Fig. 5 and 10, for the arm of Table 2, `planar3`."""
     wanted = list(MOTIONS.values()) if kind == "both" else [MOTIONS[kind]]
     written = [
         {"file": str(file), "samples": made.count, "rate_hz": RATE}
