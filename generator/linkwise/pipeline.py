@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.dynamics.derive import derive
-from linkwise.emit.assemble import Derivation, identifier, manifest, shared_files
+from linkwise.emit.assemble import identifier, manifest, shared_files
 from linkwise.emit.backend import BACKENDS, BackendFiles
+from linkwise.emit.derivation import Derivation
 from linkwise.errors import LinkwiseError, within
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, read_robot

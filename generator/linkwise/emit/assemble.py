@@ -7,16 +7,15 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from importlib import resources
 from typing import Any
 
 import sympy as sp
 
 from linkwise import runtime
-from linkwise.dynamics.derive import fused_kernel
-from linkwise.dynamics.kernel import Kernel, decomposition_cost
+from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.emit.backend import BackendFiles, Loading
+from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
@@ -27,26 +26,6 @@ LINE = 100
 SHARED_RUNTIME = ("__init__.py", "dense.py", "dynamics.py", "interface.py", "quantities.py", "structure.py")
 """Files of linkwise/runtime that every package has."""
 TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}
-
-
-@dataclass(frozen=True)
-class Derivation:
-    """What every back end emits from: the system, one kernel a link, and the request that led to it."""
-
-    system: System
-    kernels: tuple[Kernel, ...]
-    package: str
-    request: Mapping[str, Any]
-
-    @cached_property
-    def fused(self) -> Kernel | None:
-        """Kernel of all links together, if there is one; found when first asked for."""
-        return fused_kernel(self.system)
-
-    @property
-    def linear(self) -> frozenset[int]:
-        """Links whose energy has terms linear in the velocities."""
-        return frozenset(j for j, k in enumerate(self.kernels) if k.forms[0].velocity_linear)
 
 
 def identifier(name: str) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from linkwise.emit.assemble import Derivation
+    from linkwise.emit.derivation import Derivation
 
 Emitter = Callable[["Derivation"], Iterator[tuple[str, str]]]
 """Turns a derivation into files: paths inside the package and texts."""

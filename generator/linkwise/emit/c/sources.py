@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise.dynamics.kernel import Kernel, parameter_names
-from linkwise.emit.assemble import Derivation
 from linkwise.emit.c.kernel_function import KernelFunction, decomposition_groups, kernel_function
 from linkwise.emit.c.shared_part import fused
+from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
