@@ -213,7 +213,7 @@ BAD_FILES = {
 
 
 @pytest.mark.parametrize("name", BAD_FILES)
-def test_bad_file_is_one_line_that_names_the_mend(name: str, linkwise: Run, tmp_path: Path) -> None:
+def test_bad_file_is_one_line_that_names_the_remedy(name: str, linkwise: Run, tmp_path: Path) -> None:
     text, message = BAD_FILES[name]
     (tmp_path / name).write_text(text, encoding="utf-8")
     done = linkwise("generate", name, "--out", "out")
@@ -244,7 +244,7 @@ BAD_ARGUMENTS = {
 
 
 @pytest.mark.parametrize("case", BAD_ARGUMENTS)
-def test_bad_argument_is_one_line_that_names_the_mend(case: str, linkwise: Run, tmp_path: Path) -> None:
+def test_bad_argument_is_one_line_that_names_the_remedy(case: str, linkwise: Run, tmp_path: Path) -> None:
     arguments, message = BAD_ARGUMENTS[case]
     done = linkwise("generate", *arguments, "--out", "out")
     assert done.returncode == 2

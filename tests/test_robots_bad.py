@@ -1,4 +1,4 @@
-"""A robot that cannot be: one line that names the joint or link, and the mend."""
+"""A robot that cannot be: one line that names the joint or link, and the remedy."""
 
 from pathlib import Path
 from typing import Any
@@ -270,7 +270,7 @@ OPTIONS: dict[str, tuple[dict[str, Any], str]] = {
     "lock": ({"lock": {"elbow": 0.0}}, "--lock 'elbow' is not a moving joint; the joints are ab, bc"),
     "tip": ({"tip": "hand"}, "--tip 'hand' is not a link; the links are a, b, c"),
     "root": ({"root": "hip"}, "--root 'hip' is not a link; the links are a, b, c"),
-    "tip before root": ({"root": "c", "tip": "a"}, "--tip 'a' does not hang on --root 'c'"),
+    "tip before root": ({"root": "c", "tip": "a"}, "--tip 'a' is not below --root 'c'"),
     "root at the end": ({"root": "c"}, "no joint moves"),
     "lock of all": ({"lock": {"ab": 0.0, "bc": 1.0}}, "no joint moves; free at least one"),
 }

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 
 class LinkwiseError(ValueError):
-    """A mistake in the input; the message says where it is and how to mend it."""
+    """A mistake in the input; the message says where it is and how to correct it."""
 
 
 @contextmanager

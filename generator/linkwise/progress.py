@@ -10,7 +10,7 @@ from rich.progress import Progress as Bar
 from rich.text import Text
 
 Progress = Callable[[str, int, int], None]
-"""Called with a stage, how much of it is done, and its whole."""
+"""Called with the name of a stage, how much of it is done, and how much there is."""
 
 
 def silent(stage: str, done: int, whole: int) -> None:
@@ -19,7 +19,7 @@ def silent(stage: str, done: int, whole: int) -> None:
 
 @contextmanager
 def progress(units: Mapping[str, str] | None = None) -> Iterator[Progress]:
-    """Yield what to report progress to; `units` says in what a stage's rate is shown, steps by default."""
+    """Yield what to report progress to; `units` gives the unit of a stage's rate, by default steps."""
     if not sys.stderr.isatty():
         yield _lines()
         return
@@ -37,21 +37,21 @@ def progress(units: Mapping[str, str] | None = None) -> Iterator[Progress]:
 
 
 class _Rate(ProgressColumn):
-    """Units a second."""
+    """Column of the rate, in units a second."""
 
     def __init__(self, units: Mapping[str, str]) -> None:
         super().__init__()
         self.units = units
 
     def render(self, task: Task) -> Text:
-        """Rate so far."""
+        """Return the rate so far, blanks before there is one."""
         unit = f"{self.units.get(task.description, 'steps')}/s"
         speed = task.finished_speed or task.speed
         return Text(f"{speed:>12,.0f} {unit:<9}" if speed else " " * 22)
 
 
 def _lines() -> Progress:
-    """A line for each tenth of a stage, but the ends alone where it has few steps."""
+    """Print a line for each tenth of a stage, or for its end alone where it has few steps."""
     last: dict[str, int] = {}
 
     def update(stage: str, done: int, whole: int) -> None:

@@ -26,8 +26,8 @@ def robot_options(
     ] = "numeric",
     lock: Annotated[list[str] | None, _flag(help="Hold a joint: JOINT=VALUE; may be repeated")] = None,
     base: Annotated[Literal["fixed", "floating"], _flag(help="How the root link is held")] = "fixed",
-    root: Annotated[str | None, _flag(help="Keep only what hangs on this link")] = None,
-    tip: Annotated[str | None, _flag(help="Keep only the chain to this link")] = None,
+    root: Annotated[str | None, _flag(help="Keep only this link and what it carries")] = None,
+    tip: Annotated[str | None, _flag(help="Keep only the chain of links to this one")] = None,
     allow_unphysical: Annotated[
         bool, _flag("--allow-unphysical", help="Accept bodies that cannot exist")
     ] = False,

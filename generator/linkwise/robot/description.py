@@ -47,11 +47,11 @@ class Coupling:
 class Loop:
     """A constraint that ties two bodies together outside the tree; `bodies` is empty where it ties others.
 
-    `what` names it in a sentence, `mend` says how to do without it.
+    `what` names it in a sentence, `remedy` says how to do without it.
     """
 
     what: str
-    mend: str
+    remedy: str
     bodies: tuple[str, ...] = ()
 
 

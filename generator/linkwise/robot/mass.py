@@ -1,9 +1,12 @@
 """Mass properties: merging rigidly connected bodies, and whether a body can exist."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.description import ZERO3, ZERO33, Body
+from linkwise.robot.notes import IMPOSSIBLE, Note
 from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3, is_finite
 from linkwise.robot.transforms import add, rotate, rotate_inertia
 
@@ -50,11 +53,23 @@ def _empty(body: Body) -> bool:
     return body.mass == 0 and all(entry == 0 for row in body.inertia for entry in row)
 
 
-def check_body(body: Body) -> str:
-    """Return what is unphysical about a body with numbers for values, or an empty string.
+def check_bodies(bodies: Iterable[Body], allow: bool) -> list[Note]:
+    """Return a note for each body that cannot exist, of bodies with numbers for values.
 
-    Raises LinkwiseError for NaN or infinity, which nothing overrides.
+    Raises LinkwiseError for one unless `allow` or the file itself allows it, and for NaN or infinity always.
     """
+    notes = []
+    for body in bodies:
+        fault = _fault(body)
+        if fault and not (allow or body.unphysical):
+            raise LinkwiseError(f"{fault}; correct it, or pass --allow-unphysical")
+        if fault:
+            notes.append(Note("unphysical", body.name, body.unphysical or fault, IMPOSSIBLE))
+    return notes
+
+
+def _fault(body: Body) -> str:
+    """Return what is unphysical about a body, or an empty string."""
     values = (body.mass, *body.com, *(entry for row in body.inertia for entry in row))
     if not all(is_finite(value) for value in values):
         raise LinkwiseError(

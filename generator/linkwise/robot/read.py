@@ -1,4 +1,4 @@
-"""One door for every description: a built-in name or a file."""
+"""Reading a robot, whatever describes it: a built-in name or a file."""
 
 import re
 from importlib import resources
@@ -20,7 +20,7 @@ def read_xml(path: Path) -> Description:
 
 
 READERS = {".toml": read_toml, ".urdf": read_urdf, ".xml": read_xml, ".mjcf": read_mjcf}
-"""Who reads a file, by the end of its name."""
+"""What reads a file, by the end of its name."""
 
 MAX_PLANAR = 1000
 """An arm of N joints has some N³/3 coefficients of each order: 1000 are far beyond what can be generated."""
@@ -34,7 +34,7 @@ DESCRIPTIONS = f"{', '.join(BUILT_IN)}, or a {', '.join(READERS)} or .py file; .
 
 
 def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
-    """Robot from a built-in name or a file; raises LinkwiseError naming the file and the mend."""
+    """Robot from a built-in name or a file; raises LinkwiseError naming the file and the remedy."""
     options = options or Options()
     with within(str(spec)):
         if match := re.fullmatch(r"planar([1-9][0-9]*)", str(spec)):

@@ -1,10 +1,11 @@
-"""The tree of a description: its one root, the walk from it, and cutting parts off."""
+"""The tree of a description: its one root, the walk from it, cutting parts off, and what is not a tree."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot.description import Connection, Description
+from linkwise.robot.description import Connection, Description, Loop
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import is_finite
 
@@ -72,7 +73,7 @@ def _check_names(description: Description) -> None:
 
 
 def cut(description: Description, root: str | None, tip: str | None) -> Description:
-    """Keep what hangs on link `root`, and of that only the chain to link `tip`; its notes say what went.
+    """Keep link `root` and what it carries, of that only the chain to link `tip`; its notes say what went.
 
     Raises LinkwiseError for names that are empty, double or unknown.
     """
@@ -89,7 +90,7 @@ def cut(description: Description, root: str | None, tip: str | None) -> Descript
             at = parent[at]
             chain.add(at)
         if root is not None and root not in chain:
-            raise LinkwiseError(f"--tip {tip!r} does not hang on --root {root!r}; choose links of one chain")
+            raise LinkwiseError(f"--tip {tip!r} is not below --root {root!r}; choose links of one chain")
         kept &= chain
     gone = tuple(Note("cut", body.name) for body in description.bodies if body.name not in kept)
     return replace(
@@ -101,9 +102,22 @@ def cut(description: Description, root: str | None, tip: str | None) -> Descript
 
 
 def _below(description: Description, root: str) -> set[str]:
-    """Return the links that hang on link `root`, itself included."""
+    """Return link `root` and the links that it carries."""
     kept, frontier = {root}, [root]
     while frontier:
         new = [c.child for c in description.connections if c.parent in frontier and c.child not in kept]
         kept, frontier = kept | set(new), new
     return kept
+
+
+def check_loops(loops: tuple[Loop, ...], carrier: Mapping[str, int | None]) -> None:
+    """Refuse what ties bodies together outside the tree, unless both are cut away or move as one.
+
+    `carrier` names the moving link of each body that is there, None for the ground.
+    """
+    for loop in loops:
+        there = [carrier[body] for body in loop.bodies if body in carrier]
+        gone = loop.bodies and not there
+        rigid = len(there) == 2 and there[0] == there[1]
+        if not (gone or rigid):
+            raise LinkwiseError(f"{loop.what}; loops are not modelled yet: {loop.remedy}")

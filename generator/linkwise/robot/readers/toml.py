@@ -59,7 +59,7 @@ class _Table:
 
 
 def read_toml(path: Path) -> Description:
-    """Read a robot; raises LinkwiseError naming the table, the key and the mend."""
+    """Read a robot; raises LinkwiseError naming the table, the key and the remedy."""
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:  # ValueError: not TOML, not UTF-8, or too many digits

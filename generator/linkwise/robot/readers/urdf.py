@@ -23,7 +23,7 @@ LOSSES = ("damping", "friction")
 
 
 def read_urdf(path: Path) -> Description:
-    """Read a robot; raises LinkwiseError naming the element and the mend."""
+    """Read a robot; raises LinkwiseError naming the element and the remedy."""
     robot = _parse(path)
     if robot.tag != "robot":
         raise LinkwiseError(f"the root element is <{robot.tag}>; a URDF file has <robot>")
