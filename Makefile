@@ -25,6 +25,7 @@ demo: $(READY)
 generate: $(READY)
 	$(BIN)/linkwise generate planar3 --out generated
 	$(BIN)/linkwise generate puma560 --out generated
+	$(BIN)/linkwise generate torso --out generated
 
 test: $(READY)
 	$(BIN)/python -m pytest

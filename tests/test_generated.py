@@ -10,7 +10,7 @@ from linkwise.emit.backend import BACKENDS
 GENERATED = Path(__file__).parents[1] / "generated"
 
 
-@pytest.mark.parametrize("robot", ["planar3", "puma560"])
+@pytest.mark.parametrize("robot", ["planar3", "puma560", "torso"])
 def test_checked_in_package_is_current(robot: str) -> None:
     folder = GENERATED / robot
     request = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["request"]

@@ -4,10 +4,11 @@ import ast
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import linkwise
 import numpy as np
@@ -16,7 +17,11 @@ from conftest import DATA
 from linkwise import check_package, generate, read_system, write_package
 from linkwise.emit.backend import BACKENDS
 from linkwise.package.load import import_package
+from linkwise.runtime.dynamics import Dynamics
+from linkwise.runtime.numpy_backend import NumpyBackend
 from linkwise.runtime.structure import Structure
+
+torch = pytest.importorskip("torch")
 
 ROOT = Path(__file__).parents[1]
 RUNTIME = Path(linkwise.__file__).parent / "runtime"
@@ -103,6 +108,69 @@ def test_packed_values_and_their_indices_have_the_same_fields(
     answer = package.load("numpy").packed(*np.ones((3, 4, 3)))
     assert isinstance(answer, package.Packed)
     assert answer._fields == package.Layout._fields
+
+
+class Pendulum:
+    """Closed forms of a point mass m on a rod of length 1, as a generated forms/link_1.py has them."""
+
+    def decomposition(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
+        gravity = 9.81 * p["m"] * xp.sin(q[..., 0])
+        return (p["m"],), (0.0,), (gravity,), (p["m"] * qdd[..., 0] + gravity,)
+
+    def torque(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
+        return self.decomposition(xp, q, qd, qdd, p)[3]  # type: ignore[no-any-return]
+
+    def position_gradient(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
+        return (9.81 * p["m"] * xp.cos(q[..., 0]),)
+
+
+ROD = Structure("rod", ("hinge",), ("rad",), ("mass",), ((0,),), (), {"m": 0.5})
+
+
+def pendulum(backend: str) -> Dynamics:
+    """The pendulum on one of the back ends, put together by hand."""
+    if backend == "numpy":
+        return Dynamics(ROD, NumpyBackend(ROD, [Pendulum()], ROD.values(None)), pendulum, (backend,))
+    from linkwise.runtime.autograd_backend import AutogradBackend
+    from linkwise.runtime.partial_lagrangian import PartialLagrangian
+    from linkwise.runtime.torch_backend import TorchBackend
+
+    class Lagrangian(PartialLagrangian):
+        path = (0,)
+
+        def kinetic(self, q: Any, qd: Any) -> Any:
+            return 0.5 * self.p["m"] * qd[0] ** 2
+
+        def potential(self, q: Any) -> Any:
+            return -9.81 * self.p["m"] * torch.cos(q[0])
+
+    if backend == "torch":
+        return Dynamics(ROD, TorchBackend(ROD, [Pendulum()], ROD.values(None)), pendulum, (backend,))
+    made = AutogradBackend(ROD, lambda p: [Lagrangian(p)], ROD.values(None))
+    return Dynamics(ROD, made, pendulum, (backend,))
+
+
+@pytest.mark.parametrize("batch", [(), (4,), (2, 3)])
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd"])
+def test_a_pendulum_is_that_of_the_textbook(backend: str, batch: tuple[int, ...]) -> None:
+    robot = pendulum(backend)
+    motion = np.random.default_rng(3).uniform(-2.0, 2.0, (3, *batch, 1))
+    q, _, qdd = motion
+    given = [torch.from_numpy(m) for m in motion] if robot.backend.takes_tensors else list(motion)
+    np.testing.assert_allclose(robot.inverse_dynamics(*given), 0.5 * (qdd + 9.81 * np.sin(q)), rtol=1e-12)
+    mass, c1, gravity = robot.coefficients(*given[:2])
+    np.testing.assert_allclose(mass, np.full((*batch, 1, 1, 1), 0.5), rtol=1e-15)
+    np.testing.assert_allclose(c1, np.zeros((*batch, 1, 1, 1)), atol=1e-15)
+    np.testing.assert_allclose(gravity[..., 0], 0.5 * 9.81 * np.sin(q), rtol=1e-12)
+    stiffness = robot.position_gradient(*given)[..., 0, 0]
+    np.testing.assert_allclose(stiffness, 0.5 * 9.81 * np.cos(q), rtol=1e-12)
+
+
+def test_a_parameter_may_be_an_array_of_one_value_a_sample() -> None:
+    masses = np.array([0.5, 1.0, 2.0])
+    robot = Dynamics(ROD, NumpyBackend(ROD, [Pendulum()], {"m": masses}), pendulum, ("numpy",))
+    torque = robot.inverse_dynamics(*(np.zeros((3, 1)), np.zeros((3, 1)), np.ones((3, 1))))
+    np.testing.assert_allclose(torque[:, 0], masses)
 
 
 USER = """

@@ -18,7 +18,7 @@ class LoadedRobot:
     name: str
     joints: tuple[str, ...]
     units: tuple[str, ...]
-    """"rad" or "m", a joint each."""
+    """One for each joint, "rad" or "m"."""
     links: tuple[str, ...]
     backend: str
     model: Model

@@ -18,7 +18,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True, eq=False)
 class Totals:
-    """Over every sample of the movement, a column each: mean of the magnitude, and its largest."""
+    """Mean and largest magnitude of each column, (columns,), over every sample of the movement."""
 
     mean: Array
     peak: Array

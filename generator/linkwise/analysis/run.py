@@ -170,7 +170,7 @@ def _prepared(
     progress: Progress,
     buffer: Path | None = None,
 ) -> Job:
-    """Read and filter a log; `buffer`, a directory, keeps the samples on disk, not in memory."""
+    """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
     samples = read_samples(log, robot.joints, robot.units, reading, progress, buffer)
     with within(str(log)):
         span_of(samples, processing)

@@ -44,7 +44,8 @@ def read_samples(
 ) -> Samples:
     """Read, convert to SI and check a log.
 
-    joint_units: "rad" or "m" a joint; buffer: a directory to keep the samples in, on disk; else memory
+    joint_units: one for each joint, "rad" or "m"
+    buffer: a directory in which a disk buffer keeps the samples; None keeps them in memory
     Raises LinkwiseError that names file, row and column for what cannot be analysed.
     """
     log = open_log(path)
@@ -98,7 +99,7 @@ def _collected(blocks: Iterator[Array], width: int, directory: Path | None) -> A
     """All rows of blocks (any, width) as one writable array, in memory or in a file in `directory`."""
     if directory is None:
         return np.concatenate([np.empty((0, width)), *blocks])
-    # The file has no name from the start: the system drops it with its last user, however that ends.
+    # The file has no name from the start: the system removes it with its last user, however that ends.
     with tempfile.TemporaryFile(dir=directory) as file:
         for block in blocks:
             file.write(np.ascontiguousarray(block).tobytes())

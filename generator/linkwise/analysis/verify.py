@@ -62,7 +62,7 @@ class Closure:
 def _larger(a: Any, b: Any) -> Any:
     if a is None or b is None:
         return b if a is None else a
-    return float(np.maximum(a, b))  # unlike Python's max, it lets no NaN pass unseen
+    return float(np.maximum(a, b))  # unlike Python's max, it never loses a NaN
 
 
 def residual(parts: list[Array], whole: Array) -> tuple[float, float]:

@@ -46,7 +46,7 @@ def open_storage(path: Path) -> TextLog:
     if told is not None and degrees is None:
         raise LinkwiseError(f"{path}: inDegrees={told!r} in the header is neither yes nor no")
     rows = _count(path, facts, "nRows")
-    # Values are padded with blanks, so any run of blanks parts them, whatever parts the names.
+    # Values are padded with blanks, so any run of blanks separates them, whatever separates the names.
     return TextLog(path, columns, row + 1, None, degrees, rows, _warnings_of_the_end(path, None))
 
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Cause:
+    """What loads a joint, and how its part of the bar looks."""
+
     quantity: Quantity
     coordinate: int | None
     label: str
@@ -22,7 +24,7 @@ class _Cause:
 
 
 def shares(result: AnalysisResult, _: int) -> "Figure":
-    """Two bars a joint: every cause, and those of the movement alone, in % of mean magnitudes."""
+    """Two bars for each joint: every cause, and those of the movement alone, in % of mean magnitudes."""
     robot = result.robot
     movement = []
     for k, joint in enumerate(robot.joints):
