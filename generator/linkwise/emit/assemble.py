@@ -85,7 +85,7 @@ def shared_files(derivation: Derivation, backends: Sequence[str]) -> Iterator[tu
 def manifest(derivation: Derivation, files: Mapping[str, str]) -> str:
     """JSON text: what was generated, from what, what it costs, and the SHA-256 of every file."""
     system = derivation.system
-    fused = derivation.fused if "c/fused.inc" in files else None
+    fused = derivation.fused if "c/links_together.h" in files else None
     data = {
         "schema": SCHEMA,
         "name": derivation.package,

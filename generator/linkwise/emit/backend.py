@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.resources import files
 
 from linkwise.emit.assemble import Derivation
 from linkwise.emit.autograd import autograd_files
-from linkwise.emit.c.sources import c_files, packed_sizes
+from linkwise.emit.c.sources import c_files
 from linkwise.emit.closed_forms import closed_form_files
 from linkwise.emit.formulas import formula_files
 from linkwise.emit.render import render
@@ -45,15 +46,19 @@ def _numpy(d: Derivation) -> Files:
     yield from closed_form_files(d.system, d.kernels, "numpy")
 
 
+RUNTIME = (
+    "__init__", "arguments", "interface", "numpy_backend", "structure", "torch_backend",
+    "native_backend", "native_build", "native_compiler", "native_library", "native_torch",
+)  # fmt: skip
+
+
 def _native(d: Derivation) -> Files:
     from linkwise.version import VERSION
 
-    shared = {"version": VERSION}
-    build = {**shared, "package": d.package}
-    sizes = {**shared, "sizes": packed_sizes(d.kernels), "n": len(d.system.coordinates)}
-    yield "native_build.py", render("package/native_build.py.j2", build)
-    yield "native_backend.py", render("package/native_backend.py.j2", sizes)
-    yield "native_torch.py", render("package/native_torch.py.j2", shared)
+    yield "native.py", render("package/native.py.j2", {"version": VERSION, "package": d.package})
+    for name in RUNTIME:
+        text = files("linkwise.runtime").joinpath(f"{name}.py").read_text(encoding="utf-8")
+        yield f"runtime/{name}.py", text
 
 
 BACKENDS: dict[str, Backend] = {
@@ -69,7 +74,7 @@ BACKENDS: dict[str, Backend] = {
         ),
         Backend(
             "native",
-            "native_backend",
+            "native",
             "the C code, compiled by this system's compiler",
             _native,
             ("c", "torch"),

@@ -1,0 +1,72 @@
+"""What the parts of a package say to each other: arrays, closed forms, back ends."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    # A package that needs no torch is read without it; then tensors are Any.
+    from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
+
+Array = TypeVar("Array", NDArray[Any], "Tensor")
+"""NumPy array or torch tensor, of float32 or float64; answers are what the motion is, device included."""
+
+Kind = TypeVar("Kind")
+
+Entries = tuple[Any, ...]
+"""Packed values one by one: each an array of the batch's shape (...), or a number that all samples share."""
+
+
+class ClosedForms(Protocol):
+    """forms/link_k.py: the closed forms of one link over its path, for arrays of the namespace `xp`.
+
+    q, qd, qdd have shape (..., n); `p` maps names of parameters to values; entries are in the order of
+    `Layout`.
+    """
+
+    def decomposition(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Entries, ...]:
+        """(c2, c1, g, tau), and h1 after them for a link whose energy has terms linear in the velocities."""
+
+    def torque(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> Entries:
+        """Tau."""
+
+    def position_gradient(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> Entries:
+        """c0."""
+
+
+class Backend(Protocol[Kind]):
+    """What computes: packed values (..., count) in the order of `Layout`, and a few operations on arrays."""
+
+    name: ClassVar[str]
+    takes_tensors: ClassVar[bool]
+    """Whether motion is given as torch tensors only."""
+    parameters: dict[str, Any]
+
+    def arrays(self, named: Mapping[str, Kind], n: int) -> Sequence[Kind]:
+        """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
+
+    def decomposition(self, q: Kind, qd: Kind, qdd: Kind) -> Sequence[Kind]:
+        """c2, c1, g, tau, h1."""
+
+    def torque(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
+        """Tau."""
+
+    def position_gradient(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
+        """c0."""
+
+    def constant(self, values: NDArray[Any], like: Kind) -> Kind:
+        """A table of numbers, to compute with `like`."""
+
+    def index(self, values: NDArray[np.intp], like: Kind) -> Kind:
+        """A table of positions, to take from `like`."""
+
+    def asarray(self, value: Any, like: Kind) -> Kind:
+        """Anything array-like, of the kind and dtype of `like`."""
+
+    def zeros(self, like: Kind, count: int) -> Kind:
+        """Zeros of shape (..., count) for `like` of shape (..., m)."""
+
+    def concatenate(self, parts: Iterable[Kind]) -> Kind:
+        """The parts joined along the last axis."""

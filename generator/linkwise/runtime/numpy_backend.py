@@ -1,0 +1,114 @@
+"""Closed forms on NumPy arrays."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arguments import same_kind
+from .interface import ClosedForms, Entries
+from .structure import Structure
+
+FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
+
+
+class NumpyBackend:
+    """Answers with NumPy arrays of the caller's dtype; parameters may be arrays (...): one value a sample."""
+
+    name: ClassVar = "numpy"
+    takes_tensors: ClassVar = False
+
+    def __init__(
+        self, structure: Structure, links: Sequence[ClosedForms], parameters: Mapping[str, Any]
+    ) -> None:
+        self.structure = structure
+        self.links = links
+        self.parameters: dict[str, Any] = {k: np.asarray(v, dtype=float) for k, v in parameters.items()}
+
+    def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
+        """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
+        arrays = {k: value if type(value) is np.ndarray else _array(k, value) for k, value in named.items()}
+        first, *rest = arrays.values()
+        if (
+            first.dtype in FLOATS
+            and first.shape[-1:] == (n,)
+            and all(a.shape == first.shape and a.dtype == first.dtype for a in rest)
+        ):
+            return [first, *rest]
+        for name, a in arrays.items():
+            if a.dtype not in FLOATS:
+                raise TypeError(f"{name} has dtype {a.dtype}; give float32 or float64")
+        return np.broadcast_arrays(*same_kind(arrays, n).values())
+
+    def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
+        """c2, c1, g, tau, h1, packed."""
+        p = self._values(q)
+        packed = [_Columns(q, size) for size in self.structure.sizes]
+        for link in self.links:
+            # A link without energy terms linear in the velocities has no h1.
+            for columns, entries in zip(packed, link.decomposition(np, q, qd, qdd, p), strict=False):
+                columns.fill(entries)
+        return [columns.array for columns in packed]
+
+    def torque(self, q: Any, qd: Any, qdd: Any) -> Any:
+        """Tau, packed."""
+        p, columns = self._values(q), _Columns(q, self.structure.sizes.tau)
+        for link in self.links:
+            columns.fill(link.torque(np, q, qd, qdd, p))
+        return columns.array
+
+    def position_gradient(self, q: Any, qd: Any, qdd: Any) -> Any:
+        """c0, packed."""
+        p, columns = self._values(q), _Columns(q, self.structure.sizes.c1)
+        for link in self.links:
+            columns.fill(link.position_gradient(np, q, qd, qdd, p))
+        return columns.array
+
+    def constant(self, values: NDArray[Any], like: Any) -> Any:
+        """A table of numbers, to compute with `like`."""
+        return np.asarray(values, dtype=like.dtype)
+
+    def index(self, values: NDArray[np.intp], like: Any) -> Any:
+        """A table of positions, to take from `like`."""
+        return np.asarray(values, dtype=np.intp)
+
+    def asarray(self, value: Any, like: Any) -> Any:
+        """Anything array-like, in the dtype of `like`."""
+        return np.asarray(value, dtype=like.dtype)
+
+    def zeros(self, like: Any, count: int) -> Any:
+        """Zeros of shape (..., count) for `like` of shape (..., m)."""
+        return np.zeros((*like.shape[:-1], count), like.dtype)
+
+    def concatenate(self, parts: Iterable[Any]) -> Any:
+        """The parts joined along the last axis."""
+        return np.concatenate(list(parts), -1)
+
+    def _values(self, q: Any) -> dict[str, Any]:
+        return {k: v.astype(q.dtype) for k, v in self.parameters.items()}
+
+
+class _Columns:
+    """An array (..., count) like q, filled from its first column on."""
+
+    def __init__(self, q: Any, count: int) -> None:
+        self.array = np.empty((*q.shape[:-1], count), q.dtype)
+        self._next = 0
+
+    def fill(self, entries: Entries) -> None:
+        start, self._next = self._next, self._next + len(entries)
+        if self.array.ndim == 1:
+            self.array[start : self._next] = entries
+            return
+        for column, value in enumerate(entries, start):
+            self.array[..., column] = value
+
+
+def _array(name: str, value: Any) -> NDArray[Any]:
+    """Anything array-like as an array; what an array cannot hold is refused."""
+    if hasattr(value, "detach"):
+        raise TypeError(f"{name} is a tensor; this back end takes arrays, torch and native take tensors")
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError(f"{name} is a masked array; fill its gaps first")
+    return np.asarray(value)

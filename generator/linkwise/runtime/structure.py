@@ -1,0 +1,95 @@
+"""What a robot consists of: names, units, paths, parameters, and where its packed values belong."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Indices = NDArray[np.intp]
+
+
+class Sizes(NamedTuple):
+    """Number of packed values of one sample."""
+
+    c2: int
+    c1: int
+    g: int
+    tau: int
+    h1: int
+
+
+class Layout(NamedTuple):
+    """Indices of packed values: (i, j, k) rows, or (i, j) rows for gravity and torque; all counted from 0."""
+
+    acceleration: Indices
+    """c2: (i, j, k) with i <= k only, as c2 is symmetric in i and k."""
+    velocity: Indices
+    """c1, and c0 of the position gradient: (i, j, k)."""
+    gravity: Indices
+    """g: (i, j)."""
+    torque: Indices
+    """tau: (i, j)."""
+    velocity_linear: Indices
+    """h1: (i, j, k) of the links in `Structure.linear`."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A robot in names and numbers: n joint coordinates that move N links."""
+
+    name: str
+    """Name of the package."""
+    joint_names: tuple[str, ...]
+    joint_units: tuple[str, ...]
+    """rad or m, one for each joint."""
+    link_names: tuple[str, ...]
+    paths: tuple[tuple[int, ...], ...]
+    """For each link the coordinates that move it, ascending, counted from 0; tau_ij is zero off this path."""
+    linear: tuple[int, ...]
+    """Links whose energy has terms linear in the velocities, as on a moving base."""
+    parameters: Mapping[str, float]
+    """Run-time parameters and the values they have unless others are given."""
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joint_names)
+
+    @property
+    def N(self) -> int:
+        """Number of links."""
+        return len(self.link_names)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Indices of the packed values, in their order: link by link, then i, then k."""
+        pairs = [[(i, j, k) for i in path for k in path] for j, path in enumerate(self.paths)]
+        every = [row for rows in pairs for row in rows]
+        upper = [(i, j, k) for i, j, k in every if i <= k]
+        linear = [row for j in self.linear for row in pairs[j]]
+        single = [(i, j) for j, path in enumerate(self.paths) for i in path]
+        return Layout(
+            _table(upper, 3), _table(every, 3), _table(single, 2), _table(single, 2), _table(linear, 3)
+        )
+
+    @cached_property
+    def sizes(self) -> Sizes:
+        """Number of packed values of one sample: c2, c1, g, tau, h1."""
+        return Sizes(*map(len, self.layout))
+
+    def values(self, given: Mapping[str, Any] | None) -> dict[str, Any]:
+        """All parameters, those `given` in place of their own; raises ValueError for an unknown name."""
+        unknown = sorted(set(given or {}) - set(self.parameters))
+        if unknown:
+            known = ", ".join(self.parameters) or "none: generate with --parameters symbolic"
+            raise ValueError(f"no parameter {unknown[0]!r}; the parameters are {known}")
+        return {**self.parameters, **(given or {})}
+
+
+def _table(rows: list[tuple[int, int]] | list[tuple[int, int, int]], width: int) -> Indices:
+    table = np.array(rows, dtype=np.intp).reshape(-1, width)
+    table.flags.writeable = False
+    return table
