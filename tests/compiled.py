@@ -11,13 +11,21 @@ from typing import Any
 
 import numpy as np
 
-FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O1", "-fPIC")
+STRICT = ("-Wall", "-Wextra", "-Werror", "-pedantic", "-O1", "-fPIC")
+FIELDS = {"c2": "acceleration", "c1": "velocity", "g": "gravity", "tau": "torque", "h1": "linear"}
+"""What the Python API calls the arrays of the header."""
 
 
-def compile_library(directory: Path, target: Path, compiler: str = "gcc") -> None:
-    """Compile the package's C files to a shared library; any warning fails."""
-    sources = sorted(str(path) for path in (directory / "c").glob("*.c"))
-    command = [compiler, *FLAGS, "-shared", "-o", str(target), *sources, "-lm"]
+def name_of(directory: Path) -> str:
+    """Name of the package in a directory."""
+    return str(json.loads((directory / "manifest.json").read_text())["name"])
+
+
+def compile_library(directory: Path, target: Path, compiler: Sequence[str] = ("gcc", "-std=c99")) -> None:
+    """Compile the package's double and float to a shared library, as its header says; any warning fails."""
+    name = name_of(directory)
+    sources = [str(directory / "c" / file) for file in (f"{name}.c", f"{name}f.c")]
+    command = [*compiler, *STRICT, "-shared", "-o", str(target), *sources, "-lm"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
@@ -27,39 +35,62 @@ class Compiled:
 
     def __init__(self, directory: Path, parameters: Sequence[float] = ()) -> None:
         self.parameters = list(parameters)
-        self.name = json.loads((directory / "manifest.json").read_text())["name"]
+        self.name = name_of(directory)
         header = (directory / "c" / f"{self.name}.h").read_text()
-        sizes = dict(re.findall(r"([A-Z0-9_]+) = (\d+)", header))
-        prefix = self.name.upper()
-        keys = {"acceleration": "C2", "velocity": "C1", "gravity": "G", "torque": "G", "linear": "H1"}
-        self.sizes = {field: int(sizes[f"{prefix}_{key}"]) for field, key in keys.items()}
+        self.numbers = {
+            key: int(value) for key, value in re.findall(rf"{self.name.upper()}_(\w+) = (\d+)", header)
+        }
+        totals = {"tau": "G"}
+        self.sizes = {array: self.numbers.get(totals.get(array, array.upper()), 0) for array in FIELDS}
         with tempfile.TemporaryDirectory() as folder:
             target = Path(folder) / f"{self.name}.so"
             compile_library(directory, target)
             self.library = ctypes.CDLL(str(target))
 
-    def _call(self, function: str, motion: tuple[Any, ...], widths: list[int]) -> list[Any]:
+    def _call(self, function: str, count: int | None, motion: Sequence[Any], lengths: list[int]) -> list[Any]:
+        """Arrays of the given lengths that a function fills; those of length 0 it does not have."""
         dtype = motion[0].dtype
         suffix, real = ("f", ctypes.c_float) if dtype == np.float32 else ("", ctypes.c_double)
-        outputs = [np.full((len(motion[0]), width), np.nan, dtype) for width in widths]
-        p = np.array(self.parameters, dtype) if self.parameters else None
-        arrays = [*(np.ascontiguousarray(m) for m in motion), p, *outputs]
-        pointers = [a if a is None else a.ctypes.data_as(ctypes.POINTER(real)) for a in arrays]
+        outputs = [np.full(length, np.nan, dtype) for length in lengths]
+        p = [np.array(self.parameters, dtype)] if self.parameters else []
+        arrays = [*map(np.ascontiguousarray, motion), *p, *(a for a in outputs if a.size)]
+        pointers = [a.ctypes.data_as(ctypes.POINTER(real)) for a in arrays]
         entry = getattr(self.library, f"{self.name}_{function}{suffix}")
         entry.restype = None
-        entry(ctypes.c_size_t(len(motion[0])), *pointers)
+        entry(*([] if count is None else [ctypes.c_size_t(count)]), *pointers)
         return outputs
+
+    def _rows(self, function: str, motion: tuple[Any, ...], widths: list[int]) -> list[Any]:
+        samples = len(motion[0])
+        outputs = self._call(function, samples, motion, [samples * width for width in widths])
+        return [a.reshape(samples, width) for a, width in zip(outputs, widths, strict=True)]
 
     def decomposition(self, *motion: Any) -> dict[str, Any]:
         """Packed c2, c1, g, tau and the linear part of c1."""
-        return dict(
-            zip(self.sizes, self._call("decomposition", motion, list(self.sizes.values())), strict=True)
-        )
+        outputs = self._rows("decomposition", motion, list(self.sizes.values()))
+        return dict(zip(FIELDS.values(), outputs, strict=True))
+
+    def decomposition_of_blocks(self, *motion: Any) -> dict[str, Any]:
+        """The same, through the function on blocks of samples."""
+        width = self.numbers["BLOCK" if motion[0].dtype == np.float64 else "BLOCKF"]
+        blocks, n = len(motion[0]) // width, motion[0].shape[-1]
+        inside = [m.reshape(blocks, width, n).swapaxes(1, 2) for m in motion]
+        lengths = [blocks * width * size for size in self.sizes.values()]
+        outputs = self._call("decomposition_blocks", blocks, inside, lengths)
+        rows = [
+            a.reshape(blocks, size, width).swapaxes(1, 2).reshape(blocks * width, size)
+            for a, size in zip(outputs, self.sizes.values(), strict=True)
+        ]
+        return dict(zip(FIELDS.values(), rows, strict=True))
+
+    def link(self, number: int, lengths: Sequence[int], *motion: Any) -> list[Any]:
+        """Results of one link, counted from 1, for one sample: arrays of the given lengths."""
+        return self._call(f"link_{number}", None, motion, list(lengths))
 
     def torque(self, *motion: Any) -> Any:
         """Packed tau."""
-        return self._call("torque", motion, [self.sizes["torque"]])[0]
+        return self._rows("torque", motion, [self.sizes["tau"]])[0]
 
     def position_gradient(self, *motion: Any) -> Any:
         """Packed c0."""
-        return self._call("position_gradient", motion, [self.sizes["velocity"]])[0]
+        return self._rows("position_gradient", motion, [self.sizes["c1"]])[0]

@@ -1,6 +1,8 @@
 """The emitted C compiles without a warning and says what NumPy says, in either precision, for any count."""
 
+import re
 import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -8,39 +10,148 @@ from types import ModuleType
 import numpy as np
 import pytest
 from answers import random_states, relative_error
-from compiled import Compiled, compile_library
+from compiled import STRICT, Compiled, compile_library, name_of
 from conftest import DATA, needs_compiler
+from linkwise import generate, read_system, write_package
+from linkwise.package.load import import_package
 
 pytestmark = needs_compiler
-ROBOTS = ["planar3", "planar3 symbolic", "puma560", str(DATA / "turntable.py")]
+TURNTABLE = str(DATA / "turntable.py")
+LEG = str(DATA / "leg.toml")
+ROBOTS = ["planar3", "planar3 symbolic", "puma560", TURNTABLE, LEG]
+COMPILERS = {
+    "gcc": ("gcc", "-std=c99"),
+    "clang": ("clang", "-std=c99"),
+    "g++": ("g++", "-x", "c++", "-std=c++17"),
+    "clang++": ("clang++", "-x", "c++", "-std=c++17"),
+}
+PARTS = ("SINES", "ONE_SAMPLE", "BLOCKS", "POSITION_GRADIENT")
 
 
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
-@pytest.mark.parametrize("robot", ROBOTS, ids=["planar3", "symbolic", "puma560", "energies"])
+def strict(compiler: str) -> tuple[str, ...]:
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler}")
+    return COMPILERS[compiler]
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("robot", ROBOTS, ids=["planar3", "symbolic", "puma560", "energies", "tree"])
 def test_it_compiles_without_a_warning(
     robot: str, compiler: str, directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    if shutil.which(compiler) is None:
-        pytest.skip(f"no {compiler}")
-    compile_library(directory_of(robot), tmp_path / "library.so", compiler)
+    compile_library(directory_of(robot), tmp_path / "library.so", strict(compiler))
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("robot", ["planar3 symbolic", LEG], ids=["symbolic", "tree"])
+def test_its_parts_compile_without_a_warning_and_link(
+    robot: str, compiler: str, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    directory = directory_of(robot)
+    command, source = (*strict(compiler), *STRICT), directory / "c" / f"{name_of(directory)}.c"
+    for part in PARTS:
+        made = str(tmp_path / f"{part}.o")
+        subprocess.run([*command, f"-DLINKWISE_PART={part}", "-c", str(source), "-o", made], check=True)
+    objects = [str(tmp_path / f"{part}.o") for part in PARTS]
+    linked = [compiler, "-shared", "-Wl,--no-undefined", *objects, "-lm", "-o", str(tmp_path / "all.so")]
+    subprocess.run(linked, check=True)
+
+
+def test_the_header_says_how_to_compile_it(directory_of: Callable[[str], Path], tmp_path: Path) -> None:
+    header = (directory_of("planar3") / "c" / "planar3.h").read_text(encoding="utf-8")
+    shutil.copytree(directory_of("planar3") / "c", tmp_path / "c")
+    commands = [line.split(" (")[0].split() for line in header.splitlines() if line.strip().startswith("cc ")]
+    assert len(commands) == 2
+    for command in commands:
+        subprocess.run(["gcc", *command[1:]], cwd=tmp_path / "c", check=True)
+    assert {path.name for path in (tmp_path / "c").glob("*.o")} == {"planar3.o", "planar3f.o"}
+
+
+def test_what_a_robot_has_no_use_for_is_not_in_its_functions(directory_of: Callable[[str], Path]) -> None:
+    def code(robot: str) -> str:
+        directory = directory_of(robot)
+        text = (directory / "c" / f"{name_of(directory)}.h").read_text(encoding="utf-8")
+        return re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+
+    assert not re.search(r"\b(h1|\w+_H1|p|\w+_PARAMETERS)\b", code("planar3"))
+    assert re.search(r"\*p\b", code("planar3 symbolic"))
+    assert re.search(r"\*h1\b", code(TURNTABLE))
+
+
+@pytest.mark.parametrize("robot", ["planar3", "puma560", LEG, TURNTABLE])
+def test_the_index_and_every_label_agree_with_the_layout(
+    robot: str, directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    folder, name = directory_of(robot) / "c", name_of(directory_of(robot))
+    text = (folder / f"{name}_index.h").read_text(encoding="utf-8")
+    layout = package_of(robot).load("numpy").layout
+    fields = {
+        "c2": layout.acceleration,
+        "c1": layout.velocity,
+        "g": layout.gravity,
+        "h1": layout.velocity_linear,
+    }
+    entries: dict[str, list[str]] = {}
+    for array, rows in fields.items():
+        table = re.search(rf"{name}_{array}_index\[\w+\]\[\d\] = {{(.*?)}};", text, re.S)
+        found = re.findall(r"{([\d, ]+)}", table[1]) if table else []
+        assert found == [", ".join(str(index + 1) for index in row) for row in rows]
+        entries[array] = found
+    entries |= {"tau": entries["g"], "c0": entries["c1"]}
+    for path in [*folder.glob("link_*.h"), *folder.glob("links_together.h")]:
+        for kernel in path.read_text(encoding="utf-8").split("KERNEL(")[1:]:
+            link = re.match(r"link_(\d+)", kernel)
+            labels = re.findall(r"(\w+)_out\[(\d+) \* W \+ b\] = .*; /\* (\w+)\((.*)\) \*/", kernel)
+            for array, entry, label, indices in labels:
+                assert link
+                own = [e for e in entries[array] if e.split(", ")[1] == link[1]]
+                assert (label, indices) == (array, own[int(entry)])
+            assert labels or not link
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("robot", ["puma560", LEG], ids=["arm", "tree"])
 def test_it_says_what_numpy_says_for_any_count(
-    dtype: type, directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+    robot: str,
+    dtype: type,
+    directory_of: Callable[[str], Path],
+    package_of: Callable[[str], ModuleType],
 ) -> None:
-    library, robot = Compiled(directory_of("puma560")), package_of("puma560").load("numpy")
+    library, reference = Compiled(directory_of(robot)), package_of(robot).load("numpy")
     tolerance = 1e-13 if dtype is np.float64 else 1e-5
+    fields = ("acceleration", "velocity", "gravity", "torque")
     for count in (1, 2, 16, 37):
-        states = tuple(m.astype(dtype) for m in random_states(6, count))
+        states = tuple(m.astype(dtype) for m in random_states(reference.n, count))
         exact = tuple(m.astype(float) for m in states)
-        expected, given = robot.packed(*exact), library.decomposition(*states)
-        for field in ("acceleration", "velocity", "gravity", "torque"):
+        expected, given = reference.packed(*exact), library.decomposition(*states)
+        for field in fields:
             assert relative_error(given[field], getattr(expected, field)) <= tolerance, (count, field)
         assert relative_error(library.torque(*states), expected.torque) <= tolerance, count
-        slopes = robot.position_gradient(*exact)[:, *robot.layout.velocity.T]
+        slopes = reference.position_gradient(*exact)[:, *reference.layout.velocity.T]
         assert relative_error(library.position_gradient(*states), slopes) <= tolerance, count
     assert library.decomposition(*(m[:0] for m in states))["torque"].shape[0] == 0
+    states = tuple(m.astype(dtype) for m in random_states(reference.n, 48))
+    expected = reference.packed(*(m.astype(float) for m in states))
+    given = library.decomposition_of_blocks(*states)
+    for field in fields:
+        assert relative_error(given[field], getattr(expected, field)) <= tolerance, field
+    for link in range(reference.N):
+        own = [getattr(reference.layout, field)[:, 1] == link for field in fields]
+        one = library.link(link + 1, [mask.sum() for mask in own], *(m[5] for m in states))
+        for field, mask, values in zip(fields, own, one, strict=True):
+            scale = np.abs(getattr(expected, field)).max()
+            np.testing.assert_allclose(values, getattr(expected, field)[5, mask], atol=tolerance * scale)
+
+
+def test_results_that_no_cache_holds_are_the_same(directory_of: Callable[[str], Path]) -> None:
+    library = Compiled(directory_of("planar3"))
+    few = random_states(3, 512)
+    expected = library.decomposition(*few)
+    repeats = (64 << 20) // (8 * sum(library.sizes.values())) // 512 + 1
+    many = [np.tile(m, (repeats, 1)) for m in few]
+    for given in (library.decomposition(*many), library.decomposition_of_blocks(*many)):
+        for field, values in expected.items():
+            assert (given[field].reshape(repeats, 512, -1) == values).all(), field
 
 
 def test_it_takes_run_time_parameters(
@@ -53,3 +164,28 @@ def test_it_takes_run_time_parameters(
     expected = package.load("numpy", parameters=heavier).packed(*states)
     assert relative_error(library.torque(*states), expected.torque) <= 1e-13
     assert relative_error(library.decomposition(*states)["velocity"], expected.velocity) <= 1e-13
+
+
+def test_links_of_energies_with_and_without_linear_terms_go_together(tmp_path: Path) -> None:
+    energies = tmp_path / "pair.py"
+    energies.write_text(
+        "from linkwise import Coordinate, LinkEnergy\n"
+        "x, y = Coordinate('x', 'm'), Coordinate('y', 'm')\n"
+        "name, coordinates = 'pair', [x, y]\n"
+        "links = [\n"
+        "    LinkEnergy('plain', x.qd**2 * (1 + x.q**2), 3 * x.q**2),\n"
+        "    LinkEnergy('carried', (x.qd + y.q * y.qd) ** 2 + x.q * y.qd, 0),\n"
+        "]\n",
+        encoding="utf-8",
+    )
+    write_package(generate(read_system(energies)), tmp_path / "pair")
+    library = Compiled(tmp_path / "pair")
+    assert library.sizes["h1"] == 4
+    states = random_states(2, 19)
+    expected = import_package(tmp_path / "pair").load("numpy").packed(*states)
+    given = library.decomposition(*states)
+    assert relative_error(given["linear"], expected.velocity_linear) <= 1e-14
+    assert relative_error(given["velocity"], expected.velocity) <= 1e-14
+    for compiler in COMPILERS:
+        if shutil.which(compiler):
+            compile_library(tmp_path / "pair", tmp_path / "library.so", COMPILERS[compiler])

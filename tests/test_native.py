@@ -125,7 +125,7 @@ def load_elsewhere(package: ModuleType, **environment: str) -> subprocess.Comple
     ("variable", "value", "message"),
     [
         ("CC", "no-such-compiler", "apt install gcc"),
-        ("CC", '"gcc', "is no command"),
+        ("CC", '"gcc', "is not a command"),
         ("CC", "true", "made no library"),
         ("LINKWISE_CACHE", "/proc", "set LINKWISE_CACHE"),
     ],

@@ -5,7 +5,7 @@ import re
 import pytest
 from linkwise import Options, generate, read_system
 
-OWN = re.compile(r"_\d+\.(py|inc)$")
+OWN = re.compile(r"_\d+\.(py|h)$")
 
 
 @pytest.mark.parametrize("parameters", ["numeric", "symbolic"])

@@ -127,7 +127,7 @@ def _parameter_lines(system: System) -> list[str]:
 def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
     """What was generated, from what, what it costs, and the SHA-256 of every file."""
     system = derivation.system
-    shared = derivation.fused if "c/fused.inc" in files else None
+    shared = derivation.fused if "c/links_together.h" in files else None
     return Manifest(
         derivation.package,
         system.name,

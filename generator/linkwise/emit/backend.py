@@ -66,15 +66,6 @@ def _c(d: Derivation) -> Iterator[tuple[str, str]]:
     return c_files(d)
 
 
-def _native(d: Derivation) -> Iterator[tuple[str, str]]:
-    from linkwise.emit.render import render
-    from linkwise.version import VERSION
-
-    for name in ("native_backend", "native_build", "native_torch"):
-        view = {"version": VERSION} | ({"package": d.package} if name == "native_build" else {})
-        yield f"runtime/{name}.py", render(f"package/{name}.py.j2", view)
-
-
 def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
     from linkwise.emit.formulas import formula_files
 
@@ -121,8 +112,17 @@ BACKENDS: dict[str, BackendFiles] = {
         BackendFiles(
             "native",
             "the C code, compiled by this system's compiler",
-            emits=(_native,),
-            runtime=("arguments.py", "numpy_backend.py"),
+            emits=(),
+            runtime=(
+                "arguments.py",
+                "native_backend.py",
+                "native_build.py",
+                "native_compiler.py",
+                "native_library.py",
+                "native_torch.py",
+                "numpy_backend.py",
+                "torch_backend.py",
+            ),
             loading=Loading(
                 "native_backend",
                 'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values)',

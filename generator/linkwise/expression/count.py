@@ -1,7 +1,7 @@
 """How much arithmetic a set of outputs costs."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
 from linkwise.expression.graph import Graph, Node, reachable
@@ -30,7 +30,8 @@ class OperationCount:
         )
 
 
-def count_operations(graph: Graph, outputs: Iterable[Node]) -> OperationCount:
-    """Count what computing `outputs` takes. A sign in front of a value is free."""
-    ops = Counter(graph.nodes[node][0] for node in reachable(graph, outputs))
+def count_operations(graph: Graph, outputs: Iterable[Node], given: Container[Node] = ()) -> OperationCount:
+    """Count what computing `outputs` takes from what is `given`. A sign in front of a value is free."""
+    needed = reachable(graph, outputs, given)
+    ops = Counter(graph.nodes[node][0] for node in needed if node not in given)
     return OperationCount(ops["add"] + ops["sub"], ops["mul"], ops["div"], ops["call"])

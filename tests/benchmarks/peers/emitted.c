@@ -1,4 +1,4 @@
-/* Times a generated robot's C: nanoseconds a sample of the full decomposition.
+/* Times the C of a robot of rigid links without run-time parameters: nanoseconds a sample of the full decomposition.
    Compiled with -DROBOT=name -DUPPER=NAME -DREAL=double -DSUFFIX= (or float, f) and the header by -include.
    Each figure is the least of many short spells, so that other work on the machine falls between them.
    Arguments: seconds for a figure, then batch sizes. Prints "layout batch threads nanoseconds" lines. */
@@ -14,7 +14,7 @@
 #define GLUE(a, b, c) JOIN3(a, b, c)
 #define CALL(function) GLUE(ROBOT, function, SUFFIX)
 #define SIZE(what) GLUE(UPPER, what, )
-enum { N = SIZE(_JOINTS), C2 = SIZE(_C2), C1 = SIZE(_C1), G = SIZE(_G), H1 = SIZE(_H1) };
+enum { N = SIZE(_JOINTS), C2 = SIZE(_C2), C1 = SIZE(_C1), G = SIZE(_G) };
 enum { W = GLUE(UPPER, _BLOCK, WIDTH), THREADS = 2 };
 typedef REAL real;
 
@@ -23,7 +23,7 @@ struct work {
     size_t count;
     long rounds, repeats;
     double start, end;
-    real *q, *qd, *qdd, *c2, *c1, *g, *tau, *h1;
+    real *q, *qd, *qdd, *c2, *c1, *g, *tau;
     pthread_barrier_t *gate;
 };
 
@@ -50,11 +50,10 @@ static real *room(size_t values)
 
 static void call(const struct work *w)
 {
-    static const real parameters[1] = {0};
     if (w->blocks)
-        CALL(_decomposition_blocks)(w->count / W, w->q, w->qd, w->qdd, parameters, w->c2, w->c1, w->g, w->tau, w->h1);
+        CALL(_decomposition_blocks)(w->count / W, w->q, w->qd, w->qdd, w->c2, w->c1, w->g, w->tau);
     else
-        CALL(_decomposition)(w->count, w->q, w->qd, w->qdd, parameters, w->c2, w->c1, w->g, w->tau, w->h1);
+        CALL(_decomposition)(w->count, w->q, w->qd, w->qdd, w->c2, w->c1, w->g, w->tau);
 }
 
 static void *loop(void *data)
@@ -86,7 +85,7 @@ static double best(struct work whole, int threads)
         w->count = share;
         w->gate = &gate;
         w->q += from * N, w->qd += from * N, w->qdd += from * N;
-        w->c2 += from * C2, w->c1 += from * C1, w->g += from * G, w->tau += from * G, w->h1 += from * H1;
+        w->c2 += from * C2, w->c1 += from * C1, w->g += from * G, w->tau += from * G;
         pthread_create(&id[t], NULL, loop, w);
     }
     for (long repeat = 0; repeat < whole.repeats; ++repeat) {
@@ -115,7 +114,7 @@ int main(int count, char **arguments)
         largest = batch > largest ? batch : largest;
     }
     struct work w = {.q = room(largest * N), .qd = room(largest * N), .qdd = room(largest * N)};
-    w.c2 = room(largest * C2), w.c1 = room(largest * C1), w.h1 = room(largest * H1);
+    w.c2 = room(largest * C2), w.c1 = room(largest * C1);
     w.g = room(largest * G), w.tau = room(largest * G);
     unsigned state = 1;
     for (size_t e = 0; e < largest * N; ++e) {

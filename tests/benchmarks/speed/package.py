@@ -40,7 +40,7 @@ class Package:
     @property
     def outputs(self) -> int:
         """Values of one sample."""
-        return sum(self.sizes[what] for what in ("C2", "C1", "G", "G", "H1"))
+        return sum(self.sizes[what] for what in ("C2", "C1", "G", "G"))
 
     def module(self) -> ModuleType:
         """Return the package itself."""
@@ -59,12 +59,13 @@ def prepare(case: Case, work: Path) -> Package:
     shutil.rmtree(cache, ignore_errors=True)
     os.environ["LINKWISE_CACHE"] = str(cache)
     build = importlib.import_module(f"{case.name}.runtime.native_build")
+    directory = work / case.name
+    sources = build.Sources(case.name, directory / "c")
     libraries, compiled = {}, {}
     for real in ("double", "float"):
         start = time.perf_counter()
-        libraries[real] = build.library(real)
+        libraries[real] = build.library(sources, real)
         compiled[real] = time.perf_counter() - start
-    directory = work / case.name
     header = (directory / "c" / f"{case.name}.h").read_text(encoding="utf-8")
     sizes = {key: int(value) for key, value in re.findall(rf"{case.name.upper()}_(\w+) = (\d+)", header)}
     manifest = json.loads((directory / "manifest.json").read_text(encoding="utf-8"))

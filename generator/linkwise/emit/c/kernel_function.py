@@ -1,34 +1,51 @@
-"""One C function over a block of samples, from the nodes that it computes."""
+"""One C function over W samples, from the nodes that it computes."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from linkwise.dynamics.coefficients import LinkForms
 from linkwise.dynamics.kernel import Kernel, parameter_names
 from linkwise.emit.printer import CPrinter
 from linkwise.emit.straight_line import Code, straight_line
+from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Node
 from linkwise.symbolic.system import System
+
+READS = ("q", "qd", "qdd", "sine", "cosine", "p", "shared")
+"""Arrays that a kernel may read, in the order of its parameters."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """A value to be stored: in which array, as which entry, and what it is called there."""
+
+    array: str
+    entry: int
+    label: str
+    node: Node
 
 
 @dataclass(frozen=True)
 class KernelFunction:
-    """One C function over a block: the lines that fetch its inputs, and those that compute and store.
+    """One C function over W samples: the lines that fetch its inputs, and those that compute and store.
 
-    With `shares` it also takes x, what the shared part of a fused kernel has computed.
+    It takes the arrays that it reads and those that it writes, and no others.
     """
 
     name: str
-    arrays: tuple[str, ...]
+    what: str
+    cost: str
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
     inputs: tuple[tuple[str, str], ...]
     statements: tuple[str, ...]
-    unused: tuple[str, ...]
-    shares: bool
 
     @property
     def parameters(self) -> str:
-        """Declarations of the output arrays."""
-        return ", ".join(f"real *restrict {array}" for array in self.arrays)
+        """Declarations of its parameters; outputs are told apart from cosines, which are c1, c2, … too."""
+        reads = [f"const real *RESTRICT {array}" for array in self.reads]
+        writes = [f"real *RESTRICT {array}_out" for array in self.writes]
+        return ",\n    ".join(filter(None, (", ".join(reads), ", ".join(writes))))
 
 
 def turned(kernel: Kernel) -> dict[Node, str]:
@@ -37,57 +54,82 @@ def turned(kernel: Kernel) -> dict[Node, str]:
     return {g.call(f, q): f"{f[0]}{k + 1}" for k, q in enumerate(kernel.inputs.q) for f in ("sin", "cos")}
 
 
-def decomposition_groups(kernel: Kernel, forms: LinkForms) -> dict[str, list[Node]]:
-    """Outputs of the full decomposition, by the array that they go to."""
-    return {
-        "acceleration": list(forms.acceleration.values()),
-        "velocity": list(forms.velocity.values()),
-        "gravity": list(forms.gravity.values()),
-        "torque": list(forms.torque.values()),
-        "linear": forms.linear_block(kernel.graph.zero),
-    }
+def decomposition_outputs(kernel: Kernel, forms: LinkForms, number: int) -> list[Output]:
+    """Outputs of the full decomposition of link `number`."""
+    linear = dict(zip(forms.velocity, forms.linear_block(kernel.graph.zero), strict=False))
+    return [
+        *outputs("c2", forms.acceleration, number),
+        *outputs("c1", forms.velocity, number),
+        *outputs("g", forms.gravity, number),
+        *outputs("tau", forms.torque, number),
+        *outputs("h1", linear, number),
+    ]
+
+
+def outputs(
+    array: str, values: Mapping[int, Node] | Mapping[tuple[int, int], Node], number: int
+) -> Iterator[Output]:
+    """One quantity of link `number`; keys are i, or i and k, counted from 0, and labels count from 1."""
+    for entry, (key, node) in enumerate(values.items()):
+        i, *k = key if isinstance(key, tuple) else (key,)
+        indices = (i + 1, number, *(x + 1 for x in k))
+        yield Output(array, entry, f"{array}({', '.join(map(str, indices))})", node)
 
 
 def kernel_function(
     system: System,
     kernel: Kernel,
     name: str,
-    groups: dict[str, list[Node]],
+    what: str,
+    results: Sequence[Output],
     shared: Mapping[Node, str] | None = None,
 ) -> KernelFunction:
-    """C function whose output arrays are `groups`; sines, cosines and what is `shared` are inputs."""
-    nodes = [node for group in groups.values() for node in group]
+    """C function that stores `results`; sines, cosines and what is `shared` are inputs."""
     given = turned(kernel) | dict(shared or {})
+    nodes = [output.node for output in results]
     code = straight_line(kernel.graph, nodes, CPrinter(), given)
+    sources = _sources(system, (shared or {}).values())
+    inputs = tuple((symbol, source) for symbol, source in sources.items() if symbol in code.symbols)
+    used = {source.split("[")[0] for _, source in inputs}
+    sines = sum(source.startswith(("sine", "cosine")) for _, source in inputs)
+    count = count_operations(kernel.graph, nodes, given)
+    kinds = [
+        (count.additions + count.multiplications, "additions and multiplications"),
+        (count.divisions, "divisions"),
+        (count.functions, "functions"),
+    ]
+    cost = ", ".join(f"{times} {kind}" for times, kind in kinds if times or kind.startswith("add"))
+    cost += f", {sines} sines and cosines apart" if sines else ""
+    return KernelFunction(
+        name,
+        what,
+        cost,
+        tuple(array for array in READS if array in used),
+        tuple(dict.fromkeys(output.array for output in results)),
+        inputs,
+        tuple(_statements(code, results)),
+    )
+
+
+def _sources(system: System, shared: Iterable[str]) -> dict[str, str]:
+    """Where each symbol that a kernel may use comes from."""
+    arrays = {"q": "q", "qd": "qd", "qdd": "qdd", "s": "sine", "c": "cosine"}
     sources = {
         f"{prefix}{k + 1}": f"{array}[{k} * W + b]"
-        for prefix, array in (
-            ("q", "q"),
-            ("qd", "qd"),
-            ("qdd", "qdd"),
-            ("s", "sine"),
-            ("c", "cosine"),
-        )
+        for prefix, array in arrays.items()
         for k in range(len(system.coordinates))
     }
     # By name: where a parameter stands depends on the robot, and a link's file must not.
     sources |= {name: f"p[at_{name}]" for name in parameter_names(system).values()}
-    sources |= {name: f"x[{at} * W + b]" for at, name in enumerate((shared or {}).values())}
-    inputs = tuple((symbol, source) for symbol, source in sources.items() if symbol in code.symbols)
-    places = [(array, at) for array, group in groups.items() for at in range(len(group))]
-    used = {source.split("[")[0] for _, source in inputs}
-    arrays = ["q", "qd", "qdd", "sine", "cosine", "p", *(["x"] if shared is not None else [])]
-    unused = [a for a in arrays if a not in used]
-    unused += [array for array, group in groups.items() if not group]
-    statements = tuple(_statements(code, places))
-    return KernelFunction(name, tuple(groups), inputs, statements, tuple(unused), shared is not None)
+    return sources | {name: f"shared[{at} * W + b]" for at, name in enumerate(shared)}
 
 
-def _statements(code: Code, places: Sequence[tuple[str, int]]) -> Iterator[str]:
-    """Assignments, and each output stored as soon as it can be: fewer values are then alive at a time."""
+def _statements(code: Code, results: Sequence[Output]) -> Iterator[str]:
+    """Assignments, and each output stored as soon as it is known: fewer values are then alive at a time."""
     waiting: dict[int, list[str]] = {}
-    for (array, at), text, ready in zip(places, code.outputs, code.ready, strict=True):
-        waiting.setdefault(ready, []).append(f"{array}[{at} * W + b] = {text};")
+    for output, text, ready in zip(results, code.outputs, code.ready, strict=True):
+        place = f"{output.array}_out[{output.entry} * W + b]"
+        waiting.setdefault(ready, []).append(f"{place} = {text}; /* {output.label} */")
     yield from waiting.get(0, ())
     for number, (variable, text) in enumerate(code.assignments, 1):
         yield f"const real {variable} = {text};"

@@ -1,36 +1,53 @@
-"""The fused kernel in C: what several links share is computed once, by a function of its own."""
+"""The kernel in which links share work: what several need is computed once, by a function of its own."""
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
-from linkwise.emit.c.kernel_function import KernelFunction, decomposition_groups, kernel_function, turned
+from linkwise.emit.c.kernel_function import (
+    KernelFunction,
+    Output,
+    decomposition_outputs,
+    kernel_function,
+    turned,
+)
 from linkwise.expression.graph import Node, operands, reachable
 from linkwise.symbolic.system import System
 
 
 @dataclass(frozen=True)
-class Fused:
-    """Functions of the shared part and of each link's rest, and how many values they share."""
+class SharedWork:
+    """The function of the shared part, those of each link's rest, and how many values they share."""
 
-    functions: tuple[KernelFunction, ...]
-    shared: int
+    part: KernelFunction
+    rests: tuple[KernelFunction, ...]
+    values: int
 
 
-def fused(system: System, kernel: Kernel | None, kernels: Sequence[Kernel]) -> Fused | None:
-    """Functions of a robot's fused kernel; None where the links alone cost no more."""
+def shared_work(system: System, kernel: Kernel | None, kernels: Sequence[Kernel]) -> SharedWork | None:
+    """Functions of the kernel of all links; None where the links alone cost no more."""
     if kernel is None or decomposition_cost([kernel]) >= decomposition_cost(kernels):
         return None
     given = turned(kernel)
     outputs = [list(forms.decomposition()) for forms in kernel.forms]
     shared = _shared(kernel, outputs, given)
-    names = {node: f"x{number + 1}" for number, node in enumerate(shared)}
-    functions = [kernel_function(system, kernel, "shared_part", {"x": shared})]
-    for number, forms in enumerate(kernel.forms, 1):
-        groups = decomposition_groups(kernel, forms)
-        functions.append(kernel_function(system, kernel, f"rest_{number}", groups, names))
-    return Fused(tuple(functions), len(shared))
+    names = {node: f"x{number}" for number, node in enumerate(shared, 1)}
+    values = [Output("shared", entry, name, node) for entry, (node, name) in enumerate(names.items())]
+    what = "What several links need: the values x1 to " + f"x{len(shared)}"
+    part = kernel_function(system, kernel, "shared_part", what, values)
+    rests = tuple(
+        kernel_function(
+            system,
+            kernel,
+            f"link_{number}_rest",
+            f"Decomposition of link {number} from the shared part on",
+            decomposition_outputs(kernel, forms, number),
+            names,
+        )
+        for number, forms in enumerate(kernel.forms, 1)
+    )
+    return SharedWork(part, rests, len(shared))
 
 
 def _shared(kernel: Kernel, outputs: list[list[Node]], given: dict[Node, str]) -> list[Node]:

@@ -1,173 +1,163 @@
-"""Closed forms in C99: kernels over a block of samples, one file a link, and entry points over them.
+"""Closed forms in C: a robot's file to compile, in double or float, and headers.
 
-A kernel's text doesn't say how wide its block or its numbers are: the files that include it do, so that one
-text serves one sample and many, float and double, and a link's file stays the same in a longer robot.
+A kernel's text does not say how many samples it takes nor which numbers: the file that includes it does. So
+one text serves one sample and many, float and double, and a link's file stays the same in a longer robot.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.resources import files
+from typing import Any
 
 from linkwise.dynamics.kernel import Kernel, parameter_names
-from linkwise.emit.c.kernel_function import KernelFunction, decomposition_groups, kernel_function
-from linkwise.emit.c.shared_part import fused
+from linkwise.emit.c import header
+from linkwise.emit.c.calls import LinkKernels, call, group_calls, link_calls, total
+from linkwise.emit.c.kernel_function import (
+    KernelFunction,
+    decomposition_outputs,
+    kernel_function,
+    outputs,
+)
+from linkwise.emit.c.shared_part import SharedWork, shared_work
+from linkwise.emit.c.sizes import Sizes, Span, groups, link_spans, whole
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 
-BLOCK = {"double": 8, "float": 16}
-"""Samples in a block: one cache line of each quantity."""
+FIXED = ("numbers.h", "sines.h", "rows.h", "stream.h")
+"""Files that are the same in every package."""
 
-PARTS = (
-    ("robot", "", "decomposition and torques of many samples"),
-    ("one", "one_", "decomposition and torques of one sample"),
-    ("gradient", "gradient_", "position gradient"),
-)
-"""Files for each number type: what they include, what their names begin with, what they hold."""
-
-GROUP = 384
-"""Values that wait in blocks at a time: 24 KiB, half of a usual first-level cache."""
-
-
-@dataclass(frozen=True)
-class LinkSizes:
-    """Number of packed values of one link, and where they start in the robot's arrays."""
-
-    number: int
-    acceleration: int
-    velocity: int
-    gravity: int
-    linear: int
-    at_acceleration: int
-    at_velocity: int
-    at_gravity: int
-    at_linear: int
-
-
-@dataclass(frozen=True)
-class LinkGroup:
-    """Consecutive links whose results, block by block, stay in the cache until they turn into rows together.
-
-    The fields beside `links` are those of LinkSizes, for the whole group.
-    """
-
-    links: tuple[LinkSizes, ...]
-    acceleration: int
-    velocity: int
-    gravity: int
-    linear: int
-    at_acceleration: int
-    at_velocity: int
-    at_gravity: int
-    at_linear: int
+SHARED_FILE = "links_together.h"
 
 
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     """Paths inside the package and texts."""
     system, name = derivation.system, derivation.package
-    shared = {"version": VERSION}
+    together = shared_work(system, derivation.fused, derivation.kernels)
+    kernels = []
     for number, kernel in enumerate(derivation.kernels, 1):
-        for file, functions in _functions(system, kernel, number):
-            view = {**shared, "number": number, "functions": functions}
-            yield f"c/{file}_{number}.inc", render("c/link.inc.j2", view)
-    sizes = list(link_sizes(derivation.kernels))
-    c2, c1, g, _, h1 = packed_sizes(derivation.kernels)
-    totals = {"n": len(system.coordinates), "c2": c2, "c1": c1, "g": g, "h1": h1}
-    groups = list(link_groups(sizes))
-    kinds = ("acceleration", "velocity", "gravity", "linear")
-    room = {kind: max(1, *(getattr(group, kind) for group in groups)) for kind in kinds}
-    whole = fused(system, derivation.fused, derivation.kernels)
-    robot = {**shared, "links": sizes, "groups": groups, "room": room, "largest": max(room.values())}
-    robot["shared"] = whole.shared if whole else 0
-    gradient = {**shared, "links": sizes, "largest": max(k.velocity for k in sizes)}
-    header = {
-        "name": name,
-        "upper": name.upper(),
-        "links": range(1, len(sizes) + 1),
-        "parameters": len(system.parameters),
-        "types": [("double", "", BLOCK["double"]), ("float", "f", BLOCK["float"])],
-    }
-    parameters = {"parameters": list(parameter_names(system).values())}
-    yield f"c/{name}.h", render("c/robot.h.j2", shared | totals | header)
-    yield "c/sizes.inc", render("c/sizes.inc.j2", shared | totals | parameters)
-    yield "c/blocks.inc", render("c/blocks.inc.j2", shared)
-    yield "c/one.inc", render("c/one.inc.j2", {**shared, "links": sizes})
-    yield "c/robot.inc", render("c/robot.inc.j2", robot)
-    if whole:
-        view = {**shared, "number": 0, "functions": whole.functions}
-        yield "c/fused.inc", render("c/link.inc.j2", view)
-    yield "c/gradient.inc", render("c/gradient.inc.j2", gradient)
-    for file in ("turn.c", "internal.h"):
-        yield f"c/{file}", render(f"c/{file}.j2", {**shared, "name": name})
-    for kind, suffix in (("double", ""), ("float", "f")):
-        for part, stem, what in PARTS:
-            view = {
-                "name": name,
-                "type": kind,
-                "suffix": suffix,
-                "block": BLOCK[kind],
-                "part": part,
-                "what": what,
-            }
-            yield f"c/{name}_{stem}{kind}.c", render("c/robot.c.j2", shared | view)
+        rest = together.rests[number - 1] if together else None
+        kernels.append(_link_kernels(system, kernel, number, rest))
+        yield f"c/link_{number}.h", _kernel_file(_link_view(system, number, kernels[-1]))
+    if together:
+        yield f"c/{SHARED_FILE}", _kernel_file(_shared_view(together))
+    links = link_spans(derivation.kernels)
+    common = {"version": VERSION, "name": name}
+    robot = common | _robot_view(system, links, kernels, together)
+    yield f"c/{name}.c", render("c/robot.c.j2", robot)
+    yield f"c/{name}f.c", render("c/robotf.c.j2", common)
+    names = common | {"upper": name.upper()}
+    yield f"c/{name}.h", render("c/robot.h.j2", names | _header_view(system, links))
+    tables = {"tables": list(header.index_tables(system, links))}
+    yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)
+    for file in FIXED:
+        yield f"c/{file}", files("linkwise.runtime").joinpath("c", file).read_text(encoding="utf-8")
 
 
-def link_sizes(kernels: Sequence[Kernel]) -> Iterator[LinkSizes]:
-    """Sizes and offsets of the links' packed values, in order."""
-    c2 = c1 = g = linear = 0
-    for number, kernel in enumerate(kernels, 1):
-        forms = kernel.forms[0]
-        counts = (
-            len(forms.acceleration),
-            len(forms.velocity),
-            len(forms.gravity),
-            len(forms.linear_block(kernel.graph.zero)),
-        )
-        yield LinkSizes(number, *counts, c2, c1, g, linear)
-        c2, c1, g, linear = c2 + counts[0], c1 + counts[1], g + counts[2], linear + counts[3]
-
-
-def link_groups(sizes: Sequence[LinkSizes]) -> Iterator[LinkGroup]:
-    """Groups of at most GROUP values; a link that is larger is one by itself."""
-    links: list[LinkSizes] = []
-    for link in sizes:
-        if links and sum(map(_values, links)) + _values(link) > GROUP:
-            yield _group(links)
-            links = []
-        links.append(link)
-    yield _group(links)
-
-
-def _values(k: LinkSizes) -> int:
-    return k.acceleration + k.velocity + 2 * k.gravity + k.linear
-
-
-def _group(links: Sequence[LinkSizes]) -> LinkGroup:
-    kinds = ("acceleration", "velocity", "gravity", "linear")
-    counts = {kind: sum(getattr(k, kind) for k in links) for kind in kinds}
-    starts = {f"at_{kind}": getattr(links[0], f"at_{kind}") for kind in kinds}
-    return LinkGroup(tuple(links), **counts, **starts)
-
-
-def packed_sizes(kernels: Sequence[Kernel]) -> tuple[int, int, int, int, int]:
-    """Packed values of one sample of the whole robot: c2, c1, g, τ, h1."""
-    *_, last = link_sizes(kernels)
-    gravity = last.at_gravity + last.gravity
-    return (
-        last.at_acceleration + last.acceleration,
-        last.at_velocity + last.velocity,
-        gravity,
-        gravity,
-        last.at_linear + last.linear,
+def _link_kernels(system: System, kernel: Kernel, number: int, rest: KernelFunction | None) -> LinkKernels:
+    forms = kernel.forms[0]
+    stem = f"link_{number}"
+    results = decomposition_outputs(kernel, forms, number)
+    torques = [output for output in results if output.array == "tau"]
+    gradients = list(outputs("c0", forms.position_gradient, number))
+    return LinkKernels(
+        kernel_function(system, kernel, f"{stem}_decomposition", "Decomposition", results),
+        kernel_function(system, kernel, f"{stem}_torque", "Torques alone", torques),
+        kernel_function(system, kernel, f"{stem}_position_gradient", "Position gradient", gradients),
+        rest,
     )
 
 
-def _functions(system: System, kernel: Kernel, number: int) -> Iterator[tuple[str, list[KernelFunction]]]:
-    """Stems of the link's files and the functions in each."""
-    forms = kernel.forms[0]
-    groups = decomposition_groups(kernel, forms)
-    yield "link", [kernel_function(system, kernel, f"link_{number}_decomposition", groups)]
-    torque = {"torque": groups["torque"]}
-    yield "torque", [kernel_function(system, kernel, f"link_{number}_torque", torque)]
-    gradient = {"gradient": list(forms.position_gradient.values())}
-    yield "gradient", [kernel_function(system, kernel, f"gradient_{number}", gradient)]
+def _link_view(system: System, number: int, kernels: LinkKernels) -> dict[str, Any]:
+    return {
+        "title": f"Link {number}, {header.shown(system.links[number - 1].name)}",
+        "about": (
+            "The file that includes this one asks for functions by WANT_DECOMPOSITION, WANT_TORQUE and",
+            "WANT_POSITION_GRADIENT, and says how many samples W they take; KERNEL completes their names.",
+        ),
+        "functions": (
+            ("WANT_DECOMPOSITION", kernels.decomposition),
+            ("WANT_TORQUE", kernels.torque),
+            ("WANT_POSITION_GRADIENT", kernels.position_gradient),
+        ),
+    }
+
+
+def _shared_view(together: SharedWork) -> dict[str, Any]:
+    return {
+        "title": "All links together, where they share work",
+        "about": (
+            "shared_part computes what several links need, x1, x2 and so on, and link_1_rest what is then",
+            "left of link 1. The file that includes this one says how many samples W they take.",
+        ),
+        "functions": tuple(("", function) for function in (together.part, *together.rests)),
+    }
+
+
+def _kernel_file(view: Mapping[str, Any]) -> str:
+    return render("c/link.h.j2", {"version": VERSION, **view})
+
+
+def _robot_view(
+    system: System, links: Sequence[Span], kernels: Sequence[LinkKernels], together: SharedWork | None
+) -> dict[str, Any]:
+    """Fields of NAME.c but for its name."""
+    robot = whole(links)
+    arrays = robot.size.arrays
+    parts = tuple(groups(links))
+    waiting = _most([whole(part).size for part in parts])
+    names = list(parameter_names(system).values())
+    motion = _inputs(system)
+    return {
+        "n": len(system.coordinates),
+        "totals": _totals(robot.size),
+        "total": robot.size.total,
+        "parameters": [(name, place) for place, name in enumerate(names)],
+        "kernels": f"link_1.h to link_{len(links)}.h" if len(links) > 1 else "link_1.h",
+        "inputs": header.pointers("const real", motion),
+        "outputs": header.pointers("real", arrays),
+        "pointers": ", ".join(f"*{array}" for array in arrays),
+        "passed": ", ".join((*motion, *arrays)),
+        "passed_motion": ", ".join(motion),
+        "links": [link_calls(link, k) for link, k in zip(links, kernels, strict=True)],
+        "groups": [group_calls(part, kernels, arrays) for part in parts],
+        "room": [(array, waiting.of(array)) for array in arrays],
+        "waiting": ", ".join(f"{array}_block" for array in arrays),
+        "streams": len(parts) == 1,
+        "largest": max(waiting.of(array) for array in arrays),
+        "waiting_torques": waiting.g,
+        "largest_gradient": max(link.size.c1 for link in links),
+        "shared": together.values if together else 0,
+        "shared_call": call(together.part, "block", "m.", {"shared": "shared"}) if together else "",
+    }
+
+
+def _header_view(system: System, links: Sequence[Span]) -> dict[str, Any]:
+    """Fields of NAME.h but for its name."""
+    robot = whole(links)
+    return {
+        "command": header.COMMAND,
+        "n": len(system.coordinates),
+        "totals": _totals(robot.size),
+        "linear": bool(robot.size.h1),
+        "links": list(header.link_lines(system, links)),
+        "joints": list(header.joint_lines(system)),
+        "parameters": header.parameter_lines(system),
+        "blocks": tuple(header.BLOCK.values()),
+        "functions": list(header.functions(_inputs(system), robot, links)),
+    }
+
+
+def _inputs(system: System) -> tuple[str, ...]:
+    """Arrays that every function takes."""
+    return ("q", "qd", "qdd", "p") if system.parameters else ("q", "qd", "qdd")
+
+
+def _totals(size: Sizes) -> list[tuple[str, int]]:
+    """Names in C and values of the robot's numbers of entries."""
+    return [(total(array), size.of(array)) for array in size.arrays if array != "tau"]
+
+
+def _most(sizes: Sequence[Sizes]) -> Sizes:
+    """Return room for any of these."""
+    return Sizes(*(max(size.of(array) for size in sizes) for array in ("c2", "c1", "g", "h1")))

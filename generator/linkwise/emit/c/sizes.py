@@ -1,0 +1,91 @@
+"""How many values a link's results take, and where they lie among those of the robot."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from linkwise.dynamics.kernel import Kernel
+
+ARRAYS = ("c2", "c1", "g", "tau", "h1")
+"""Arrays of the decomposition in the order of the API; c0 has as many values as c1."""
+
+GROUP = 384
+"""Values that wait in blocks at a time: 24 KiB, half of a usual first-level cache."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """A number of values, or a place, in each array; tau is as long as g, c0 as long as c1."""
+
+    c2: int = 0
+    c1: int = 0
+    g: int = 0
+    h1: int = 0
+
+    def __add__(self, other: "Sizes") -> "Sizes":
+        return Sizes(self.c2 + other.c2, self.c1 + other.c1, self.g + other.g, self.h1 + other.h1)
+
+    def __sub__(self, other: "Sizes") -> "Sizes":
+        return Sizes(self.c2 - other.c2, self.c1 - other.c1, self.g - other.g, self.h1 - other.h1)
+
+    def of(self, array: str) -> int:
+        """Number of values in an array, or where it begins."""
+        return {
+            "c2": self.c2,
+            "c1": self.c1,
+            "g": self.g,
+            "tau": self.g,
+            "h1": self.h1,
+            "c0": self.c1,
+        }[array]
+
+    @property
+    def total(self) -> int:
+        """Values of all arrays together."""
+        return sum(map(self.of, ARRAYS))
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        """Arrays that hold anything, h1 being empty without energies linear in the velocities."""
+        return tuple(array for array in ARRAYS if self.of(array))
+
+
+@dataclass(frozen=True)
+class Span:
+    """Consecutive links, counted from 1: how many values they have, and where these begin."""
+
+    first: int
+    last: int
+    size: Sizes
+    start: Sizes
+
+
+def link_spans(kernels: Sequence[Kernel]) -> tuple[Span, ...]:
+    """Return each link by itself, in order."""
+    spans: list[Span] = []
+    start = Sizes()
+    for number, kernel in enumerate(kernels, 1):
+        forms = kernel.forms[0]
+        linear = len(forms.linear_block(kernel.graph.zero))
+        size = Sizes(len(forms.acceleration), len(forms.velocity), len(forms.gravity), linear)
+        spans.append(Span(number, number, size, start))
+        start += size
+    return tuple(spans)
+
+
+def whole(links: Sequence[Span]) -> Span:
+    """Return consecutive links as one."""
+    return Span(links[0].first, links[-1].last, sum((k.size for k in links), Sizes()), links[0].start)
+
+
+def groups(links: Sequence[Span]) -> Iterator[tuple[Span, ...]]:
+    """Links whose results stay in the cache, block by block, until they turn into rows together.
+
+    A group has at most GROUP values; a link that is larger is one by itself.
+    """
+    group: list[Span] = []
+    for link in links:
+        if group and whole(group).size.total + link.size.total > GROUP:
+            yield tuple(group)
+            group = []
+        group.append(link)
+    yield tuple(group)

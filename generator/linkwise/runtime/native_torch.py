@@ -1,0 +1,153 @@
+"""Compiled C as torch operators, with gradients.
+
+Forward runs the C code; backward differentiates the closed forms in torch, which are there for that.
+"""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from .native_backend import NativeBackend, result_sizes
+from .native_build import Sources
+from .torch_backend import TorchBackend
+
+OPERATORS: dict[tuple[Sources, str], Any] = {}
+"""Operators made so far; torch wants each to be made once."""
+
+
+class TorchSide(TorchBackend):
+    """What NativeBackend does with tensors."""
+
+    name: ClassVar = "native"
+
+    def __init__(self, native: NativeBackend) -> None:
+        super().__init__(native.structure, native.links, native.parameters)
+        self.native = native
+        self.operators = {call: operator(native, call) for call in result_sizes(native.structure)}
+
+    def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
+        """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
+        motion = super().arrays(named, n)
+        if motion[0].device.type != "cpu":
+            raise TypeError(
+                f"the tensors lie on {motion[0].device}; this back end takes CPU tensors, torch takes all"
+            )
+        if _transformed(motion):
+            raise TypeError(
+                "this back end does not run inside torch.func or forward-mode differentiation; take torch"
+            )
+        return motion
+
+    def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
+        """c2, c1, g, tau, h1, packed."""
+        return list(self._run("decomposition", q, qd, qdd))
+
+    def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+        """Tau, packed."""
+        return self._run("torque", q, qd, qdd)[0]
+
+    def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+        """c0, packed."""
+        return self._run("position_gradient", q, qd, qdd)[0]
+
+    def _run(self, call: str, q: Tensor, qd: Tensor, qdd: Tensor) -> tuple[Tensor, ...]:
+        names = self.structure.parameters
+        values = [self.parameters[name].to(q).reshape(()) for name in names]
+        p = torch.stack(values) if values else q.new_empty(0)
+        recorded = torch.is_grad_enabled() and any(t.requires_grad for t in (q, qd, qdd, p))
+        if recorded or torch.compiler.is_compiling():
+            results = self.operators[call](q, qd, qdd, p)
+            return results if isinstance(results, tuple) else (results,)
+        return compute(self.native, call, q, qd, qdd)
+
+
+def compute(native: NativeBackend, call: str, *motion: Tensor) -> tuple[Tensor, ...]:
+    """Results of the C code as tensors that share its memory."""
+    arrays = (t.detach().resolve_neg().numpy() for t in motion)
+    return tuple(torch.from_numpy(result) for result in native.run(call, *arrays))
+
+
+def operator(native: NativeBackend, call: str) -> Any:
+    """Torch operator of a C function, with a gradient, made when first asked for."""
+    key = (native.sources, call)
+    if key not in OPERATORS:
+        OPERATORS[key] = _define(native, call)
+    return OPERATORS[key]
+
+
+def _define(native: NativeBackend, call: str) -> Any:
+    """Operator (q, qd, qdd, p) -> results; p holds the parameters in the structure's order."""
+    structure, sources, links = native.structure, native.sources, native.links
+    sizes = result_sizes(structure)[call]
+
+    def values(p: Tensor) -> dict[str, Tensor]:
+        return dict(zip(structure.parameters, p.unbind(), strict=True))
+
+    def forward(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
+        backend = NativeBackend(structure, sources.directory, links, values(p.detach()))
+        return _bare(compute(backend, call, q, qd, qdd))
+
+    def fake(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
+        return _bare(tuple(q.new_empty((*q.shape[:-1], size)) for size in sizes))
+
+    def setup(ctx: Any, inputs: Any, output: Any) -> None:
+        ctx.save_for_backward(*inputs)
+
+    def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
+        def again(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
+            return getattr(TorchBackend(structure, links, values(p)), call)(q, qd, qdd)
+
+        return _backward(again, ctx.saved_tensors, ctx.needs_input_grad, slopes)
+
+    results = ", ".join(["Tensor"] * len(sizes))
+    schema = f"(Tensor q, Tensor qd, Tensor qdd, Tensor p) -> ({results})"
+    made = torch.library.custom_op(f"{_namespace(sources)}::{call}", forward, mutates_args=(), schema=schema)
+    made.register_fake(fake)
+    made.register_autograd(backward, setup_context=setup)
+    return made
+
+
+def _backward(
+    again: Any, inputs: Sequence[Tensor], needed: Sequence[bool], slopes: Sequence[Tensor]
+) -> tuple[Tensor | None, ...]:
+    """Slopes of the inputs from those of the results, by computing these once more in torch."""
+    differentiable = torch.is_grad_enabled()
+    with torch.enable_grad():
+        fresh = [t if differentiable else t.detach().requires_grad_() for t in inputs]
+        results = again(*fresh)
+        results = results if isinstance(results, list) else [results]
+        pairs = [(r, s) for r, s in zip(results, slopes, strict=True) if r.requires_grad and s is not None]
+        wanted = [t for t, need in zip(fresh, needed, strict=True) if need]
+        reached, given = zip(*pairs, strict=True)
+        found = iter(
+            torch.autograd.grad(reached, wanted, given, create_graph=differentiable, allow_unused=True)
+        )
+    return tuple(next(found) if need else None for need in needed)
+
+
+def _transformed(motion: Sequence[Tensor]) -> bool:
+    """Whether a transformation that needs more than values is under way; it would be lost without a word."""
+    if torch.compiler.is_compiling():
+        return False
+    if torch._C._are_functorch_transforms_active():
+        return True
+    inside = torch.autograd.forward_ad._current_level >= 0
+    return inside and any(_has_tangent(t) for t in motion)
+
+
+def _has_tangent(t: Tensor) -> bool:
+    return torch.autograd.forward_ad.unpack_dual(t).tangent is not None  # type: ignore[no-untyped-call]
+
+
+def _bare(results: tuple[Tensor, ...]) -> Any:
+    """An operator with one result returns it by itself."""
+    return results if len(results) > 1 else results[0]
+
+
+def _namespace(sources: Sources) -> str:
+    """A namespace of torch operators for this package alone, also beside another of the same name."""
+    place = hashlib.sha256(f"{__name__} {sources.directory}".encode()).hexdigest()[:12]
+    return f"linkwise_{sources.name}_{place}"
