@@ -87,8 +87,8 @@ def _shared_view(together: SharedWork) -> dict[str, Any]:
     return {
         "title": "All links together, where they share work",
         "about": (
-            "shared_part computes what several links need, x1, x2 and so on, and link_1_rest what is then",
-            "left of link 1. The file that includes this one says how many samples W they take.",
+            "shared_part computes what several links need, link_1_rest what is then left of link 1. The file",
+            "that includes this one says how many samples W they take; KERNEL completes their names.",
         ),
         "functions": tuple(("", function) for function in (together.part, *together.rests)),
     }
