@@ -33,7 +33,7 @@ def packed(package: Any, directory: Path, backend: str, q: Any, qd: Any, qdd: An
         return answer | {"position_gradient": library.position_gradient(q, qd, qdd)}
     dynamics = package.load(backend)
     motion = (q, qd, qdd)
-    if backend in ("torch", "autograd"):
+    if dynamics.backend.takes_tensors:
         import torch
 
         motion = tuple(torch.from_numpy(m) for m in motion)

@@ -76,7 +76,7 @@ def test_a_coefficient_that_is_zero_but_for_rounding_passes(tmp_path: Path) -> N
 def test_a_slightly_wrong_coefficient_fails_all_the_same(
     old: str, new: str, failing: str, package: Path
 ) -> None:
-    change_file(package, "numpy_forms/link_2.py", old, new)
+    change_file(package, "forms/link_2.py", old, new)
     assert marks(package)[failing] == "FAIL"
 
 
@@ -86,13 +86,13 @@ def test_a_slightly_wrong_coefficient_fails_all_the_same(
         ('RuntimeError("gcc failed: error: expected install")', "FAIL"),
         ('OSError("no space")', "FAIL"),
         ('ValueError("strange")', "FAIL"),
-        ('ImportError("gone", name=__package__ + ".numpy_forms")', "FAIL"),
+        ('ImportError("gone", name=__package__ + ".forms")', "FAIL"),
         ('RuntimeError("needs a C compiler: apt install gcc")', "skip"),
         ('ImportError("No module named torch", name="torch")', "skip"),
     ],
 )
 def test_only_what_is_missing_here_is_left_out(error: str, mark: str, package: Path) -> None:
-    change_file(package, "load.py", "    if backend not in", f"    raise {error}\n    if backend not in")
+    change_file(package, "__init__.py", "    if backend not in", f"    raise {error}\n    if backend not in")
     found = marks(package)
     assert found.pop("hashes") == "ok"
     assert found.pop("back ends") == "FAIL"
@@ -100,10 +100,10 @@ def test_only_what_is_missing_here_is_left_out(error: str, mark: str, package: P
 
 
 def test_a_package_that_cannot_be_imported_or_asked_fails(package: Path) -> None:
-    change_file(package, "dynamics.py", "class Dynamics", "def broken(:\nclass Dynamics")
+    change_file(package, "runtime/dynamics.py", "class Dynamics", "def broken(:\nclass Dynamics")
     assert marks(package) == {"hashes": "ok", "import": "FAIL"}
-    change_file(package, "dynamics.py", "def broken(:\n", "")
-    change_file(package, "dynamics.py", "def partial_torque", "def full_torque")
+    change_file(package, "runtime/dynamics.py", "def broken(:\n", "")
+    change_file(package, "runtime/dynamics.py", "def partial_torque", "def full_torque")
     assert marks(package)["answers"] == "FAIL"
 
 
@@ -129,9 +129,9 @@ def test_files_beyond_the_manifest_fail(package: Path) -> None:
     (package / "__pycache__").mkdir()
     (package / "__pycache__/names.pyc").write_bytes(b"")
     assert check_package(package, 5)[0].passed
-    (package / "numpy_forms/more.py").write_text("")
+    (package / "forms/more.py").write_text("")
     [result] = check_package(package)
-    assert (result.mark, result.detail) == ("FAIL", "numpy_forms/more.py was added")
+    assert (result.mark, result.detail) == ("FAIL", "forms/more.py was added")
 
 
 def test_a_manifest_that_lists_no_files_fails(package: Path) -> None:

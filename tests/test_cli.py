@@ -64,9 +64,9 @@ def test_a_mistaken_option_is_one_line(linkwise: Run, arguments: list[str]) -> N
 
 
 def test_generate_replaces_an_earlier_package_whole(linkwise: Run, planar2: Path) -> None:
-    assert (planar2 / "numpy_forms").is_dir()
+    assert (planar2 / "forms").is_dir()
     linkwise("generate", "planar2", "--out", "out", "--backend", "c")
-    assert not (planar2 / "numpy_forms").exists()
+    assert not (planar2 / "forms").exists()
 
 
 def test_manifest_tells_how_to_make_the_package_again(planar2: Path) -> None:
@@ -91,21 +91,21 @@ def test_check_prints_the_largest_error_of_each(linkwise: Run, planar2: Path) ->
 
 
 def test_check_catches_a_tampered_file(linkwise: Run, planar2: Path) -> None:
-    (planar2 / "numpy_forms/link_2.py").write_text("# mine now\n")
+    (planar2 / "forms/link_2.py").write_text("# mine now\n")
     (planar2 / "names.py").unlink()
     done = linkwise("check", planar2)
     assert done.returncode == 1
     assert "FAIL  hashes" in done.stdout
-    assert "names.py is missing; numpy_forms/link_2.py was changed" in done.stdout
+    assert "forms/link_2.py was changed; names.py is missing" in done.stdout
 
 
 def test_check_catches_wrong_numbers_under_a_right_hash(linkwise: Run, planar2: Path) -> None:
     import hashlib
 
-    path = planar2 / "numpy_forms/link_1.py"
+    path = planar2 / "forms/link_1.py"
     path.write_text(path.read_text().replace("0.5", "0.6").replace("0.0", "0.1"))
     manifest = json.loads((planar2 / "manifest.json").read_text())
-    manifest["files"]["numpy_forms/link_1.py"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    manifest["files"]["forms/link_1.py"] = hashlib.sha256(path.read_bytes()).hexdigest()
     (planar2 / "manifest.json").write_text(json.dumps(manifest))
     done = linkwise("check", planar2, "--samples", 5)
     assert done.returncode == 1

@@ -39,7 +39,7 @@ def whole_directory(target: Path, refuse: Callable[[Path], None]) -> Iterator[Pa
 
 
 def write_files(directory: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
-    """Write files, by name, into a folder that may hold others; raises LinkwiseError, and then writes none."""
+    """Write files, by name, into a folder that may hold others; raises LinkwiseError and writes none then."""
     drafts: list[tuple[Path, Path]] = []
     try:
         directory.mkdir(parents=True, exist_ok=True)

@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.dynamics.derive import derive
-from linkwise.emit.assemble import Derivation, identifier, manifest, shared_files
-from linkwise.emit.backend import BACKENDS
+from linkwise.emit.assemble import identifier, manifest, shared_files
+from linkwise.emit.backend import BACKENDS, BackendFiles
+from linkwise.emit.derivation import Derivation
 from linkwise.errors import LinkwiseError, within
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, read_robot
@@ -50,19 +51,21 @@ def generate(
         )
     derivation = Derivation(system, derive(system, progress), package, request or {})
     files: dict[str, str] = {}
-    for number, backend in enumerate(chosen):
-        progress("emit", number, len(chosen))
-        files.update(BACKENDS[backend].files(derivation))
-    progress("emit", len(chosen), len(chosen))
-    files.update(shared_files(derivation, [b for b in chosen if BACKENDS[b].module]))
+    emitters = list(dict.fromkeys(emitter for backend in chosen for emitter in backend.emits))
+    for number, emitter in enumerate(emitters):
+        progress("emit", number, len(emitters))
+        files.update(emitter(derivation))
+    progress("emit", len(emitters), len(emitters))
+    files.update(shared_files(derivation, chosen))
     files["manifest.json"] = manifest(derivation, files)
     return files
 
 
-def _chosen(backends: Iterable[str]) -> tuple[str, ...]:
+def _chosen(backends: Iterable[str]) -> tuple[BackendFiles, ...]:
+    """Back ends by name and those that they need, in the registry's order."""
     names = list(backends)
     for name in names:
         if name not in BACKENDS:
             raise LinkwiseError(f"no back end {name!r}; choose among {', '.join(BACKENDS)}")
     names += [needed for name in names for needed in BACKENDS[name].needs]
-    return tuple(name for name in BACKENDS if name in names)
+    return tuple(backend for name, backend in BACKENDS.items() if name in names)

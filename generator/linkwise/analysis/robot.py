@@ -14,13 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.analysis.poses import Body, read_skeleton
-from linkwise.analysis.tensors import TENSORS, TensorModel
+from linkwise.analysis.tensors import TensorModel
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
 
 Array = NDArray[np.float64]
-BACKENDS = ("native", "numpy")
-"""Back ends in the order tried: compiled C is the fastest, NumPy always works."""
 
 
 class PackedLayout(Protocol):
@@ -33,13 +31,12 @@ class PackedLayout(Protocol):
 
 
 class Packed(Protocol):
-    """c2, c1, g and τ_ij without the zeros, each (..., terms); `layout` says which is which."""
+    """c2, c1, g and τ_ij without the zeros, each (..., terms); the model's `layout` says which is which."""
 
     acceleration: Array
     velocity: Array
     gravity: Array
     torque: Array
-    layout: PackedLayout
 
 
 class Propagation(Protocol):
@@ -56,6 +53,7 @@ class Model(Protocol):
     joint_names: Sequence[str]
     link_names: Sequence[str]
     joint_units: Sequence[str]
+    layout: PackedLayout
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Joint torques τ_i (..., n)."""
@@ -102,7 +100,7 @@ def load_robot(directory: Path, backend: str | None = None) -> Robot:
         raise LinkwiseError(f"{manifest_path}: damaged ({error}); generate the robot again") from error
     digest = hashlib.sha256(text).hexdigest()
     package = _import(directory, digest)
-    chosen, model = _load(directory, package, BACKENDS if backend is None else (backend,))
+    chosen, model = _load(directory, package, package.FASTEST_FIRST if backend is None else (backend,))
     return Robot(
         name,
         tuple(model.joint_names),
@@ -150,7 +148,7 @@ def _load(directory: Path, package: ModuleType, backends: Sequence[str]) -> tupl
     for backend in backends:
         try:
             model = package.load(backend)
-            return backend, TensorModel(model) if backend in TENSORS else model
+            return backend, TensorModel(model) if model.backend.takes_tensors else model
         except Exception as error:  # A back end may lack its compiler, its library or its files.
             reasons.append(f"{backend}: {error}")
     raise LinkwiseError(

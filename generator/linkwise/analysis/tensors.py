@@ -6,18 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-TENSORS = ("torch", "autograd")
-"""Back ends that take tensors."""
 
 
 class TensorModel:
-    """A loaded package whose back end is one of TENSORS, as the analysis uses it (`robot.Model`)."""
+    """A loaded package whose back end takes tensors, as the analysis uses it (`robot.Model`)."""
 
     def __init__(self, model: Any) -> None:
         self._model = model
         self.joint_names = model.joint_names
         self.link_names = model.link_names
         self.joint_units = model.joint_units
+        self.layout = model.layout
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Any:
         """Joint torques τ_i (..., n)."""

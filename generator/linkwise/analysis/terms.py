@@ -31,9 +31,7 @@ class Terms:
     @classmethod
     def of(cls, robot: Robot, convention: Convention) -> "Terms":
         """Plan where each packed value of the robot goes."""
-        zero = np.zeros((1, len(robot.joints)))
-        layout = robot.model.packed(zero, zero, zero).layout
-        columns = columns_of(robot, layout)
+        columns = columns_of(robot, robot.model.layout)
         row = {column.key: at for at, column in enumerate(columns)}
         parts = [
             (at, _rows(columns, TERMS, joint=c.joint, link=c.link))
@@ -45,7 +43,7 @@ class Terms:
             for at, c in enumerate(columns)
             if c.quantity == "tau"
         ]
-        return cls(robot, convention, columns, _sources(layout, row), tuple(parts), tuple(wholes))
+        return cls(robot, convention, columns, _sources(robot.model.layout, row), tuple(parts), tuple(wholes))
 
     def rows(self, quantity: Quantity) -> slice:
         """Where a quantity's columns stand; they stand together."""

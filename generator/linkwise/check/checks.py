@@ -70,7 +70,7 @@ class _Answers:
     """A loaded back end, asked with and answering in NumPy arrays."""
 
     def __init__(self, dynamics: Any) -> None:
-        self.dynamics, self.tensors = dynamics, dynamics.backend.name in ("torch", "autograd")
+        self.dynamics, self.tensors = dynamics, dynamics.backend.takes_tensors
 
     def __call__(self, call: str, *motion: Array) -> Any:
         if not self.tensors:
@@ -120,9 +120,9 @@ def _numbers(manifest: dict[str, Any], loaded: dict[str, _Answers], motion: Moti
 def _oracle(manifest: dict[str, Any], loaded: dict[str, _Answers], motion: Motion) -> Oracle | None:
     if manifest["skeleton"] is not None:
         return recursion_oracle(manifest, motion)
-    if "autograd" not in loaded:
-        return None
-    return difference_oracle(loaded["autograd"].dynamics.backend.modules, motion)
+    backends = [answers.dynamics.backend for answers in loaded.values()]
+    lagrangians = next((backend.modules for backend in backends if hasattr(backend, "modules")), None)
+    return None if lagrangians is None else difference_oracle(lagrangians, motion)
 
 
 def _line(error: Exception) -> str:

@@ -7,6 +7,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from linkwise.emit.backend import BACKENDS
 from linkwise.errors import LinkwiseError
 
 app = typer.Typer(
@@ -43,7 +44,7 @@ def generate(
     name: Annotated[str | None, typer.Option(help="Name of the package; the robot's if not given")] = None,
     backend: Annotated[
         list[str] | None,
-        typer.Option(help="numpy, torch, autograd, native, c or formulas; may be repeated; all if not given"),
+        typer.Option(help=f"{', '.join(BACKENDS)}; may be repeated; all if not given"),
     ] = None,
     parameters: Annotated[
         str, typer.Option(help="numeric, or symbolic: keep them as run-time parameters")
@@ -59,7 +60,6 @@ def generate(
     from linkwise import pipeline
     from linkwise.cli.options import reading_options
     from linkwise.emit.assemble import identifier
-    from linkwise.emit.backend import BACKENDS
     from linkwise.package.write import check_target, write_package
     from linkwise.progress import progress
 

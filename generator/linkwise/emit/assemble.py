@@ -5,42 +5,27 @@ import json
 import keyword
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from importlib import resources
 from typing import Any
 
 import sympy as sp
 
-from linkwise.dynamics.derive import fused_kernel
-from linkwise.dynamics.kernel import Kernel, decomposition_cost
+from linkwise import runtime
+from linkwise.dynamics.kernel import decomposition_cost
+from linkwise.emit.backend import BackendFiles, Loading
+from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 
 SCHEMA = 1
 LONGEST_NAME = 60
+LINE = 100
+SHARED_RUNTIME = ("__init__.py", "dense.py", "dynamics.py", "interface.py", "quantities.py", "structure.py")
+"""Files of linkwise/runtime that every package has."""
 TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}
-
-
-@dataclass(frozen=True)
-class Derivation:
-    """What every back end emits from: the system, one kernel a link, and the request that led to it."""
-
-    system: System
-    kernels: tuple[Kernel, ...]
-    package: str
-    request: Mapping[str, Any]
-
-    @cached_property
-    def fused(self) -> Kernel | None:
-        """Kernel of all links together, if there is one; found when first asked for."""
-        return fused_kernel(self.system)
-
-    @property
-    def linear(self) -> frozenset[int]:
-        """Links whose energy has terms linear in the velocities."""
-        return frozenset(j for j, k in enumerate(self.kernels) if k.forms[0].velocity_linear)
 
 
 def identifier(name: str) -> str:
@@ -51,14 +36,14 @@ def identifier(name: str) -> str:
     return text
 
 
-def shared_files(derivation: Derivation, backends: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Files that serve every back end; `backends` are those that `load` is to know."""
-    from linkwise.emit.backend import BACKENDS
-
-    system = derivation.system
-    shared = {"version": VERSION}
+def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iterator[tuple[str, str]]:
+    """Files that serve every back end, and the runtime files of those `chosen`, which `load` is to know."""
+    loadable = {backend: backend.loading for backend in chosen if backend.loading}
+    fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
+    system, shared = derivation.system, {"version": VERSION}
     names = {
         **shared,
+        "name": repr(derivation.package),
         "joints": [ascii(c.name) for c in system.coordinates],
         "units": [repr(c.unit) for c in system.coordinates],
         "links": [ascii(link.name) for link in system.links],
@@ -66,20 +51,51 @@ def shared_files(derivation: Derivation, backends: Sequence[str]) -> Iterator[tu
         "linear": repr(tuple(sorted(derivation.linear))),
         "parameters": [(ascii(s.name), repr(float(v))) for s, v in system.parameters.items()],
     }
-    load = {
+    init = {
         **shared,
-        "backends": tuple(backends),
-        "default": repr(backends[0]) if backends else "None",
-        "docs": [(name, BACKENDS[name].doc) for name in backends],
-        "modules": {name: BACKENDS[name].module for name in backends},
+        "package": derivation.package,
+        "default": next((backend.name for backend in loadable), ""),
+        "makers": [Maker.of(backend, loading) for backend, loading in loadable.items()],
+        "fastest_first": [backend.name for backend, _ in fastest_first],
+        "parameters": _parameter_lines(system),
     }
-    yield "__init__.py", render("package/init.py.j2", {**shared, "package": derivation.package})
+    yield "__init__.py", render("package/init.py.j2", init)
     yield "names.py", render("package/names.py.j2", names)
-    yield "load.py", render("package/load.py.j2", load)
-    yield "dynamics.py", render("package/dynamics.py.j2", shared)
-    yield "packing.py", render("package/packing.py.j2", shared)
-    if backends:
-        yield "numpy_backend.py", render("package/numpy_backend.py.j2", shared)
+    yield "py.typed", ""
+    copied = {name for backend in loadable for name in backend.runtime}
+    for name in sorted(copied.union(SHARED_RUNTIME)):
+        yield f"runtime/{name}", resources.files(runtime).joinpath(name).read_text(encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Maker:
+    """A function of the package's __init__.py that makes one back end."""
+
+    name: str
+    doc: str
+    imports: tuple[str, ...]
+    made: str
+
+    @classmethod
+    def of(cls, backend: BackendFiles, loading: Loading) -> "Maker":
+        """Its class comes from runtime/, and is the first word of the expression."""
+        made = loading.made.partition("(")[0]
+        imported = f"from .runtime.{loading.module} import {made}"
+        return cls(backend.name, backend.doc, (*loading.imports, imported), loading.made)
+
+
+def _parameter_lines(system: System) -> list[str]:
+    """Names of the parameters as lines of a docstring, which none of their characters can end."""
+    if not system.parameters:
+        return ["none: generate with --parameters symbolic"]
+    lines: list[str] = []
+    for symbol in system.parameters:
+        name = ascii(symbol.name).replace("\\", "\\\\").replace('"', '\\"')
+        if lines and len(lines[-1]) + len(name) < LINE:
+            lines[-1] += f" {name},"
+        else:
+            lines.append(f"{name},")
+    return [*lines[:-1], lines[-1].removesuffix(",")]
 
 
 def manifest(derivation: Derivation, files: Mapping[str, str]) -> str:

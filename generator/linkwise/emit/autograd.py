@@ -1,4 +1,4 @@
-"""Lagrangians as torch modules, one file a link, and the machinery that differentiates them."""
+"""Lagrangians as torch modules, one file a link."""
 
 from collections.abc import Iterator
 
@@ -23,11 +23,9 @@ def autograd_files(system: System, linear: frozenset[int]) -> Iterator[tuple[str
             "path": repr(system.path(j)),
             "linear": j in linear,
         }
-        yield f"autograd/link_{j + 1}.py", render("autograd/link.py.j2", view)
-    shared = {"version": VERSION}
-    yield "autograd/partial_lagrangian.py", render("autograd/partial_lagrangian.py.j2", shared)
+        yield f"energies/link_{j + 1}.py", render("energies/link.py.j2", view)
     init = {"version": VERSION, "numbers": range(1, len(system.links) + 1)}
-    yield "autograd/__init__.py", render("autograd/init.py.j2", init)
+    yield "energies/__init__.py", render("energies/init.py.j2", init)
 
 
 def _calls(function: Function) -> bool:

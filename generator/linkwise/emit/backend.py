@@ -1,85 +1,134 @@
-"""Back ends: each turns a derivation into files; adding one adds an entry here and touches nothing else."""
+"""The registry of back ends: adding one adds an entry here and touches no other line.
+
+An entry is read by the command line too, so that this file imports what emits only when it emits.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib.resources import files
+from typing import TYPE_CHECKING
 
-from linkwise.emit.assemble import Derivation
-from linkwise.emit.autograd import autograd_files
-from linkwise.emit.c.sources import c_files
-from linkwise.emit.closed_forms import closed_form_files
-from linkwise.emit.formulas import formula_files
-from linkwise.emit.render import render
+if TYPE_CHECKING:
+    from linkwise.emit.derivation import Derivation
 
-Files = Iterator[tuple[str, str]]
+Emitter = Callable[["Derivation"], Iterator[tuple[str, str]]]
+"""Turns a derivation into files: paths inside the package and texts."""
 
 
 @dataclass(frozen=True)
-class Backend:
-    """How a back end's files are made; `module` is what `load` imports, empty where nothing loads."""
+class Loading:
+    """How the package's `load` makes the back end: the class in runtime/, and what it is made of."""
+
+    module: str
+    """Module in runtime/ that holds the class."""
+    made: str
+    """Expression over the imported names, ROBOT, and `values` of the parameters."""
+    imports: tuple[str, ...]
+    """Statements before it."""
+    speed: int
+    """Rank among the back ends that compute, 1 the fastest for a large batch."""
+
+
+@dataclass(frozen=True)
+class BackendFiles:
+    """What a back end adds to a package."""
 
     name: str
-    module: str
     doc: str
-    files: Callable[[Derivation], Files]
+    emits: tuple[Emitter, ...]
+    """What is written for the robot; two back ends with one emitter share its files."""
+    runtime: tuple[str, ...] = ()
+    """Files copied from linkwise/runtime, beside those of every package."""
+    loading: Loading | None = None
+    """None where nothing loads."""
     needs: tuple[str, ...] = ()
+    """Other back ends without which it cannot be."""
 
 
-def _runtime(name: str) -> Files:
-    from linkwise.version import VERSION
+def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.closed_forms import closed_form_files
 
-    yield f"{name}.py", render(f"package/{name}.py.j2", {"version": VERSION})
-
-
-def _autograd(d: Derivation) -> Files:
-    yield from autograd_files(d.system, d.linear)
-    yield from _runtime("autograd_backend")
-    yield from _runtime("torch_backend")
+    return closed_form_files(d.system, d.kernels)
 
 
-def _torch(d: Derivation) -> Files:
-    yield from closed_form_files(d.system, d.kernels, "torch")
-    yield from _runtime("torch_backend")
+def _energies(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.autograd import autograd_files
+
+    return autograd_files(d.system, d.linear)
 
 
-def _numpy(d: Derivation) -> Files:
-    yield from closed_form_files(d.system, d.kernels, "numpy")
+def _c(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.c.sources import c_files
+
+    return c_files(d)
 
 
-RUNTIME = (
-    "__init__", "arguments", "interface", "numpy_backend", "structure", "torch_backend",
-    "native_backend", "native_build", "native_compiler", "native_library", "native_torch",
-)  # fmt: skip
+def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.formulas import formula_files
+
+    return formula_files(d)
 
 
-def _native(d: Derivation) -> Files:
-    from linkwise.version import VERSION
+LINKS = "from .forms import LINKS"
 
-    yield "native.py", render("package/native.py.j2", {"version": VERSION, "package": d.package})
-    for name in RUNTIME:
-        text = files("linkwise.runtime").joinpath(f"{name}.py").read_text(encoding="utf-8")
-        yield f"runtime/{name}.py", text
-
-
-BACKENDS: dict[str, Backend] = {
+BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend
     for backend in (
-        Backend("numpy", "numpy_backend", "closed forms on NumPy arrays", _numpy),
-        Backend("torch", "torch_backend", "closed forms on torch tensors", _torch),
-        Backend(
-            "autograd",
-            "autograd_backend",
-            "each link's Lagrangian, differentiated by torch",
-            _autograd,
+        BackendFiles(
+            "numpy",
+            "closed forms on NumPy arrays",
+            emits=(_forms,),
+            runtime=("arguments.py", "numpy_backend.py"),
+            loading=Loading("numpy_backend", "NumpyBackend(ROBOT, LINKS, values)", (LINKS,), speed=2),
         ),
-        Backend(
-            "native",
+        BackendFiles(
+            "torch",
+            "closed forms on torch tensors",
+            emits=(_forms,),
+            runtime=("arguments.py", "torch_backend.py"),
+            loading=Loading("torch_backend", "TorchBackend(ROBOT, LINKS, values)", (LINKS,), speed=3),
+        ),
+        BackendFiles(
+            "autograd",
+            "each link's Lagrangian, differentiated by torch",
+            emits=(_energies,),
+            runtime=(
+                "arguments.py",
+                "autograd_backend.py",
+                "partial_lagrangian.py",
+                "recording.py",
+                "torch_backend.py",
+            ),
+            loading=Loading(
+                "autograd_backend",
+                "AutogradBackend(ROBOT, links, values)",
+                ("from .energies import links",),
+                speed=4,
+            ),
+        ),
+        BackendFiles(
             "native",
             "the C code, compiled by this system's compiler",
-            _native,
-            ("c", "torch"),
+            emits=(),
+            runtime=(
+                "arguments.py",
+                "native_backend.py",
+                "native_build.py",
+                "native_compiler.py",
+                "native_library.py",
+                "native_torch.py",
+                "numpy_backend.py",
+            ),
+            loading=Loading(
+                "native_backend",
+                'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values)',
+                ("from pathlib import Path", LINKS),
+                speed=1,
+            ),
+            needs=("c", "torch"),
         ),
-        Backend("c", "", "closed forms in C99, to compile into a program of your own", c_files),
-        Backend("formulas", "", "closed forms to read, for small robots", formula_files),
+        BackendFiles("c", "closed forms in C99, to compile into a program of your own", emits=(_c,)),
+        BackendFiles("formulas", "closed forms to read, for small robots", emits=(_formulas,)),
     )
 }

@@ -1,4 +1,4 @@
-"""Closed forms as Python functions over NumPy arrays or torch tensors, one file a link."""
+"""Closed forms as Python functions over arrays of a namespace `xp`, NumPy or torch, one file a link."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from linkwise.version import VERSION
 
 @dataclass(frozen=True)
 class FormFunction:
-    """One emitted function; each group of outputs is packed into an array of its own."""
+    """One emitted function; each group of outputs is returned as a tuple."""
 
     name: str
     doc: str
@@ -24,36 +24,35 @@ class FormFunction:
     groups: tuple[str, ...]
 
 
-def closed_form_files(system: System, kernels: Sequence[Kernel], library: str) -> Iterator[tuple[str, str]]:
-    """Paths inside the package and texts; `library` is numpy or torch."""
-    folder, prefix = f"{library}_forms", {"numpy": "np", "torch": "torch"}[library]
-    imported = "import numpy as np" if library == "numpy" else "import torch"
+def closed_form_files(system: System, kernels: Sequence[Kernel]) -> Iterator[tuple[str, str]]:
+    """Paths inside the package and texts."""
     for j, kernel in enumerate(kernels):
         view = {
             "number": j + 1,
             "version": VERSION,
-            "import_library": imported,
             "name": ascii(system.links[j].name),
             "path": repr(kernel.forms[0].path),
-            "functions": list(_functions(system, kernel, PythonPrinter(prefix))),
+            "functions": list(_functions(system, kernel, PythonPrinter("xp"))),
         }
-        yield f"{folder}/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
+        yield f"forms/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
     numbers = range(1, len(kernels) + 1)
-    init = {"library": library, "version": VERSION, "numbers": numbers}
-    yield f"{folder}/__init__.py", render("closed_forms/init.py.j2", init)
+    init = {"version": VERSION, "numbers": numbers}
+    yield "forms/__init__.py", render("closed_forms/init.py.j2", init)
 
 
 def _functions(system: System, kernel: Kernel, printer: PythonPrinter) -> Iterator[FormFunction]:
     forms = kernel.forms[0]
+    linear = forms.linear_block(kernel.graph.zero)
     groups: Mapping[str, tuple[str, list[Sequence[Node]]]] = {
         "decomposition": (
-            "c2_ik for i <= k, c1_ik, g_i, tau_i, and the part of c1 linear in qd.",
+            "c2_ik for i <= k, c1_ik, g_i, tau_i"
+            + (", and h1_ik, the part of c1 linear in qd." if linear else "."),
             [
                 list(forms.acceleration.values()),
                 list(forms.velocity.values()),
                 list(forms.gravity.values()),
                 list(forms.torque.values()),
-                forms.linear_block(kernel.graph.zero),
+                *([linear] if linear else []),
             ],
         ),
         "torque": ("tau_i.", [list(forms.torque.values())]),

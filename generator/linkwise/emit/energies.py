@@ -23,6 +23,12 @@ class Function:
     code: Code
     result: str
 
+    @property
+    def signature(self) -> str:
+        """The arguments with their types."""
+        types = {"q": "Values", "qd": "Values", "p": "Parameters"}
+        return ", ".join(f"{name}: {types[name]}" for name in self.arguments.split(", "))
+
 
 def energy_functions(system: System, link: int) -> tuple[Function, ...]:
     """Functions twist, height, kinetic and potential of a link; the first two for a rigid link only."""

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import sympy as sp
 from sympy.simplify.fu import TR8
 
-from linkwise.emit.assemble import Derivation
+from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.system import System

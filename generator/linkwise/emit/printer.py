@@ -1,7 +1,5 @@
 """One node to text, in the syntax of each target language."""
 
-from typing import ClassVar
-
 from linkwise.expression.graph import Entry
 
 ATOM, PRODUCT, SUM = 3, 2, 1
@@ -56,16 +54,14 @@ class Printer:
 
 
 class PythonPrinter(Printer):
-    """Calls into an array library, such as `np` or `torch`."""
-
-    RENAMED: ClassVar = {"np": {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}}
+    """Calls into an array library, such as `np`, `torch` or the argument `xp`."""
 
     def __init__(self, library: str) -> None:
         self.library = library
 
     def function(self, name: str) -> str:
         """Text of a function of the library."""
-        return f"{self.library}.{self.RENAMED.get(self.library, {}).get(name, name)}"
+        return f"{self.library}.{name}"
 
 
 class CPrinter(Printer):

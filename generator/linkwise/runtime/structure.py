@@ -53,12 +53,12 @@ class Structure:
     parameters: Mapping[str, float]
     """Run-time parameters and the values they have unless others are given."""
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
 
-    @property
+    @cached_property
     def N(self) -> int:
         """Number of links."""
         return len(self.link_names)

@@ -52,7 +52,7 @@ def measure(
                     if backend == "native":
                         robot.backend.threads = threads
                     motion = sample(package, batch, dtype)
-                    if backend in ("torch", "autograd"):
+                    if robot.backend.takes_tensors:
                         motion = [torch.from_numpy(a) for a in motion]
                     ns = best(lambda robot=robot, motion=motion: robot.packed(*motion), seconds) / batch
                     figures.append(Figure(package.name, backend, dtype, "rows", batch, threads, ns))

@@ -9,7 +9,6 @@ from importlib.resources import files
 from typing import Any
 
 from linkwise.dynamics.kernel import Kernel, parameter_names
-from linkwise.emit.assemble import Derivation
 from linkwise.emit.c import header
 from linkwise.emit.c.calls import LinkKernels, call, group_calls, link_calls, total
 from linkwise.emit.c.kernel_function import (
@@ -20,6 +19,7 @@ from linkwise.emit.c.kernel_function import (
 )
 from linkwise.emit.c.shared_part import SharedWork, shared_work
 from linkwise.emit.c.sizes import Sizes, Span, groups, link_spans, whole
+from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION

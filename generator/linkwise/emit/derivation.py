@@ -1,0 +1,30 @@
+"""What every back end emits from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from linkwise.dynamics.derive import fused_kernel
+from linkwise.dynamics.kernel import Kernel
+from linkwise.symbolic.system import System
+
+
+@dataclass(frozen=True)
+class Derivation:
+    """What every back end emits from: the system, one kernel a link, and the request that led to it."""
+
+    system: System
+    kernels: tuple[Kernel, ...]
+    package: str
+    request: Mapping[str, Any]
+
+    @cached_property
+    def fused(self) -> Kernel | None:
+        """Kernel of all links together, if there is one; found when first asked for."""
+        return fused_kernel(self.system)
+
+    @property
+    def linear(self) -> frozenset[int]:
+        """Links whose energy has terms linear in the velocities."""
+        return frozenset(j for j, k in enumerate(self.kernels) if k.forms[0].velocity_linear)

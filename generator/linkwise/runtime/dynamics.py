@@ -1,0 +1,166 @@
+"""The calls that every back end answers.
+
+Index i is the joint that is loaded, j the link whose motion loads it, k the coordinate that moves.
+
+    tau_ij = sum_k c2_ijk qdd_k + sum_k c1_ijk qd_k + g_ij
+
+tau_ij is zero off the path of link j, so results are kept packed, beside a list of their indices; dense
+tensors are a view that is built on request.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .dense import Dense
+from .interface import Array, Backend
+from .quantities import Coefficients, GradientPropagation, Packed, Propagation
+from .structure import Layout, Structure
+
+
+class Dynamics:
+    """Partial torques of a robot on one back end; made by the package's `load`.
+
+    q, qd, qdd: positions, velocities and accelerations of shape (..., n): rad, rad/s, rad/s^2 for a revolute
+    joint, m, m/s, m/s^2 for a prismatic one. They are NumPy arrays or torch tensors, as the back end takes
+    them, of float32 or float64. The shapes before the last axis broadcast.
+
+    Answers are of the same kind, dtype and device; torques in N m, or N where joint i is prismatic.
+
+    Every call raises ValueError for a wrong shape, and TypeError for another kind of array and for dtypes or
+    devices that differ; the message names the argument.
+    """
+
+    n: int
+    """Number of joints."""
+    N: int
+    """Number of links."""
+    joint_names: tuple[str, ...]
+    """Names of the joints, in the order of i and k."""
+    joint_units: tuple[str, ...]
+    """Unit of each joint's position: rad or m."""
+    link_names: tuple[str, ...]
+    """Names of the links, in the order of j."""
+    layout: Layout
+    """Indices that packed values belong to."""
+    parameters: Mapping[str, Any]
+    """Values of the run-time parameters."""
+    backend: Backend[Any]
+    """What computes; of the native one `threads` may be set."""
+
+    def __init__(
+        self,
+        structure: Structure,
+        backend: Backend[Any],
+        load: Callable[..., "Dynamics"],
+        asked: tuple[Any, ...],
+    ) -> None:
+        """`load` makes this robot again from the arguments that it was `asked` with."""
+        self.n, self.N = structure.n, structure.N
+        self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
+        self.link_names, self.layout = structure.link_names, structure.layout
+        self.backend, self.parameters = backend, backend.parameters
+        self._load, self._asked = load, asked
+        self._dense = Dense(structure, backend)
+
+    def __repr__(self) -> str:
+        return f"<{self.n} joints, {self.N} links on {self.backend.name}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled, copied or sent to another process, it is loaded again there."""
+        return self._load, self._asked
+
+    def packed(self, q: Array, qd: Array, qdd: Array) -> Packed[Array]:
+        """Full decomposition without the zeros: c2, c1 (closing), g, tau, h1, (..., count) each."""
+        return Packed(
+            *self.backend.decomposition(*self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n))
+        )
+
+    def packed_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """tau_ij on the paths only, (..., count); its indices are `layout.torque`."""
+        tau: Array = self.backend.torque(*self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n))
+        return tau
+
+    def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """tau_ij, the torque on joint i by the motion of link j, shape (..., n, N)."""
+        return self._dense.spread(self.packed_torque(q, qd, qdd), "torque")
+
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """tau_i = sum_j tau_ij, shape (..., n)."""
+        return self._dense.summed(self.packed_torque(q, qd, qdd))
+
+    def coefficients(self, q: Array, qd: Array) -> Coefficients[Array]:
+        """c2, c1 (..., n, N, n) and g (..., n, N) of the closing convention."""
+        q, qd = self.backend.arrays({"q": q, "qd": qd}, self.n)
+        packed = self.packed(q, qd, self.backend.zeros(q, self.n))
+        return Coefficients(
+            self._dense.spread(packed.acceleration, "acceleration"),
+            self._dense.spread(packed.velocity, "velocity"),
+            self._dense.spread(packed.gravity, "gravity"),
+        )
+
+    @overload
+    def propagation(
+        self, q: Array, qd: Array, qdd: Array, convention: Literal["closing"] = ...
+    ) -> Propagation[Array]: ...
+    @overload
+    def propagation(
+        self, q: Array, qd: Array, qdd: Array, convention: Literal["gradient"]
+    ) -> GradientPropagation[Array]: ...
+    @overload
+    def propagation(
+        self, q: Array, qd: Array, qdd: Array, convention: str
+    ) -> Propagation[Array] | GradientPropagation[Array]: ...
+    def propagation(
+        self, q: Array, qd: Array, qdd: Array, convention: str = "closing"
+    ) -> Propagation[Array] | GradientPropagation[Array]:
+        """Motion propagation torques c2_ijk qdd_k and c1_ijk qd_k (..., n, N, n), and g_ij (..., n, N).
+
+        closing: over all coordinates and orders they sum to tau_ij. gradient: c1 = d(tau_ij)/d(qd_k), the
+        paper's Eq. 1 to the letter, whose velocity part sums to twice the velocity force. Any other word
+        raises ValueError.
+        """
+        if convention not in ("closing", "gradient"):
+            raise ValueError(f"no convention {convention!r}; choose closing or gradient")
+        q, qd, qdd = self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n)
+        packed = self.packed(q, qd, qdd)
+        c2 = self._dense.spread(packed.acceleration, "acceleration")
+        c1 = self._dense.spread(packed.velocity, "velocity")
+        if convention == "gradient":
+            c1 = 2.0 * c1 - self._dense.spread(packed.velocity_linear, "velocity_linear")
+        kind = Propagation if convention == "closing" else GradientPropagation
+        return kind(
+            c2 * qdd[..., None, None, :],
+            c1 * qd[..., None, None, :],
+            self._dense.spread(packed.gravity, "gravity"),
+        )
+
+    def position_gradient(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
+        c0: Array = self.backend.position_gradient(
+            *self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n)
+        )
+        return self._dense.spread(c0, "velocity")
+
+    def masked(self, q: Array, qd: Array, qdd: Array, mask: ArrayLike | Array) -> Array:
+        """sum over m, k of mask_mk c_m,ijk q_k^(m) (the paper's Eq. 21-24), shape (..., n, N).
+
+        mask: shape (3, n), zeros and ones, or weights between; row m is the order: 0 position, 1 velocity,
+        2 acceleration. Gravity is in no row: a mask of ones in rows 1 and 2 gives tau_ij - g_ij.
+        """
+        if np.shape(mask) != (3, self.n):
+            raise ValueError(
+                f"the mask has shape {tuple(np.shape(mask))}; it must be (3, {self.n}): order, coordinate"
+            )
+        q, qd, qdd = self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n)
+        weights = self.backend.asarray(mask, q)
+        coefficients = self.coefficients(q, qd)
+        total = coefficients.velocity @ (weights[1] * qd)[..., None, :, None]
+        total = total + coefficients.acceleration @ (weights[2] * qdd)[..., None, :, None]
+        # A tensor of numbers that nobody may look at yet, as under vmap, might ask for positions too.
+        if not isinstance(weights, np.ndarray) or weights[0].any():
+            total = total + self.position_gradient(q, qd, qdd) @ (weights[0] * q)[..., None, :, None]
+        torque: Array = total[..., 0]
+        return torque

@@ -1,0 +1,68 @@
+"""What the calls answer: coefficients, propagation torques, packed values.
+
+Index i is the joint that is loaded, j the link whose motion loads it, k the coordinate that moves.
+Torques are in N m, or N where joint i is prismatic; a coefficient is in that unit over the unit of the motion
+that it multiplies.
+"""
+
+from typing import Generic, NamedTuple
+
+from .interface import Array
+
+
+class Coefficients(NamedTuple, Generic[Array]):
+    """Coefficients of the closing convention: tau_ij = sum_k c2_ijk qdd_k + sum_k c1_ijk qd_k + g_ij."""
+
+    acceleration: Array
+    """c2 (..., n, N, n): what accelerations weigh, link j's share of the mass matrix."""
+    velocity: Array
+    """c1 (..., n, N, n): what velocities weigh."""
+    gravity: Array
+    """g (..., n, N)."""
+
+
+class Propagation(NamedTuple, Generic[Array]):
+    """Motion propagation torques of the closing convention: over k and the orders they sum to tau_ij."""
+
+    acceleration: Array
+    """c2_ijk qdd_k (..., n, N, n)."""
+    velocity: Array
+    """c1_ijk qd_k (..., n, N, n)."""
+    gravity: Array
+    """g_ij (..., n, N)."""
+
+    @property
+    def convention(self) -> str:
+        """Which c1 was taken."""
+        return "closing"
+
+
+class GradientPropagation(NamedTuple, Generic[Array]):
+    """Motion propagation torques with c1 = d(tau_ij)/d(qd_k): velocities then count twice in their sum."""
+
+    acceleration: Array
+    """c2_ijk qdd_k (..., n, N, n)."""
+    velocity: Array
+    """c1_ijk qd_k (..., n, N, n)."""
+    gravity: Array
+    """g_ij (..., n, N)."""
+
+    @property
+    def convention(self) -> str:
+        """Which c1 was taken."""
+        return "gradient"
+
+
+class Packed(NamedTuple, Generic[Array]):
+    """Full decomposition without its zeros: values (..., count) whose indices are the robot's `layout`."""
+
+    acceleration: Array
+    """c2, for i <= k only, as it is symmetric in i and k."""
+    velocity: Array
+    """c1 of the closing convention."""
+    gravity: Array
+    """g."""
+    torque: Array
+    """tau."""
+    velocity_linear: Array
+    """h1: the part of c1 from energy terms linear in the velocities; a robot of rigid links has none."""

@@ -1,0 +1,234 @@
+"""The runtime: real files that every package holds unchanged, and the types that they give its user."""
+
+import ast
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import linkwise
+import numpy as np
+import pytest
+from conftest import DATA
+from linkwise import check_package, generate, read_system, write_package
+from linkwise.emit.backend import BACKENDS
+from linkwise.package.load import import_package
+from linkwise.runtime.dynamics import Dynamics
+from linkwise.runtime.numpy_backend import NumpyBackend
+from linkwise.runtime.structure import Structure
+
+torch = pytest.importorskip("torch")
+
+ROOT = Path(__file__).parents[1]
+RUNTIME = Path(linkwise.__file__).parent / "runtime"
+FORK = Structure(
+    name="fork",
+    joint_names=("base", "left", "right"),
+    joint_units=("rad", "rad", "m"),
+    link_names=("stem", "left", "right"),
+    paths=((0,), (0, 1), (0, 2)),
+    linear=(2,),
+    parameters={"m": 0.5},
+)
+ALLOWED = {"numpy", "torch"} | sys.stdlib_module_names
+
+
+def test_packed_values_are_listed_link_by_link_along_their_paths() -> None:
+    assert (FORK.n, FORK.N) == (3, 3)
+    assert FORK.layout.torque.tolist() == [[0, 0], [0, 1], [1, 1], [0, 2], [2, 2]]
+    assert FORK.layout.acceleration[1:4].tolist() == [[0, 1, 0], [0, 1, 1], [1, 1, 1]]
+    assert FORK.layout.velocity_linear.tolist() == [[0, 2, 0], [0, 2, 2], [2, 2, 0], [2, 2, 2]]
+    assert tuple(FORK.sizes) == (7, 9, 5, 5, 4)
+    assert replace(FORK, linear=()).sizes.h1 == 0
+
+
+def test_given_parameters_replace_built_in_ones_by_name() -> None:
+    assert FORK.values(None) == {"m": 0.5}
+    assert FORK.values({"m": 2.0}) == {"m": 2.0}
+    with pytest.raises(ValueError, match="no parameter 'k'; the parameters are m"):
+        FORK.values({"k": 1.0})
+    with pytest.raises(ValueError, match="are none: generate with --parameters symbolic"):
+        replace(FORK, parameters={}).values({"k": 1.0})
+
+
+@pytest.mark.parametrize("file", sorted(path.name for path in RUNTIME.glob("*.py")))
+def test_the_runtime_imports_numpy_torch_and_its_own_files_only(file: str) -> None:
+    for node in ast.walk(ast.parse((RUNTIME / file).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level <= 1
+            name = node.module or ""
+            assert (RUNTIME / f"{name}.py").is_file() if node.level else name.split(".")[0] in ALLOWED
+        elif isinstance(node, ast.Import):
+            assert all(alias.name.split(".")[0] in ALLOWED for alias in node.names)
+
+
+def test_packages_of_different_robots_hold_the_same_runtime_byte_for_byte() -> None:
+    for robot in ("planar2", DATA / "turntable.py"):
+        files = generate(read_system(robot))
+        copied = {path.name for path in RUNTIME.glob("*.py")}
+        for name in copied:
+            assert files[f"runtime/{name}"].encode() == (RUNTIME / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("backend", list(BACKENDS))
+def test_a_package_holds_what_its_back_ends_import(backend: str) -> None:
+    files = generate(read_system("planar2"), [backend])
+    for path in files:
+        if not path.endswith(".py"):
+            continue
+        for node in ast.walk(ast.parse(files[path])):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                folder = Path(path).parents[node.level - 1] / (node.module or "").replace(".", "/")
+                names = [folder / alias.name for alias in node.names] if not node.module else [folder]
+                for name in names:
+                    assert {f"{name.as_posix()}.py", f"{name.as_posix()}/__init__.py"} & set(files), path
+
+
+def test_a_new_back_end_is_one_entry_of_the_registry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    numpy = BACKENDS["numpy"]
+    assert numpy.loading is not None
+    loading = replace(numpy.loading, speed=9)
+    monkeypatch.setitem(BACKENDS, "mirror", replace(numpy, name="mirror", doc="a copy", loading=loading))
+    write_package(generate(read_system("planar2"), ["numpy", "mirror"]), tmp_path / "planar2")
+    package = import_package(tmp_path / "planar2")
+    assert package.BACKENDS == package.FASTEST_FIRST == ("numpy", "mirror")
+    assert "mirror: a copy" in package.load.__doc__
+    found = {result.name for result in check_package(tmp_path / "planar2", 5) if result.passed}
+    assert "numpy against mirror: tau_ij" in found
+
+
+def test_packed_values_and_their_indices_have_the_same_fields(
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    package = package_of("planar3")
+    answer = package.load("numpy").packed(*np.ones((3, 4, 3)))
+    assert isinstance(answer, package.Packed)
+    assert answer._fields == package.Layout._fields
+
+
+class Pendulum:
+    """Closed forms of a point mass m on a rod of length 1, as a generated forms/link_1.py has them."""
+
+    def decomposition(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
+        gravity = 9.81 * p["m"] * xp.sin(q[..., 0])
+        return (p["m"],), (0.0,), (gravity,), (p["m"] * qdd[..., 0] + gravity,)
+
+    def torque(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
+        return self.decomposition(xp, q, qd, qdd, p)[3]  # type: ignore[no-any-return]
+
+    def position_gradient(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
+        return (9.81 * p["m"] * xp.cos(q[..., 0]),)
+
+
+ROD = Structure("rod", ("hinge",), ("rad",), ("mass",), ((0,),), (), {"m": 0.5})
+
+
+def pendulum(backend: str) -> Dynamics:
+    """The pendulum on one of the back ends, put together by hand."""
+    if backend == "numpy":
+        return Dynamics(ROD, NumpyBackend(ROD, [Pendulum()], ROD.values(None)), pendulum, (backend,))
+    from linkwise.runtime.autograd_backend import AutogradBackend
+    from linkwise.runtime.partial_lagrangian import PartialLagrangian
+    from linkwise.runtime.torch_backend import TorchBackend
+
+    class Lagrangian(PartialLagrangian):
+        path = (0,)
+
+        def kinetic(self, q: Any, qd: Any) -> Any:
+            return 0.5 * self.p["m"] * qd[0] ** 2
+
+        def potential(self, q: Any) -> Any:
+            return -9.81 * self.p["m"] * torch.cos(q[0])
+
+    if backend == "torch":
+        return Dynamics(ROD, TorchBackend(ROD, [Pendulum()], ROD.values(None)), pendulum, (backend,))
+    made = AutogradBackend(ROD, lambda p: [Lagrangian(p)], ROD.values(None))
+    return Dynamics(ROD, made, pendulum, (backend,))
+
+
+@pytest.mark.parametrize("batch", [(), (4,), (2, 3)])
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd"])
+def test_a_pendulum_is_that_of_the_textbook(backend: str, batch: tuple[int, ...]) -> None:
+    robot = pendulum(backend)
+    motion = np.random.default_rng(3).uniform(-2.0, 2.0, (3, *batch, 1))
+    q, _, qdd = motion
+    given = [torch.from_numpy(m) for m in motion] if robot.backend.takes_tensors else list(motion)
+    np.testing.assert_allclose(robot.inverse_dynamics(*given), 0.5 * (qdd + 9.81 * np.sin(q)), rtol=1e-12)
+    mass, c1, gravity = robot.coefficients(*given[:2])
+    np.testing.assert_allclose(mass, np.full((*batch, 1, 1, 1), 0.5), rtol=1e-15)
+    np.testing.assert_allclose(c1, np.zeros((*batch, 1, 1, 1)), atol=1e-15)
+    np.testing.assert_allclose(gravity[..., 0], 0.5 * 9.81 * np.sin(q), rtol=1e-12)
+    stiffness = robot.position_gradient(*given)[..., 0, 0]
+    np.testing.assert_allclose(stiffness, 0.5 * 9.81 * np.cos(q), rtol=1e-12)
+
+
+def test_a_parameter_may_be_an_array_of_one_value_a_sample() -> None:
+    masses = np.array([0.5, 1.0, 2.0])
+    robot = Dynamics(ROD, NumpyBackend(ROD, [Pendulum()], {"m": masses}), pendulum, ("numpy",))
+    torque = robot.inverse_dynamics(*(np.zeros((3, 1)), np.zeros((3, 1)), np.ones((3, 1))))
+    np.testing.assert_allclose(torque[:, 0], masses)
+
+
+USER = """
+from typing import Any
+
+import numpy as np
+import planar2
+import torch
+from numpy.typing import NDArray
+
+Arrays = NDArray[Any]
+
+
+def of_arrays(robot: planar2.Dynamics, q: NDArray[np.float64]) -> Arrays:
+    coefficients: planar2.Coefficients[Arrays] = robot.coefficients(q, q)
+    closing: planar2.Propagation[Arrays] = robot.propagation(q, q, q)
+    gradient: planar2.GradientPropagation[Arrays] = robot.propagation(q, q, q, convention="gradient")
+    packed: planar2.Packed[Arrays] = robot.packed(q, q, q)
+    masked = robot.masked(q, q, q, [[0, 0], [1, 1], [1, 1]])
+    rows: NDArray[np.intp] = robot.layout.acceleration
+    names: tuple[str, ...] = robot.joint_names + planar2.link_names
+    print(coefficients.velocity.shape, closing.convention, gradient.gravity, packed.torque)
+    print(masked, rows, names)
+    return robot.partial_torque(q, q, q)
+
+
+def of_tensors(q: torch.Tensor) -> torch.Tensor:
+    robot = planar2.load("torch", {})
+    stiffness: torch.Tensor = robot.position_gradient(q, q, q)
+    return robot.coefficients(q, q).acceleration.sum() + stiffness.sum() + robot.inverse_dynamics(q, q, q)
+
+
+robot = planar2.load()
+tau = robot.partial_torque(np.zeros(2), np.zeros(2), np.zeros(2))
+reveal_type(tau)
+robot.partial_torques  # ERROR
+robot.partial_torque("q", "qd", "qdd")  # ERROR
+planar2.load(backend=1)  # ERROR
+"""
+
+
+def test_a_package_and_its_user_are_typed_strictly(tmp_path: Path) -> None:
+    pytest.importorskip("mypy")
+    write_package(generate(read_system("planar2"), ["numpy", "torch", "autograd"]), tmp_path / "planar2")
+    assert (tmp_path / "planar2/py.typed").is_file()
+    (tmp_path / "user.py").write_text(USER)
+    # The project's own cache, so that NumPy and torch are read once; the package is read anew.
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(ROOT / ".mypy_cache")]
+    environment = os.environ | {"MYPYPATH": str(tmp_path)}
+    done = subprocess.run(
+        [*command, "user.py", "planar2"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    expected = [f"user.py:{at}" for at, line in enumerate(USER.splitlines(), 1) if line.endswith("# ERROR")]
+    found = [line for line in done.stdout.splitlines() if ": error:" in line]
+    assert [line.split(": error:")[0] for line in found] == expected, done.stdout + done.stderr
+    assert "numpy.ndarray[tuple[Any, ...], numpy.dtype[Any]]" in done.stdout
