@@ -54,10 +54,10 @@ class Dynamics:
         self,
         structure: Structure,
         backend: Backend[Any],
-        load: Callable[[str, Mapping[str, Any]], "Dynamics"],
-        asked: tuple[str, Mapping[str, Any]],
+        load: Callable[..., "Dynamics"],
+        asked: tuple[Any, ...],
     ) -> None:
-        """`load` makes this robot again from what it was `asked` for: a back end by name, and parameters."""
+        """`load` makes this robot again from the arguments that it was `asked` with."""
         self.n, self.N = structure.n, structure.N
         self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
         self.link_names, self.layout = structure.link_names, structure.layout

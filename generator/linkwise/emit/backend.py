@@ -117,6 +117,7 @@ BACKENDS: dict[str, BackendFiles] = {
                 "arguments.py",
                 "native_backend.py",
                 "native_build.py",
+                "native_calls.py",
                 "native_compiler.py",
                 "native_library.py",
                 "native_torch.py",

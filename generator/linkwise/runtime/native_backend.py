@@ -1,10 +1,6 @@
 """Compiled C on NumPy arrays and torch CPU tensors."""
 
-import os
-import sys
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -12,34 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .interface import ClosedForms
-from .native_build import Sources
-from .native_library import Array, Memory, address, function
+from .native_calls import NativeCalls, has_tensors
 from .numpy_backend import NumpyBackend
 from .structure import Structure
 
 if TYPE_CHECKING:
     from .native_torch import TorchSide
 
-PER_THREAD = 1 << 20
-"""Bytes of results below which another thread costs more than it saves."""
-
-
-@cache
-def pool(threads: int) -> ThreadPoolExecutor:
-    """Worker threads, shared by all robots; ctypes lets go of Python's lock while C runs."""
-    return ThreadPoolExecutor(threads, thread_name_prefix="linkwise")
-
-
-# Threads don't survive a fork; the child starts its own.
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=pool.cache_clear)
-
 
 class NativeBackend(NumpyBackend):
-    """Answers in kind: arrays for arrays, tensors for tensors; each parameter is one number for all samples.
-
-    `threads` is how many a large batch may use.
-    """
+    """Arrays for arrays, tensors for tensors; each parameter is one number for all samples."""
 
     name: ClassVar = "native"
     takes_tensors: ClassVar = False
@@ -56,144 +34,65 @@ class NativeBackend(NumpyBackend):
         Compiles at the first call for this package; raises RuntimeError where that cannot be.
         """
         super().__init__(structure, links, {})
-        self.sources = Sources(structure.name, sources)
         self.parameters = dict(parameters)
-        self.threads = os.cpu_count() or 1
-        self._learned = _tensors(parameters.values())
-        self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
-        self._functions: dict[tuple[str, np.dtype[Any]], Any] = {}
-        self._sizes = result_sizes(structure)
-        self._memory = Memory()
+        self.calls = NativeCalls(structure, sources, parameters)
         self._torch_side: TorchSide | None = None
-        self._function("decomposition", np.dtype("f8"))
+
+    @property
+    def threads(self) -> int:
+        """Threads that a large batch may use; as many as there are cores unless set."""
+        return self.calls.threads
+
+    @threads.setter
+    def threads(self, count: int) -> None:
+        self.calls.threads = count
 
     def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
-        return self._torch().arrays(named, n) if _tensors(named.values()) else super().arrays(named, n)
+        return self._torch().arrays(named, n) if has_tensors(named.values()) else super().arrays(named, n)
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, packed."""
-        if _tensors([q]):
+        if has_tensors([q]):
             return self._torch().decomposition(q, qd, qdd)
-        return self.run("decomposition", q, qd, qdd)
+        return self.calls.run("decomposition", q, qd, qdd)
 
     def torque(self, q: Any, qd: Any, qdd: Any) -> Any:
         """Tau, packed."""
-        if _tensors([q]):
+        if has_tensors([q]):
             return self._torch().torque(q, qd, qdd)
-        return self.run("torque", q, qd, qdd)[0]
+        return self.calls.run("torque", q, qd, qdd)[0]
 
     def position_gradient(self, q: Any, qd: Any, qdd: Any) -> Any:
         """c0, packed."""
-        if _tensors([q]):
+        if has_tensors([q]):
             return self._torch().position_gradient(q, qd, qdd)
-        return self.run("position_gradient", q, qd, qdd)[0]
+        return self.calls.run("position_gradient", q, qd, qdd)[0]
 
     def constant(self, values: NDArray[Any], like: Any) -> Any:
         """A table of numbers, to compute with `like`."""
-        return self._torch().constant(values, like) if _tensors([like]) else super().constant(values, like)
+        return self._torch().constant(values, like) if has_tensors([like]) else super().constant(values, like)
 
     def index(self, values: NDArray[np.intp], like: Any) -> Any:
         """A table of positions, to take from `like`."""
-        return self._torch().index(values, like) if _tensors([like]) else super().index(values, like)
+        return self._torch().index(values, like) if has_tensors([like]) else super().index(values, like)
 
     def asarray(self, value: Any, like: Any) -> Any:
         """Anything array-like, of the kind and dtype of `like`."""
-        return self._torch().asarray(value, like) if _tensors([like]) else super().asarray(value, like)
+        return self._torch().asarray(value, like) if has_tensors([like]) else super().asarray(value, like)
 
     def zeros(self, like: Any, count: int) -> Any:
         """Zeros of shape (..., count) for `like` of shape (..., m)."""
-        return self._torch().zeros(like, count) if _tensors([like]) else super().zeros(like, count)
+        return self._torch().zeros(like, count) if has_tensors([like]) else super().zeros(like, count)
 
     def concatenate(self, parts: Iterable[Any]) -> Any:
         """The parts joined along the last axis."""
         parts = list(parts)
-        return self._torch().concatenate(parts) if _tensors(parts) else super().concatenate(parts)
-
-    def run(self, call: str, q: Array, qd: Array, qdd: Array) -> list[Array]:
-        """Results (..., size) of a C function for arrays of one shape (..., n), in one piece of memory."""
-        sizes = self._sizes[call]
-        kind, shape, n = q.dtype, q.shape[:-1], q.shape[-1]
-        count, width = q.size // n, kind.itemsize
-        buffer = self._memory(count * sum(sizes), kind)
-        motion = [a if a.flags.c_contiguous else np.ascontiguousarray(a) for a in (q, qd, qdd)]
-        inputs = [(address(a), n * width) for a in motion]
-        results, outputs, at, start = [], [], 0, address(buffer)
-        for size in sizes:
-            end = at + count * size
-            results.append(buffer[at:end].reshape(*shape, size) if shape else buffer[at:end])
-            if size:  # for what a robot has none of, its functions take no array
-                outputs.append((start + at * width, size * width))
-            at = end
-        values = self._numbers(kind) if self._learned else self._constants[kind]
-        p = [(address(values), 0)] if self.parameters else []
-        parts = min(self.threads, buffer.nbytes // PER_THREAD)
-        if count:
-            self._call(self._function(call, kind), count, [*inputs, *p, *outputs], parts)
-        return results
-
-    def _function(self, call: str, kind: "np.dtype[Any]") -> Any:
-        """C function of a call for a dtype, compiled if it is not there yet."""
-        found = self._functions.get((call, kind))
-        if found is None:
-            outputs = sum(size > 0 for size in self._sizes[call])
-            arrays = 3 + bool(self.parameters) + outputs
-            found = self._functions[call, kind] = function(self.sources, call, kind.str[1:], arrays)
-        return found
-
-    def _call(self, compute: Any, count: int, arrays: Sequence[tuple[int, int]], parts: int) -> None:
-        """Call a C function; `arrays` are addresses, and bytes from one sample to the next.
-
-        In several `parts`, threads take shares of the samples; shares of 16 fill blocks of either type.
-        """
-        if parts <= 1:
-            compute(count, *(start for start, _ in arrays))
-            return
-        share = -(-count // parts // 16) * 16
-
-        def run(first: int) -> None:
-            compute(min(share, count - first), *(start + first * step for start, step in arrays))
-
-        first, *others = range(0, count, share)
-        waiting = [pool(self.threads).submit(run, start) for start in others]
-        run(first)
-        for future in waiting:
-            future.result()
-
-    def _numbers(self, kind: "np.dtype[Any]") -> Array:
-        """Parameters in the order of the structure; a tensor's value is the one it has now."""
-        for name in self.structure.parameters:
-            if np.shape(self.parameters[name]) != ():
-                raise ValueError(
-                    f"parameter {name!r} must be one number here; "
-                    "the numpy and torch back ends take one a sample"
-                )
-        return np.array([_number(self.parameters[name]) for name in self.structure.parameters], dtype=kind)
+        return self._torch().concatenate(parts) if has_tensors(parts) else super().concatenate(parts)
 
     def _torch(self) -> "TorchSide":
         if self._torch_side is None:
-            from .native_torch import TorchSide
+            from .native_torch import TorchSide  # it needs torch, which arrays do without
 
-            self._torch_side = TorchSide(self)
+            self._torch_side = TorchSide(self.calls, self.links)
         return self._torch_side
-
-
-def result_sizes(structure: Structure) -> dict[str, tuple[int, ...]]:
-    """Values of one sample in each array that a C function answers with."""
-    sizes = structure.sizes
-    return {
-        "decomposition": tuple(sizes),
-        "torque": (sizes.tau,),
-        "position_gradient": (sizes.c1,),
-    }
-
-
-def _tensors(values: Iterable[Any]) -> bool:
-    """Whether one of the values is a torch tensor; torch isn't imported to find out."""
-    torch = sys.modules.get("torch")
-    return torch is not None and any(isinstance(v, torch.Tensor) for v in values)
-
-
-def _number(value: Any) -> float:
-    """A parameter's value as it is now, without its gradient."""
-    return float(value.detach() if _tensors([value]) else value)

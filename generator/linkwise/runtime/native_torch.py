@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
-from .native_backend import NativeBackend, result_sizes
+from .interface import ClosedForms
 from .native_build import Sources
+from .native_calls import NativeCalls
 from .torch_backend import TorchBackend
 
 OPERATORS: dict[tuple[Sources, str], Any] = {}
@@ -19,14 +20,14 @@ OPERATORS: dict[tuple[Sources, str], Any] = {}
 
 
 class TorchSide(TorchBackend):
-    """What NativeBackend does with tensors."""
+    """What the native back end does with tensors."""
 
     name: ClassVar = "native"
 
-    def __init__(self, native: NativeBackend) -> None:
-        super().__init__(native.structure, native.links, native.parameters)
-        self.native = native
-        self.operators = {call: operator(native, call) for call in result_sizes(native.structure)}
+    def __init__(self, calls: NativeCalls, links: Sequence[ClosedForms]) -> None:
+        super().__init__(calls.structure, links, calls.parameters)
+        self.calls = calls
+        self.operators = {call: operator(calls, links, call) for call in calls.sizes}
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
@@ -61,34 +62,33 @@ class TorchSide(TorchBackend):
         if recorded or torch.compiler.is_compiling():
             results = self.operators[call](q, qd, qdd, p)
             return results if isinstance(results, tuple) else (results,)
-        return compute(self.native, call, q, qd, qdd)
+        return compute(self.calls, call, q, qd, qdd)
 
 
-def compute(native: NativeBackend, call: str, *motion: Tensor) -> tuple[Tensor, ...]:
+def compute(calls: NativeCalls, call: str, *motion: Tensor) -> tuple[Tensor, ...]:
     """Results of the C code as tensors that share its memory."""
     arrays = (t.detach().resolve_neg().numpy() for t in motion)
-    return tuple(torch.from_numpy(result) for result in native.run(call, *arrays))
+    return tuple(torch.from_numpy(result) for result in calls.run(call, *arrays))
 
 
-def operator(native: NativeBackend, call: str) -> Any:
+def operator(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
     """Torch operator of a C function, with a gradient, made when first asked for."""
-    key = (native.sources, call)
+    key = (calls.sources, call)
     if key not in OPERATORS:
-        OPERATORS[key] = _define(native, call)
+        OPERATORS[key] = _define(calls, links, call)
     return OPERATORS[key]
 
 
-def _define(native: NativeBackend, call: str) -> Any:
+def _define(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
     """Operator (q, qd, qdd, p) -> results; p holds the parameters in the structure's order."""
-    structure, sources, links = native.structure, native.sources, native.links
-    sizes = result_sizes(structure)[call]
+    structure, sources, sizes = calls.structure, calls.sources, calls.sizes[call]
 
     def values(p: Tensor) -> dict[str, Tensor]:
         return dict(zip(structure.parameters, p.unbind(), strict=True))
 
     def forward(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
-        backend = NativeBackend(structure, sources.directory, links, values(p.detach()))
-        return _bare(compute(backend, call, q, qd, qdd))
+        present = NativeCalls(structure, sources.directory, values(p.detach()))
+        return _bare(compute(present, call, q, qd, qdd))
 
     def fake(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
         return _bare(tuple(q.new_empty((*q.shape[:-1], size)) for size in sizes))

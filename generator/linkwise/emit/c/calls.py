@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from linkwise.emit.c.header import pointers
 from linkwise.emit.c.kernel_function import KernelFunction
-from linkwise.emit.c.sizes import Sizes, Span, whole
+from linkwise.emit.c.sizes import EntryCounts, Span, whole
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,11 @@ def group_calls(links: Sequence[Span], kernels: Sequence[LinkKernels], arrays: S
 
 
 def call(
-    function: KernelFunction, width: str, motion: str, into: Mapping[str, str], start: Sizes | None = None
+    function: KernelFunction,
+    width: str,
+    motion: str,
+    into: Mapping[str, str],
+    start: EntryCounts | None = None,
 ) -> str:
     """Call of a kernel for one sample or a block; outputs begin at their pointers, or `start` entries on."""
     reads = [array if array == "shared" else f"{motion}{array}" for array in function.reads]

@@ -1,6 +1,6 @@
 """One C function over W samples, from the nodes that it computes."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from linkwise.dynamics.coefficients import LinkForms
@@ -88,7 +88,9 @@ def kernel_function(
     given = turned(kernel) | dict(shared or {})
     nodes = [output.node for output in results]
     code = straight_line(kernel.graph, nodes, CPrinter(), given)
-    sources = _sources(system, (shared or {}).values())
+    sources = symbols(system) | {
+        name: f"shared[{at} * W + b]" for at, name in enumerate((shared or {}).values())
+    }
     inputs = tuple((symbol, source) for symbol, source in sources.items() if symbol in code.symbols)
     used = {source.split("[")[0] for _, source in inputs}
     sines = sum(source.startswith(("sine", "cosine")) for _, source in inputs)
@@ -111,8 +113,8 @@ def kernel_function(
     )
 
 
-def _sources(system: System, shared: Iterable[str]) -> dict[str, str]:
-    """Where each symbol that a kernel may use comes from."""
+def symbols(system: System) -> dict[str, str]:
+    """Return where each symbol that a kernel may use comes from."""
     arrays = {"q": "q", "qd": "qd", "qdd": "qdd", "s": "sine", "c": "cosine"}
     sources = {
         f"{prefix}{k + 1}": f"{array}[{k} * W + b]"
@@ -120,8 +122,7 @@ def _sources(system: System, shared: Iterable[str]) -> dict[str, str]:
         for k in range(len(system.coordinates))
     }
     # By name: where a parameter stands depends on the robot, and a link's file must not.
-    sources |= {name: f"p[at_{name}]" for name in parameter_names(system).values()}
-    return sources | {name: f"shared[{at} * W + b]" for at, name in enumerate(shared)}
+    return sources | {name: f"p[at_{name}]" for name in parameter_names(system).values()}
 
 
 def _statements(code: Code, results: Sequence[Output]) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """The kernel in which links share work: what several need is computed once, by a function of its own."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
@@ -10,6 +10,7 @@ from linkwise.emit.c.kernel_function import (
     Output,
     decomposition_outputs,
     kernel_function,
+    symbols,
     turned,
 )
 from linkwise.expression.graph import Node, operands, reachable
@@ -32,10 +33,9 @@ def shared_work(system: System, kernel: Kernel | None, kernels: Sequence[Kernel]
     given = turned(kernel)
     outputs = [list(forms.decomposition()) for forms in kernel.forms]
     shared = _shared(kernel, outputs, given)
-    names = {node: f"x{number}" for number, node in enumerate(shared, 1)}
+    names = _names(kernel, shared, symbols(system))
     values = [Output("shared", entry, name, node) for entry, (node, name) in enumerate(names.items())]
-    what = "What several links need: the values x1 to " + f"x{len(shared)}"
-    part = kernel_function(system, kernel, "shared_part", what, values)
+    part = kernel_function(system, kernel, "shared_part", "What several links need", values)
     rests = tuple(
         kernel_function(
             system,
@@ -48,6 +48,17 @@ def shared_work(system: System, kernel: Kernel | None, kernels: Sequence[Kernel]
         for number, forms in enumerate(kernel.forms, 1)
     )
     return SharedWork(part, rests, len(shared))
+
+
+def _names(kernel: Kernel, shared: Sequence[Node], taken: Iterable[str]) -> dict[Node, str]:
+    """Name each shared value as the graph suggests, or x1, x2, … where it has no suggestion of its own."""
+    names: dict[Node, str] = {}
+    used = {*taken, *(f"x{number + 1}" for number in range(len(shared)))}
+    for number, node in enumerate(shared, 1):
+        suggested = kernel.graph.names.get(node)
+        names[node] = f"x{number}" if suggested is None or suggested in used else suggested
+        used.add(names[node])
+    return names
 
 
 def _shared(kernel: Kernel, outputs: list[list[Node]], given: dict[Node, str]) -> list[Node]:

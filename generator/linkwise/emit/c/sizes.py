@@ -13,7 +13,7 @@ GROUP = 384
 
 
 @dataclass(frozen=True)
-class Sizes:
+class EntryCounts:
     """A number of values, or a place, in each array; tau is as long as g, c0 as long as c1."""
 
     c2: int = 0
@@ -21,11 +21,11 @@ class Sizes:
     g: int = 0
     h1: int = 0
 
-    def __add__(self, other: "Sizes") -> "Sizes":
-        return Sizes(self.c2 + other.c2, self.c1 + other.c1, self.g + other.g, self.h1 + other.h1)
+    def __add__(self, other: "EntryCounts") -> "EntryCounts":
+        return EntryCounts(self.c2 + other.c2, self.c1 + other.c1, self.g + other.g, self.h1 + other.h1)
 
-    def __sub__(self, other: "Sizes") -> "Sizes":
-        return Sizes(self.c2 - other.c2, self.c1 - other.c1, self.g - other.g, self.h1 - other.h1)
+    def __sub__(self, other: "EntryCounts") -> "EntryCounts":
+        return EntryCounts(self.c2 - other.c2, self.c1 - other.c1, self.g - other.g, self.h1 - other.h1)
 
     def of(self, array: str) -> int:
         """Number of values in an array, or where it begins."""
@@ -55,18 +55,18 @@ class Span:
 
     first: int
     last: int
-    size: Sizes
-    start: Sizes
+    size: EntryCounts
+    start: EntryCounts
 
 
 def link_spans(kernels: Sequence[Kernel]) -> tuple[Span, ...]:
     """Return each link by itself, in order."""
     spans: list[Span] = []
-    start = Sizes()
+    start = EntryCounts()
     for number, kernel in enumerate(kernels, 1):
         forms = kernel.forms[0]
         linear = len(forms.linear_block(kernel.graph.zero))
-        size = Sizes(len(forms.acceleration), len(forms.velocity), len(forms.gravity), linear)
+        size = EntryCounts(len(forms.acceleration), len(forms.velocity), len(forms.gravity), linear)
         spans.append(Span(number, number, size, start))
         start += size
     return tuple(spans)
@@ -74,7 +74,7 @@ def link_spans(kernels: Sequence[Kernel]) -> tuple[Span, ...]:
 
 def whole(links: Sequence[Span]) -> Span:
     """Return consecutive links as one."""
-    return Span(links[0].first, links[-1].last, sum((k.size for k in links), Sizes()), links[0].start)
+    return Span(links[0].first, links[-1].last, sum((k.size for k in links), EntryCounts()), links[0].start)
 
 
 def groups(links: Sequence[Span]) -> Iterator[tuple[Span, ...]]:

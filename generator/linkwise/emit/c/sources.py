@@ -18,7 +18,7 @@ from linkwise.emit.c.kernel_function import (
     outputs,
 )
 from linkwise.emit.c.shared_part import SharedWork, shared_work
-from linkwise.emit.c.sizes import Sizes, Span, groups, link_spans, whole
+from linkwise.emit.c.sizes import EntryCounts, Span, groups, link_spans, whole
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.system import System
@@ -87,8 +87,8 @@ def _shared_view(together: SharedWork) -> dict[str, Any]:
     return {
         "title": "All links together, where they share work",
         "about": (
-            "shared_part computes what several links need, x1, x2 and so on, and link_1_rest what is then",
-            "left of link 1. The file that includes this one says how many samples W they take.",
+            "shared_part computes what several links need, link_1_rest what is then left of link 1. The file",
+            "that includes this one says how many samples W they take; KERNEL completes their names.",
         ),
         "functions": tuple(("", function) for function in (together.part, *together.rests)),
     }
@@ -153,11 +153,11 @@ def _inputs(system: System) -> tuple[str, ...]:
     return ("q", "qd", "qdd", "p") if system.parameters else ("q", "qd", "qdd")
 
 
-def _totals(size: Sizes) -> list[tuple[str, int]]:
+def _totals(size: EntryCounts) -> list[tuple[str, int]]:
     """Names in C and values of the robot's numbers of entries."""
     return [(total(array), size.of(array)) for array in size.arrays if array != "tau"]
 
 
-def _most(sizes: Sequence[Sizes]) -> Sizes:
+def _most(sizes: Sequence[EntryCounts]) -> EntryCounts:
     """Return room for any of these."""
-    return Sizes(*(max(size.of(array) for size in sizes) for array in ("c2", "c1", "g", "h1")))
+    return EntryCounts(*(max(size.of(array) for size in sizes) for array in ("c2", "c1", "g", "h1")))

@@ -1,0 +1,30 @@
+/* Results that no cache holds go past it: memory is then written without being read first. The same in every package
+   of linkwise. It needs rows.h. */
+#if defined(__AVX512F__)
+#include <immintrin.h>
+#endif
+#include <string.h>
+
+/* Above this many bytes, results are better not kept in the cache. */
+#define LARGE ((size_t)64 << 20)
+
+/* `count` values past the cache, if `to` starts on a cache line, as it does wherever that matters, and the processor
+   can; otherwise an ordinary copy. */
+static void stream(size_t count, const real *from, real *to)
+{
+#if defined(__AVX512F__)
+    if ((size_t)to % 64 == 0 && count % BLOCK == 0) {
+        for (size_t at = 0; at < count; at += BLOCK)
+            _mm512_stream_si512((__m512i *)(to + at), _mm512_load_si512((const __m512i *)(from + at)));
+        return;
+    }
+#endif
+    memcpy(to, from, count * sizeof(real));
+}
+
+/* A whole block to consecutive rows, put together in the cache and then written at one go. */
+static inline void stream_rows(size_t entries, const real *block, real *rows, real *scratch)
+{
+    scatter(BLOCK, entries, entries, block, scratch);
+    stream(entries * BLOCK, scratch, rows);
+}

@@ -1,0 +1,63 @@
+/* Number types, compilers and parts: what all files here rely on. The same in every package of linkwise.
+
+   One text of arithmetic serves double and float, one sample and many. It is written with
+       real    double or float
+       R(x)    the number x in that type                     F(f)   the C library's function f in that type
+       W       samples that are computed at a time: 1 or BLOCK
+   Beside these, SHARED marks a function that one part calls and another defines. */
+#ifndef LINKWISE_NUMBERS_H
+#define LINKWISE_NUMBERS_H
+
+#include <stddef.h>
+
+#ifdef LINKWISE_FLOAT
+typedef float real;
+#define R(x) x##f
+#define F(function) function##f
+#else
+typedef double real;
+#define R(x) x
+#define F(function) function
+#endif
+
+/* Samples in a block: one cache line of each quantity. */
+#define BLOCK (64 / (int)sizeof(real))
+
+/* No two arrays of a kernel overlap; C++ has no word of its own for that. */
+#if defined(__GNUC__) || defined(_MSC_VER)
+#define RESTRICT __restrict
+#elif defined(__cplusplus)
+#define RESTRICT
+#else
+#define RESTRICT restrict
+#endif
+
+/* Blocks start on a cache line, so that no vector straddles two. What is APART stays a function of its own: a kernel
+   over blocks, put into its caller, would lose what RESTRICT says. */
+#if defined(__GNUC__)
+#define ALIGNED __attribute__((aligned(64)))
+#define APART __attribute__((noinline)) static
+#else
+#define ALIGNED
+#define APART static
+#endif
+
+/* Compiled as it stands, a robot's file is whole. A build may also compile it in parts, side by side, and link them:
+   -DLINKWISE_PART=SINES, ONE_SAMPLE, BLOCKS or POSITION_GRADIENT, of which the last may be left away. */
+#define SINES 1
+#define ONE_SAMPLE 2
+#define BLOCKS 3
+#define POSITION_GRADIENT 4
+#ifndef LINKWISE_PART
+#define PART(part) 1
+#define SHARED static
+#else
+#define PART(part) (LINKWISE_PART == part)
+#if defined(__GNUC__) && !defined(_WIN32)
+#define SHARED __attribute__((visibility("hidden")))
+#else
+#define SHARED
+#endif
+#endif
+
+#endif
