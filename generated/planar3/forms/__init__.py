@@ -17,11 +17,12 @@ accordingly). Vectors have components _x, _y, _z; numbers in names count joints 
     t1, t2, ...     parts of the above with the other sign, and whatever else is used more than once
 """
 
+from ..runtime.interface import ClosedForms
 from . import link_1
 from . import link_2
 from . import link_3
 
-LINKS = (
+LINKS: tuple[ClosedForms, ...] = (
     link_1,
     link_2,
     link_3,

@@ -17,6 +17,7 @@ accordingly). Vectors have components _x, _y, _z; numbers in names count joints 
     t1, t2, ...     parts of the above with the other sign, and whatever else is used more than once
 """
 
+from ..runtime.interface import ClosedForms
 from . import link_1
 from . import link_2
 from . import link_3
@@ -24,7 +25,7 @@ from . import link_4
 from . import link_5
 from . import link_6
 
-LINKS = (
+LINKS: tuple[ClosedForms, ...] = (
     link_1,
     link_2,
     link_3,

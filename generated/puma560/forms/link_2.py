@@ -7,11 +7,14 @@ All vectors are in one common frame:
     origin  where joint 1 is at the instant, at rest
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 LINK = 'link2'
 PATH = (0, 1)
 
 
-def decomposition(xp, q, qd, qdd, p):
+def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
     56 additions and multiplications, 2 sines and cosines.
@@ -67,7 +70,7 @@ def decomposition(xp, q, qd, qdd, p):
     )
 
 
-def torque(xp, q, qd, qdd, p):
+def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return tau.
 
     55 additions and multiplications, 2 sines and cosines.
@@ -103,7 +106,7 @@ def torque(xp, q, qd, qdd, p):
     )
 
 
-def position_gradient(xp, q, qd, qdd, p):
+def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c0 = d(tau)/d(q).
 
     69 additions and multiplications, 2 sines and cosines.

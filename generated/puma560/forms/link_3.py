@@ -7,11 +7,14 @@ All vectors are in one common frame:
     origin  the link's centre of mass, moving with it; lengths are times the square root of its mass
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 LINK = 'link3'
 PATH = (0, 1, 2)
 
 
-def decomposition(xp, q, qd, qdd, p):
+def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
     137 additions and multiplications, 4 sines and cosines.
@@ -94,7 +97,7 @@ def decomposition(xp, q, qd, qdd, p):
     )
 
 
-def torque(xp, q, qd, qdd, p):
+def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return tau.
 
     91 additions and multiplications, 4 sines and cosines.
@@ -147,7 +150,7 @@ def torque(xp, q, qd, qdd, p):
     )
 
 
-def position_gradient(xp, q, qd, qdd, p):
+def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c0 = d(tau)/d(q).
 
     155 additions and multiplications, 4 sines and cosines.

@@ -7,11 +7,14 @@ All vectors are in one common frame:
     origin  the link's centre of mass, moving with it; lengths are times the square root of its mass
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 LINK = 'link6'
 PATH = (0, 1, 2, 3, 4, 5)
 
 
-def decomposition(xp, q, qd, qdd, p):
+def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
     744 additions and multiplications, 10 sines and cosines.
@@ -287,7 +290,7 @@ def decomposition(xp, q, qd, qdd, p):
     )
 
 
-def torque(xp, q, qd, qdd, p):
+def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return tau.
 
     382 additions and multiplications, 10 sines and cosines.
@@ -441,7 +444,7 @@ def torque(xp, q, qd, qdd, p):
     )
 
 
-def position_gradient(xp, q, qd, qdd, p):
+def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c0 = d(tau)/d(q).
 
     974 additions and multiplications, 10 sines and cosines.

@@ -7,11 +7,14 @@ All vectors are in one common frame:
     origin  where joint 2 is at the instant, at rest
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 LINK = 'left_upper_arm'
 PATH = (0, 1, 2, 3)
 
 
-def decomposition(xp, q, qd, qdd, p):
+def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
     348 additions and multiplications, 6 sines and cosines.
@@ -189,7 +192,7 @@ def decomposition(xp, q, qd, qdd, p):
     )
 
 
-def torque(xp, q, qd, qdd, p):
+def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return tau.
 
     220 additions and multiplications, 6 sines and cosines.
@@ -284,7 +287,7 @@ def torque(xp, q, qd, qdd, p):
     )
 
 
-def position_gradient(xp, q, qd, qdd, p):
+def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c0 = d(tau)/d(q).
 
     439 additions and multiplications, 6 sines and cosines.

@@ -7,11 +7,14 @@ All vectors are in one common frame:
     origin  where joint 2 is at the instant, at rest
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 LINK = 'left_forearm'
 PATH = (0, 1, 2, 3, 4)
 
 
-def decomposition(xp, q, qd, qdd, p):
+def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
     466 additions and multiplications, 8 sines and cosines.
@@ -236,7 +239,7 @@ def decomposition(xp, q, qd, qdd, p):
     )
 
 
-def torque(xp, q, qd, qdd, p):
+def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return tau.
 
     265 additions and multiplications, 8 sines and cosines.
@@ -350,7 +353,7 @@ def torque(xp, q, qd, qdd, p):
     )
 
 
-def position_gradient(xp, q, qd, qdd, p):
+def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c0 = d(tau)/d(q).
 
     581 additions and multiplications, 8 sines and cosines.
