@@ -30,6 +30,7 @@ from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 from sympy.simplify.fu import TR8
 
 GOLDEN = json.loads((Path(__file__).parent / "data" / "term_counts.json").read_text())
+KINDS = ("q", "qd", "qdd")
 ARITHMETIC = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -55,20 +56,31 @@ def spring_pendulum() -> System:
     return EnergySystem("spring_pendulum", (x, a), links, values)
 
 
+def geared(ratio: float) -> System:
+    """planar3 whose third joint turns by `ratio` times the angle of the second."""
+    robot = read_robot("planar3", Options(parameters="symbolic"))
+    *links, last = robot.links
+    joint = replace(last.joint, coordinate=1, ratio=ratio)
+    arm = replace(robot, name=f"geared {ratio}", coordinates=robot.coordinates[:2])
+    return rigid_system(replace(arm, links=(*links, replace(last, joint=joint))))
+
+
 def values_at_random(system: System, seed: int) -> dict[str, float]:
     draw = random.Random(seed)
     n = len(system.coordinates)
-    names = [f"{kind}{k + 1}" for kind in ("q", "qd", "qdd") for k in range(n)]
+    names = [f"{kind}{k + 1}" for kind in KINDS for k in range(n)]
     names += [symbol.name for symbol in system.parameters]
     return {name: draw.uniform(0.3, 1.7) for name in names}
 
 
 def evaluated_expansion(p: Laurent, found: LinkTorques, system: System, at: dict[str, float]) -> complex:
+    """A torque of `found`, from its polynomial in u_k = q_k/d_k at given q, q̇ and q̈."""
     x, n = found.variables, len(system.coordinates)
-    bare = {c.name: at[f"q{k + 1}"] for k, c in enumerate(system.coordinates)}
+    at = at | {f"{kind}{k + 1}": at[f"{kind}{k + 1}"] / d for k, d in enumerate(x.units) for kind in KINDS}
+    bare = {c.q: at[f"q{k + 1}"] for k, c in enumerate(system.coordinates)}
     value = [1j] + [complex(math.cos(at[f"q{k + 1}"]), math.sin(at[f"q{k + 1}"])) for k in range(n)]
     value += [at[f"qd{k + 1}"] for k in range(n)] + [at[f"qdd{k + 1}"] for k in range(n)]
-    value += [bare[name] if name in bare else at[name] for name in x.names]
+    value += [bare[symbol] if symbol in bare else at[symbol.name] for symbol in x.others]
     total = 0j
     for key, c in p.terms.items():
         powers = zip(value, exponents(key, x.digits), strict=True)
@@ -95,7 +107,9 @@ def evaluated_graph(kernel: Kernel, output: Node, at: dict[str, float]) -> float
 
 
 @pytest.mark.parametrize(
-    "system", [symbolic("puma560"), symbolic("planar4"), spring_pendulum()], ids=lambda s: s.name
+    "system",
+    [symbolic("puma560"), symbolic("planar4"), spring_pendulum(), geared(1.5), geared(-0.4)],
+    ids=lambda s: s.name,
 )
 def test_expanded_torques_equal_the_closed_forms_of_the_graph(system: System) -> None:
     every = tuple(range(len(system.coordinates)))
@@ -104,7 +118,8 @@ def test_expanded_torques_equal_the_closed_forms_of_the_graph(system: System) ->
         kernel = link_kernel(system, found.link)
         for i, torque in found.torques.items():
             exact = evaluated_graph(kernel, kernel.forms[0].torque[i], at)
-            assert evaluated_expansion(torque, found, system, at) == pytest.approx(exact, rel=1e-9, abs=1e-9)
+            expanded = evaluated_expansion(torque, found, system, at) / found.variables.units[i]
+            assert expanded == pytest.approx(exact, rel=1e-9, abs=1e-9)
 
 
 def sympy_counts(n: int) -> tuple[int, int]:
@@ -185,8 +200,10 @@ def test_a_robot_whose_first_link_exceeds_the_budget_is_refused() -> None:
 @pytest.mark.parametrize(
     ("energy", "complaint"),
     [
-        (sp.exp(sp.Symbol("a", real=True)), "exp"),
-        (sp.cos(sp.Symbol("a", real=True) / 2), "whole combinations"),
+        (sp.exp(Coordinate("a").q), "exp"),
+        (sp.cos(sp.sqrt(2) * Coordinate("a").q), "whole combinations"),
+        (sp.cos(0.123 * Coordinate("a").q), "round the ratio to a simple fraction"),
+        (sp.cos(sp.Symbol("k", real=True) / 2), "whole combinations"),
         (1 / (1 + sp.Symbol("k", real=True)), "below a fraction line"),
         (sp.Symbol("k", real=True) ** 99, "a power above 63"),
     ],
@@ -239,3 +256,19 @@ def test_a_part_costs_what_its_product_costs(order: int, coordinate: int, operat
 def test_counts_rest_on_expressions_alone() -> None:
     (found,) = link_torques(symbolic("planar1"), (0,), 100, silent)
     assert count_terms(found.torques[0], found.variables).total == GOLDEN["total"][0]
+
+
+def test_a_gear_of_a_fraction_has_the_terms_of_any_other() -> None:
+    # No two angles of the sums q2 and r q2, r not ±1, ±2 or 0, meet in one term.
+    counts = [
+        [row.count for row in terms_report(geared(ratio), TermQuery(None), 10**6, False, silent).rows]
+        for ratio in (5.0, 1.5, 0.4)
+    ]
+    assert counts[0] == counts[1] == counts[2]
+
+
+def test_a_parameter_named_like_a_coordinate_is_not_a_motion() -> None:
+    x, mass = Coordinate("x", "m"), sp.Symbol("x", real=True)
+    system = EnergySystem("slide", (x,), (LinkEnergy("cart", mass * x.qd**2 / 2, x.q**2),), {mass: 1.0})
+    (row, _) = terms_report(system, TermQuery(), 100, False, silent).rows
+    assert (row.count.total, row.kept) == (2, 1)

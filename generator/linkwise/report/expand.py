@@ -1,11 +1,12 @@
 """From a link's symbolic energy to a fully expanded polynomial.
 
-Digits of a monomial: the power of i, then z_k, q̇_k and q̈_k of the n coordinates, then parameters
-(and q_k itself, for slides and springs) as they turn up.
+Digits of a monomial: the power of i, then z_k, u̇_k and ü_k of the n coordinates, then parameters
+(and u_k itself, for slides and springs) as they turn up. Here u_k = q_k/d_k and z_k = exp(i u_k); d_k is 1
+unless a gear turns a link by a fraction of q_k, which is a whole multiple of u_k.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 import sympy as sp
@@ -15,7 +16,6 @@ from linkwise.report.laurent import (
     LIMIT,
     ONE,
     ZERO,
-    ExponentError,
     Laurent,
     add,
     at_digit,
@@ -31,35 +31,36 @@ ROUNDING = 1e-9
 
 
 class Variables:
-    """Which digit of a monomial belongs to which variable."""
+    """Which digit of a monomial belongs to which variable; `units` are the d_k."""
 
-    def __init__(self, n: int) -> None:
-        self.n = n
-        self._other: dict[str, int] = {}
+    def __init__(self, units: Sequence[int]) -> None:
+        self.units = tuple(units)
+        self.n = len(self.units)
+        self._other: dict[sp.Symbol, int] = {}
 
     def z(self, k: int) -> int:
-        """Monomial exp(i q_k)."""
+        """Monomial z_k."""
         return at_digit(1 + k)
 
     def qd(self, k: int) -> int:
-        """Monomial q̇_k."""
+        """Monomial u̇_k."""
         return at_digit(1 + self.n + k)
 
     def qdd(self, k: int) -> int:
-        """Monomial q̈_k."""
+        """Monomial ü_k."""
         return at_digit(1 + 2 * self.n + k)
 
-    def other(self, name: str) -> int:
-        """Monomial of a parameter or a bare coordinate; new names get the next digit."""
-        return at_digit(self._other.setdefault(name, 1 + 3 * self.n + len(self._other)))
+    def other(self, symbol: sp.Symbol) -> int:
+        """Monomial of a parameter or a bare coordinate; a new one gets the next digit."""
+        return at_digit(self._other.setdefault(symbol, 1 + 3 * self.n + len(self._other)))
 
-    def digit_of(self, name: str) -> int | None:
+    def digit_of(self, symbol: sp.Symbol) -> int | None:
         """Digit of a parameter or bare coordinate, None if it never turned up."""
-        return self._other.get(name)
+        return self._other.get(symbol)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the digits behind the q̈, in order."""
+    def others(self) -> tuple[sp.Symbol, ...]:
+        """Symbols of the digits behind the ü, in order."""
         return tuple(self._other)
 
     @property
@@ -71,14 +72,16 @@ class Variables:
 class Expansion:
     """Expands SymPy expressions over coordinates; remembers what each symbol stands for."""
 
-    def __init__(self, coordinates: Iterable[Coordinate], budget: int, rounding: float = 0.0) -> None:
+    def __init__(
+        self, coordinates: Sequence[Coordinate], units: Sequence[int], budget: int, rounding: float = 0.0
+    ) -> None:
         self.coordinates = tuple(coordinates)
-        self.variables = Variables(len(self.coordinates))
+        self.variables = Variables(units)
         self.budget, self.rounding = budget, rounding
         self._known: dict[sp.Expr, Laurent] = {}
         self._angles = {c.q: k for k, c in enumerate(self.coordinates)}
         for k, c in enumerate(self.coordinates):
-            self._known[c.qd] = Laurent({self.variables.qd(k): 1}, 1, 1)
+            self._known[c.qd] = Laurent({self.variables.qd(k): units[k]}, 1, 1)
 
     def define(self, definitions: Iterable[Definition]) -> None:
         """Expand named steps in order; later expressions may use their symbols."""
@@ -91,7 +94,8 @@ class Expansion:
         if known is not None:
             return known
         if expr.is_Symbol:
-            return Laurent({self.variables.other(expr.name): 1}, 1, 1)
+            unit = self.variables.units[self._angles[expr]] if expr in self._angles else 1
+            return Laurent({self.variables.other(expr): unit}, 1, 1)
         if expr.is_Rational or expr.is_Float:
             return constant(exact(expr))
         if expr.is_Add:
@@ -127,29 +131,46 @@ class Expansion:
         return power(base, int(exponent), self.budget)
 
     def _wave(self, expr: sp.Expr) -> Laurent:
-        """Sine or cosine of a whole combination of angles: (z^a ± z^−a)/2, the sine over i."""
+        """Sine or cosine of a whole combination of the u_k: (z^a ± z^−a)/2, the sine over i."""
         key, phase = 0, 0.0
         bound = 0
         for term in sp.Add.make_args(sp.expand(expr.args[0])):
             factor, rest = term.as_coeff_Mul()
-            if rest in self._angles and float(factor).is_integer():
-                key += int(factor) * self.variables.z(self._angles[rest])
-                bound = max(bound, abs(int(factor)))
+            if rest in self._angles:
+                k = self._angles[rest]
+                whole = int(exact(factor) * self.variables.units[k])
+                key += whole * self.variables.z(k)
+                bound = max(bound, abs(whole))
             elif term.is_number:
                 phase += float(term)
             else:
                 raise LinkwiseError(
                     f"{expr} cannot be expanded into terms; counts need sines and cosines of whole "
-                    "combinations of the joint angles"
+                    "combinations of the joint angles, or of simple fractions of them"
                 )
         if bound > LIMIT:
-            raise ExponentError
+            raise LinkwiseError(
+                f"{expr} cannot be expanded into terms: written in whole multiples of one angle a joint, it "
+                f"takes more than {LIMIT} of them; round the ratio to a simple fraction"
+            )
         sine = Laurent({key + 1: -1, -key + 1: 1}, 2, bound) if key else ZERO
         cosine = Laurent({key: 1, -key: 1}, 2, bound) if key else ONE
         s, c = snapped(math.sin(phase)), snapped(math.cos(phase))
         if expr.func == sp.sin:
             return add([sine.scaled(c), cosine.scaled(s)])
         return add([cosine.scaled(c), sine.scaled(-s)])
+
+
+def angle_units(coordinates: Sequence[Coordinate], energies: Iterable[sp.Expr]) -> tuple[int, ...]:
+    """d_k: the least whole numbers for which all sines and cosines are of whole multiples of q_k/d_k."""
+    units = {c.q: 1 for c in coordinates}
+    for energy in energies:
+        for wave in energy.atoms(sp.sin, sp.cos):
+            for term in sp.Add.make_args(sp.expand(wave.args[0])):
+                factor, angle = term.as_coeff_Mul()
+                if angle in units:
+                    units[angle] = math.lcm(units[angle], exact(factor).denominator)
+    return tuple(units.values())
 
 
 def exact(number: sp.Expr) -> Fraction:

@@ -5,14 +5,14 @@ On an expanded polynomial each derivative is one pass over the terms: ∂/∂q o
 i e. A digit is a byte, so the exponents of a term are the bytes of its key.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import sympy as sp
 
 from linkwise.errors import LinkwiseError, within
 from linkwise.progress import Progress
-from linkwise.report.expand import ROUNDING, Expansion, Variables
+from linkwise.report.expand import ROUNDING, Expansion, Variables, angle_units
 from linkwise.report.laurent import (
     I_SQUARED,
     LIMIT,
@@ -38,7 +38,10 @@ FORM = (
 
 @dataclass(frozen=True)
 class LinkTorques:
-    """τ_ij of link j for the joints asked for; those off path(j) are missing: their torque is 0."""
+    """τ_ij of link j for the joints asked for; those off path(j) are missing: their torque is 0.
+
+    torques: d_i τ_ij by joint i, in the u_k = q_k/d_k of `variables`; the d are 1 but for geared joints
+    """
 
     link: int
     torques: dict[int, Laurent]
@@ -53,9 +56,11 @@ def link_torques(
     links: int | None = None,
 ) -> Iterator[LinkTorques]:
     """Expand the first `links` links (None: all); raises BudgetExceededError at one too large."""
-    rounding = 0.0 if is_exact(system) else ROUNDING
-    expansion = Expansion(system.coordinates, budget, rounding)
-    wanted = link_energies(system)[:links]
+    energies = link_energies(system)
+    rounding = 0.0 if is_exact(system, energies) else ROUNDING
+    units = angle_units(system.coordinates, (expr for energy in energies for expr in _expressions(energy)))
+    expansion = Expansion(system.coordinates, units, budget, rounding)
+    wanted = energies[:links]
     for j, link in enumerate(wanted):
         with within(f"link {link.name!r}"):
             try:
@@ -84,11 +89,15 @@ def _torques(
     return {i: by.torque(lagrangian, i, path).pruned(expansion.rounding) for i in chosen}
 
 
-def is_exact(system: System) -> bool:
+def _expressions(energy: StepwiseEnergy) -> Iterator[sp.Expr]:
+    yield from (expr for _, expr in (*energy.twist.definitions, *energy.height.definitions))
+    yield from (energy.kinetic, energy.potential)
+
+
+def is_exact(system: System, energies: Iterable[StepwiseEnergy]) -> bool:
     """Whether no coefficient is rounded: rotations of 0 and ±1, no angle offsets, no irrational number."""
     links = system.robot.links if isinstance(system, RigidSystem) else ()
     straight = all(e in (-1.0, 0.0, 1.0) for link in links for row in link.joint.rotation for e in row)
-    energies = link_energies(system)
     return straight and all(_is_rational(e.kinetic) and _is_rational(e.potential) for e in energies)
 
 
@@ -100,8 +109,9 @@ def _is_rational(energy: sp.Expr) -> bool:
 
 def form_of(system: System) -> str:
     """Name the canonical form that the counts of `system` are taken in."""
+    exact = is_exact(system, link_energies(system))
     rounded = f"fixed angles as decimals, coefficients below {ROUNDING:g} of the largest dropped"
-    return f"{FORM}; {'coefficients exact' if is_exact(system) else rounded}"
+    return f"{FORM}; {'coefficients exact' if exact else rounded}"
 
 
 class Differentiation:
@@ -110,7 +120,7 @@ class Differentiation:
     def __init__(self, coordinates: tuple[Coordinate, ...], variables: Variables) -> None:
         self._x, self._n = variables, len(coordinates)
         self._digits = variables.digits
-        self._bare = [variables.digit_of(c.name) for c in coordinates]
+        self._bare = [variables.digit_of(c.q) for c in coordinates]
 
     def torque(self, lagrangian: Laurent, i: int, path: tuple[int, ...]) -> Laurent:
         """τ_ij from link j's expanded Lagrangian, with path(j) the coordinates that move it."""

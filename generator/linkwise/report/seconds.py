@@ -73,8 +73,8 @@ def first_links(system: System, n: int) -> System:
     """Return the serial arm of the first n links."""
     if isinstance(system, EnergySystem):
         return replace(system, coordinates=system.coordinates[:n], links=system.links[:n])
-    robot = system.robot
-    return rigid_system(replace(robot, coordinates=robot.coordinates[:n], links=robot.links[:n]))
+    robot, last = system.robot, system.links[n - 1].chain[-1]
+    return rigid_system(replace(robot, coordinates=robot.coordinates[:n], links=robot.links[: last + 1]))
 
 
 def _generated(system: System, directory: Path) -> Package:
