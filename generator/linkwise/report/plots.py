@@ -120,7 +120,7 @@ def terms_images(report: TermsReport) -> dict[str, bytes]:
     """Terms of each τ_ij as a table of shades: joints down, links across, kept in brackets."""
     rows = len({row.joint for row in report.rows})
     columns = len({row.link for row in report.rows})
-    size = max(4.2, 1.2 + 0.95 * columns), max(1.7, 1.0 + 0.62 * rows)
+    size = max(4.2, 1.2 + 0.95 * columns), max(1.9, 1.2 + 0.62 * rows)
     return _images("terms", lambda figure: _draw_terms(figure, report), size)
 
 
@@ -141,7 +141,7 @@ def _draw_terms(figure: Any, report: TermsReport) -> None:
     axes.grid(visible=False)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
-    axes.set_title(f"{short(report.robot)}: terms of τᵢⱼ (in brackets: {report.query})")
+    axes.set_title(f"{short(report.robot)}: terms of τᵢⱼ\nin brackets: those for the {report.query}")
 
 
 def _draw_cell(axes: Any, x: int, y: int, row: TorqueTerms, shade: float) -> None:

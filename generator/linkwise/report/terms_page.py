@@ -62,19 +62,32 @@ def _pair(cost: Operations | None) -> dict[str, int]:
 
 def terms_markdown(report: TermsReport) -> str:
     """Return the report as Markdown."""
+    moving = _in_a_term(report)
     view = {
         "robot": report.robot,
         "form": report.form,
         "kept": str(report.query),
         "progress": progress_line(report),
         "summary": [_summary(row, report.links) for row in report.rows],
-        "coordinates": list(range(1, len(report.joints) + 1)),
+        "coordinates": [k + 1 for k in moving],
         "buckets": [
-            (_name(row), row.count.gravity, row.count.acceleration, row.count.velocity) for row in report.rows
+            (
+                _name(row),
+                row.count.gravity,
+                [row.count.acceleration[k] for k in moving],
+                [row.count.velocity[k] for k in moving],
+            )
+            for row in report.rows
         ],
         "operations": _operation_lines(report),
     }
     return render("report/terms.md.j2", view)
+
+
+def _in_a_term(report: TermsReport) -> list[int]:
+    """Coordinates whose motion is in some term: a large robot has many that load nothing counted."""
+    counts = [row.count for row in report.rows]
+    return [k for k in range(len(report.joints)) if any(c.acceleration[k] or c.velocity[k] for c in counts)]
 
 
 def progress_line(report: TermsReport) -> str:

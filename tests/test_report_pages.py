@@ -1,0 +1,72 @@
+"""The pages of the reports, and the templates that they are made from."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+import sympy as sp
+from linkwise.emit.render import render, variables
+from linkwise.errors import LinkwiseError
+from linkwise.progress import silent
+from linkwise.report import (
+    TermQuery,
+    Timing,
+    measure,
+    reduction_markdown,
+    reduction_page,
+    seconds,
+    seconds_json,
+    seconds_markdown,
+    seconds_page,
+    study,
+    terms_markdown,
+    terms_page,
+    terms_report,
+)
+from linkwise.robot import Coordinate, Options, read_robot
+from linkwise.symbolic.system import EnergySystem, LinkEnergy, System, rigid_system
+
+
+def planar(n: int) -> System:
+    return rigid_system(read_robot(f"planar{n}", Options(parameters="symbolic")))
+
+
+def test_each_template_uses_every_field_of_its_view_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: dict[str, set[str]] = {}
+
+    def recording(template: str, view: Mapping[str, Any]) -> str:
+        seen[template] = set(view)
+        return render(template, view)
+
+    for module in (terms_page, reduction_page, seconds_page, seconds):
+        monkeypatch.setattr(module, "render", recording)
+    arm = planar(1)
+    result = study("arm", arm, 1, 1, 1, 100, silent)
+    terms_markdown(terms_report(arm, TermQuery(), 100, False, silent))
+    reduction_markdown(result)
+    seconds_markdown(result, seconds_json("arm", measure(arm, (1,), silent)))
+    assert seen.keys() == {
+        f"report/{name}.j2" for name in ("terms.md", "reduction.md", "measured.md", "row.py")
+    }
+    for template, fields in seen.items():
+        assert fields == variables(template), template
+
+
+def test_a_joint_that_is_in_no_term_has_no_column() -> None:
+    report = terms_report(planar(4), TermQuery(joint=0, link=1), 100, False, silent)
+    assert "| torque | gravity | acc 1 | acc 2 | vel 1 | vel 2 |\n" in terms_markdown(report)
+
+
+def test_measured_seconds_are_held_against_the_terms() -> None:
+    result = study("arm", planar(2), 1, 2, 2, 100, silent)
+    timings = [Timing(2, "closed form", 1.0, 2.0, 3.0), Timing(2, "autograd", 1.0, 10.0, 11.0)]
+    said = seconds_markdown(result, seconds_json("arm", timings))
+    assert "**Closed form**: at 2 DoF extracting saves 50.0% of the time, weaker than the 57.1%" in said
+    assert "**Autograd**: at 2 DoF extracting saves 90.0% of the time, stronger than the 57.1%" in said
+
+
+def test_an_arm_whose_first_joint_moves_no_inertia_is_refused() -> None:
+    a = Coordinate("a")
+    spring = EnergySystem("spring", (a,), (LinkEnergy("coil", sp.S.Zero, a.q**2),))
+    with pytest.raises(LinkwiseError, match="no term of τ_1 contains q̈_1"):
+        study("spring", spring, 1, 1, 1, 100, silent)
