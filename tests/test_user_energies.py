@@ -76,8 +76,8 @@ def test_degree_three_in_the_velocities_is_refused() -> None:
         puck(Coordinate("x", "m").qd ** 3)
 
 
-def test_energy_that_is_no_polynomial_in_the_velocities_is_refused() -> None:
-    with pytest.raises(LinkwiseError, match="link 'disc': its energies are no polynomial in the velocities"):
+def test_energy_that_is_not_a_polynomial_in_the_velocities_is_refused() -> None:
+    with pytest.raises(LinkwiseError, match="its energies are not polynomials in the velocities"):
         puck(sp.sin(Coordinate("x", "m").qd))
 
 
@@ -128,9 +128,9 @@ HEAD = "from linkwise import *\nimport sympy as sp\nx = Coordinate('x')\n"
 GOOD = HEAD + "coordinates = [x]\nlinks = [LinkEnergy('a', x.qd**2, 0)]\n"
 FILES = {
     "exit": (GOOD + "import sys; sys.exit(0)", "running the file failed: SystemExit: 0"),
-    "number": (GOOD + "coordinates = [Coordinate(3)]", "the coordinate name 3 is no string"),
+    "number": (GOOD + "coordinates = [Coordinate(3)]", "the coordinate name 3 is not a string"),
     "unit": (GOOD + "coordinates = [Coordinate('x', 'deg')]", "coordinate 'x' has the unit 'deg'; give rad"),
-    "link": (GOOD + "links = [LinkEnergy(None, x.qd**2, 0)]", "the link name None is no string"),
+    "link": (GOOD + "links = [LinkEnergy(None, x.qd**2, 0)]", "the link name None is not a string"),
     "name": (GOOD + "name = 3", "the robot's name is 3; give a string"),
     "list": (GOOD + "parameters = [3]", "`parameters` must be a dictionary of SymPy symbols"),
     "text": (GOOD + "parameters = {'m': 1}", "`parameters` must be a dictionary of SymPy symbols"),

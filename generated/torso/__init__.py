@@ -31,9 +31,7 @@ def load(backend: str = "numpy", parameters: Mapping[str, Any] | None = None) ->
         autograd: each link's Lagrangian, differentiated by torch
         native: the C code, compiled by this system's compiler
 
-    parameters: values in place of the built-in ones, by name: numbers, arrays or, where a back end computes with
-    torch, tensors, through which gradients flow. The names:
-        none: generate with --parameters symbolic
+    parameters: none here; generate with --parameters symbolic to keep them.
 
     Raises ValueError for a back end or a parameter that this package doesn't have.
     """

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .native_build import Sources
-from .native_library import Array, Memory, address, function
+from .native_library import Memory, NumberArray, address, function
 from .structure import Structure
 
 PER_THREAD = 1 << 20
@@ -47,7 +47,7 @@ class NativeCalls:
         self._memory = Memory()
         self._function("decomposition", np.dtype("f8"))
 
-    def run(self, call: str, q: Array, qd: Array, qdd: Array) -> list[Array]:
+    def run(self, call: str, q: NumberArray, qd: NumberArray, qdd: NumberArray) -> list[NumberArray]:
         """Results (..., size) of a C function for arrays of one shape (..., n), in one piece of memory."""
         sizes = self.sizes[call]
         kind, shape, n = q.dtype, q.shape[:-1], q.shape[-1]
@@ -97,7 +97,7 @@ class NativeCalls:
         for future in waiting:
             future.result()
 
-    def _numbers(self, kind: "np.dtype[Any]") -> Array:
+    def _numbers(self, kind: "np.dtype[Any]") -> NumberArray:
         """Parameters in the order of the structure; a tensor's value is the one it has now."""
         for name in self.structure.parameters:
             if np.shape(self.parameters[name]) != ():

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .native_build import Sources, library
 
-Array = NDArray[Any]
+NumberArray = NDArray[Any]
 
 
 @cache
@@ -33,7 +33,7 @@ def function(sources: Sources, call: str, kind: str, arrays: int) -> Any:
     return found
 
 
-def address(array: Array) -> int:
+def address(array: NumberArray) -> int:
     """Where an array begins in memory."""
     start: int = array.__array_interface__["data"][0]
     return start
@@ -50,8 +50,8 @@ class Memory:
     def __init__(self) -> None:
         self._earlier: list[NDArray[np.uint8]] = []
 
-    def __call__(self, size: int, kind: "np.dtype[Any]") -> Array:
-        """Array of `size` numbers, starting on a cache line so that C can write whole lines."""
+    def __call__(self, size: int, kind: "np.dtype[Any]") -> NumberArray:
+        """NumberArray of `size` numbers, starting on a cache line so that C can write whole lines."""
         count = size * kind.itemsize + 64
         if count < self.LEAST:
             return np.empty(size, kind)
@@ -62,7 +62,7 @@ class Memory:
                 owner = self._earlier.pop(0)  # at once, so that no other thread looks at it
             except IndexError:
                 continue
-            # Held by `owner` and by the question itself alone.
+            # Held by `owner` and by this very look alone.
             if count <= owner.nbytes <= 2 * count and sys.getrefcount(owner) == 2:
                 break
             self._earlier.append(owner)
@@ -74,6 +74,6 @@ class Memory:
         return array
 
 
-def _aligned(owner: NDArray[np.uint8], size: int, kind: "np.dtype[Any]") -> Array:
+def _aligned(owner: NDArray[np.uint8], size: int, kind: "np.dtype[Any]") -> NumberArray:
     start = -address(owner) % 64
     return owner[start : start + size * kind.itemsize].view(kind)

@@ -4,7 +4,19 @@
        real    double or float
        R(x)    the number x in that type                     F(f)   the C library's function f in that type
        W       samples that are computed at a time: 1 or BLOCK
-   Beside these, SHARED marks a function that one part calls and another defines. */
+   Beside these, SHARED marks a function that one part calls and another defines.
+
+   In the kernels, vectors have components _x, _y and _z; numbers in names count joints from 1, and 0 is the base:
+       s3, c3          sine and cosine of joint 3 (3b: of another joint that follows coordinate 3)
+       x3, y3, z3      axes of the frame that joint 3 moves; z3 is the joint's own axis
+       s3_x, s3_y ...  moment (p - o) x z3 of the axis about the origin o, p a point on it
+       zd3, sd3        how z3 and that moment change by the joints before
+       w3, wd3         angular velocity and acceleration of what joint 3 carries
+       v3, u3          its velocity at the origin o, and that of its frame relative to o
+       n3_c2, f3_c2    wrench (moment, force) that accelerating joint 3 asks of the link: c2(i, j, 3) is its part on joint i
+       n3_c1, f3_c1    the same for the velocity of joint 3 and c1(i, j, 3)
+       ag              gravity
+       t1, t2, ...     parts of the above with the other sign, and whatever else is used more than once */
 #ifndef LINKWISE_NUMBERS_H
 #define LINKWISE_NUMBERS_H
 

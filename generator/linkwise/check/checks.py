@@ -84,7 +84,7 @@ def _load(package: Package) -> tuple[dict[str, Model], list[Result]]:
 
 
 def _lacks(error: Exception, package: str) -> bool:
-    """Whether a library or the compiler is missing here, which is no fault of the package."""
+    """Whether a library or the compiler is missing here, which is not the package's fault."""
     if isinstance(error, ImportError):
         return not (error.name or "").startswith(package)
     return isinstance(error, RuntimeError) and "install" in str(error) and " failed: " not in str(error)

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.check.newton_euler import Array, NewtonEuler
-from linkwise.package.load import Model
+from linkwise.check.newton_euler import NewtonEuler
+from linkwise.package.load import Array, Model
 from linkwise.package.manifest import Manifest
 
 TOLERANCE = 1e-9

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from linkwise.check.newton_euler import Array
+from linkwise.package.load import Array
 
 STEP = 1e-4
 

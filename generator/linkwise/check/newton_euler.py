@@ -4,11 +4,9 @@ Plain vectors in the world's axes, forces at centres of mass, one link at a time
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
-
-Array = NDArray[np.float64]
 
 
 class NewtonEuler:

@@ -40,7 +40,8 @@ app = typer.Typer(add_completion=False)
 def reduction(
     options: Options,
     robot: Annotated[
-        str, typer.Option(help=f"planar: the paper's arm; or a serial robot: {DESCRIPTIONS}")
+        str,
+        typer.Option(help=f"planar: an arm as the paper's; or a serial robot: {DESCRIPTIONS}"),
     ] = "planar",
     dof: Annotated[str, typer.Option(help="Degrees of freedom, FIRST..LAST")] = "1..10",
     measured: Annotated[bool, typer.Option("--measure", help="Time generated code too; needs torch")] = False,

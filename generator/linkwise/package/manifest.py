@@ -128,7 +128,7 @@ def _check_tree(tree: RigidTree, count: int, links: set[str]) -> None:
         if not 0 <= body.coordinate < count:
             raise ValueError(f"body {index} of the tree hangs on no joint")
         if body.parent is not None and not 0 <= body.parent < index:
-            raise ValueError(f"the parent of body {index} of the tree is no earlier body")
+            raise ValueError(f"the parent of body {index} of the tree is not an earlier body")
     lost = sorted(links - {body.link for body in tree.bodies})
     if lost:
         raise ValueError(f"link {lost[0]!r} is not in the tree")

@@ -69,7 +69,7 @@ def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[Li
     ):
         for item in names:
             if not isinstance(item, str):
-                raise LinkwiseError(f"the {what} name {item!r} is no string; put it in quotes")
+                raise LinkwiseError(f"the {what} name {item!r} is not a string; put it in quotes")
             if not item.strip() or names.count(item) > 1:
                 fault = "is used twice" if item.strip() else "is empty"
                 raise LinkwiseError(f"the {what} name {item!r} {fault}; give each its own")
@@ -164,7 +164,7 @@ def _check_degree(lagrangian: sp.Expr, velocities: list[sp.Symbol]) -> None:
         degree = sp.Poly(lagrangian, *velocities, domain="EX").total_degree()
     except sp.PolynomialError:
         raise LinkwiseError(
-            "its energies are no polynomial in the velocities; use terms up to degree 2"
+            "its energies are not polynomials in the velocities; use terms up to degree 2"
         ) from None
     if degree > 2:
         raise LinkwiseError(
