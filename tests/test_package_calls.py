@@ -1,6 +1,8 @@
 """The calls of a generated package: shapes, dtypes, gradients, conventions, masks and messages."""
 
+import pickle
 from collections.abc import Callable
+from copy import deepcopy
 from types import ModuleType
 from typing import Any
 
@@ -214,6 +216,23 @@ def test_wrong_dtype_names_the_argument(package_of: Callable[[str], ModuleType])
         robot.partial_torque(q, qd.astype(np.float32), qdd)
     with pytest.raises(TypeError, match="q is ndarray; this back end takes torch tensors"):
         package_of("planar3").load("torch").partial_torque(q, qd, qdd)
+
+
+def test_tensors_on_different_devices_are_refused(package_of: Callable[[str], ModuleType]) -> None:
+    q = torch.ones(3, dtype=torch.float64)
+    with pytest.raises(TypeError, match="q, qd, qdd lie on different devices; move them to one"):
+        package_of("planar3").load("torch").partial_torque(q, q, q.to("meta"))
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_copied_or_pickled_robot_keeps_back_end_and_parameters(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot = package_of("planar3 symbolic").load(backend, parameters={"m_2": 2.0})
+    states = states_of(backend, 4, 3)
+    for again in (deepcopy(robot), pickle.loads(pickle.dumps(robot))):
+        assert again.backend.name == backend
+        assert relative_error(again.partial_torque(*states), robot.partial_torque(*states)) == 0.0
 
 
 @pytest.mark.parametrize("call", ["partial_torque", "position_gradient", "inverse_dynamics"])

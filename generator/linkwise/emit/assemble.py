@@ -86,8 +86,6 @@ class Maker:
 
 def _parameter_lines(system: System) -> list[str]:
     """Names of the parameters as lines of a docstring, which none of their characters can end."""
-    if not system.parameters:
-        return ["none: generate with --parameters symbolic"]
     lines: list[str] = []
     for symbol in system.parameters:
         name = ascii(symbol.name).replace("\\", "\\\\").replace('"', '\\"')
@@ -95,7 +93,7 @@ def _parameter_lines(system: System) -> list[str]:
             lines[-1] += f" {name},"
         else:
             lines.append(f"{name},")
-    return [*lines[:-1], lines[-1].removesuffix(",")]
+    return [*lines[:-1], *(last.removesuffix(",") for last in lines[-1:])]
 
 
 def manifest(derivation: Derivation, files: Mapping[str, str]) -> str:
