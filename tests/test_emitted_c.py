@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from answers import random_states, relative_error
 from compiled import STRICT, Compiled, compile_library, name_of
-from conftest import DATA, needs_compiler
+from conftest import DATA, PANDA, needs_compiler
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
 
@@ -19,6 +19,9 @@ pytestmark = needs_compiler
 TURNTABLE = str(DATA / "turntable.py")
 LEG = str(DATA / "leg.toml")
 ROBOTS = ["planar3", "planar3 symbolic", "puma560", TURNTABLE, LEG]
+SHARING = pytest.param(
+    str(PANDA), marks=pytest.mark.skipif(not PANDA.is_file(), reason="no Panda"), id="links that share work"
+)
 COMPILERS = {
     "gcc": ("gcc", "-std=c99"),
     "clang": ("clang", "-std=c99"),
@@ -43,7 +46,7 @@ def test_it_compiles_without_a_warning(
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("robot", ["planar3 symbolic", LEG], ids=["symbolic", "tree"])
+@pytest.mark.parametrize("robot", [pytest.param("planar3 symbolic", id="symbolic"), SHARING])
 def test_its_parts_compile_without_a_warning_and_link(
     robot: str, compiler: str, directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:
@@ -78,7 +81,7 @@ def test_what_a_robot_has_no_use_for_is_not_in_its_functions(directory_of: Calla
     assert re.search(r"\*h1\b", code(TURNTABLE))
 
 
-@pytest.mark.parametrize("robot", ["planar3", "puma560", LEG, TURNTABLE])
+@pytest.mark.parametrize("robot", ["planar3", "puma560", LEG, TURNTABLE, SHARING])
 def test_the_index_and_every_label_agree_with_the_layout(
     robot: str, directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
 ) -> None:
