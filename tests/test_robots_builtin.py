@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from linkwise import check_package, generate, read_system, write_package
-from linkwise.dynamics.derive import derive, fused_kernel
+from linkwise.dynamics.derive import derive, shared_kernel
 from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.robot import BUILT_IN, DESCRIPTIONS, read_robot
 
@@ -31,7 +31,7 @@ def test_torso_is_a_small_tree_whose_links_share_work() -> None:
     ]
     assert system.path(2) == (0, 1, 2, 3, 4)
     assert system.path(4) == (0, 1, 2, 5, 6)
-    together = fused_kernel(system)
+    together = shared_kernel(system)
     assert together is not None
     assert decomposition_cost([together]) < 0.95 * decomposition_cost(derive(system))
 

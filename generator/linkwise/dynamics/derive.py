@@ -9,8 +9,8 @@ from linkwise.errors import within
 from linkwise.progress import Progress, silent
 from linkwise.symbolic.system import EnergySystem, System
 
-MAX_FUSED = 4000
-"""Largest sum of squared path lengths for a fused kernel."""
+MAX_SHARED = 4000
+"""Largest sum of squared path lengths for a kernel of all links together."""
 
 
 def link_kernel(system: System, link: int) -> Kernel:
@@ -25,7 +25,7 @@ def link_kernel(system: System, link: int) -> Kernel:
         return search.build(axes, origin)
 
 
-def fused_kernel(system: System) -> Kernel | None:
+def shared_kernel(system: System) -> Kernel | None:
     """Decomposition of every link of a rigid robot on one graph, in one common frame, where they share work.
 
     None for energies of a user's own, and for a robot so large that finding the frame takes too long.
@@ -33,7 +33,7 @@ def fused_kernel(system: System) -> Kernel | None:
     if isinstance(system, EnergySystem) or len(system.links) < 2:
         return None
     chains = [link.chain for link in system.links]
-    if sum(len(chain) ** 2 for chain in chains) > MAX_FUSED:
+    if sum(len(chain) ** 2 for chain in chains) > MAX_SHARED:
         return None
     tree = [(-1 if k.parent is None else k.parent, k.joint) for k in system.robot.links]
     search = FrameSearch(system, range(len(chains)), tree, chains)

@@ -13,6 +13,7 @@ import sympy as sp
 from linkwise import runtime
 from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.emit.backend import BackendFiles, Loading
+from linkwise.emit.c.shared_part import SHARED_FILE
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
@@ -125,7 +126,7 @@ def _parameter_lines(system: System) -> list[str]:
 def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
     """What was generated, from what, what it costs, and the SHA-256 of every file."""
     system = derivation.system
-    shared = derivation.fused if "c/links_together.h" in files else None
+    shared = derivation.shared if f"c/{SHARED_FILE}" in files else None
     return Manifest(
         derivation.package,
         system.name,

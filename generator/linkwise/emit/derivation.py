@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from linkwise.dynamics.derive import fused_kernel
+from linkwise.dynamics.derive import shared_kernel
 from linkwise.dynamics.kernel import Kernel
 from linkwise.symbolic.system import System
 
@@ -20,9 +20,9 @@ class Derivation:
     request: Mapping[str, Any]
 
     @cached_property
-    def fused(self) -> Kernel | None:
+    def shared(self) -> Kernel | None:
         """Kernel of all links together, if there is one; found when first asked for."""
-        return fused_kernel(self.system)
+        return shared_kernel(self.system)
 
     @property
     def linear(self) -> frozenset[int]:

@@ -16,6 +16,9 @@ from linkwise.emit.c.kernel_function import (
 from linkwise.expression.graph import Node, operands, reachable
 from linkwise.symbolic.system import System
 
+SHARED_FILE = "links_together.h"
+"""Name of the file; it is there only where links share work."""
+
 
 @dataclass(frozen=True)
 class SharedWork:

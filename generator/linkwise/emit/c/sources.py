@@ -17,7 +17,7 @@ from linkwise.emit.c.kernel_function import (
     kernel_function,
     outputs,
 )
-from linkwise.emit.c.shared_part import SharedWork, shared_work
+from linkwise.emit.c.shared_part import SHARED_FILE, SharedWork, shared_work
 from linkwise.emit.c.sizes import EntryCounts, Span, groups, link_spans, whole
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
@@ -27,13 +27,11 @@ from linkwise.version import VERSION
 FIXED = ("numbers.h", "sines.h", "rows.h", "stream.h")
 """Files that are the same in every package."""
 
-SHARED_FILE = "links_together.h"
-
 
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     """Paths inside the package and texts."""
     system, name = derivation.system, derivation.package
-    together = shared_work(system, derivation.fused, derivation.kernels)
+    together = shared_work(system, derivation.shared, derivation.kernels)
     kernels = []
     for number, kernel in enumerate(derivation.kernels, 1):
         rest = together.rests[number - 1] if together else None
