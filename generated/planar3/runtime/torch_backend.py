@@ -41,23 +41,25 @@ class TorchBackend:
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, packed."""
         p = self._values(q)
-        groups: list[list[Any]] = [[] for _ in self.structure.sizes]
+        groups: list[list[Tensor]] = [[] for _ in self.structure.sizes]
         for link in self.links:
-            # A link without energy terms linear in the velocities has no h1.
+            # Link by link, so that one link's values lend their memory to the next one's. A link without
+            # energy terms linear in the velocities has no h1.
             for group, entries in zip(groups, link.decomposition(torch, q, qd, qdd, p), strict=False):
-                group += entries
-        return [_stacked(q, group) for group in groups]
+                group.append(_stacked(q, entries))
+        return [self.concatenate(group) if group else self.zeros(q, 0) for group in groups]
 
     def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """Tau, packed."""
         p = self._values(q)
-        return _stacked(q, [entry for link in self.links for entry in link.torque(torch, q, qd, qdd, p)])
+        return self.concatenate(_stacked(q, link.torque(torch, q, qd, qdd, p)) for link in self.links)
 
     def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """c0, packed."""
         p = self._values(q)
-        rows = [link.position_gradient(torch, q, qd, qdd, p) for link in self.links]
-        return _stacked(q, [entry for row in rows for entry in row])
+        return self.concatenate(
+            _stacked(q, link.position_gradient(torch, q, qd, qdd, p)) for link in self.links
+        )
 
     def constant(self, values: Any, like: Tensor) -> Tensor:
         """A table of numbers, to compute with `like`."""
@@ -87,10 +89,7 @@ class TorchBackend:
 
 def _stacked(q: Tensor, entries: Sequence[Any]) -> Tensor:
     """Entries, numbers or tensors that broadcast to the batch of q (..., n), as one tensor (..., count)."""
-    shape = q.shape[:-1]
-    if not entries:
-        return q.new_zeros((*shape, 0))
-    like = q[..., 0]
+    shape, like = q.shape[:-1], q[..., 0]
     columns = [
         v.to(q.dtype).expand(shape) if torch.is_tensor(v) else torch.full_like(like, v) for v in entries
     ]
