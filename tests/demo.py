@@ -16,7 +16,7 @@ def table(name: str) -> str:
     tau = robot.partial_torque(q, qd, qdd)
     width = max(map(len, robot.joint_names))
     head = "".join(f"{link:>10}" for link in (*robot.link_names, "sum"))
-    lines = [f"{name}: torque in N m on each joint by the motion of each link", f"{'':{width}}{head}"]
+    lines = [f"{name}: torque in N m on each joint through each link", f"{'':{width}}{head}"]
     for joint, row in zip(robot.joint_names, tau, strict=True):
         lines.append(f"{joint:{width}}" + "".join(f"{value:10.4f}" for value in (*row, row.sum())))
     return "\n".join(lines)

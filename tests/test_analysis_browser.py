@@ -10,9 +10,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from linkwise.analysis import Processing, Reading, analyze
-from linkwise.analysis.columns import Column
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.result import Totals
+from linkwise.analysis.result_columns import Column
 from linkwise.analysis.run import Wanted, analyze_to
 from linkwise.analysis.show.page import report
 from linkwise.progress import silent

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linkwise.analysis import analyze
-from linkwise.analysis.columns import Column
 from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.result_columns import Column
 from linkwise.analysis.show.poses import poses
 from linkwise.errors import LinkwiseError
 from linkwise.package.manifest import BodyEntry

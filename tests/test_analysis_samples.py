@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from linkwise.analysis.column_matching import select
 from linkwise.analysis.even_time import resampled
 from linkwise.analysis.samples import read_samples
-from linkwise.analysis.selection import select
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
 from linkwise.progress import silent

@@ -277,18 +277,18 @@ def test_check_of_a_folder_without_a_package_says_so(linkwise: Run, tmp_path: Pa
 def test_energies_take_no_lock(linkwise: Run) -> None:
     done = linkwise("inspect", DATA / "turntable.py", "--lock", "x=0")
     assert done.returncode == 2
-    assert "energies in Python take no --lock" in done.stderr
+    assert "energies in Python do not accept --lock" in done.stderr
 
 
 def test_energies_take_no_option_of_rigid_bodies(linkwise: Run) -> None:
     given = ("--lock", "x=0", "--base", "floating", "--root", "a", "--tip", "b", "--allow-unphysical")
     done = linkwise("inspect", DATA / "turntable.py", *given, "--free-mimic")
     assert done.returncode == 2
-    named = "no --lock, --base, --root, --tip, --allow-unphysical, --free-mimic; change the energies"
+    named = "not accept --lock, --base, --root, --tip, --allow-unphysical, --free-mimic; change the energies"
     assert named in done.stderr
     done = linkwise("inspect", DATA / "turntable.py", "--joint-friction")
     assert done.returncode == 2
-    assert "energies in Python take no --joint-friction" in done.stderr
+    assert "energies in Python do not accept --joint-friction" in done.stderr
 
 
 HAND = """<mujoco><worldbody><body name="palm"><joint name="a" axis="0 0 1" armature="0.1" damping="0.2"/>

@@ -31,7 +31,7 @@ def test_torso_is_a_small_tree_whose_links_share_work() -> None:
     ]
     assert system.path(2) == (0, 1, 2, 3, 4)
     assert system.path(4) == (0, 1, 2, 5, 6)
-    together = shared_kernel(system)
+    together = shared_kernel(system, derive(system))
     assert together is not None
     assert decomposition_cost([together]) < 0.95 * decomposition_cost(derive(system))
 

@@ -3,9 +3,10 @@
     robot file ─read_robot─▶ Robot ─rigid_system─▶ RigidSystem ─┐
     energies in Python ─read_energies───────────▶ EnergySystem ─┤
                                                                 ▼
-    derive         closed forms, a kernel a link: by the rigid-link rule, which differentiates nothing, or by
-                   Euler–Lagrange from energies that a user wrote
-    package_files  their text in each back end, the runtime, the manifest
+    derive         closed forms, one kernel per link: by the rigid-link rule, which differentiates nothing, or
+                   by Euler–Lagrange from energies that a user wrote
+    package_files  their text in each back end (C also asks for one kernel of all links, where they share
+                   work), the runtime, the manifest
 
 SymPy energies of rigid links take no part in this: they are worked out for what shows or differentiates them,
 the autograd back end, formulas and reports.
@@ -34,7 +35,9 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
         with within(str(spec)):
             rigid = [f"--{name.replace('_', '-')}" for name in options.given if name != "parameters"]
             if rigid:
-                raise LinkwiseError(f"energies in Python take no {', '.join(rigid)}; change the energies")
+                raise LinkwiseError(
+                    f"energies in Python do not accept {', '.join(rigid)}; change the energies"
+                )
             return read_energies(Path(spec), options.parameters == "symbolic")
     return rigid_system(read_robot(spec, options))
 

@@ -14,7 +14,11 @@ accordingly). Vectors have components _x, _y, _z; numbers in names count joints 
     n3_c2, f3_c2    wrench (moment, force) that accelerating joint 3 asks of the link; c2(i, j, 3) is its part on joint i
     n3_c1, f3_c1    the same for the velocity of joint 3 and c1(i, j, 3)
     ag              gravity
-    t1, t2, ...     parts of the above with the other sign, and whatever else is used more than once
+    t1, t2, ...     whatever else is used more than once, such as one of the above with the other sign
+
+Where components are equal, one name stands for all: that of the first joint which has it. The axis of a joint that
+follows another one is times its ratio. Where a file says that lengths are times the square root of the mass, so are
+s, v, u and gravity, and the forces f are divided by that root.
 """
 
 from ..runtime.interface import ClosedForms

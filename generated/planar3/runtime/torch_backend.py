@@ -39,7 +39,7 @@ class TorchBackend:
         return torch.broadcast_tensors(*same_kind(named, n).values())  # type: ignore[no-any-return, no-untyped-call]
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
-        """c2, c1, g, tau, h1, packed."""
+        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         p = self._values(q)
         groups: list[list[Tensor]] = [[] for _ in self.structure.sizes]
         for link in self.links:
@@ -50,12 +50,12 @@ class TorchBackend:
         return [self.concatenate(group) if group else self.zeros(q, 0) for group in groups]
 
     def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-        """Tau, packed."""
+        """tau (..., count) in the order of `Layout.torque`."""
         p = self._values(q)
         return self.concatenate(_stacked(q, link.torque(torch, q, qd, qdd, p)) for link in self.links)
 
     def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-        """c0, packed."""
+        """c0 (..., count) in the order of `Layout.velocity`."""
         p = self._values(q)
         return self.concatenate(
             _stacked(q, link.position_gradient(torch, q, qd, qdd, p)) for link in self.links

@@ -1,6 +1,7 @@
 """The calls that every back end answers.
 
-Index i is the joint that is loaded, j the link whose motion loads it, k the coordinate that moves.
+Index i is the joint that is loaded, j the link through which it is loaded (by the link's motion and weight),
+k the coordinate that moves.
 
     tau_ij = sum_k c2_ijk qdd_k + sum_k c1_ijk qd_k + g_ij
 
@@ -84,7 +85,7 @@ class Dynamics:
         return tau
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """tau_ij, the torque on joint i by the motion of link j, shape (..., n, N)."""
+        """tau_ij, the torque on joint i through link j, shape (..., n, N)."""
         return self._dense.spread(self.packed_torque(q, qd, qdd), "torque")
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:

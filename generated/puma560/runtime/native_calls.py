@@ -103,7 +103,7 @@ class NativeCalls:
             if np.shape(self.parameters[name]) != ():
                 raise ValueError(
                     f"parameter {name!r} must be one number here; "
-                    "the numpy and torch back ends take one a sample"
+                    "the numpy and torch back ends take one per sample"
                 )
         return np.array([_number(self.parameters[name]) for name in self.structure.parameters], dtype=kind)
 

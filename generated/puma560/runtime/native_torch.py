@@ -43,15 +43,15 @@ class TorchSide(TorchBackend):
         return motion
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
-        """c2, c1, g, tau, h1, packed."""
+        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         return list(self._run("decomposition", q, qd, qdd))
 
     def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-        """Tau, packed."""
+        """tau (..., count) in the order of `Layout.torque`."""
         return self._run("torque", q, qd, qdd)[0]
 
     def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-        """c0, packed."""
+        """c0 (..., count) in the order of `Layout.velocity`."""
         return self._run("position_gradient", q, qd, qdd)[0]
 
     def _run(self, call: str, q: Tensor, qd: Tensor, qdd: Tensor) -> tuple[Tensor, ...]:

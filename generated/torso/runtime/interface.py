@@ -30,10 +30,10 @@ class ClosedForms(Protocol):
         """(c2, c1, g, tau), and h1 after them for a link whose energy has terms linear in the velocities."""
 
     def torque(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> Entries:
-        """Tau."""
+        """tau_ij, by i."""
 
     def position_gradient(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> Entries:
-        """c0."""
+        """c0_ijk = d(tau_ij)/d(q_k), by i, then k."""
 
 
 class Backend(Protocol[Kind]):
@@ -48,13 +48,13 @@ class Backend(Protocol[Kind]):
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
 
     def decomposition(self, q: Kind, qd: Kind, qdd: Kind) -> Sequence[Kind]:
-        """c2, c1, g, tau, h1."""
+        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
 
     def torque(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
-        """Tau."""
+        """tau (..., count) in the order of `Layout.torque`."""
 
     def position_gradient(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
-        """c0."""
+        """c0 (..., count) in the order of `Layout.velocity`."""
 
     def constant(self, values: NDArray[Any], like: Kind) -> Kind:
         """A table of numbers, to compute with `like`."""

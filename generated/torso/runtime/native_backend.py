@@ -52,19 +52,19 @@ class NativeBackend(NumpyBackend):
         return self._torch().arrays(named, n) if has_tensors(named.values()) else super().arrays(named, n)
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
-        """c2, c1, g, tau, h1, packed."""
+        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         if has_tensors([q]):
             return self._torch().decomposition(q, qd, qdd)
         return self.calls.run("decomposition", q, qd, qdd)
 
     def torque(self, q: Any, qd: Any, qdd: Any) -> Any:
-        """Tau, packed."""
+        """tau (..., count) in the order of `Layout.torque`."""
         if has_tensors([q]):
             return self._torch().torque(q, qd, qdd)
         return self.calls.run("torque", q, qd, qdd)[0]
 
     def position_gradient(self, q: Any, qd: Any, qdd: Any) -> Any:
-        """c0, packed."""
+        """c0 (..., count) in the order of `Layout.velocity`."""
         if has_tensors([q]):
             return self._torch().position_gradient(q, qd, qdd)
         return self.calls.run("position_gradient", q, qd, qdd)[0]

@@ -1,6 +1,6 @@
 """What the calls answer: coefficients, propagation torques, packed values.
 
-Index i is the joint that is loaded, j the link whose motion loads it, k the coordinate that moves.
+Index i is the joint that is loaded, j the link through which it is loaded, k the coordinate that moves.
 Torques are in N m, or N where joint i is prismatic; a coefficient is in that unit over the unit of the motion
 that it multiplies.
 """

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.columns import MEANING, Column, Quantity
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.result_columns import MEANING, Column, Quantity
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.verify import Closure
 from linkwise.errors import LinkwiseError

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from linkwise.analysis.column_matching import Selection, radians_per_unit, select, unit_warnings
 from linkwise.analysis.even_time import even_rate, resampled
 from linkwise.analysis.logs import Log, open_log
-from linkwise.analysis.selection import Selection, radians_per_unit, select, unit_warnings
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.package.load import Array

@@ -6,7 +6,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Protocol, Self
 
-from linkwise.analysis.columns import MEANING, Column
+from linkwise.analysis.result_columns import MEANING, Column
 from linkwise.extras import extra
 from linkwise.package.load import Array
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.analysis.columns import TERMS, Column, Key, Quantity, columns_of, mirrored
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.result_columns import TERMS, Column, Key, Quantity, columns_of, mirrored
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.verify import Closure, residual, worst_of
 from linkwise.package.load import Array, PackedLayout

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.columns import Column, Quantity
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.result_columns import Column, Quantity
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.check.finite_difference import partial_torque
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.load import Array, Model
 from linkwise.package.manifest import Manifest
@@ -85,8 +86,6 @@ def recursion_oracle(recursion: NewtonEuler, states: States) -> Oracle:
 
 def difference_oracle(modules: Any, states: States) -> Oracle:
     """Finite differences of the Lagrangians of the autograd back end."""
-    from linkwise.check.finite_difference import partial_torque  # it needs torch
-
     tau = partial_torque(modules, states.q, states.qd, states.qdd)
     return Oracle("finite differences of L", DIFFERENCE_TOLERANCE, tau, None)
 

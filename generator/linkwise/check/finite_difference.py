@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-import torch
 
+from linkwise.extras import extra
 from linkwise.package.load import Array
 
 STEP = 1e-4
@@ -12,6 +12,7 @@ STEP = 1e-4
 
 def partial_torque(modules: Any, q: Array, qd: Array, qdd: Array) -> Array:
     """τ_ij, shape (samples, n, N), from modules (q, qd) -> L_j; error of order STEP²."""
+    torch = extra("torch")
     samples, n = q.shape
     tau = np.zeros((samples, n, len(modules)))
     for j, module in enumerate(modules):

@@ -3,10 +3,33 @@
 Plain vectors in the world's axes, forces at centres of mass, one link at a time; the textbook recursion.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
+
+
+@dataclass(frozen=True)
+class _FrameMotion:
+    """A frame in the world's axes: rotation (samples, 3, 3); origin, ω, α and its acceleration − gravity."""
+
+    rotation: Array
+    origin: Array
+    omega: Array
+    alpha: Array
+    a: Array
+
+
+@dataclass(frozen=True)
+class _BodyMotion:
+    """A body's frame, its joint's axis, its centre of mass and that one's acceleration − gravity."""
+
+    frame: _FrameMotion
+    axis: Array
+    com: Array
+    a_com: Array
 
 
 class NewtonEuler:
@@ -21,56 +44,60 @@ class NewtonEuler:
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
         """τ_ij, shape (samples, n, N), for inputs of shape (samples, n)."""
-        samples = len(q)
-        motion = self._forward(q, qd, qdd, self.gravity if gravity else 0.0 * self.gravity)
-        tau = np.zeros((samples, self.n, len(self.links)))
+        motions = self._motions(q, qd, qdd, self.gravity if gravity else 0.0 * self.gravity)
+        tau = np.zeros((len(q), self.n, len(self.links)))
         for j, at in enumerate(self.links):
-            body, (rotation, _, omega, alpha, com, a_com, _) = self.bodies[at], motion[at]
-            inertia = rotation @ np.array(body.inertia) @ rotation.transpose(0, 2, 1)
-            force = body.mass * a_com
-            moment = (inertia @ alpha[..., None])[..., 0] + np.cross(
-                omega, (inertia @ omega[..., None])[..., 0]
-            )
+            body, motion = self.bodies[at], motions[at]
+            turn, omega = motion.frame.rotation, motion.frame.omega
+            inertia = turn @ np.array(body.inertia) @ turn.transpose(0, 2, 1)
+            force = body.mass * motion.a_com
+            spin = np.cross(omega, _applied(inertia, omega))
+            moment = _applied(inertia, motion.frame.alpha) + spin
             back: int | None = at
             while back is not None:
-                upper, (_, origin, _, _, _, _, axis) = self.bodies[back], motion[back]
-                turns = upper.kind == "revolute"
-                about = moment + np.cross(com - origin, force) if turns else force
-                tau[:, upper.coordinate, j] += upper.ratio * np.einsum("si,si->s", axis, about)
+                upper, joint = self.bodies[back], motions[back]
+                lever = motion.com - joint.frame.origin
+                about = moment + np.cross(lever, force) if upper.kind == "revolute" else force
+                tau[:, upper.coordinate, j] += upper.ratio * np.einsum("si,si->s", joint.axis, about)
                 back = upper.parent
         return tau
 
-    def _forward(self, q: Array, qd: Array, qdd: Array, gravity: Array) -> list[tuple[Array, ...]]:
-        """For each body: rotation, origin, ω, α, centre of mass, its acceleration − gravity, joint axis."""
-        samples = len(q)
-        zero = np.zeros((samples, 3))
-        ground = (np.broadcast_to(np.eye(3), (samples, 3, 3)), zero, zero, zero, zero - gravity)
-        origins: list[tuple[Array, ...]] = []
-        motion: list[tuple[Array, ...]] = []
+    def _motions(self, q: Array, qd: Array, qdd: Array, gravity: Array) -> list[_BodyMotion]:
+        """Motion of each body, from the ground outwards."""
+        zero = np.zeros((len(q), 3))
+        upright = np.broadcast_to(np.eye(3), (len(q), 3, 3))
+        ground = _FrameMotion(upright, zero, zero, zero, zero - gravity)
+        motions: list[_BodyMotion] = []
         for body in self.bodies:
-            up = ground if body.parent is None else origins[body.parent]
-            rotation, position, omega, alpha, a = up
-            k, ratio = body.coordinate, body.ratio
-            turn, rate, change = (ratio * x[:, k : k + 1] for x in (q, qd, qdd))
-            arm = rotation @ np.array(body.translation)
-            rotation = rotation @ np.array(body.rotation)
-            axis = rotation[:, :, 2]
-            slide, slide_rate, slide_change = zero, zero, zero
-            if body.kind == "prismatic":
-                slide, slide_rate, slide_change = turn * axis, rate * axis, change * axis
-            arm = arm + slide
-            a = a + np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm))
-            a = a + 2 * np.cross(omega, slide_rate) + slide_change
-            position = position + arm
-            if body.kind == "revolute":
-                alpha = alpha + change * axis + np.cross(omega, rate * axis)
-                omega = omega + rate * axis
-                rotation = rotation @ _about_z(turn[:, 0])
-            origins.append((rotation, position, omega, alpha, a))
-            lever = rotation @ np.array(body.com)
-            a_com = a + np.cross(alpha, lever) + np.cross(omega, np.cross(omega, lever))
-            motion.append((rotation, position, omega, alpha, position + lever, a_com, axis))
-        return motion
+            up = ground if body.parent is None else motions[body.parent].frame
+            k = body.coordinate
+            turn, rate, change = (body.ratio * x[:, k : k + 1] for x in (q, qd, qdd))
+            motions.append(_moved(body, up, turn, rate, change))
+        return motions
+
+
+def _moved(body: BodyEntry, up: _FrameMotion, turn: Array, rate: Array, change: Array) -> _BodyMotion:
+    """Motion of a body on its parent `up`; turn, rate and change are those of its joint (samples, 1)."""
+    rotation, omega, alpha = up.rotation @ np.array(body.rotation), up.omega, up.alpha
+    axis, arm = rotation[:, :, 2], up.rotation @ np.array(body.translation)
+    if body.kind == "prismatic":
+        arm = arm + turn * axis
+    a = up.a + np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm))
+    if body.kind == "prismatic":
+        a = a + 2 * np.cross(omega, rate * axis) + change * axis
+    else:
+        alpha = alpha + change * axis + np.cross(omega, rate * axis)
+        omega = omega + rate * axis
+        rotation = rotation @ _about_z(turn[:, 0])
+    origin, lever = up.origin + arm, rotation @ np.array(body.com)
+    a_com = a + np.cross(alpha, lever) + np.cross(omega, np.cross(omega, lever))
+    return _BodyMotion(_FrameMotion(rotation, origin, omega, alpha, a), axis, origin + lever, a_com)
+
+
+def _applied(matrices: Array, vectors: Array) -> Array:
+    """Each matrix times its vector."""
+    product: Array = np.einsum("sab,sb->sa", matrices, vectors)
+    return product
 
 
 def _about_z(angle: Array) -> Array:

@@ -14,3 +14,8 @@ BUDGET = 2_000_000
 Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
 Budget = Annotated[int, typer.Option(min=1, help="Terms that one expansion may hold")]
 ReportOut = Annotated[Path | None, typer.Option(help="Directory that gets the report's files")]
+
+
+def counted(number: int, what: str) -> str:
+    """A number of things, "1 joint" or "3 joints"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,6 +1,5 @@
 """The command `generate`."""
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -8,8 +7,9 @@ from typing import Annotated
 import typer
 
 from linkwise import pipeline
+from linkwise.cli import counted
 from linkwise.cli.options import RobotName, reads_robot
-from linkwise.emit.assemble import identifier
+from linkwise.emit.assemble import checked_identifier
 from linkwise.emit.backend import BACKENDS
 from linkwise.package.write import check_target, write_package
 from linkwise.progress import progress
@@ -34,13 +34,14 @@ def generate(
     path = Path(robot)
     request = {"robot": path.name if path.is_file() else robot, "backends": backends, **asdict(options)}
     system = pipeline.read_system(robot, options)
-    check_target(out / (name or identifier(system.name)), system.name)
+    directory = out / checked_identifier(name, system.name)
+    check_target(directory, system.name)
     with progress() as report:
         files = pipeline.generate(system, backends, name, request, report)
-    directory = out / json.loads(files["manifest.json"])["name"]
     write_package(files, directory)
     for effect in effects(system.notes):
         typer.echo(f"warning: {robot}: {effect}", err=True)
     typer.echo(
-        f"wrote {directory}: {len(system.coordinates)} joints, {len(system.links)} links, {len(files)} files"
+        f"wrote {directory}: {counted(len(system.coordinates), 'joint')}, "
+        f"{counted(len(system.links), 'link')}, {counted(len(files), 'file')}"
     )

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from linkwise import pipeline
-from linkwise.cli import Json
+from linkwise.cli import Json, counted
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import rigid_tree
 from linkwise.errors import LinkwiseError
@@ -37,7 +37,7 @@ def inspect(
     """Show a robot's joints, links and parameters, and what was merged, locked or ignored."""
     system = pipeline.read_system(robot, options)
     if joint_friction and isinstance(system, EnergySystem):
-        raise LinkwiseError(f"{robot}: energies in Python take no --joint-friction; leave it out")
+        raise LinkwiseError(f"{robot}: energies in Python do not accept --joint-friction; leave it out")
     data = inspection(system, () if joint_friction else LOSSES)
     typer.echo(json.dumps(data, indent=1) if as_json else table(data))
 
@@ -64,7 +64,9 @@ def inspection(system: System, hidden: Collection[str] = LOSSES) -> dict[str, An
 
 def table(data: dict[str, Any]) -> str:
     """Lines for a person."""
-    lines = [f"{data['name']}: {len(data['joints'])} joints, {len(data['links'])} links"]
+    lines = [
+        f"{data['name']}: {counted(len(data['joints']), 'joint')}, {counted(len(data['links']), 'link')}"
+    ]
     lines += ["", "joints"]
     lines += [f"  {k}  {c['name']} [{c['unit']}]" for k, c in enumerate(data["joints"], 1)]
     lines += ["", "links (mass; moved by)"]

@@ -1,1 +1,1 @@
-"""The expression graph: lowering from SymPy, derivatives, the rigid-link rule, operation counts."""
+"""The method: coefficients of rigid links by rule, of other energies by Euler–Lagrange."""

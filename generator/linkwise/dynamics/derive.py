@@ -1,10 +1,11 @@
 """From a system to kernels: the closed forms of each link, and of all links together."""
 
+from collections.abc import Sequence
 from operator import itemgetter
 
 from linkwise.dynamics.euler_lagrange import euler_lagrange
 from linkwise.dynamics.frame_search import MAX_AXES, FrameSearch
-from linkwise.dynamics.kernel import Kernel, lowering, parameter_nodes
+from linkwise.dynamics.kernel import Kernel, decomposition_cost, lowering, parameter_nodes
 from linkwise.errors import within
 from linkwise.progress import Progress, silent
 from linkwise.symbolic.system import EnergySystem, System
@@ -25,10 +26,11 @@ def link_kernel(system: System, link: int) -> Kernel:
         return search.build(axes, origin)
 
 
-def shared_kernel(system: System) -> Kernel | None:
+def shared_kernel(system: System, kernels: Sequence[Kernel]) -> Kernel | None:
     """Decomposition of every link of a rigid robot on one graph, in one common frame, where they share work.
 
-    None for energies of a user's own, and for a robot so large that finding the frame takes too long.
+    None where the links' own `kernels` cost no more, for energies of a user's own, and for a robot so large
+    that finding the frame takes too long.
     """
     if isinstance(system, EnergySystem) or len(system.links) < 2:
         return None
@@ -38,7 +40,8 @@ def shared_kernel(system: System) -> Kernel | None:
     tree = [(-1 if k.parent is None else k.parent, k.joint) for k in system.robot.links]
     search = FrameSearch(system, range(len(chains)), tree, chains)
     _, axes, origin = min(search.framed(MAX_AXES - 1), key=itemgetter(0))
-    return search.build(axes, origin, gradient=False)
+    kernel = search.build(axes, origin, gradient=False)
+    return kernel if decomposition_cost([kernel]) < decomposition_cost(kernels) else None
 
 
 def _energy_kernel(system: EnergySystem, link: int) -> Kernel:
@@ -50,7 +53,7 @@ def _energy_kernel(system: EnergySystem, link: int) -> Kernel:
 
 
 def derive(system: System, progress: Progress = silent) -> tuple[Kernel, ...]:
-    """One kernel a link: its closed forms on a graph."""
+    """One kernel per link: its closed forms on a graph."""
     kernels = []
     for j in range(len(system.links)):
         progress("derive", j, len(system.links))

@@ -92,9 +92,9 @@ def _axes_in_words(turn: Orientation, axes: CommonAxes) -> str:
         return "the base's"
     joint = turn.labels[axes.frame]
     return (
-        f"of the frame before joint {joint} turns"
+        f"of the frame before joint {joint} moves"
         if axes.before
-        else f"of the frame that joint {joint} turns"
+        else f"of the frame that joint {joint} moves"
     )
 
 
@@ -102,7 +102,7 @@ def _origin_in_words(turn: Orientation, origin: Origin, link: RigidLink) -> str:
     if origin.frame is None:
         text = "the link's centre of mass, moving with it"
         number = isinstance(link.mass, (int, float)) and link.mass >= 0
-        return f"{text}; lengths are times the square root of its mass" if number else text
+        return f"{text}; lengths are times the square root of its mass, {link.mass!r} kg" if number else text
     if origin.frame < 0:
         return "the base's, at rest"
     return f"where joint {turn.labels[origin.frame]} is at the instant, at rest"

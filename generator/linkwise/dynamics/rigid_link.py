@@ -45,8 +45,8 @@ def rigid_forms(
     """
     g = turn.g
     motion = link_motion(turn, link, chain, origin)
-    bulk = _moments(turn, link, chain[-1], motion)
-    weight, wrench = _weight(g, bulk, motion), bulk.wrench(g, motion)
+    moments = _moments(turn, link, chain[-1], motion)
+    weight, wrench = _weight(g, moments, motion), moments.wrench(g, motion)
     path = tuple(sorted({screw.coordinate for screw in motion.screws}))
     pairs = [(i, k) for i in path for k in path]
     c2 = {pair: g.zero for pair in pairs if pair[0] <= pair[1]}
@@ -56,8 +56,8 @@ def rigid_forms(
         k = screw.coordinate
         gravity[k] = g.add(gravity[k], pair_product(g, screw.s, weight))
         torque[k] = g.add(torque[k], pair_product(g, screw.s, wrench))
-        inertial, coriolis = bulk.inertial(g, screw), bulk.coriolis(g, screw)
-        after, before = bulk.turned(g, screw, wrench) if gradient else (None, None)
+        inertial, coriolis = moments.inertial(g, screw), moments.coriolis(g, screw)
+        after, before = moments.turned(g, screw, wrench) if gradient else (None, None)
         for number, other in enumerate(motion.screws):
             i = other.coordinate
             if i <= k:
@@ -85,13 +85,13 @@ class _Moments:
         moment = vec.add(g, vec.cross(g, self.h, s), vec.apply(g, self.inertia, z))
         return moment, vec.add(g, vec.scale(g, self.m, s), vec.cross(g, z, self.h))
 
-    def bent(self, g: Graph, z: Vector) -> Spatial:
+    def by_velocity(self, g: Graph, z: Vector) -> Spatial:
         """N = B z, f = z × P."""
         return vec.apply(g, self.b, z), vec.cross(g, z, self.momentum)
 
     def wrench(self, g: Graph, motion: LinkMotion) -> Spatial:
         """Wrench of τ: of the link's acceleration and twist."""
-        return spatial_add(g, self.accelerated(g, motion.acceleration), self.bent(g, motion.twist[0]))
+        return spatial_add(g, self.accelerated(g, motion.acceleration), self.by_velocity(g, motion.twist[0]))
 
     def inertial(self, g: Graph, screw: Screw) -> Spatial:
         """Wrench of c2 for the screw's coordinate."""
@@ -99,13 +99,13 @@ class _Moments:
 
     def coriolis(self, g: Graph, screw: Screw) -> Spatial:
         """Wrench of c1 for the screw's coordinate."""
-        turning = self.bent(g, screw.s[0])
+        turning = self.by_velocity(g, screw.s[0])
         return _named(g, screw, "c1", spatial_add(g, self.accelerated(g, screw.sd), turning))
 
     def turned(self, g: Graph, screw: Screw, wrench: Spatial) -> tuple[Spatial, Spatial]:
         """Change of the wrench with the screw's coordinate, for joints behind it, and for it and before."""
-        bent = self.bent(g, screw.sd[0])
-        after = spatial_add(g, self.accelerated(g, screw.sdd), spatial_add(g, bent, bent))
+        turning = self.by_velocity(g, screw.sd[0])
+        after = spatial_add(g, self.accelerated(g, screw.sdd), spatial_add(g, turning, turning))
         return after, spatial_add(g, after, force_cross(g, screw.s, wrench))
 
 
@@ -127,19 +127,19 @@ def _moments(turn: Orientation, link: RigidLink, frame: int, motion: LinkMotion)
     momentum = vec.add(g, vec.scale(g, motion.m, v), vec.cross(g, omega, h))
     # B = −[ω]× E − v hᵀ + (h·v) 1; E is symmetric, so column k of −[ω]× E is E_k × ω.
     hv = vec.dot(g, h, v)
-    spun = [vec.cross(g, column, omega) for column in e]
+    crossed = [vec.cross(g, column, omega) for column in e]
 
     def row(i: int) -> Vector:
-        entries = (g.add(spun[k][i], g.sub(hv if i == k else g.zero, g.mul(v[i], h[k]))) for k in range(3))
+        entries = (g.add(crossed[k][i], g.sub(hv if i == k else g.zero, g.mul(v[i], h[k]))) for k in range(3))
         x, y, z = entries
         return x, y, z
 
     return _Moments(motion.m, h, inertia, momentum, (row(0), row(1), row(2)))
 
 
-def _weight(g: Graph, bulk: _Moments, motion: LinkMotion) -> Spatial:
+def _weight(g: Graph, moments: _Moments, motion: LinkMotion) -> Spatial:
     """Gravity's wrench: f = −m a_g, N = c × f."""
-    force = vec.minus(g, vec.scale(g, bulk.m, motion.gravity))
+    force = vec.minus(g, vec.scale(g, moments.m, motion.gravity))
     return vec.cross(g, motion.com, force), force
 
 

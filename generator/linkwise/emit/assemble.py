@@ -11,9 +11,8 @@ from importlib import resources
 import sympy as sp
 
 from linkwise import runtime
-from linkwise.dynamics.kernel import decomposition_cost
+from linkwise.dynamics.kernel import Kernel, decomposition_cost
 from linkwise.emit.backend import BackendFiles, Loading
-from linkwise.emit.c.shared_part import SHARED_FILE
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
@@ -41,7 +40,8 @@ def package_files(
         files.update(emitter(derivation))
     progress("emit", len(emitters), len(emitters))
     files.update(shared_files(derivation, backends))
-    files[FILE] = manifest(derivation, files).text()
+    shared = derivation.shared if any(backend.shares_work for backend in backends) else None
+    files[FILE] = manifest(derivation, shared, files).text()
     return files
 
 
@@ -123,10 +123,9 @@ def _parameter_lines(system: System) -> list[str]:
     return [*lines[:-1], *(last.removesuffix(",") for last in lines[-1:])]
 
 
-def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
+def manifest(derivation: Derivation, shared: Kernel | None, files: Mapping[str, str]) -> Manifest:
     """What was generated, from what, what it costs, and the SHA-256 of every file."""
     system = derivation.system
-    shared = derivation.shared if f"c/{SHARED_FILE}" in files else None
     return Manifest(
         derivation.package,
         system.name,

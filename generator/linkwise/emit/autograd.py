@@ -1,4 +1,4 @@
-"""Lagrangians as torch modules, one file a link; a rigid link's energies continue those of its parent."""
+"""Lagrangians as torch modules, one file per link; a rigid link's energies continue those of its parent."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The registry of back ends: adding one adds an entry here and touches no other line.
+"""The registry of back ends: adding one adds an entry here and touches no other list of names.
 
 An entry is read by the command line too, so that this file imports what emits only when it emits.
 """
@@ -46,6 +46,8 @@ class BackendFiles:
     """None where nothing loads."""
     needs: tuple[str, ...] = ()
     """Other back ends without which it cannot be."""
+    shares_work: bool = False
+    """Whether it has a kernel of all links where they share work."""
 
 
 def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
@@ -132,7 +134,12 @@ BACKENDS: dict[str, BackendFiles] = {
             ),
             needs=("c", "torch"),
         ),
-        BackendFiles("c", "closed forms in C99, to compile into a program of your own", emits=(_c,)),
+        BackendFiles(
+            "c",
+            "closed forms in C99 and C++17, to compile into a program of your own",
+            emits=(_c,),
+            shares_work=True,
+        ),
         BackendFiles("formulas", "closed forms to read, for small robots", emits=(_formulas,)),
     )
 }

@@ -1,4 +1,4 @@
-"""Closed forms as Python functions over an array namespace, NumPy or torch, one file a link."""
+"""Closed forms as Python functions over an array namespace, NumPy or torch, one file per link."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from linkwise.dynamics.kernel import Kernel
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
 from linkwise.emit.straight_line import fetched, straight_line
-from linkwise.expression.count import count_operations
+from linkwise.expression.count import count_operations, in_words
 from linkwise.expression.graph import Node
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
@@ -83,5 +83,6 @@ def _function(system: System, kernel: Kernel, name: str, doc: str, groups: Seque
     cost = count_operations(kernel.graph, nodes)
     texts = iter(code.outputs)
     results = tuple(tuple((next(texts), label) for label, _ in rows) for rows in groups)
-    spent = f"{cost.arithmetic} additions and multiplications, {cost.functions} sines and cosines"
-    return FormFunction(name, doc, spent, fetched(system, code, "[..., {}]"), code.assignments, results)
+    return FormFunction(
+        name, doc, in_words(cost), fetched(system, code, "[..., {}]"), code.assignments, results
+    )

@@ -12,7 +12,7 @@ from linkwise.symbolic.system import System
 
 @dataclass(frozen=True)
 class Derivation:
-    """What every back end emits from: the system, one kernel a link, and the request that led to it."""
+    """What every back end emits from: the system, one kernel per link, and the request that led to it."""
 
     system: System
     kernels: tuple[Kernel, ...]
@@ -21,8 +21,8 @@ class Derivation:
 
     @cached_property
     def shared(self) -> Kernel | None:
-        """Kernel of all links together, if there is one; found when first asked for."""
-        return shared_kernel(self.system)
+        """Kernel of all links together, None where they share no work; found when first asked for."""
+        return shared_kernel(self.system, self.kernels)
 
     @property
     def linear(self) -> frozenset[int]:

@@ -35,3 +35,23 @@ def count_operations(graph: Graph, outputs: Iterable[Node], given: Container[Nod
     needed = reachable(graph, outputs, given)
     ops = Counter(graph.nodes[node][0] for node in needed if node not in given)
     return OperationCount(ops["add"] + ops["sub"], ops["mul"], ops["div"], ops["call"])
+
+
+def in_words(count: OperationCount) -> str:
+    """What a count says to a reader: "23 additions and multiplications, 1 division, 4 sines and the like"."""
+    parts = [
+        _times(
+            count.additions + count.multiplications,
+            "addition or multiplication",
+            "additions and multiplications",
+        )
+    ]
+    if count.divisions:
+        parts.append(_times(count.divisions, "division", "divisions"))
+    if count.functions:
+        parts.append(_times(count.functions, "sine or the like", "sines, cosines and the like"))
+    return ", ".join(parts)
+
+
+def _times(number: int, one: str, more: str) -> str:
+    return f"{number} {one if number == 1 else more}"

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError
+from linkwise.extras import extra
 from linkwise.package.manifest import FILE, Manifest
 
 Array = NDArray[np.float64]
@@ -128,8 +129,7 @@ class TensorModel:
 
 def _answering(call: Any) -> Any:
     def answer(*motion: Array, **options: Any) -> Any:
-        import torch
-
+        torch = extra("torch")
         result = call(*(torch.from_numpy(np.array(m)) for m in motion), **options)
         if isinstance(result, tuple):
             return type(result)(*map(_array, result))

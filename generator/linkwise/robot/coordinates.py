@@ -11,7 +11,7 @@ from linkwise.robot.robot import Coordinate
 
 
 @dataclass(frozen=True)
-class Motion:
+class AxisRule:
     """How an axis moves: ratio · q + offset of a coordinate; without one it stands at the offset."""
 
     coordinate: int | None
@@ -24,7 +24,7 @@ class Movement:
     """The coordinates, and how each axis moves with them, by its name."""
 
     coordinates: tuple[Coordinate, ...]
-    motion: dict[str, Motion]
+    motion: dict[str, AxisRule]
     notes: tuple[Note, ...]
 
 
@@ -37,17 +37,17 @@ def movement(
     """
     _check_axes(axes, lock)
     mimics, freed = _mimics(connections, {axis.name for axis in axes}, lock, free_mimic)
-    motion: dict[str, Motion] = {}
+    motion: dict[str, AxisRule] = {}
     moving: list[Coordinate] = []
     for axis in axes:
         if axis.name in lock:
-            motion[axis.name] = Motion(None, 0.0, lock[axis.name])
+            motion[axis.name] = AxisRule(None, 0.0, lock[axis.name])
         elif axis.name not in mimics:
-            motion[axis.name] = Motion(len(moving))
+            motion[axis.name] = AxisRule(len(moving))
             moving.append(Coordinate(axis.name, axis.unit))
     for name, mimic in mimics.items():
         master = motion[mimic.master]
-        motion[name] = Motion(
+        motion[name] = AxisRule(
             master.coordinate, mimic.ratio * master.ratio, mimic.offset + mimic.ratio * master.offset
         )
     notes = [

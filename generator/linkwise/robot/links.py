@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
-from linkwise.robot.coordinates import Motion
+from linkwise.robot.coordinates import AxisRule
 from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.mass import Placed, merge
@@ -41,7 +41,7 @@ class Assembly:
 
 
 def moving_links(
-    bodies: tuple[Body, ...], joints: list[tuple[Connection, tuple[Axis, ...]]], motion: dict[str, Motion]
+    bodies: tuple[Body, ...], joints: list[tuple[Connection, tuple[Axis, ...]]], motion: dict[str, AxisRule]
 ) -> Assembly:
     """Return the moving links, each with the bodies that are rigidly connected to it merged.
 
@@ -88,7 +88,7 @@ def check_masses(links: tuple[Link, ...], moving: tuple[Coordinate, ...], allow:
     return [Note("unphysical", name, "moves no mass; its torque is zero", IMPOSSIBLE) for name in idle]
 
 
-def _pass(place: _Place, axis: Axis, motion: Motion, child: str, moving: list[_Moving]) -> _Place:
+def _pass(place: _Place, axis: Axis, motion: AxisRule, child: str, moving: list[_Moving]) -> _Place:
     """Pass one axis: a new moving link, or a fixed displacement when it is locked.
 
     The new link's frame has z on the axis; an offset of the coordinate is folded into the fixed part.

@@ -65,8 +65,11 @@ class Joint:
     name: str
     kind: Literal["revolute", "prismatic"]
     coordinate: int
+    """Index among the robot's coordinates; joints that follow one another share it."""
     rotation: Rotation
+    """From the link's axes at q = 0 to the parent's."""
     translation: Vec3
+    """Of the link's origin, in m, in the parent's axes."""
     ratio: float = 1.0
 
 
@@ -76,6 +79,7 @@ class Link:
 
     name: str
     parent: int | None
+    """Index among the robot's links; None for the ground."""
     joint: Joint
     mass: Scalar
     com: Vec3

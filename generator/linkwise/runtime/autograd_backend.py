@@ -14,7 +14,7 @@ from .torch_backend import TorchBackend
 class AutogradBackend(TorchBackend):
     """Partial torques and coefficients by differentiating each link's Lagrangian.
 
-    lagrangians: the `links` of energies/__init__.py, which makes one module a link for given parameters
+    lagrangians: the `links` of energies/__init__.py, which makes one module per link for given parameters
     """
 
     name: ClassVar = "autograd"
@@ -30,7 +30,7 @@ class AutogradBackend(TorchBackend):
 
     @property
     def modules(self) -> Sequence[PartialLagrangian]:
-        """One nn.Module a link; module(q, qd) is its Lagrangian in J."""
+        """One nn.Module per link; module(q, qd) is its Lagrangian in J."""
         return self.lagrangians(self.parameters)
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
@@ -40,20 +40,20 @@ class AutogradBackend(TorchBackend):
         return super().arrays(named, n)
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
-        """c2, c1, g, tau, h1, packed."""
+        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         parts = self._each("decomposition", q, qd, qdd)
         return [self.concatenate(column) for column in zip(*parts, strict=True)]
 
     def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-        """Tau, packed."""
+        """tau (..., count) in the order of `Layout.torque`."""
         return self.concatenate(self._each("torque", q, qd, qdd))
 
     def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-        """c0, packed."""
+        """c0 (..., count) in the order of `Layout.velocity`."""
         return self.concatenate(self._each("position_gradient", q, qd, qdd))
 
     def _each(self, call: str, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Any]:
-        """One answer a link of the Lagrangians' method `call`."""
+        """One answer per link of the Lagrangians' method `call`."""
         if torch.is_inference_mode_enabled():
             # Nothing can be differentiated in that mode, and the answer would be zeros.
             with torch.inference_mode(False), torch.no_grad():

@@ -42,7 +42,7 @@ class NumpyBackend:
         return np.broadcast_arrays(*same_kind(arrays, n).values())
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
-        """c2, c1, g, tau, h1, packed."""
+        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         p = self._values(q)
         packed = [_Columns(q, size) for size in self.structure.sizes]
         for link in self.links:
@@ -52,14 +52,14 @@ class NumpyBackend:
         return [columns.array for columns in packed]
 
     def torque(self, q: Any, qd: Any, qdd: Any) -> Any:
-        """Tau, packed."""
+        """tau (..., count) in the order of `Layout.torque`."""
         p, columns = self._values(q), _Columns(q, self.structure.sizes.tau)
         for link in self.links:
             columns.fill(link.torque(np, q, qd, qdd, p))
         return columns.array
 
     def position_gradient(self, q: Any, qd: Any, qdd: Any) -> Any:
-        """c0, packed."""
+        """c0 (..., count) in the order of `Layout.velocity`."""
         p, columns = self._values(q), _Columns(q, self.structure.sizes.c1)
         for link in self.links:
             columns.fill(link.position_gradient(np, q, qd, qdd, p))

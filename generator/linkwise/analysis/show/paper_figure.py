@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from linkwise.analysis.columns import Column, Quantity, load_unit
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.result_columns import Column, Quantity, load_unit
 from linkwise.extras import extra
 from linkwise.plotstyle import colour, dash, short
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from linkwise.analysis.columns import Quantity
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.result_columns import Quantity
 from linkwise.extras import extra
 from linkwise.plotstyle import GRAVITY, colour, short
 
