@@ -22,11 +22,12 @@ SHARED_FILE = "links_together.h"
 
 @dataclass(frozen=True)
 class SharedWork:
-    """The function of the shared part, those of each link's rest, and how many values they share."""
+    """The function of the shared part, those of each link's rest, how many values they share, their frame."""
 
     part: KernelFunction
     rests: tuple[KernelFunction, ...]
     values: int
+    frame: tuple[str, ...]
 
 
 def shared_work(system: System, kernel: Kernel | None, kernels: Sequence[Kernel]) -> SharedWork | None:
@@ -50,16 +51,16 @@ def shared_work(system: System, kernel: Kernel | None, kernels: Sequence[Kernel]
         )
         for number, forms in enumerate(kernel.forms, 1)
     )
-    return SharedWork(part, rests, len(shared))
+    return SharedWork(part, rests, len(shared), kernel.frame)
 
 
 def _names(kernel: Kernel, shared: Sequence[Node], taken: Iterable[str]) -> dict[Node, str]:
-    """Name each shared value as the graph suggests, or x1, x2, … where it has no suggestion of its own."""
+    """Name each shared value as the graph suggests, or shared_30, by its place, where the graph does not."""
     names: dict[Node, str] = {}
-    used = {*taken, *(f"x{number + 1}" for number in range(len(shared)))}
-    for number, node in enumerate(shared, 1):
+    used = {*taken, *(f"shared_{place}" for place in range(len(shared)))}
+    for place, node in enumerate(shared):
         suggested = kernel.graph.names.get(node)
-        names[node] = f"x{number}" if suggested is None or suggested in used else suggested
+        names[node] = f"shared_{place}" if suggested is None or suggested in used else suggested
         used.add(names[node])
     return names
 
