@@ -16,7 +16,10 @@
        n3_c2, f3_c2    wrench (moment, force) that accelerating joint 3 asks of the link: c2(i, j, 3) is its part on joint i
        n3_c1, f3_c1    the same for the velocity of joint 3 and c1(i, j, 3)
        ag              gravity
-       t1, t2, ...     parts of the above with the other sign, and whatever else is used more than once */
+       t1, t2, ...     parts of the above with the other sign, and whatever else is used more than once
+
+   Equal components keep the name of the first joint that has them. Where a joint follows another (mimic), its z is times
+   its ratio. Where the head of a link's file says so, lengths are times the square root of the link's mass. */
 #ifndef LINKWISE_NUMBERS_H
 #define LINKWISE_NUMBERS_H
 

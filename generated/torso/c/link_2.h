@@ -4,10 +4,14 @@
    The file that includes this one asks for functions by WANT_DECOMPOSITION, WANT_TORQUE and
    WANT_POSITION_GRADIENT, and says how many samples W they take; KERNEL completes their names.
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3, s3 and c3
-   sine and cosine of q3. So that c2 means one thing, a cosine, the arrays that take the outputs end in _out. Beside
-   each output stands what it is: c2(i, j, k) is what the acceleration of joint k weighs in the torque at joint i
-   through link j; the robot's header tells of c1, g, tau and c0. */
+   All vectors are in one common frame:
+       axes    of the frame that joint 2 moves
+       origin  where joint 2 is at the instant, at rest
+
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
+   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
+   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
+   at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 348 additions and multiplications, 6 sines and cosines apart. */

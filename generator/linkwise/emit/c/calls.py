@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from linkwise.emit.c.header import pointers
 from linkwise.emit.c.kernel_function import KernelFunction
+from linkwise.emit.c.prototypes import NUMBERS, pointers
 from linkwise.emit.c.sizes import EntryCounts, Span, whole
 
 
@@ -24,17 +24,23 @@ class LinkKernels:
 
 
 @dataclass(frozen=True)
-class Piece:
-    """Values of some links in one array of the robot: how many, and where they go.
+class Motions:
+    """The struct of what kernels read: its fields, and its values for a sample, a block x, the block `at`."""
 
-    `rows` and `blocks` are the places of the first of them for the samples from s on, and for block s.
-    """
-
-    array: str
-    total: str
-    count: int
-    rows: str
+    fields: str
+    sample: str
+    block: str
     blocks: str
+
+
+@dataclass(frozen=True)
+class Moves:
+    """How values of some links in one array leave their block: calls, and their place in block s."""
+
+    scatter: str
+    stream_rows: str
+    stream: str
+    place: str
 
 
 @dataclass(frozen=True)
@@ -47,24 +53,37 @@ class LinkCalls:
     decomposition: str
     torque: str
     position_gradient: str
-    gradients: Piece
+    gradients_to_rows: str
 
 
 @dataclass(frozen=True)
 class GroupCalls:
-    """How the kernels of a group of links are called for one block, and where their results go.
+    """The function of a group of links for one block: its text, its calls, and how results leave.
 
-    `places` are those of every array of the robot, for block s.
+    `waits` has results wait in blocks, `places` puts them into every array of the robot, for block s.
     """
 
-    name: str
     what: str
-    shared: bool
+    signature: str
     decomposition: tuple[str, ...]
-    torque: tuple[str, ...]
-    pieces: tuple[Piece, ...]
+    waits: str
+    straight: str
+    moves: tuple[Moves, ...]
     places: tuple[str, ...]
-    torques: Piece
+    torque: tuple[str, ...]
+    torques_to_rows: str
+
+
+def motions(inputs: Sequence[str]) -> Motions:
+    """Return the struct's fields and values; `inputs` are the arrays that every function takes."""
+    parameters = [array for array in inputs if array == "p"]
+    motion, turned = ("q", "qd", "qdd"), ("sine", "cosine")
+    return Motions(
+        ", ".join(f"*{array}" for array in (*motion, *turned, *parameters)),
+        _braces([*motion, *turned, *parameters]),
+        _braces([*(f"x.{array}" for array in (*motion, *turned)), *parameters]),
+        _braces([*(f"{array} + at" for array in motion), *turned, *parameters]),
+    )
 
 
 def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
@@ -77,7 +96,7 @@ def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
         call(kernels.decomposition, "one", "m.", arrays, link.start),
         call(kernels.torque, "one", "m.", {"tau": "tau"}, link.start),
         call(kernels.position_gradient, "block", "m.", {"c0": "c0_block"}),
-        _piece("c0", link),
+        _moves("c0", link).scatter,
     )
 
 
@@ -87,15 +106,20 @@ def group_calls(links: Sequence[Span], kernels: Sequence[LinkKernels], arrays: S
     into = {array: f"r->{array}" for array in arrays}
     mine = [(kernels[link.first - 1], link.start - group.start) for link in links]
     one = group.first == group.last
+    name = f"link_{group.first}" if one else f"links_{group.first}_to_{group.last}"
+    shared = any("shared" in k.blocks.reads for k, _ in mine)
+    passed = f"{name}(&m, shared, " if shared else f"{name}(&m, "
+    values = "const real *shared, " if shared else ""
     return GroupCalls(
-        f"link_{group.first}" if one else f"links_{group.first}_to_{group.last}",
         f"Link {group.first}" if one else f"Links {group.first} to {group.last}",
-        any("shared" in k.blocks.reads for k, _ in mine),
+        f"{name}(const struct inputs *m, {values}const struct results *r)",
         tuple(call(k.blocks, "block", "m->", into, start) for k, start in mine),
+        f"{passed}&r)",
+        f"{passed}&there)",
+        tuple(_moves(array, group) for array in group.size.arrays),
+        tuple(_moves(array, group).place for array in arrays),
         tuple(call(k.torque, "block", "m.", {"tau": "tau_block"}, start) for k, start in mine),
-        tuple(_piece(array, group) for array in group.size.arrays),
-        tuple(_piece(array, group).blocks for array in arrays),
-        _piece("tau", group),
+        _moves("tau", group).scatter,
     )
 
 
@@ -114,14 +138,23 @@ def call(
 
 def total(array: str) -> str:
     """Name in C of the number of entries of an array."""
-    return {"tau": "G", "c0": "C1"}.get(array, array.upper())
+    return NUMBERS[array]
 
 
-def _piece(array: str, links: Span) -> Piece:
-    start, every = links.start.of(array), total(array)
+def _moves(array: str, links: Span) -> Moves:
+    start, every, count = links.start.of(array), total(array), links.size.of(array)
     rows = f"{array} + s * {every}" + (f" + {start}" if start else "")
-    blocks = f"{array} + " + (f"(s * {every} + {start}) * BLOCK" if start else f"s * {every} * BLOCK")
-    return Piece(array, every, links.size.of(array), rows, blocks)
+    place = f"{array} + " + (f"(s * {every} + {start}) * BLOCK" if start else f"s * {every} * BLOCK")
+    return Moves(
+        f"scatter(samples, {count}, {every}, {array}_block, {rows})",
+        f"stream_rows({every}, {array}_block, {rows}, scratch)",
+        f"stream({count} * BLOCK, {array}_block, {place})",
+        place,
+    )
+
+
+def _braces(values: Sequence[str]) -> str:
+    return f"{{{', '.join(values)}}}"
 
 
 def _at(pointer: str, entry: int) -> str:

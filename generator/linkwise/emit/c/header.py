@@ -1,30 +1,19 @@
 """What a robot's header says: which joint, link and entry is which, how to compile, and the functions."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise.emit.c.sizes import Span
-from linkwise.runtime.native_compiler import FLAGS
+from linkwise.runtime.native_compiler import FLAGS, TUNING
 from linkwise.symbolic.system import System
 
 BLOCK = {"double": 8, "float": 16}
 """Samples in a block: one cache line of each quantity, as in numbers.h."""
 
-COMMAND = " ".join(("cc", *FLAGS, "-march=native", "-c"))
+TUNED, TUNED_ARM = (" ".join(TUNING[kind]) for kind in ("x86_64", "aarch64"))
+"""Flags that make full use of the processor, on x86 and on ARM."""
 LONGEST = 60
 """Characters of a name that are shown."""
-
-
-@dataclass(frozen=True)
-class Functions:
-    """The functions of one number type; `links` pairs each link's number with the outputs of its function."""
-
-    title: str
-    type: str
-    suffix: str
-    inputs: str
-    outputs: str
-    links: tuple[tuple[int, str], ...]
 
 
 @dataclass(frozen=True)
@@ -37,22 +26,15 @@ class IndexTable:
     lines: tuple[str, ...]
 
 
-def pointers(kind: str, arrays: Iterable[str]) -> str:
-    """Return declarations of array parameters; `kind` is such as const double."""
-    return ", ".join(f"{kind} *{array}" for array in arrays)
+def commands(name: str) -> list[str]:
+    """Command lines that compile a robot's double and float, on x86."""
+    return [" ".join(("cc", *FLAGS, TUNED, "-c", source)) for source in (f"{name}.c", f"{name}f.c")]
 
 
-def functions(inputs: Sequence[str], robot: Span, links: Sequence[Span]) -> Iterator[Functions]:
-    """Functions of double, then of float."""
-    for kind, suffix in (("double", ""), ("float", "f")):
-        yield Functions(
-            f"All links, many samples, in {kind}",
-            kind,
-            suffix,
-            pointers(f"const {kind}", inputs),
-            pointers(kind, robot.size.arrays),
-            tuple((link.first, pointers(kind, link.size.arrays)) for link in links),
-        )
+def cpp_command(name: str) -> str:
+    """Command line that compiles a robot's double as C++, on x86."""
+    flags = (flag.replace("-std=c99", "-std=c++17") for flag in FLAGS)
+    return " ".join(("c++", "-x", "c++", *flags, TUNED, "-c", f"{name}.c"))
 
 
 def link_lines(system: System, links: Sequence[Span]) -> Iterator[str]:
@@ -71,19 +53,19 @@ def link_lines(system: System, links: Sequence[Span]) -> Iterator[str]:
         ]
         for link in links
     ]
-    return _aligned([head, *rows])
+    return aligned([head, *rows])
 
 
 def joint_lines(system: System) -> Iterator[str]:
     """Return a table: each joint, its unit and its name."""
     rows = [[str(k), c.unit, shown(c.name)] for k, c in enumerate(system.coordinates, 1)]
-    return _aligned([["joint", "unit", "name"], *rows])
+    return aligned([["joint", "unit", "name"], *rows])
 
 
 def parameter_lines(system: System) -> list[str]:
     """Return a table: each run-time parameter and the value that the description has."""
     rows = [[shown(s.name), repr(float(value))] for s, value in system.parameters.items()]
-    return list(_aligned(rows))
+    return list(aligned(rows))
 
 
 def index_tables(system: System, links: Sequence[Span]) -> Iterator[IndexTable]:
@@ -110,6 +92,13 @@ def shown(name: str) -> str:
     return text
 
 
+def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Return lines with their columns below each other."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "   ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+
+
 def _partners(array: str, path: Sequence[int], place: int) -> Sequence[int | None]:
     """Joints k that joint i, at `place` of the path, has entries with."""
     return [None] if array == "g" else path[place:] if array == "c2" else path
@@ -124,10 +113,3 @@ def _run(path: Sequence[int]) -> str:
     if len(path) > 2 and path[-1] - path[0] == len(path) - 1:
         return f"{path[0]} to {path[-1]}"
     return " ".join(map(str, path))
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Return lines with their columns below each other."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "   ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()

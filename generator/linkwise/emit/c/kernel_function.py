@@ -29,12 +29,14 @@ class Output:
 class KernelFunction:
     """One C function over W samples: the lines that fetch its inputs, and those that compute and store.
 
-    It takes the arrays that it reads and those that it writes, and no others.
+    It takes the arrays that it reads and those that it writes, and no others. `arithmetic` is its number of
+    additions, multiplications and divisions for each sample.
     """
 
     name: str
     what: str
     cost: str
+    arithmetic: int
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     inputs: tuple[tuple[str, str], ...]
@@ -106,6 +108,7 @@ def kernel_function(
         name,
         what,
         cost,
+        count.arithmetic,
         tuple(array for array in READS if array in used),
         tuple(dict.fromkeys(output.array for output in results)),
         inputs,

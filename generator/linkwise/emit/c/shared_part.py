@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from linkwise.dynamics.kernel import Kernel, decomposition_cost
+from linkwise.dynamics.kernel import Kernel
 from linkwise.emit.c.kernel_function import (
     KernelFunction,
     Output,
@@ -22,17 +22,16 @@ SHARED_FILE = "links_together.h"
 
 @dataclass(frozen=True)
 class SharedWork:
-    """The function of the shared part, those of each link's rest, and how many values they share."""
+    """The function of the shared part, those of each link's rest, how many values they share, their frame."""
 
     part: KernelFunction
     rests: tuple[KernelFunction, ...]
     values: int
+    frame: tuple[str, ...]
 
 
-def shared_work(system: System, kernel: Kernel | None, kernels: Sequence[Kernel]) -> SharedWork | None:
-    """Functions of the kernel of all links; None where the links alone cost no more."""
-    if kernel is None or decomposition_cost([kernel]) >= decomposition_cost(kernels):
-        return None
+def shared_work(system: System, kernel: Kernel) -> SharedWork:
+    """Functions of the kernel of all links."""
     given = turned(kernel)
     outputs = [list(forms.decomposition()) for forms in kernel.forms]
     shared = _shared(kernel, outputs, given)
@@ -50,16 +49,16 @@ def shared_work(system: System, kernel: Kernel | None, kernels: Sequence[Kernel]
         )
         for number, forms in enumerate(kernel.forms, 1)
     )
-    return SharedWork(part, rests, len(shared))
+    return SharedWork(part, rests, len(shared), kernel.frame)
 
 
 def _names(kernel: Kernel, shared: Sequence[Node], taken: Iterable[str]) -> dict[Node, str]:
-    """Name each shared value as the graph suggests, or x1, x2, … where it has no suggestion of its own."""
+    """Name each shared value as the graph suggests, or shared_30, by its place, where the graph does not."""
     names: dict[Node, str] = {}
-    used = {*taken, *(f"x{number + 1}" for number in range(len(shared)))}
-    for number, node in enumerate(shared, 1):
+    used = {*taken, *(f"shared_{place}" for place in range(len(shared)))}
+    for place, node in enumerate(shared):
         suggested = kernel.graph.names.get(node)
-        names[node] = f"x{number}" if suggested is None or suggested in used else suggested
+        names[node] = f"shared_{place}" if suggested is None or suggested in used else suggested
         used.add(names[node])
     return names
 

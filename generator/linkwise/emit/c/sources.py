@@ -10,13 +10,15 @@ from typing import Any
 
 from linkwise.dynamics.kernel import Kernel, parameter_names
 from linkwise.emit.c import header
-from linkwise.emit.c.calls import LinkKernels, call, group_calls, link_calls, total
+from linkwise.emit.c.calls import LinkKernels, call, group_calls, link_calls, motions, total
 from linkwise.emit.c.kernel_function import (
     KernelFunction,
     decomposition_outputs,
     kernel_function,
     outputs,
 )
+from linkwise.emit.c.prototypes import cost, functions, pointers
+from linkwise.emit.c.quantity_table import causes, quantity_lines
 from linkwise.emit.c.shared_part import SHARED_FILE, SharedWork, shared_work
 from linkwise.emit.c.sizes import EntryCounts, Span, groups, link_spans, whole
 from linkwise.emit.derivation import Derivation
@@ -31,12 +33,12 @@ FIXED = ("numbers.h", "sines.h", "rows.h", "stream.h")
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     """Paths inside the package and texts."""
     system, name = derivation.system, derivation.package
-    together = shared_work(system, derivation.shared, derivation.kernels)
+    together = shared_work(system, derivation.shared) if derivation.shared else None
     kernels = []
     for number, kernel in enumerate(derivation.kernels, 1):
         rest = together.rests[number - 1] if together else None
         kernels.append(_link_kernels(system, kernel, number, rest))
-        yield f"c/link_{number}.h", _kernel_file(_link_view(system, number, kernels[-1]))
+        yield f"c/link_{number}.h", _kernel_file(_link_view(system, number, kernels[-1], kernel.frame))
     if together:
         yield f"c/{SHARED_FILE}", _kernel_file(_shared_view(together))
     links = link_spans(derivation.kernels)
@@ -45,7 +47,10 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     yield f"c/{name}.c", render("c/robot.c.j2", robot)
     yield f"c/{name}f.c", render("c/robotf.c.j2", common)
     names = common | {"upper": name.upper()}
-    yield f"c/{name}.h", render("c/robot.h.j2", names | _header_view(system, links))
+    yield (
+        f"c/{name}.h",
+        render("c/robot.h.j2", names | _header_view(system, links, name) | _costs(kernels, together)),
+    )
     tables = {"tables": list(header.index_tables(system, links))}
     yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)
     for file in FIXED:
@@ -66,8 +71,9 @@ def _link_kernels(system: System, kernel: Kernel, number: int, rest: KernelFunct
     )
 
 
-def _link_view(system: System, number: int, kernels: LinkKernels) -> dict[str, Any]:
+def _link_view(system: System, number: int, kernels: LinkKernels, frame: tuple[str, ...]) -> dict[str, Any]:
     return {
+        "frame": frame,
         "title": f"Link {number}, {header.shown(system.links[number - 1].name)}",
         "about": (
             "The file that includes this one asks for functions by WANT_DECOMPOSITION, WANT_TORQUE and",
@@ -83,10 +89,12 @@ def _link_view(system: System, number: int, kernels: LinkKernels) -> dict[str, A
 
 def _shared_view(together: SharedWork) -> dict[str, Any]:
     return {
+        "frame": together.frame,
         "title": "All links together, where they share work",
         "about": (
             "shared_part computes what several links need, link_1_rest what is then left of link 1. The file",
             "that includes this one says how many samples W they take; KERNEL completes their names.",
+            "Where a shared value has no name of its own, shared_30, say, is entry 30 of the array `shared`.",
         ),
         "functions": tuple(("", function) for function in (together.part, *together.rests)),
     }
@@ -106,43 +114,61 @@ def _robot_view(
     waiting = _most([whole(part).size for part in parts])
     names = list(parameter_names(system).values())
     motion = _inputs(system)
+    shared = [("shared", together.values)] if together else []
     return {
         "n": len(system.coordinates),
         "totals": _totals(robot.size),
         "total": robot.size.total,
         "parameters": [(name, place) for place, name in enumerate(names)],
         "kernels": f"link_1.h to link_{len(links)}.h" if len(links) > 1 else "link_1.h",
-        "inputs": header.pointers("const real", motion),
-        "outputs": header.pointers("real", arrays),
+        "inputs": pointers("const real", motion),
+        "outputs": pointers("real", arrays),
+        "motions": motions(motion),
         "pointers": ", ".join(f"*{array}" for array in arrays),
         "passed": ", ".join((*motion, *arrays)),
         "passed_motion": ", ".join(motion),
         "links": [link_calls(link, k) for link, k in zip(links, kernels, strict=True)],
         "groups": [group_calls(part, kernels, arrays) for part in parts],
-        "room": [(array, waiting.of(array)) for array in arrays],
+        "room": [*shared, *((f"{array}_block", waiting.of(array)) for array in arrays)],
         "waiting": ", ".join(f"{array}_block" for array in arrays),
         "streams": len(parts) == 1,
         "largest": max(waiting.of(array) for array in arrays),
         "waiting_torques": waiting.g,
         "largest_gradient": max(link.size.c1 for link in links),
-        "shared": together.values if together else 0,
-        "shared_call": call(together.part, "block", "m.", {"shared": "shared"}) if together else "",
+        "shared_calls": [call(together.part, "block", "m.", {"shared": "shared"})] if together else [],
+        "decomposition_kernels": f'#include "{SHARED_FILE}"' if together else "#define WANT_DECOMPOSITION",
     }
 
 
-def _header_view(system: System, links: Sequence[Span]) -> dict[str, Any]:
-    """Fields of NAME.h but for its name."""
+def _header_view(system: System, links: Sequence[Span], name: str) -> dict[str, Any]:
+    """Fields of NAME.h but for its name and its costs."""
     robot = whole(links)
+    linear = bool(robot.size.h1)
     return {
-        "command": header.COMMAND,
+        "commands": header.commands(name),
+        "cpp_command": header.cpp_command(name),
+        "tuned": header.TUNED,
+        "tuned_arm": header.TUNED_ARM,
         "n": len(system.coordinates),
         "totals": _totals(robot.size),
-        "linear": bool(robot.size.h1),
+        "full": ", ".join(array for array in ("c1", "c0", "h1") if robot.size.of(array)),
+        "causes": causes(system),
+        "quantities": list(quantity_lines(system, linear)),
         "links": list(header.link_lines(system, links)),
         "joints": list(header.joint_lines(system)),
         "parameters": header.parameter_lines(system),
         "blocks": tuple(header.BLOCK.values()),
-        "functions": list(header.functions(_inputs(system), robot, links)),
+        "functions": list(functions(_inputs(system), robot, links)),
+    }
+
+
+def _costs(kernels: Sequence[LinkKernels], together: SharedWork | None) -> dict[str, int]:
+    """Arithmetic operations of a sample in NAME.h, of samples that go through blocks."""
+    shared = [together.part] if together else []
+    return {
+        "decomposition_cost": cost([*shared, *(k.blocks for k in kernels)]),
+        "torque_cost": cost(k.torque for k in kernels),
+        "gradient_cost": cost(k.position_gradient for k in kernels),
     }
 
 

@@ -1,0 +1,93 @@
+"""The functions of a robot's header: their parameters, the shapes of these, and what a sample costs."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
+
+from linkwise.emit.c.kernel_function import KernelFunction
+from linkwise.emit.c.sizes import Span
+
+NUMBERS = {"c2": "C2", "c1": "C1", "g": "G", "tau": "G", "h1": "H1", "c0": "C1"}
+"""Names in C of the numbers of entries."""
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Shapes of what functions read and of what they write: in rows of samples, in blocks, for one sample."""
+
+    motion: str
+    results: str
+    motion_blocks: str
+    results_blocks: str
+    motion_one: str
+
+
+@dataclass(frozen=True)
+class LinkFunction:
+    """The function of one link, counted from 1: its outputs, and their shapes."""
+
+    number: int
+    outputs: str
+    shapes: str
+
+
+@dataclass(frozen=True)
+class Functions:
+    """The functions of one number type."""
+
+    title: str
+    type: str
+    suffix: str
+    inputs: str
+    outputs: str
+    shapes: Shapes
+    links: tuple[LinkFunction, ...]
+
+
+def pointers(kind: str, arrays: Iterable[str]) -> str:
+    """Return declarations of array parameters; `kind` is such as const double."""
+    return ", ".join(f"{kind} *{array}" for array in arrays)
+
+
+def functions(inputs: Sequence[str], robot: Span, links: Sequence[Span]) -> Iterator[Functions]:
+    """Functions of double, then of float; `inputs` are the arrays that every function takes."""
+    for kind, suffix, block in (("double", "", "BLOCK"), ("float", "f", "BLOCKF")):
+        yield Functions(
+            f"All links, many samples, in {kind}",
+            kind,
+            suffix,
+            pointers(f"const {kind}", inputs),
+            pointers(kind, robot.size.arrays),
+            Shapes(
+                _motion("p" in inputs, "count, JOINTS"),
+                _shapes((array, f"count, {NUMBERS[array]}") for array in robot.size.arrays),
+                _motion("p" in inputs, f"blocks, JOINTS, {block}"),
+                _shapes((array, f"blocks, {NUMBERS[array]}, {block}") for array in robot.size.arrays),
+                _motion("p" in inputs, "JOINTS"),
+            ),
+            tuple(
+                LinkFunction(
+                    link.first,
+                    pointers(kind, link.size.arrays),
+                    _shapes((array, str(link.size.of(array))) for array in link.size.arrays),
+                )
+                for link in links
+            ),
+        )
+
+
+def cost(kernels: Iterable[KernelFunction]) -> int:
+    """Additions, multiplications and divisions for each sample of all these functions."""
+    return sum(kernel.arithmetic for kernel in kernels)
+
+
+def _motion(parameters: bool, shape: str) -> str:
+    return _shapes([("q, qd, qdd", shape), *([("p", "PARAMETERS")] if parameters else [])])
+
+
+def _shapes(shapes: Iterable[tuple[str, str]]) -> str:
+    """Arrays and their shapes, those of one shape together."""
+    return ", ".join(
+        f"{', '.join(array for array, _ in same)} ({shape})" for shape, same in groupby(shapes, itemgetter(1))
+    )
