@@ -1,0 +1,96 @@
+"""What a robot's own C file and its header are rendered from."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from linkwise.dynamics.kernel import parameter_names
+from linkwise.emit.c import header
+from linkwise.emit.c.calls import LinkKernels, call, group_calls, link_calls, motions, total
+from linkwise.emit.c.prototypes import cost, functions, pointers
+from linkwise.emit.c.quantity_table import causes, quantity_lines
+from linkwise.emit.c.shared_part import SHARED_FILE, SharedWork
+from linkwise.emit.c.sizes import EntryCounts, Span, groups, whole
+from linkwise.symbolic.system import System
+
+
+def robot_view(
+    system: System, links: Sequence[Span], kernels: Sequence[LinkKernels], together: SharedWork | None
+) -> dict[str, Any]:
+    """Fields of NAME.c but for its name."""
+    robot = whole(links)
+    arrays = robot.size.arrays
+    parts = tuple(groups(links))
+    waiting = _most([whole(part).size for part in parts])
+    names = list(parameter_names(system).values())
+    motion = _inputs(system)
+    shared = [("shared", together.values)] if together else []
+    return {
+        "n": len(system.coordinates),
+        "totals": _totals(robot.size),
+        "total": robot.size.total,
+        "parameters": [(name, place) for place, name in enumerate(names)],
+        "kernels": f"link_1.h to link_{len(links)}.h" if len(links) > 1 else "link_1.h",
+        "inputs": pointers("const real", motion),
+        "outputs": pointers("real", arrays),
+        "motions": motions(motion),
+        "pointers": ", ".join(f"*{array}" for array in arrays),
+        "passed": ", ".join((*motion, *arrays)),
+        "passed_motion": ", ".join(motion),
+        "links": [link_calls(link, k) for link, k in zip(links, kernels, strict=True)],
+        "groups": [group_calls(part, kernels, arrays) for part in parts],
+        "room": [*shared, *((f"{array}_block", waiting.of(array)) for array in arrays)],
+        "waiting": ", ".join(f"{array}_block" for array in arrays),
+        "streams": len(parts) == 1,
+        "largest": max(waiting.of(array) for array in arrays),
+        "waiting_torques": waiting.g,
+        "largest_gradient": max(link.size.c1 for link in links),
+        "shared_calls": [call(together.part, "block", "m.", {"shared": "shared"})] if together else [],
+        "decomposition_kernels": f'#include "{SHARED_FILE}"' if together else "#define WANT_DECOMPOSITION",
+    }
+
+
+def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, Any]:
+    """Fields of NAME.h but for its name and its costs."""
+    robot = whole(links)
+    linear = bool(robot.size.h1)
+    return {
+        "commands": header.commands(name),
+        "cpp_command": header.cpp_command(name),
+        "tuned": header.TUNED,
+        "tuned_arm": header.TUNED_ARM,
+        "n": len(system.coordinates),
+        "totals": _totals(robot.size),
+        "full": ", ".join(array for array in ("c1", "c0", "h1") if robot.size.of(array)),
+        "causes": causes(system),
+        "quantities": list(quantity_lines(system, linear)),
+        "links": list(header.link_lines(system, links)),
+        "joints": list(header.joint_lines(system)),
+        "parameters": header.parameter_lines(system),
+        "blocks": tuple(header.BLOCK.values()),
+        "functions": list(functions(_inputs(system), robot, links)),
+    }
+
+
+def costs(kernels: Sequence[LinkKernels], together: SharedWork | None) -> dict[str, int]:
+    """Arithmetic operations of a sample in NAME.h, of samples that go through blocks."""
+    shared = [together.part] if together else []
+    return {
+        "decomposition_cost": cost([*shared, *(k.blocks for k in kernels)]),
+        "torque_cost": cost(k.torque for k in kernels),
+        "gradient_cost": cost(k.position_gradient for k in kernels),
+    }
+
+
+def _inputs(system: System) -> tuple[str, ...]:
+    """Arrays that every function takes."""
+    return ("q", "qd", "qdd", "p") if system.parameters else ("q", "qd", "qdd")
+
+
+def _totals(size: EntryCounts) -> list[tuple[str, int]]:
+    """Names in C and values of the robot's numbers of entries."""
+    return [(total(array), size.of(array)) for array in size.arrays if array != "tau"]
+
+
+def _most(sizes: Sequence[EntryCounts]) -> EntryCounts:
+    """Return room for any of these."""
+    return EntryCounts(*(max(size.of(array) for size in sizes) for array in ("c2", "c1", "g", "h1")))
