@@ -19,6 +19,7 @@ from linkwise import (
     read_system,
     write_package,
 )
+from linkwise.package.load import open_package
 
 
 @pytest.fixture(scope="session")
@@ -183,3 +184,16 @@ def test_a_damaged_manifest_is_named(case: str, package: Path) -> None:
         check_package(package)
     assert str(caught.value).startswith(f"{package / 'manifest.json'} is damaged: {message}")
     assert str(caught.value).endswith("; generate the robot again")
+
+
+def test_a_manifest_of_another_version_is_told_apart_from_a_damaged_one(package: Path) -> None:
+    change_manifest(package, lambda data: data.update(schema=1))
+    with pytest.raises(LinkwiseError, match=r"another version of linkwise \(schema 1, this one reads 2\)"):
+        check_package(package)
+
+
+def test_a_manifest_at_odds_with_its_package_is_refused(package: Path) -> None:
+    change_manifest(package, lambda data: data["links"].pop())
+    assert marks(package) == {"hashes": "ok", "import": "FAIL"}
+    with pytest.raises(LinkwiseError, match=r"does not agree with its manifest.json: .* links"):
+        open_package(package)

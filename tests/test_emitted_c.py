@@ -19,7 +19,8 @@ from linkwise.package.load import import_package
 pytestmark = needs_compiler
 TURNTABLE = str(DATA / "turntable.py")
 LEG = str(DATA / "leg.toml")
-ROBOTS = ["planar3", "planar3 symbolic", "puma560", TURNTABLE, LEG]
+WEIGHTS = str(DATA / "weights.py")
+ROBOTS = ["planar3", "planar3 symbolic", "puma560", TURNTABLE, LEG, WEIGHTS]
 SHARING = pytest.param(
     str(PANDA), marks=pytest.mark.skipif(not PANDA.is_file(), reason="no Panda"), id="links that share work"
 )
@@ -39,7 +40,9 @@ def strict(compiler: str) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("robot", ROBOTS, ids=["planar3", "symbolic", "puma560", "energies", "tree"])
+@pytest.mark.parametrize(
+    "robot", ROBOTS, ids=["planar3", "symbolic", "puma560", "energies", "tree", "weights"]
+)
 def test_it_compiles_without_a_warning(
     robot: str, compiler: str, directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:

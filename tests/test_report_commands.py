@@ -26,11 +26,11 @@ def report(*arguments: str) -> subprocess.CompletedProcess[str]:
         (("reduction", "--dof", "1..1000000"), "reaches 1000000, but the planar arm has at most 1000 joints"),
         (
             ("reduction", "--budget", "0"),
-            "'--budget': Input should be greater than or equal to 1. See linkwise",
+            "'--budget': Input should be greater than or equal to 1. See python -m linkwise report",
         ),
         (
             ("terms", "planar3", "--budget", "-4"),
-            "'--budget': Input should be greater than or equal to 1. See linkwise",
+            "'--budget': Input should be greater than or equal to 1. See python -m linkwise report",
         ),
         (("terms", "planar3", "--order", "3"), "--order is 3; choose 2 for acceleration"),
         (("terms", "planar3", "--order", "-1"), "--order is -1; choose"),

@@ -151,7 +151,7 @@ def legs(folder: Path, equality: str, option: str = "") -> Path:
         ('<weld site1="tip" site2="end"/>', "an unnamed weld equality ties link 'right' to link 'left'"),
         (
             '<tendon name="taut" tendon1="cord"/>',
-            "the tendon equality 'taut' ties parts of the model together",
+            "the tendon equality 'taut' ties links together by tendon 'cord'",
         ),
     ],
     ids=["connect", "unnamed", "weld to the world", "weld of sites", "tendon"],
@@ -184,6 +184,20 @@ def test_equality_between_bodies_that_move_as_one_or_are_cut_away_is_not_a_loop(
         read_system(path, Options(lock={"l": 0.3}))
     with pytest.raises(LinkwiseError, match="loops are not modelled yet"):
         read_system(path, Options(tip="left"))
+
+
+def test_tendon_and_weld_to_the_world_bind_only_what_still_moves(tmp_path: Path) -> None:
+    taut = legs(tmp_path, '<tendon name="taut" tendon1="cord"/>')
+    assert len(read_system(taut, Options(lock={"l": 0.1})).links) == 2
+    assert len(read_system(taut, Options(tip="right")).links) == 2
+    glued = legs(tmp_path, '<weld name="glue" body1="left"/>')
+    assert len(read_system(glued, Options(tip="right")).links) == 2
+    with pytest.raises(LinkwiseError, match="'glue' ties link 'left' to link 'world'"):
+        read_system(glued, Options(tip="left"))
+
+
+def test_tendon_without_a_force_of_its_own_is_not_told_as_left_out(tmp_path: Path) -> None:
+    assert not effects(read_system(legs(tmp_path, "")).notes)
 
 
 def test_free_body_tells_what_its_coordinates_mean_for_the_torques(tmp_path: Path) -> None:

@@ -188,7 +188,7 @@ def of_arrays(robot: planar2.Dynamics, q: NDArray[np.float64]) -> Arrays:
     coefficients: planar2.Coefficients[Arrays] = robot.coefficients(q, q)
     closing: planar2.Propagation[Arrays] = robot.propagation(q, q, q)
     gradient: planar2.GradientPropagation[Arrays] = robot.propagation(q, q, q, convention="gradient")
-    packed: planar2.Packed[Arrays] = robot.packed(q, q, q)
+    packed: planar2.Packed[NDArray[np.float64]] = robot.packed(q, q, q)
     masked = robot.masked(q, q, q, [[0, 0], [1, 1], [1, 1]])
     rows: NDArray[np.intp] = robot.layout.acceleration
     names: tuple[str, ...] = robot.joint_names + planar2.link_names

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     # A package that needs no torch is read without it; then tensors are Any.
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
 
-Array = TypeVar("Array", NDArray[Any], "Tensor")
+Array = TypeVar("Array", NDArray[np.float64], NDArray[np.float32], NDArray[Any], "Tensor")
 """NumPy array or torch tensor, of float32 or float64; answers are what the motion is, device included."""
 
 Kind = TypeVar("Kind")

@@ -86,11 +86,13 @@ class Dynamics:
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """tau_ij, the torque on joint i through link j, shape (..., n, N)."""
-        return self._dense.spread(self.packed_torque(q, qd, qdd), "torque")
+        tau: Array = self._dense.spread(self.packed_torque(q, qd, qdd), "torque")
+        return tau
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
         """tau_i = sum_j tau_ij, shape (..., n)."""
-        return self._dense.summed(self.packed_torque(q, qd, qdd))
+        tau: Array = self._dense.summed(self.packed_torque(q, qd, qdd))
+        return tau
 
     def coefficients(self, q: Array, qd: Array) -> Coefficients[Array]:
         """c2, c1 (..., n, N, n) and g (..., n, N) of the closing convention."""
@@ -110,10 +112,6 @@ class Dynamics:
     def propagation(
         self, q: Array, qd: Array, qdd: Array, convention: Literal["gradient"]
     ) -> GradientPropagation[Array]: ...
-    @overload
-    def propagation(
-        self, q: Array, qd: Array, qdd: Array, convention: str
-    ) -> Propagation[Array] | GradientPropagation[Array]: ...
     def propagation(
         self, q: Array, qd: Array, qdd: Array, convention: str = "closing"
     ) -> Propagation[Array] | GradientPropagation[Array]:
@@ -127,8 +125,8 @@ class Dynamics:
             raise ValueError(f"no convention {convention!r}; choose closing or gradient")
         q, qd, qdd = self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n)
         packed = self.packed(q, qd, qdd)
-        c2 = self._dense.spread(packed.acceleration, "acceleration")
-        c1 = self._dense.spread(packed.velocity, "velocity")
+        c2: Any = self._dense.spread(packed.acceleration, "acceleration")
+        c1: Any = self._dense.spread(packed.velocity, "velocity")
         if convention == "gradient":
             c1 = 2.0 * c1 - self._dense.spread(packed.velocity_linear, "velocity_linear")
         kind = Propagation if convention == "closing" else GradientPropagation
@@ -140,10 +138,9 @@ class Dynamics:
 
     def position_gradient(self, q: Array, qd: Array, qdd: Array) -> Array:
         """c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
-        c0: Array = self.backend.position_gradient(
-            *self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n)
-        )
-        return self._dense.spread(c0, "velocity")
+        packed = self.backend.position_gradient(*self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n))
+        c0: Array = self._dense.spread(packed, "velocity")
+        return c0
 
     def masked(self, q: Array, qd: Array, qdd: Array, mask: ArrayLike | Array) -> Array:
         """sum over m, k of mask_mk c_m,ijk q_k^(m) (the paper's Eq. 21-24), shape (..., n, N).

@@ -72,7 +72,8 @@ def main() -> None:
         if not hasattr(error, "format_message"):
             raise
         if message := error.format_message():  # empty where the help was shown for want of a command
-            _fail(f"{message.rstrip('.')}. See linkwise --help")
+            asked = getattr(getattr(error, "ctx", None), "command_path", "linkwise")
+            _fail(f"{message.replace('Value error, ', '').rstrip('.')}. See {asked} --help")
         sys.exit(2)
     sys.exit(status if isinstance(status, int) else 0)
 

@@ -85,12 +85,25 @@ def open_package(directory: Path) -> Package:
     """Read and import the package in `directory`; raises LinkwiseError for one that cannot be."""
     manifest = Manifest.read(directory)
     try:
-        return Package(directory, manifest, import_package(directory))
+        module = import_package(directory)
+        require_agreement(manifest, module)
+        return Package(directory, manifest, module)
     except Exception as error:  # a damaged file may raise anything
         reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
         raise LinkwiseError(
             f"{directory}: cannot be imported ({reason}); generate the robot again"
         ) from error
+
+
+def require_agreement(manifest: Manifest, module: ModuleType) -> None:
+    """Raise ValueError where a package has other joints or links than its manifest says."""
+    names = {
+        "joints": (tuple(joint.name for joint in manifest.joints), tuple(module.joint_names)),
+        "links": (tuple(link.name for link in manifest.links), tuple(module.link_names)),
+    }
+    for what, (said, there) in names.items():
+        if said != there:
+            raise ValueError(f"it does not agree with its {FILE}: that has other {what}")
 
 
 def import_package(directory: Path) -> ModuleType:

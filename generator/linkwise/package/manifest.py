@@ -114,11 +114,16 @@ class Manifest:
             )
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
-            if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-                raise ValueError(f"its schema is not {SCHEMA}")
+            if isinstance(data, dict) and data.get("schema", SCHEMA) != SCHEMA:
+                raise LinkwiseError(
+                    f"{path} was written by another version of linkwise (schema {data['schema']!r}, this one "
+                    f"reads {SCHEMA}); generate the robot again"
+                )
             manifest: Manifest = _decoded(cls, data, "")
         except OSError as error:
             raise LinkwiseError(f"{path} cannot be read: {error.strerror}") from error
+        except LinkwiseError:
+            raise
         except (ValueError, RecursionError) as error:
             reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
             raise LinkwiseError(f"{path} is damaged: {reason}; generate the robot again") from error

@@ -45,14 +45,16 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Loop:
-    """A constraint that ties two bodies together outside the tree; `bodies` is empty where it ties others.
+    """A constraint that ties pairs of bodies together outside the tree; none where it ties others.
 
-    `what` names it in a sentence, `remedy` says how to do without it.
+    `what` names it in a sentence, `remedy` says how to do without it. A tie `of_joints` is gone with either
+    body of its pair; any other still loads the one that is left.
     """
 
     what: str
     remedy: str
-    bodies: tuple[str, ...] = ()
+    pairs: tuple[tuple[str, str], ...] = ()
+    of_joints: bool = False
 
 
 @dataclass(frozen=True)

@@ -111,13 +111,18 @@ def _below(description: Description, root: str) -> set[str]:
 
 
 def check_loops(loops: tuple[Loop, ...], carrier: Mapping[str, int | None]) -> None:
-    """Refuse what ties bodies together outside the tree, unless both are cut away or move as one.
+    """Refuse what ties bodies together outside the tree, unless they move as one or are cut away.
 
     `carrier` names the moving link of each body that is there, None for the ground.
     """
     for loop in loops:
-        there = [carrier[body] for body in loop.bodies if body in carrier]
-        gone = loop.bodies and not there
-        rigid = len(there) == 2 and there[0] == there[1]
-        if not (gone or rigid):
+        if not loop.pairs or any(_acts(pair, carrier, loop.of_joints) for pair in loop.pairs):
             raise LinkwiseError(f"{loop.what}; loops are not modelled yet: {loop.remedy}")
+
+
+def _acts(pair: tuple[str, str], carrier: Mapping[str, int | None], of_joint: bool) -> bool:
+    """Whether a tie between two bodies can load a moving link."""
+    there = [carrier[body] for body in pair if body in carrier]
+    if len(there) < 2:
+        return not of_joint and any(link is not None for link in there)
+    return there[0] != there[1]

@@ -1,6 +1,6 @@
 """Calls of kernels, and where each writes: the decisions behind a robot's C file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from linkwise.emit.c.kernel_function import KernelFunction
@@ -49,6 +49,7 @@ class LinkCalls:
 
     number: int
     outputs: str
+    idle: tuple[str, ...]
     alone: str
     decomposition: str
     torque: str
@@ -89,10 +90,12 @@ def motions(inputs: Sequence[str]) -> Motions:
 def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
     """Calls of one link's kernels."""
     arrays = {array: array for array in link.size.arrays}
+    alone = call(kernels.decomposition, "one", "m.", arrays)
     return LinkCalls(
         link.first,
         pointers("real", link.size.arrays),
-        call(kernels.decomposition, "one", "m.", arrays),
+        idle([alone]),
+        alone,
         call(kernels.decomposition, "one", "m.", arrays, link.start),
         call(kernels.torque, "one", "m.", {"tau": "tau"}, link.start),
         call(kernels.position_gradient, "block", "m.", {"c0": "c0_block"}),
@@ -108,12 +111,13 @@ def group_calls(links: Sequence[Span], kernels: Sequence[LinkKernels], arrays: S
     one = group.first == group.last
     name = f"link_{group.first}" if one else f"links_{group.first}_to_{group.last}"
     shared = any("shared" in k.blocks.reads for k, _ in mine)
+    calls = tuple(call(k.blocks, "block", "m->", into, start) for k, start in mine)
     passed = f"{name}(&m, shared, " if shared else f"{name}(&m, "
     values = "const real *shared, " if shared else ""
     return GroupCalls(
         f"Link {group.first}" if one else f"Links {group.first} to {group.last}",
         f"{name}(const struct inputs *m, {values}const struct results *r)",
-        tuple(call(k.blocks, "block", "m->", into, start) for k, start in mine),
+        (*idle(calls), *calls),
         f"{passed}&r)",
         f"{passed}&there)",
         tuple(_moves(array, group) for array in group.size.arrays),
@@ -134,6 +138,11 @@ def call(
     reads = [array if array == "shared" else f"{motion}{array}" for array in function.reads]
     writes = [_at(into[array], start.of(array) if start else 0) for array in function.writes]
     return f"{function.name}_{width}({', '.join([*reads, *writes])})"
+
+
+def idle(calls: Iterable[str]) -> tuple[str, ...]:
+    """What tells a compiler that no call reads the motion: that of a slide, say, has a constant gradient."""
+    return () if any("m." in text or "m->" in text for text in calls) else ("(void)m",)
 
 
 def total(array: str) -> str:

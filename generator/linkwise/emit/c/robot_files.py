@@ -5,7 +5,7 @@ from typing import Any
 
 from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
-from linkwise.emit.c.calls import LinkKernels, call, group_calls, link_calls, motions, total
+from linkwise.emit.c.calls import LinkKernels, call, group_calls, idle, link_calls, motions, total
 from linkwise.emit.c.prototypes import cost, functions, pointers
 from linkwise.emit.c.quantity_table import causes, quantity_lines
 from linkwise.emit.c.shared_part import SHARED_FILE, SharedWork
@@ -24,6 +24,7 @@ def robot_view(
     names = list(parameter_names(system).values())
     motion = _inputs(system)
     shared = [("shared", together.values)] if together else []
+    calls = [link_calls(link, k) for link, k in zip(links, kernels, strict=True)]
     return {
         "n": len(system.coordinates),
         "totals": _totals(robot.size),
@@ -36,8 +37,11 @@ def robot_view(
         "pointers": ", ".join(f"*{array}" for array in arrays),
         "passed": ", ".join((*motion, *arrays)),
         "passed_motion": ", ".join(motion),
-        "links": [link_calls(link, k) for link, k in zip(links, kernels, strict=True)],
+        "links": calls,
         "groups": [group_calls(part, kernels, arrays) for part in parts],
+        "idle_decomposition": idle(link.decomposition for link in calls),
+        "idle_torque": idle(link.torque for link in calls),
+        "idle_gradient": idle(link.position_gradient for link in calls),
         "room": [*shared, *((f"{array}_block", waiting.of(array)) for array in arrays)],
         "waiting": ", ".join(f"{array}_block" for array in arrays),
         "streams": len(parts) == 1,

@@ -29,6 +29,8 @@ VALUES = {
 """Arrays that act on a joint or body where they are not zero. Armature is the inertia of a motor's rotor:
 unlike the others, it belongs to rigid-body dynamics."""
 
+TENDON_FORCES = ("tendon_stiffness", "tendon_damping", "tendon_frictionloss", "tendon_armature")
+
 FORCES = {
     "actuator",
     "armature",
@@ -49,8 +51,14 @@ def unused(model: Any) -> tuple[Note, ...]:
     counts = {what: int(getattr(model, name)) for what, name in COUNTS.items()}
     counts |= {what: sum(value != 0 for value in getattr(model, name)) for what, name in VALUES.items()}
     counts["fluid"] = int(model.opt.density != 0 or model.opt.viscosity != 0)
+    acting = FORCES if _pulls(model) else FORCES - {"tendon"}
     return tuple(
-        Note("ignored", what, f"{count} ×", LEFT_OUT if what in FORCES else "")
+        Note("ignored", what, f"{count} ×", LEFT_OUT if what in acting else "")
         for what, count in sorted(counts.items())
         if count
     )
+
+
+def _pulls(model: Any) -> bool:
+    """Whether a tendon exerts a force by itself: one that only bounds or couples does not."""
+    return any(value != 0 for name in TENDON_FORCES for value in getattr(model, name))
