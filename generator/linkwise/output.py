@@ -99,4 +99,4 @@ def _exchange(draft: Path, target: Path) -> None:
 def _unwritable(place: Path, error: OSError) -> LinkwiseError:
     reason = error.strerror or type(error).__name__
     at = error.filename if isinstance(error, FileExistsError | NotADirectoryError) else None
-    return LinkwiseError(f"{at or place}: nothing was written: {reason}; choose another --out or --name")
+    return LinkwiseError(f"{at or place}: nothing was written: {reason}; choose another place")

@@ -37,7 +37,7 @@ void API(link_1)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_1_decomposition_one(m.qdd, m.cosine, c2, c1, g, tau);
 }
 
@@ -46,7 +46,7 @@ void API(link_2)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_2_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -55,7 +55,7 @@ void API(link_3)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_3_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -64,7 +64,7 @@ SHARED void API(decomposition_one)(const real *q, const real *qd, const real *qd
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_1_decomposition_one(m.qdd, m.cosine, c2, c1, g, tau);
     link_2_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2 + 1 * W, c1 + 1 * W, g + 1 * W, tau + 1 * W);
     link_3_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2 + 4 * W, c1 + 5 * W, g + 3 * W, tau + 3 * W);
@@ -74,7 +74,7 @@ SHARED void API(torque_one)(const real *q, const real *qd, const real *qdd, real
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_1_torque_one(m.qdd, m.cosine, tau);
     link_2_torque_one(m.qd, m.qdd, m.sine, m.cosine, tau + 1 * W);
     link_3_torque_one(m.qd, m.qdd, m.sine, m.cosine, tau + 3 * W);

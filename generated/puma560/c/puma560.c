@@ -40,7 +40,7 @@ void API(link_1)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_1_decomposition_one(m.qdd, c2, c1, g, tau);
 }
 
@@ -49,7 +49,7 @@ void API(link_2)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_2_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -58,7 +58,7 @@ void API(link_3)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_3_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -67,7 +67,7 @@ void API(link_4)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_4_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -76,7 +76,7 @@ void API(link_5)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_5_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -85,7 +85,7 @@ void API(link_6)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_6_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -94,7 +94,7 @@ SHARED void API(decomposition_one)(const real *q, const real *qd, const real *qd
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_1_decomposition_one(m.qdd, c2, c1, g, tau);
     link_2_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2 + 1 * W, c1 + 1 * W, g + 1 * W, tau + 1 * W);
     link_3_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2 + 4 * W, c1 + 5 * W, g + 3 * W, tau + 3 * W);
@@ -107,7 +107,7 @@ SHARED void API(torque_one)(const real *q, const real *qd, const real *qdd, real
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_1_torque_one(m.qdd, tau);
     link_2_torque_one(m.qd, m.qdd, m.sine, m.cosine, tau + 1 * W);
     link_3_torque_one(m.qd, m.qdd, m.sine, m.cosine, tau + 3 * W);

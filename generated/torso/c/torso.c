@@ -39,7 +39,7 @@ void API(link_1)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_1_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -48,7 +48,7 @@ void API(link_2)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_2_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -57,7 +57,7 @@ void API(link_3)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_3_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -66,7 +66,7 @@ void API(link_4)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_4_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -75,7 +75,7 @@ void API(link_5)(const real *q, const real *qd, const real *qdd,
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_5_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
 }
 
@@ -84,7 +84,7 @@ SHARED void API(decomposition_one)(const real *q, const real *qd, const real *qd
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_1_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
     link_2_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2 + 6 * W, c1 + 9 * W, g + 3 * W, tau + 3 * W);
     link_3_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2 + 16 * W, c1 + 25 * W, g + 7 * W, tau + 7 * W);
@@ -96,7 +96,7 @@ SHARED void API(torque_one)(const real *q, const real *qd, const real *qdd, real
 {
     real sine[N], cosine[N];
     const struct inputs m = {q, qd, qdd, sine, cosine};
-    API(sines)(N, q, sine, cosine);
+    API(sines)(N, m.q, sine, cosine);
     link_1_torque_one(m.qd, m.qdd, m.sine, m.cosine, tau);
     link_2_torque_one(m.qd, m.qdd, m.sine, m.cosine, tau + 3 * W);
     link_3_torque_one(m.qd, m.qdd, m.sine, m.cosine, tau + 7 * W);

@@ -19,7 +19,7 @@ from linkwise.check.compare import (
     structure,
 )
 from linkwise.check.newton_euler import NewtonEuler
-from linkwise.package.load import Model, Package, import_package, require_agreement
+from linkwise.package.load import Model, Package, load_package
 from linkwise.package.manifest import FILE, Manifest
 
 
@@ -30,9 +30,7 @@ def check_package(directory: Path, samples: int = 100) -> list[Result]:
     if not results[0].passed:
         return results
     try:
-        module = import_package(directory)
-        require_agreement(manifest, module)
-        package = Package(directory, manifest, module)
+        package = load_package(directory, manifest)
     except Exception as error:
         return [*results, Result("import", False, None, _line(error))]
     loaded, missing = _load(package)

@@ -72,6 +72,7 @@ def main() -> None:
         if not hasattr(error, "format_message"):
             raise
         if message := error.format_message():  # empty where the help was shown for want of a command
+            # "Value error, " is pydantic's, which typer asks about values.
             asked = getattr(getattr(error, "ctx", None), "command_path", "linkwise")
             _fail(f"{message.replace('Value error, ', '').rstrip('.')}. See {asked} --help")
         sys.exit(2)

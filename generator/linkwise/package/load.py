@@ -85,9 +85,7 @@ def open_package(directory: Path) -> Package:
     """Read and import the package in `directory`; raises LinkwiseError for one that cannot be."""
     manifest = Manifest.read(directory)
     try:
-        module = import_package(directory)
-        require_agreement(manifest, module)
-        return Package(directory, manifest, module)
+        return load_package(directory, manifest)
     except Exception as error:  # a damaged file may raise anything
         reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
         raise LinkwiseError(
@@ -95,8 +93,10 @@ def open_package(directory: Path) -> Package:
         ) from error
 
 
-def require_agreement(manifest: Manifest, module: ModuleType) -> None:
-    """Raise ValueError where a package has other joints or links than its manifest says."""
+def load_package(directory: Path, manifest: Manifest) -> Package:
+    """Import the package of a manifest; raises ValueError where it has other joints or links than that says,
+    and passes on whatever the package raises."""
+    module = import_package(directory)
     names = {
         "joints": (tuple(joint.name for joint in manifest.joints), tuple(module.joint_names)),
         "links": (tuple(link.name for link in manifest.links), tuple(module.link_names)),
@@ -104,6 +104,7 @@ def require_agreement(manifest: Manifest, module: ModuleType) -> None:
     for what, (said, there) in names.items():
         if said != there:
             raise ValueError(f"it does not agree with its {FILE}: that has other {what}")
+    return Package(directory, manifest, module)
 
 
 def import_package(directory: Path) -> ModuleType:

@@ -114,19 +114,18 @@ class Manifest:
             )
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
-            if isinstance(data, dict) and data.get("schema", SCHEMA) != SCHEMA:
-                raise LinkwiseError(
-                    f"{path} was written by another version of linkwise (schema {data['schema']!r}, this one "
-                    f"reads {SCHEMA}); generate the robot again"
-                )
-            manifest: Manifest = _decoded(cls, data, "")
+            schema = data.get("schema", SCHEMA) if isinstance(data, dict) else SCHEMA
+            manifest: Manifest | None = _decoded(cls, data, "") if schema == SCHEMA else None
         except OSError as error:
             raise LinkwiseError(f"{path} cannot be read: {error.strerror}") from error
-        except LinkwiseError:
-            raise
         except (ValueError, RecursionError) as error:
             reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
             raise LinkwiseError(f"{path} is damaged: {reason}; generate the robot again") from error
+        if manifest is None:
+            raise LinkwiseError(
+                f"{path} was written by another version of linkwise (schema {schema!r}, this one reads "
+                f"{SCHEMA}); generate the robot again"
+            )
         return manifest
 
 

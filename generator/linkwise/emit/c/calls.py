@@ -49,7 +49,6 @@ class LinkCalls:
 
     number: int
     outputs: str
-    idle: tuple[str, ...]
     alone: str
     decomposition: str
     torque: str
@@ -90,12 +89,10 @@ def motions(inputs: Sequence[str]) -> Motions:
 def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
     """Calls of one link's kernels."""
     arrays = {array: array for array in link.size.arrays}
-    alone = call(kernels.decomposition, "one", "m.", arrays)
     return LinkCalls(
         link.first,
         pointers("real", link.size.arrays),
-        idle([alone]),
-        alone,
+        call(kernels.decomposition, "one", "m.", arrays),
         call(kernels.decomposition, "one", "m.", arrays, link.start),
         call(kernels.torque, "one", "m.", {"tau": "tau"}, link.start),
         call(kernels.position_gradient, "block", "m.", {"c0": "c0_block"}),

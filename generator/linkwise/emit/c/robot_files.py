@@ -39,7 +39,6 @@ def robot_view(
         "passed_motion": ", ".join(motion),
         "links": calls,
         "groups": [group_calls(part, kernels, arrays) for part in parts],
-        "idle_decomposition": idle(link.decomposition for link in calls),
         "idle_torque": idle(link.torque for link in calls),
         "idle_gradient": idle(link.position_gradient for link in calls),
         "room": [*shared, *((f"{array}_block", waiting.of(array)) for array in arrays)],
