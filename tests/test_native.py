@@ -1,14 +1,17 @@
 """The native back end: what its compiled code and its cache must not get wrong."""
 
+import gc
 import multiprocessing
 import os
 import pickle
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -77,16 +80,93 @@ def test_threads_give_the_same_numbers(planar3: ModuleType, motion: np.ndarray) 
     np.testing.assert_array_equal(robot.packed(*many).velocity, one)
 
 
-def test_results_that_are_held_stay_as_they_are(planar3: ModuleType, motion: np.ndarray) -> None:
+HOLDINGS: dict[str, Callable[[Any], Any]] = {
+    "the answer": lambda answer: answer,
+    "a field": lambda answer: answer.velocity,
+    "a slice": lambda answer: answer.torque[::7, 1],
+    "a view": lambda answer: answer.velocity.reshape(-1).view(np.uint8),
+    "a view of a view": lambda answer: answer.velocity[1:][::2].T,
+    "its base": lambda answer: answer.velocity.base,
+    "a tensor": lambda answer: torch.from_numpy(answer.velocity),
+    "a slice of a tensor": lambda answer: torch.from_numpy(answer.velocity)[5:, 1],
+    "a buffer": lambda answer: memoryview(answer.velocity),
+}
+"""How a user may hold on to results."""
+
+
+def values_of(held: Any) -> list[np.ndarray]:
+    return [np.asarray(a).copy() for a in (held if isinstance(held, tuple) else (held,))]
+
+
+@pytest.fixture
+def nobody_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How many references an object has is the interpreter's own affair, and changed with Python 3.14."""
+    monkeypatch.setattr(sys, "getrefcount", lambda _: 2)
+
+
+@pytest.mark.usefixtures("nobody_counts")
+@pytest.mark.parametrize("holding", HOLDINGS)
+def test_results_that_are_held_stay_as_they_are(
+    holding: str, planar3: ModuleType, motion: np.ndarray
+) -> None:
     robot = planar3.load("native")
-    held = [robot.packed(*(scale * motion)) for scale in (1.0, 0.5, 0.25)]
-    views = [robot.packed(*(scale * motion)).torque[::7, 1] for scale in (1.0, 0.5, 0.25)]
+    held = [HOLDINGS[holding](robot.packed(*(scale * motion))) for scale in (1.0, 0.5, 0.25)]
+    before = [values_of(one) for one in held]
+    gc.collect()
     for _ in range(8):
         robot.packed(*(3.0 * motion))
-    for scale, result, view in zip((1.0, 0.5, 0.25), held, views, strict=True):
-        again = planar3.load("numpy").packed(*(scale * motion))
-        np.testing.assert_allclose(result.velocity, again.velocity, rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(view, again.torque[::7, 1], rtol=1e-12, atol=1e-12)
+    for one, values in zip(held, before, strict=True):
+        for now, then in zip(values_of(one), values, strict=True):
+            np.testing.assert_array_equal(now, then)
+
+
+@pytest.mark.usefixtures("nobody_counts")
+def test_tensors_that_are_held_stay_as_they_are(planar3: ModuleType, motion: np.ndarray) -> None:
+    robot = planar3.load("native")
+    q, qd, qdd = torch.from_numpy(motion)
+    held = [robot.packed(q, scale * qd, qdd).velocity[::3] for scale in (1.0, 2.0)]
+    before = [values_of(one) for one in held]
+    for _ in range(8):
+        robot.packed(q, 3.0 * qd, qdd)
+    for one, values in zip(held, before, strict=True):
+        np.testing.assert_array_equal(values_of(one)[0], values[0])
+
+
+@pytest.mark.usefixtures("nobody_counts")
+def test_threads_that_ask_side_by_side_keep_their_own_results(
+    planar3: ModuleType, motion: np.ndarray
+) -> None:
+    robot, reference = planar3.load("native"), planar3.load("numpy")
+
+    def ask(scale: float) -> list[np.ndarray]:
+        return [robot.packed(*(scale * step * motion)).velocity for step in range(1, 6)]
+
+    scales = np.linspace(0.1, 1.0, 8)
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(ask, scales))
+    for scale, held in zip(scales, answers, strict=True):
+        for step, velocity in enumerate(held, 1):
+            expected = reference.packed(*(scale * step * motion)).velocity
+            np.testing.assert_allclose(velocity, expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_results_beyond_64_mib_are_those_of_a_small_batch(
+    planar3: ModuleType, motion: np.ndarray, dtype: type, threads: int
+) -> None:
+    robot = planar3.load("native")
+    robot.backend.threads = threads
+    few = robot.packed(*motion.astype(dtype))
+    sample = sum(values.nbytes for values in few) // motion.shape[1]
+    times = (64 << 20) // (sample * motion.shape[1]) + 1
+    many, held = np.tile(motion.astype(dtype), (1, times, 1)), None
+    for _ in range(2):
+        before, held = held, robot.packed(*many)
+    for answer in (before, held):
+        assert sum(values.nbytes for values in answer) > 64 << 20
+        for field, values in zip(few, answer, strict=True):
+            assert (values.reshape(times, len(motion[0]), -1) == field).all()
 
 
 # Torch itself warns of a deprecation when forward mode is first used.

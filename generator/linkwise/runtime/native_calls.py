@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .native_build import Sources
-from .native_library import Memory, NumberArray, address, function
+from .native_library import NumberArray, address, function, memory
 from .structure import Structure
 
 PER_THREAD = 1 << 20
@@ -44,7 +44,6 @@ class NativeCalls:
         self._learned = has_tensors(parameters.values())
         self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
         self._functions: dict[tuple[str, np.dtype[Any]], Any] = {}
-        self._memory = Memory()
         self._function("decomposition", np.dtype("f8"))
 
     def run(self, call: str, q: NumberArray, qd: NumberArray, qdd: NumberArray) -> list[NumberArray]:
@@ -52,7 +51,7 @@ class NativeCalls:
         sizes = self.sizes[call]
         kind, shape, n = q.dtype, q.shape[:-1], q.shape[-1]
         count, width = q.size // n, kind.itemsize
-        buffer = self._memory(count * sum(sizes), kind)
+        buffer = memory(count * sum(sizes), kind)
         motion = [a if a.flags.c_contiguous else np.ascontiguousarray(a) for a in (q, qd, qdd)]
         inputs = [(address(a), n * width) for a in motion]
         results, outputs, at, start = [], [], 0, address(buffer)
