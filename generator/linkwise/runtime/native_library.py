@@ -1,6 +1,7 @@
 """The functions of a robot's compiled C, and memory for their results."""
 
 import ctypes
+from contextlib import suppress
 from functools import cache
 from typing import Any
 
@@ -19,17 +20,19 @@ LITTLE = 1 << 15
 def function(sources: Sources, call: str, kind: str, arrays: int) -> Any:
     """C function of a call that takes a count and `arrays` pointers; the first from a library compiles it.
 
-    call: decomposition, torque or position_gradient; kind: f8 or f4
+    call: decomposition, torque or position_gradient; kind: f8 or f4. Raises RuntimeError if it cannot be had.
     """
     real, suffix = {"f8": ("double", ""), "f4": ("float", "f")}[kind]
-    what = "gradient" if call == "position_gradient" else "decomposition"
-    path = library(sources, real, what)
+    path = library(sources, real, "gradient" if call == "position_gradient" else "decomposition")
     try:
-        loaded = ctypes.CDLL(str(path))
-    except OSError:
-        path.unlink(missing_ok=True)  # cut short by a full disk, say: build it again
-        loaded = ctypes.CDLL(str(library(sources, real, what)))
-    found = getattr(loaded, f"{sources.name}_{call}{suffix}")
+        found = getattr(ctypes.CDLL(str(path)), f"{sources.name}_{call}{suffix}")
+    except (OSError, AttributeError) as error:
+        with suppress(OSError):
+            path.unlink()  # whole as it is, it is of no use: the next time it is made anew
+        raise RuntimeError(
+            f"cannot load what was compiled: {error}; point CC to another C compiler, "
+            "or LINKWISE_CACHE to a directory whose files may be run"
+        ) from None
     found.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * arrays
     found.restype = None
     return found
@@ -42,7 +45,7 @@ def address(array: NumberArray) -> int:
 
 
 def memory(size: int, kind: "np.dtype[Any]") -> NumberArray:
-    """New memory for `size` numbers; unless it is little, it starts on a cache line, for C to write whole lines.
+    """New memory for `size` numbers; unless it is little, it starts on a cache line, as C wants it.
 
     It is never that of an earlier result: whether somebody still holds one cannot be known for sure, and the
     system's allocator, which knows what was freed, is as fast as a store of old results.
