@@ -1,5 +1,6 @@
 """The emitted C compiles without a warning and says what NumPy says, in either precision, for any count."""
 
+import ctypes
 import platform
 import re
 import shutil
@@ -195,6 +196,61 @@ def test_results_that_no_cache_holds_are_the_same(directory_of: Callable[[str], 
     for given in (library.decomposition(*many), library.decomposition_of_blocks(*many)):
         for field, values in expected.items():
             assert (given[field].reshape(repeats, 512, -1) == values).all(), field
+
+
+COUNTING = """
+/* In place of the compiler's own: counts stores past the cache, and those that no fence has ordered yet. */
+#include <string.h>
+typedef struct { char bytes[64]; } __m512i;
+__attribute__((weak)) long streamed = 0, unfenced = 0;
+static inline __m512i _mm512_load_si512(const void *from)
+{
+    __m512i value;
+    memcpy(&value, from, 64);
+    return value;
+}
+static inline void _mm512_stream_si512(void *to, __m512i value)
+{
+    memcpy(to, &value, 64);
+    ++streamed, ++unfenced;
+}
+static inline void _mm_sfence(void) { unfenced = 0; }
+"""
+
+
+def aligned(count: int, dtype: type) -> np.ndarray:
+    """Memory on a cache line."""
+    room = np.zeros(count * np.dtype(dtype).itemsize + 64, np.uint8)
+    start = -room.ctypes.data % 64
+    return room[start : start + count * np.dtype(dtype).itemsize].view(dtype)
+
+
+@pytest.mark.parametrize("blocks", [False, True], ids=["rows", "blocks"])
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_stores_past_the_cache_end_with_a_fence(
+    dtype: type, blocks: bool, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    (tmp_path / "immintrin.h").write_text(COUNTING, encoding="utf-8")
+    compiler = ("gcc", "-std=c99", "-D__AVX512F__", f"-I{tmp_path}")
+    compile_library(directory_of("planar3"), tmp_path / "library.so", compiler)
+    library = ctypes.CDLL(str(tmp_path / "library.so"))
+    suffix, width = ("f", 16) if dtype is np.float32 else ("", 8)
+    compute = getattr(library, f"planar3_decomposition{'_blocks' if blocks else ''}{suffix}")
+    compute.restype = None
+    sizes = (10, 14, 6, 6)
+    count = (64 << 20) // (sum(sizes) * np.dtype(dtype).itemsize) // width * width + 5 * width
+    outputs = [aligned(count * size, dtype) for size in sizes]
+    motion = np.tile(np.full(3, 0.5, dtype), count)
+    pointers = [ctypes.c_void_p(a.ctypes.data) for a in (motion, motion, motion, *outputs)]
+    streamed, unfenced = (ctypes.c_long.in_dll(library, name) for name in ("streamed", "unfenced"))
+    compute(ctypes.c_size_t(width), *pointers)
+    assert streamed.value == 0
+    compute(ctypes.c_size_t(count // width if blocks else count), *pointers)
+    assert streamed.value == sum(a.nbytes for a in outputs) // 64
+    assert unfenced.value == 0
+    for a, size in zip(outputs, sizes, strict=True):
+        samples = a.reshape(-1, size, width).swapaxes(1, 2) if blocks else a.reshape(-1, size)
+        assert (samples == samples[:1]).all()
 
 
 def test_it_takes_run_time_parameters(
