@@ -24,7 +24,15 @@ from linkwise.version import VERSION
 
 LONGEST_NAME = 60
 LINE = 100
-SHARED_RUNTIME = ("__init__.py", "dense.py", "dynamics.py", "interface.py", "quantities.py", "structure.py")
+SHARED_RUNTIME = (
+    "__init__.py",
+    "arguments.py",
+    "dense.py",
+    "dynamics.py",
+    "interface.py",
+    "quantities.py",
+    "structure.py",
+)
 """Files of linkwise/runtime that every package has."""
 TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}
 

@@ -83,14 +83,14 @@ BACKENDS: dict[str, BackendFiles] = {
             "numpy",
             "closed forms on NumPy arrays",
             emits=(_forms,),
-            runtime=("arguments.py", "numpy_backend.py"),
+            runtime=("numpy_backend.py",),
             loading=Loading("numpy_backend", "NumpyBackend(ROBOT, LINKS, values)", (LINKS,), speed=2),
         ),
         BackendFiles(
             "torch",
             "closed forms on torch tensors",
             emits=(_forms,),
-            runtime=("arguments.py", "torch_backend.py"),
+            runtime=("torch_backend.py",),
             loading=Loading("torch_backend", "TorchBackend(ROBOT, LINKS, values)", (LINKS,), speed=3),
         ),
         BackendFiles(
@@ -98,7 +98,6 @@ BACKENDS: dict[str, BackendFiles] = {
             "each link's Lagrangian, differentiated by torch",
             emits=(_energies,),
             runtime=(
-                "arguments.py",
                 "autograd_backend.py",
                 "partial_lagrangian.py",
                 "recording.py",
@@ -116,7 +115,6 @@ BACKENDS: dict[str, BackendFiles] = {
             "the C code, compiled by this system's compiler",
             emits=(),
             runtime=(
-                "arguments.py",
                 "native_backend.py",
                 "native_build.py",
                 "native_cache.py",

@@ -1,8 +1,7 @@
 """Calls of the compiled C: arrays in, arrays out, large batches on several threads."""
 
 import os
-import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .arguments import has_tensors
 from .native_build import Sources
 from .native_library import NumberArray, address, function, memory
 from .structure import Structure
@@ -52,7 +52,9 @@ class NativeCalls:
         kind, shape, n = q.dtype, q.shape[:-1], q.shape[-1]
         count, width = q.size // n, kind.itemsize
         buffer = memory(count * sum(sizes), kind)
-        motion = [a if a.flags.c_contiguous else np.ascontiguousarray(a) for a in (q, qd, qdd)]
+        motion = [
+            a if a.flags.c_contiguous and a.flags.aligned else np.array(a, order="C") for a in (q, qd, qdd)
+        ]
         inputs = [(address(a), n * width) for a in motion]
         results, outputs, at, start = [], [], 0, address(buffer)
         for size in sizes:
@@ -115,12 +117,6 @@ def result_sizes(structure: Structure) -> dict[str, tuple[int, ...]]:
         "torque": (sizes.tau,),
         "position_gradient": (sizes.c1,),
     }
-
-
-def has_tensors(values: Iterable[Any]) -> bool:
-    """Whether one of the values is a torch tensor; torch isn't imported to find out."""
-    torch = sys.modules.get("torch")
-    return torch is not None and any(isinstance(v, torch.Tensor) for v in values)
 
 
 def _number(value: Any) -> float:

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import same_kind
+from .arguments import as_array, check_axes, no_common_shape, precision
 from .interface import ClosedForms, Entries
 from .structure import Structure
 
@@ -28,18 +28,22 @@ class NumpyBackend:
 
     def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
-        arrays = {k: value if type(value) is np.ndarray else _array(k, value) for k, value in named.items()}
-        first, *rest = arrays.values()
+        first, *rest = named.values()
         if (
-            first.dtype in FLOATS
+            type(first) is np.ndarray
+            and first.dtype in FLOATS
             and first.shape[-1:] == (n,)
-            and all(a.shape == first.shape and a.dtype == first.dtype for a in rest)
+            and all(type(a) is np.ndarray and a.shape == first.shape and a.dtype == first.dtype for a in rest)
         ):
             return [first, *rest]
-        for name, a in arrays.items():
-            if a.dtype not in FLOATS:
-                raise TypeError(f"{name} has dtype {a.dtype}; give float32 or float64")
-        return np.broadcast_arrays(*same_kind(arrays, n).values())
+        read = {name: as_array(name, value) for name, value in named.items()}
+        kind = precision(named, read)
+        arrays = {name: a.astype(kind, copy=False) for name, a in read.items()}
+        check_axes(arrays, n)
+        try:
+            return np.broadcast_arrays(*arrays.values())
+        except ValueError:
+            raise no_common_shape(arrays, n) from None
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
@@ -75,7 +79,7 @@ class NumpyBackend:
 
     def asarray(self, value: Any, like: Any) -> Any:
         """Anything array-like, in the dtype of `like`."""
-        return np.asarray(value, dtype=like.dtype)
+        return as_array("the mask", value).astype(like.dtype)
 
     def zeros(self, like: Any, count: int) -> Any:
         """Zeros of shape (..., count) for `like` of shape (..., m)."""
@@ -103,12 +107,3 @@ class _Columns:
             return
         for column, value in enumerate(entries, start):
             self.array[..., column] = value
-
-
-def _array(name: str, value: Any) -> NDArray[Any]:
-    """Anything array-like as an array; what an array cannot hold is refused."""
-    if hasattr(value, "detach"):
-        raise TypeError(f"{name} is a tensor; this back end takes arrays, torch and native take tensors")
-    if isinstance(value, np.ma.MaskedArray):
-        raise TypeError(f"{name} is a masked array; fill its gaps first")
-    return np.asarray(value)

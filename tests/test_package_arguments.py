@@ -1,0 +1,231 @@
+"""What the calls of a package take for a motion: every kind that leaves no doubt, and no other."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import needs_compiler
+
+torch = pytest.importorskip("torch")
+
+BACKENDS = ("numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler))
+MOTION = np.array([[[1, -2, 3], [2, 0, -1]], [[0, 1, 1], [-3, 2, 1]], [[2, 2, -1], [1, 0, 4]]])
+"""q, qd, qdd of two samples in whole numbers, which every dtype holds exactly."""
+
+
+def unaligned(a: np.ndarray) -> np.ndarray:
+    room = np.zeros(a.nbytes + 1, np.uint8)
+    made = room[1:].view(a.dtype).reshape(a.shape)
+    made[...] = a
+    return made
+
+
+TENSORS: dict[str, Callable[[np.ndarray], Any]] = {
+    "tensor": lambda a: torch.from_numpy(a.astype(float)),
+    "tensor of integers": torch.from_numpy,
+    "negated tensor": lambda a: torch._neg_view(torch.from_numpy(-a.astype(float))),
+}
+KINDS: dict[str, Callable[[np.ndarray], Any]] = TENSORS | {
+    "array": lambda a: a.astype(float),
+    "integers": lambda a: a,
+    "bytes": lambda a: a.astype(np.int8),
+    "list": lambda a: a.astype(float).tolist(),
+    "list of integers": lambda a: a.tolist(),
+    "tuple of tuples": lambda a: tuple(map(tuple, a.tolist())),
+    "list of arrays": list,
+    "other byte order": lambda a: a.astype(">f8"),
+    "backwards": lambda a: a.astype(float)[::-1, ::-1].copy()[::-1, ::-1],
+    "column after column": lambda a: np.asfortranarray(a.astype(float)),
+    "read-only": lambda a: np.frombuffer(a.astype(float).tobytes()).reshape(a.shape),
+    "unaligned": lambda a: unaligned(a.astype(float)),
+}
+
+
+def answers_tensors(backend: str, motion: Any) -> bool:
+    return backend in ("torch", "autograd") or (
+        backend == "native" and any(torch.is_tensor(part) for part in motion)
+    )
+
+
+def expected(package: ModuleType) -> Any:
+    return package.load("numpy").packed(*MOTION.astype(float))
+
+
+def check(package: ModuleType, backend: str, motion: Any, dtype: str = "float64") -> None:
+    answer = package.load(backend).packed(*motion)
+    for values, exact in zip(answer, expected(package), strict=True):
+        assert torch.is_tensor(values) == answers_tensors(backend, motion)
+        assert str(values.dtype).removeprefix("torch.") == dtype
+        tolerance = 1e-13 if dtype == "float64" else 1e-5
+        np.testing.assert_allclose(np.asarray(values), exact, rtol=tolerance, atol=tolerance)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_whatever_reads_as_numbers_is_taken(
+    backend: str, kind: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    package, of = package_of("planar3"), KINDS[kind]
+    check(package, backend, [of(part) for part in MOTION])
+    q, qd, qdd = MOTION
+    check(package, backend, [of(q), qd.astype(float), qdd.tolist()])
+
+
+@pytest.mark.parametrize(
+    ("dtypes", "result"),
+    [
+        (("float32", "list", "int64"), "float32"),
+        (("list", "int32", "float32"), "float32"),
+        (("float32", "float64", "list"), "float64"),
+        (("int8", "float64", "float32"), "float64"),
+        (("int64", "list", "uint8"), "float64"),
+    ],
+)
+@pytest.mark.parametrize("tensors", [False, True])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_has_no_precision_goes_along_with_what_has(
+    backend: str, tensors: bool, dtypes: tuple[str, ...], result: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    def cast(part: np.ndarray, dtype: str) -> Any:
+        if dtype == "list":
+            return part.astype(float).tolist()
+        return torch.from_numpy(part.astype(dtype)) if tensors else part.astype(dtype)
+
+    whole = np.abs(MOTION)
+    motion = [cast(part, dtype) for part, dtype in zip(whole, dtypes, strict=True)]
+    answer = package_of("planar3").load(backend).packed_torque(*motion)
+    assert str(answer.dtype).removeprefix("torch.") == result
+    exact = package_of("planar3").load("numpy").packed_torque(*whole.astype(float))
+    np.testing.assert_allclose(np.asarray(answer), exact, rtol=1e-5 if result == "float32" else 1e-13)
+
+
+@pytest.mark.parametrize("backend", ["torch", "autograd", pytest.param("native", marks=needs_compiler)])
+def test_gradients_flow_beside_arrays_and_lists(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot = package_of("planar3").load(backend)
+    q, qd, qdd = torch.from_numpy(MOTION.astype(float))
+    leaf = q.clone().requires_grad_()
+    array = qd.numpy().copy()
+    answer = robot.inverse_dynamics(leaf, array, qdd.tolist()).square().sum()
+    array[...] = np.nan  # what the user does with it afterwards is of no account
+    answer.backward()
+    again = q.clone().requires_grad_()
+    robot.inverse_dynamics(again, qd, qdd).square().sum().backward()
+    assert leaf.grad is not None
+    torch.testing.assert_close(leaf.grad, again.grad)
+
+
+REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
+    "booleans": (lambda: np.ones(3, bool), "qd has dtype bool; give float32, float64 or integers"),
+    "list of booleans": (lambda: [True, False, True], "qd has dtype bool; give"),
+    "complex": (lambda: np.ones(3, complex), "qd has dtype complex128; give"),
+    "half": (lambda: np.ones(3, np.float16), "qd has dtype float16; give"),
+    "long": (lambda: np.ones(3, np.longdouble), "qd has dtype (longdouble|float128|float96); give"),
+    "half of torch": (lambda: torch.ones(3, dtype=torch.float16), "qd has dtype float16; give"),
+    "words": (lambda: "abc", r"qd has dtype str\d+; give"),
+    "nothing": (lambda: None, "qd has dtype object; give"),
+    "a gap": (lambda: [1.0, None, 2.0], "qd has dtype object; give"),
+    "ragged": (lambda: [[1.0, 2.0], [1.0]], "qd does not read as an array: .*inhomogeneous"),
+    "masked": (lambda: np.ma.masked_array(np.ones(3), [0, 1, 0]), "qd is a masked array; fill its gaps"),
+    "tensors": (lambda: [torch.tensor(1.0)] * 3, r"qd is a list of tensors; join them with torch\.stack"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_leaves_a_doubt_is_refused_by_name(
+    backend: str, kind: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    make, message = REFUSED[kind]
+    with pytest.raises((TypeError, ValueError), match=message) as error:
+        package_of("planar3").load(backend).partial_torque(np.ones(3), make(), np.ones(3))
+    assert "\n" not in str(error.value)
+
+
+def test_arrays_refuse_tensors_that_would_lose_something(package_of: Callable[[str], ModuleType]) -> None:
+    robot = package_of("planar3").load("numpy")
+    one = np.ones(3)
+    leaf = torch.ones(3, dtype=torch.float64, requires_grad=True)
+    with pytest.raises(TypeError, match=r"qd requires a gradient, which arrays do not carry; load torch, or"):
+        robot.partial_torque(one, leaf, one)
+    with torch.no_grad():
+        assert isinstance(robot.partial_torque(one, leaf, one), np.ndarray)
+    with pytest.raises(TypeError, match=r"qdd lies on meta; load torch, or pass qdd\.cpu\(\)"):
+        robot.partial_torque(one, one, torch.ones(3, device="meta"))
+    with pytest.raises(TypeError, match=r"q does not read as an array: .*BFloat16"):
+        robot.partial_torque(torch.ones(3, dtype=torch.bfloat16), one, one)
+
+
+@pytest.mark.parametrize("tensors", [False, True])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_shapes_that_do_not_go_together_are_named(
+    backend: str, tensors: bool, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot = package_of("planar3").load(backend)
+    q, qd, qdd = np.ones((4, 3)), np.ones((5, 3)), np.ones(3)
+    motion = [torch.from_numpy(part) for part in (q, qd, qdd)] if tensors else [q, qd, qdd]
+    shapes = r"q \(4, 3\), qd \(5, 3\), qdd \(3,\)"
+    message = f"^the shapes do not go together: {shapes}; before the last axis, 3 for the joints, axes must"
+    with pytest.raises(ValueError, match=message):
+        robot.partial_torque(*motion)
+    with pytest.raises(ValueError, match=r"^the shapes do not go together: q \(4, 3\), qd \(5, 3\); before"):
+        robot.coefficients(*motion[:2])
+    with pytest.raises(ValueError, match=r"qdd has shape \(\); its last axis must be 3, one for each joint"):
+        robot.partial_torque(motion[2], motion[2], 1.0)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_nan_is_found_where_it_was_asked_for(backend: str, package_of: Callable[[str], ModuleType]) -> None:
+    package = package_of("planar3")
+    robot = package.load(backend, check_finite=True)
+    q, qd, qdd = MOTION.astype(float)
+    many = np.tile(qd, (2, 1, 1))
+    many[1, 0, 2] = np.inf
+    gap = [1.0, float("nan"), 0.0]
+    for call in (robot.packed, robot.packed_torque, robot.partial_torque, robot.inverse_dynamics):
+        with pytest.raises(ValueError, match=r"^qdd is nan for joint 'joint2'$"):
+            call(q, qd, gap)
+    with pytest.raises(ValueError, match=r"^qd is inf at sample 1, 0 for joint 'joint3'$"):
+        robot.coefficients(q, many)
+    with pytest.raises(ValueError, match=r"^qd is -inf at sample 1 for joint 'joint3'$"):
+        robot.propagation(q, -many[1, ::-1], qdd)
+    with pytest.raises(ValueError, match=r"^q is nan for joint 'joint2'$"):
+        robot.position_gradient(torch.tensor(gap), qd, qdd)
+    with pytest.raises(ValueError, match=r"^q is nan for joint 'joint2'$"):
+        robot.masked(gap, qd, qdd, np.ones((3, 3)))
+    np.testing.assert_array_equal(
+        robot.packed_torque(q, qd, qdd), package.load(backend).packed_torque(q, qd, qdd)
+    )
+    assert np.isnan(np.asarray(package.load(backend).packed_torque(q, qd, gap))).any()
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_repr_tells_the_robot(backend: str, package_of: Callable[[str], ModuleType]) -> None:
+    assert repr(package_of("planar3").load(backend)) == f"<planar3 on {backend}: 3 joints, 3 links>"
+    symbolic = package_of("planar3 symbolic")
+    count = len(symbolic.parameters)
+    assert repr(symbolic.load(backend)) == f"<planar3 on {backend}: 3 joints, 3 links, {count} parameters>"
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_copied_robot_still_looks_for_nan(backend: str, package_of: Callable[[str], ModuleType]) -> None:
+    robot = deepcopy(package_of("planar3").load(backend, check_finite=True))
+    with pytest.raises(ValueError, match="q is nan"):
+        robot.packed(np.full(3, np.nan), np.ones(3), np.ones(3))
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("batch", [(), (2,), (2, 3), (0,)])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_field_that_a_robot_has_none_of_is_empty_but_an_array(
+    backend: str, batch: tuple[int, ...], dtype: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    part = np.ones((*batch, 3), dtype)
+    answer = package_of("planar3").load(backend).packed(part, part, part)
+    assert tuple(answer.velocity_linear.shape) == (*batch, 0)
+    assert str(answer.velocity_linear.dtype).removeprefix("torch.") == dtype
+    assert torch.is_tensor(answer.velocity_linear) == (backend in ("torch", "autograd"))
