@@ -15,7 +15,9 @@ from answers import random_states, relative_error
 from compiled import STRICT, Compiled, compile_library, name_of
 from conftest import DATA, PANDA, needs_compiler
 from linkwise import generate, read_system, write_package
+from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.load import import_package
+from linkwise.package.manifest import Manifest
 
 pytestmark = needs_compiler
 TURNTABLE = str(DATA / "turntable.py")
@@ -185,6 +187,52 @@ def test_it_says_what_numpy_says_for_any_count(
         for field, mask, values in zip(fields, own, one, strict=True):
             scale = np.abs(getattr(expected, field)).max()
             np.testing.assert_allclose(values, getattr(expected, field)[5, mask], atol=tolerance * scale)
+
+
+def recursion(directory: Path, q: np.ndarray, qd: np.ndarray) -> dict[str, np.ndarray]:
+    """Dense c2, c1 and g of every link from torques alone, by a recursion that knows nothing of kernels.
+
+    tau is linear in qdd and quadratic in qd, for which differences are exact: c1 = 1/2 d(tau)/d(qd).
+    """
+    manifest = Manifest.read(directory)
+    assert manifest.tree is not None
+    torque, rest = NewtonEuler(manifest, manifest.tree).partial_torque, np.zeros_like(q)
+    gravity = torque(q, rest, rest)
+    units = [np.broadcast_to(row, q.shape) for row in np.eye(q.shape[-1])]
+    c2 = [torque(q, rest, unit) - gravity for unit in units]
+    c1 = [(torque(q, qd + unit, rest) - torque(q, qd - unit, rest)) / 4.0 for unit in units]
+    return {"acceleration": np.stack(c2, -1), "velocity": np.stack(c1, -1), "gravity": gravity}
+
+
+def test_links_that_share_work_say_what_a_recursion_says(
+    directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    directory = directory_of("torso")
+    assert (directory / "c/links_together.h").is_file()
+    library, native = Compiled(directory), package_of("torso").load("native")
+    q, qd, qdd = random_states(native.n, 48)
+    expected = recursion(directory, q, qd)
+    expected["torque"] = (
+        sum(
+            np.einsum("sijk,sk->sij", expected[field], motion)
+            for field, motion in (("acceleration", qdd), ("velocity", qd))
+        )
+        + expected["gravity"]
+    )
+    single = [library.decomposition(*(m[s : s + 1] for m in (q, qd, qdd))) for s in range(3)]
+    for field, dense in expected.items():
+        values = dense[:, *getattr(native.layout, field).T]
+        answers = {
+            "rows": library.decomposition(q, qd, qdd)[field],
+            "blocks": library.decomposition_of_blocks(q, qd, qdd)[field],
+            "native": getattr(native.packed(q, qd, qdd), field),
+        }
+        for name, given in answers.items():
+            assert relative_error(given, values) <= 1e-13, (name, field)
+        assert relative_error(np.concatenate([one[field] for one in single]), values[:3]) <= 1e-13, field
+    few = tuple(m.astype(np.float32) for m in (q, qd, qdd))
+    assert relative_error(library.decomposition(*few)["torque"], answers["native"]) <= 1e-5
+    assert relative_error(native.packed_torque(q, qd, qdd), answers["native"]) <= 1e-13
 
 
 def test_results_that_no_cache_holds_are_the_same(directory_of: Callable[[str], Path]) -> None:
