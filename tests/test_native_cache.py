@@ -146,6 +146,28 @@ def test_a_new_cache_is_private(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert stat.S_IMODE(cache_directory().stat().st_mode) == 0o700
 
 
+def test_a_link_to_the_cache_is_followed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "there").mkdir(mode=0o700)
+    (tmp_path / "link").symlink_to("there")
+    monkeypatch.setenv("LINKWISE_CACHE", str(tmp_path / "link"))
+    assert cache_directory() == (tmp_path / "there").resolve()
+
+
+def test_what_stands_in_the_way_of_a_build_is_named(tiny: Sources) -> None:
+    path = library(tiny, "double")
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(
+        RuntimeError, match=r"^cannot write \S*\.so: Is a directory; set LINKWISE_CACHE"
+    ) as error:
+        library(tiny, "double")
+    one_line(error)
+    path.rmdir()
+    path.with_suffix(".build").symlink_to(path.parent)
+    with pytest.raises(RuntimeError, match=r"^cannot write \S*\.build: File exists; set LINKWISE_CACHE"):
+        library(tiny, "double")
+
+
 @pytest.mark.parametrize("mode", [0o777, 0o720])
 def test_a_cache_that_others_may_write_to_is_refused(mode: int, tiny: Sources, tmp_path: Path) -> None:
     (tmp_path / "cache").chmod(mode)

@@ -74,9 +74,8 @@ def _build(compiler: Compiler, source: Path, parts: Sequence[str], target: Path,
             raise RuntimeError(f"{compiler.command[0]} made no library; point CC to a C compiler")
         keep(made, target)
     except OSError as error:
-        raise RuntimeError(
-            f"cannot write to the cache {target.parent}: {error.strerror}; {ELSEWHERE}"
-        ) from None
+        place = error.filename or target
+        raise RuntimeError(f"cannot write {place}: {error.strerror}; {ELSEWHERE}") from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     if not is_whole(target):

@@ -27,6 +27,7 @@ def cache_directory() -> Path:
     path = _chosen_directory()
     try:
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path = path.resolve()  # a link that leads there may lead elsewhere later
         found = path.stat()
     except OSError as error:
         raise RuntimeError(f"cannot make the cache {path}: {error.strerror}; {ELSEWHERE}") from None
