@@ -236,6 +236,11 @@ COMPILERS = {
         "cc failed: x.c:1: error: no room",
     ),
     "many lines": (f"{ANSWER}printf 'a\\nb\\n' >&2\nexit 3", 0o755, "cc failed: a b; the other back ends"),
+    "no room": (
+        f"{ANSWER}echo 'in f:\nld: final link failed: No space left on device\nld: error' >&2\nexit 1",
+        0o755,
+        "cc failed: ld: final link failed: No space left on device; the other back ends",
+    ),
     "not text": (f"{ANSWER}printf 'error \\377' >&2\nexit 3", 0o755, "cc failed: error"),
     "no word": (f"{ANSWER}exit 3", 0o755, "cc failed: exit status 3; the other back ends need no compiler"),
     "killed": (f"{ANSWER}kill -9 $$", 0o755, "cc failed: it was ended by SIGKILL"),

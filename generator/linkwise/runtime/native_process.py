@@ -1,13 +1,13 @@
 """Running a compiler: several at a time, never for ever, and a terminal is told of the wait."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from pathlib import Path
 
 PATIENCE = 3600.0
 """Seconds after which a compiler counts as hung; the largest robots take minutes."""
@@ -35,57 +35,60 @@ def told(what: str) -> Iterator[Tell]:
         show("", "\r")
 
 
-def run_all(commands: Sequence[Sequence[str]], folder: Path, tell: Tell) -> None:
+def run_all(commands: Sequence[Sequence[str]], tell: Tell) -> None:
     """Run commands side by side; raises RuntimeError, in one line, for one that fails or hangs."""
     running: list[subprocess.Popen[bytes]] = []
-    complaints = [folder / f"{number}.txt" for number in range(len(commands))]
+    complaints: dict[int, bytes] = {}
     try:
-        for command, complaint in zip(commands, complaints, strict=True):
-            running.append(_started(command, complaint))
-        _wait(running, commands[0][0], tell)
+        for command in commands:
+            running.append(_started(command))
+        _wait(running, complaints, commands[0][0], tell)
     finally:
-        for process in running:
-            if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)  # with whatever it has started
+        for number, process in enumerate(running):
+            if number not in complaints:
+                with suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)  # with whatever it has started
                 process.wait()
-    for process, command, complaint in zip(running, commands, complaints, strict=True):
+                process.stderr.close()  # type: ignore[union-attr]
+    for number, (process, command) in enumerate(zip(running, commands, strict=True)):
         if process.returncode:
-            raise RuntimeError(
-                f"{command[0]} failed: {_reason(complaint, process.returncode)}; "
-                "the other back ends need no compiler"
-            )
+            reason = _reason(complaints[number], process.returncode)
+            raise RuntimeError(f"{command[0]} failed: {reason}; the other back ends need no compiler")
 
 
-def _started(command: Sequence[str], complaint: Path) -> "subprocess.Popen[bytes]":
-    with complaint.open("wb") as errors:
-        try:
-            return subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=errors,
-                start_new_session=True,
-            )
-        except OSError as error:
-            raise RuntimeError(
-                f"{command[0]} cannot be run: {error.strerror}; point CC to a C compiler"
-            ) from None
+def _started(command: Sequence[str]) -> "subprocess.Popen[bytes]":
+    try:
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        )
+    except OSError as error:
+        raise RuntimeError(
+            f"{command[0]} cannot be run: {error.strerror}; point CC to a C compiler"
+        ) from None
 
 
-def _wait(running: "Sequence[subprocess.Popen[bytes]]", name: str, tell: Tell) -> None:
+def _wait(
+    running: "Sequence[subprocess.Popen[bytes]]", complaints: dict[int, bytes], name: str, tell: Tell
+) -> None:
+    """Fill `complaints` with what each says on stderr until it ends."""
     start = time.monotonic()
-    while left := [process for process in running if process.poll() is None]:
+    while left := [number for number in range(len(running)) if number not in complaints]:
         seconds = time.monotonic() - start
         if seconds > PATIENCE:
             raise RuntimeError(f"{name} is not done after {PATIENCE:.0f} s; point CC to another C compiler")
-        tell(f"{len(running) - len(left)} of {len(running)} parts, {seconds:.0f} s")
-        with suppress(subprocess.TimeoutExpired):
-            left[0].wait(min(1.0, PATIENCE))
+        tell(f"{len(complaints)} of {len(running)} parts, {seconds:.0f} s")
+        for number in left:
+            with suppress(subprocess.TimeoutExpired):
+                complaints[number] = running[number].communicate(timeout=min(1.0, PATIENCE) / len(left))[1]
 
 
-def _reason(complaint: Path, code: int) -> str:
+def _reason(complaint: bytes, code: int) -> str:
     """A compiler's first complaint, as one line."""
-    lines = complaint.read_text(encoding="utf-8", errors="replace").splitlines()
-    said = next((line for line in lines if "error" in line.lower()), " ".join(lines))
-    fallback = f"exit status {code}" if code > 0 else f"it was ended by {signal.Signals(-code).name}"
-    return " ".join(said.split())[:200] or fallback
+    lines = complaint.decode(errors="replace").splitlines()
+    telling = (line for line in lines if re.search("error|fail|no space", line, re.IGNORECASE))
+    said = " ".join(next(telling, " ".join(lines)).split())[:200]
+    return said or (f"exit status {code}" if code > 0 else f"it was ended by {signal.Signals(-code).name}")
