@@ -236,7 +236,7 @@ BAD_ARGUMENTS = {
     "keyword": (("planar2", "--name", "class"), "'class' is not a usable module name"),
     "parameters": (
         ("planar2", "--parameters", "some"),
-        "'some' is not one of 'numeric', 'symbolic'",
+        "'some' is not one of 'numeric', 'nonzero', 'symbolic'",
     ),
     "base": (("planar2", "--base", "moving"), "'moving' is not one of 'fixed', 'floating'"),
     "tip": (("planar2", "--tip", "hand"), "--tip 'hand' is not a link"),

@@ -13,6 +13,7 @@ import sympy as sp
 from linkwise import runtime
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
 from linkwise.emit.backend import BackendFiles, Loading
+from linkwise.emit.bodies import body_texts, in_docstring, parameter_rules
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
@@ -24,7 +25,15 @@ from linkwise.version import VERSION
 
 LONGEST_NAME = 60
 LINE = 100
-SHARED_RUNTIME = ("__init__.py", "dense.py", "dynamics.py", "interface.py", "quantities.py", "structure.py")
+SHARED_RUNTIME = (
+    "__init__.py",
+    "dense.py",
+    "dynamics.py",
+    "interface.py",
+    "parameter_values.py",
+    "quantities.py",
+    "structure.py",
+)
 """Files of linkwise/runtime that every package has."""
 TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}
 
@@ -68,6 +77,7 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     loadable = {backend: backend.loading for backend in chosen if backend.loading}
     fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
     system, shared = derivation.system, {"version": VERSION}
+    bodies = body_texts(system)
     names = {
         **shared,
         "name": repr(derivation.package),
@@ -77,6 +87,8 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
         "paths": [repr(system.path(j)) for j in range(len(system.links))],
         "linear": repr(tuple(sorted(derivation.linear))),
         "parameters": [(ascii(s.name), repr(float(v))) for s, v in system.parameters.items()],
+        "bodies": bodies,
+        "calls_numpy": any("np." in value for body in bodies for value in body.values),
     }
     init = {
         **shared,
@@ -85,6 +97,7 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
         "makers": [Maker.of(backend, loading) for backend, loading in loadable.items()],
         "fastest_first": [backend.name for backend, _ in fastest_first],
         "parameters": _parameter_lines(system),
+        "about_parameters": parameter_rules(system, bodies),
     }
     yield "__init__.py", render("package/init.py.j2", init)
     yield "names.py", render("package/names.py.j2", names)
@@ -115,7 +128,7 @@ def _parameter_lines(system: System) -> list[str]:
     """Names of the parameters as lines of a docstring, which none of their characters can end."""
     lines: list[str] = []
     for symbol in system.parameters:
-        name = ascii(symbol.name).replace("\\", "\\\\").replace('"', '\\"')
+        name = in_docstring(ascii(symbol.name))
         if lines and len(lines[-1]) + len(name) < LINE:
             lines[-1] += f" {name},"
         else:

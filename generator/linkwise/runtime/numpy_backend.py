@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from .arguments import same_kind
 from .interface import ClosedForms, Entries
+from .parameter_values import fits
 from .structure import Structure
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
@@ -24,7 +25,7 @@ class NumpyBackend:
     ) -> None:
         self.structure = structure
         self.links = links
-        self.parameters: dict[str, Any] = {k: np.asarray(v, dtype=float) for k, v in parameters.items()}
+        self.parameters: dict[str, Any] = {k: _parameter(k, v) for k, v in parameters.items()}
 
     def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
@@ -86,6 +87,9 @@ class NumpyBackend:
         return np.concatenate(list(parts), -1)
 
     def _values(self, q: Any) -> dict[str, Any]:
+        for name, value in self.parameters.items():
+            if value.ndim:
+                fits(name, value.shape, q.shape[:-1])
         return {k: v.astype(q.dtype) for k, v in self.parameters.items()}
 
 
@@ -112,3 +116,13 @@ def _array(name: str, value: Any) -> NDArray[Any]:
     if isinstance(value, np.ma.MaskedArray):
         raise TypeError(f"{name} is a masked array; fill its gaps first")
     return np.asarray(value)
+
+
+def _parameter(name: str, value: Any) -> NDArray[Any]:
+    """A parameter's value; a gradient, which arrays do not carry, is not lost without a word."""
+    if getattr(value, "requires_grad", False):
+        raise TypeError(
+            f"parameter {name!r} is a tensor that requires a gradient, which arrays do not carry; "
+            "take torch or native, or detach it"
+        )
+    return np.asarray(value, dtype=float)
