@@ -186,7 +186,7 @@ REFUSED = {
     ),
     "shapes": (
         {"m_upper": np.ones(3), "I_upper_xx": np.full(2, 0.01)},
-        "the shapes of m_upper, I_upper_xx do not fit together",
+        "parameters m_upper, I_upper_xx differ in shape; give each one number a sample",
     ),
 }
 NO_NUMBER = {
@@ -239,6 +239,11 @@ def test_one_value_a_sample_must_fit_the_motion(backend: str, arm: ModuleType) -
     each = arm.load(backend, {"m_upper": np.arange(4.0)}).partial_torque(*motion)
     alone = arm.load(backend, {"m_upper": 2.0}).partial_torque(*motion)
     assert np.array_equal(np.asarray(each)[2], np.asarray(alone)[2])
+
+
+def test_parameters_come_by_name(arm: ModuleType) -> None:
+    with pytest.raises(TypeError, match=r"^parameters is list; give values by name, such as \{'l1': 0.3\}"):
+        arm.load("numpy", [1.0])
 
 
 def test_a_gradient_is_not_lost_on_arrays(arm: ModuleType) -> None:

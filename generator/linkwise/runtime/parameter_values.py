@@ -36,6 +36,9 @@ def checked_values(
     """All parameters, those `given` in place of their `own` values; raises what the package's `load` says."""
     if not given:
         return dict(own)
+    if not isinstance(given, Mapping):
+        example = dict(list(own.items())[:1])
+        raise TypeError(f"parameters is {type(given).__name__}; give values by name, such as {example}")
     for name in given:
         if name not in own:
             raise ValueError(_unknown(name, own))
