@@ -42,7 +42,7 @@ def checked_values(
     for name in given:
         if name not in own:
             raise ValueError(_unknown(name, own))
-    tensors = {name: value for name, value in given.items() if is_tensor(value)}
+    tensors = {name: value for name, value in given.items() if _is_tensor(value)}
     seen = {name: _number(name, value) for name, value in given.items() if name not in tensors}
     plain = {**own, **seen}
     seen |= {name: _number(name, value) for name, value in _looked_at(tensors).items()}
@@ -142,14 +142,14 @@ def _check_bodies(
 def _unknown(name: str, own: Mapping[str, float]) -> str:
     if not own:
         return f"no parameter {_short(name)}; the parameters are none: generate with --parameters symbolic"
+    if len(own) <= MOST_NAMES:
+        return f"no parameter {_short(name)}; the parameters are {', '.join(map(_plain, own))}"
     near = difflib.get_close_matches(str(name), own, MOST_NAMES, 0.5) or list(own)[:MOST_NAMES]
-    names = ", ".join(near if len(own) > MOST_NAMES else own)
-    if len(own) > MOST_NAMES:
-        return f"no parameter {_short(name)}; near it are {names}, and `parameters` has all {len(own)}"
-    return f"no parameter {_short(name)}; the parameters are {names}"
+    names = ", ".join(map(_plain, near))
+    return f"no parameter {_short(name)}; near it are {names}, and `parameters` has all {len(own)}"
 
 
-def is_tensor(value: Any) -> bool:
+def _is_tensor(value: Any) -> bool:
     """Whether a value is a torch tensor; torch isn't imported to find out."""
     torch = sys.modules.get("torch")
     return torch is not None and isinstance(value, torch.Tensor)
@@ -177,10 +177,17 @@ def _looked_at(tensors: Mapping[str, Any]) -> dict[str, Any]:
 
 def _listed(names: Sequence[str] | Mapping[str, Any], values: Mapping[str, Any]) -> str:
     """The first few parameters with their values."""
-    scalars = {name: np.ndim(values[name]) == 0 for name in list(names)[:MOST_NAMES]}
-    shown = [f"{name} = {values[name]:g}" if scalar else name for name, scalar in scalars.items()]
+    shown = [
+        _plain(name) if np.ndim(values[name]) else f"{_plain(name)} = {values[name]:g}"
+        for name in list(names)[:MOST_NAMES]
+    ]
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"{', '.join(shown)}{more}"
+
+
+def _plain(name: str) -> str:
+    """A name as one line may hold it."""
+    return name if name.isprintable() and len(name) <= LONGEST else _short(name)
 
 
 def _short(value: Any) -> str:
