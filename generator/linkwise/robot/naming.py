@@ -13,7 +13,11 @@ KINDS = {
     "m": ("kg", "mass"),
     "c": ("m", "centre of mass in m, in the link's own frame as the file has it"),
     "I": ("kg m^2", "inertia about the centre of mass in kg·m², along the axes of that frame"),
-    "p": ("m", "place of the joint that moves the link in m, in the frame of its parent in the file"),
+    "p": (
+        "m",
+        "place of the joint that moves the link in m, in the frame of its parent in the file; on the ground it "
+        "moves no torque and is no parameter",
+    ),
 }
 MOST_USES = 4
 """Uses of a file's own parameter that its meaning names."""
