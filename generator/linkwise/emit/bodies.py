@@ -17,8 +17,8 @@ from linkwise.symbolic.system import RigidSystem, System
 NAMES = (
     "m_LINK is a mass in kg; c_LINK_x a centre of mass in m and I_LINK_xx an inertia about it in kg m^2, "
     "both in the link's own frame as the file has it; p_LINK_x the place of the joint that moves the link, "
-    "in m in the frame of its parent in the file. Joints on the ground, whose place moves no torque, have no p, "
-    "links with neither mass nor inertia nothing else."
+    "in m in the frame of its parent in the file. Joints on the ground, whose place moves no torque, have no "
+    "p, links with neither mass nor inertia nothing else."
 )
 FREE = "They are those of the energies: any finite value is taken."
 ALLOWED = "Any finite value is taken, also such as no body has: generated with --allow-unphysical."

@@ -15,8 +15,8 @@ KINDS = {
     "I": ("kg m^2", "inertia about the centre of mass in kg·m², along the axes of that frame"),
     "p": (
         "m",
-        "place of the joint that moves the link in m, in the frame of its parent in the file; on the ground it "
-        "moves no torque and is no parameter",
+        "place of the joint that moves the link in m, in the frame of its parent in the file; on the ground "
+        "it moves no torque and is no parameter",
     ),
 }
 MOST_USES = 4
