@@ -127,7 +127,7 @@ def test_inspect_names_what_was_merged_locked_and_ignored(linkwise: Run) -> None
 
 
 def test_inspect_prints_a_table(linkwise: Run) -> None:
-    done = linkwise("inspect", "planar3", "--parameters", "symbolic")
+    done = linkwise("inspect", "planar3")
     assert done.stdout.startswith("planar3: 3 joints, 3 links\n")
     assert "  3  link3  (0.6 kg; joint1, joint2, joint3)" in done.stdout
     assert "  m_2 = 0.6" in done.stdout
@@ -236,7 +236,7 @@ BAD_ARGUMENTS = {
     "keyword": (("planar2", "--name", "class"), "'class' is not a usable module name"),
     "parameters": (
         ("planar2", "--parameters", "some"),
-        "'some' is not one of 'numeric', 'symbolic'",
+        "'some' is not one of 'numeric', 'nonzero', 'symbolic'",
     ),
     "base": (("planar2", "--base", "moving"), "'moving' is not one of 'fixed', 'floating'"),
     "tip": (("planar2", "--tip", "hand"), "--tip 'hand' is not a link"),

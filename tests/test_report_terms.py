@@ -40,7 +40,7 @@ ARITHMETIC = {
 
 
 def symbolic(name: str) -> System:
-    return rigid_system(read_robot(name, Options(parameters="symbolic")))
+    return rigid_system(read_robot(name, Options(parameters="nonzero")))
 
 
 def spring_pendulum() -> System:

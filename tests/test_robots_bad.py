@@ -216,7 +216,10 @@ def test_promoted_parameters_come_with_units_and_their_frame(tmp_path: Path) -> 
         subject: detail for kind, subject, detail in notes_of(path, Options("symbolic")) if kind == "promoted"
     }
     assert promoted["m_…"] == "mass in kg"
-    assert promoted["p_…"] == "place of the joint in m, in linkwise's frame of the parent"
+    assert promoted["p_…"] == (
+        "place of the joint that moves the link in m, in the frame of its parent in the file; on the ground "
+        "it moves no torque and is no parameter"
+    )
     assert not [note for note in notes_of("planar3", Options("symbolic")) if note[0] == "promoted"]
     assert not [note for note in notes_of(path) if note[0] == "promoted"]
 

@@ -38,7 +38,7 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
                 raise LinkwiseError(
                     f"energies in Python do not accept {', '.join(rigid)}; change the energies"
                 )
-            return read_energies(Path(spec), options.parameters == "symbolic")
+            return read_energies(Path(spec), options.parameters != "numeric")
     return rigid_system(read_robot(spec, options))
 
 

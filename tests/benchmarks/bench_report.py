@@ -21,7 +21,7 @@ def panda() -> Path:
 
 def count(robot: str | Path, joints: int, tip: str | None = None) -> int:
     """Terms of the first joints' torques, every link expanded."""
-    system = read_system(robot, Options(parameters="symbolic", tip=tip))
+    system = read_system(robot, Options(parameters="nonzero", tip=tip))
     sums = [RunningCount(len(system.coordinates)) for _ in range(joints)]
     for found in link_torques(system, tuple(range(joints)), BUDGET, silent):
         for i, torque in found.torques.items():

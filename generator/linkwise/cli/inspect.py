@@ -13,6 +13,7 @@ from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import rigid_tree
 from linkwise.errors import LinkwiseError
 from linkwise.robot import Options
+from linkwise.robot.robot import Parameter
 from linkwise.symbolic.system import EnergySystem, System
 
 LOSSES = ("damping", "friction")
@@ -22,7 +23,7 @@ app = typer.Typer(add_completion=False)
 
 
 @app.command()
-@reads_robot()
+@reads_robot(parameters="symbolic")
 def inspect(
     robot: RobotName,
     options: Options,
@@ -57,9 +58,16 @@ def inspection(system: System, hidden: Collection[str] = LOSSES) -> dict[str, An
             }
             for j, name in enumerate(system.link_names)
         ],
-        "parameters": {s.name: float(v) for s, v in system.parameters.items()},
+        "parameters": [asdict(parameter) for parameter in parameters(system)],
         "notes": [asdict(note) for note in system.notes if note.kind not in hidden],
     }
+
+
+def parameters(system: System) -> tuple[Parameter, ...]:
+    """Run-time parameters: values in the file, units and meanings."""
+    if isinstance(system, EnergySystem):
+        return tuple(Parameter(s.name, float(v), "", "of the energies") for s, v in system.parameters.items())
+    return system.robot.parameters
 
 
 def table(data: dict[str, Any]) -> str:
@@ -74,11 +82,10 @@ def table(data: dict[str, Any]) -> str:
         mass = "" if link["mass"] is None else f"{link['mass']:.6g} kg; "
         lines.append(f"  {k}  {link['name']}  ({mass}{', '.join(link['path'])})")
     if data["parameters"]:
-        lines += [
-            "",
-            "parameters",
-            *(f"  {name} = {value:g}" for name, value in data["parameters"].items()),
-        ]
+        heads = [f"{p['name']} = {p['value']:.6g} {p['unit']}".rstrip() for p in data["parameters"]]
+        width = max(map(len, heads))
+        lines += ["", "parameters (of `load`, generated with --parameters symbolic or nonzero)"]
+        lines += [f"  {h:<{width}}  {p['meaning']}" for h, p in zip(heads, data["parameters"], strict=True)]
     for kind in dict.fromkeys(note["kind"] for note in data["notes"]):
         lines += ["", kind]
         for note in data["notes"]:

@@ -11,7 +11,7 @@ import typer
 from linkwise.errors import LinkwiseError
 from linkwise.robot import DESCRIPTIONS, Options
 
-Parameters = Literal["numeric", "symbolic"]
+Parameters = Literal["numeric", "nonzero", "symbolic"]
 RobotName = Annotated[str, typer.Argument(help=DESCRIPTIONS)]
 PANEL = "Reading the robot"
 
@@ -22,7 +22,11 @@ def _flag(*names: str, help: str) -> Any:
 
 def robot_options(
     parameters: Annotated[
-        Parameters, _flag(help="numeric: their values; symbolic: a symbol for each, set at run time")
+        Parameters,
+        _flag(
+            help="numeric: their values; symbolic: a symbol for each, set at run time; nonzero: zeros stay "
+            "zeros, which keeps formulas short"
+        ),
     ] = "numeric",
     lock: Annotated[list[str] | None, _flag(help="Hold a joint: JOINT=VALUE; may be repeated")] = None,
     base: Annotated[Literal["fixed", "floating"], _flag(help="How the root link is held")] = "fixed",

@@ -36,7 +36,7 @@ app = typer.Typer(add_completion=False)
 
 
 @app.command()
-@reads_robot(parameters="symbolic")
+@reads_robot(parameters="nonzero")
 def reduction(
     options: Options,
     robot: Annotated[

@@ -26,7 +26,7 @@ app = typer.Typer(add_completion=False)
 
 
 @app.command()
-@reads_robot(parameters="symbolic")
+@reads_robot(parameters="nonzero")
 def terms(
     robot: RobotName,
     options: Options,

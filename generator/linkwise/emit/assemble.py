@@ -13,6 +13,7 @@ import sympy as sp
 from linkwise import runtime
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
 from linkwise.emit.backend import BackendFiles, Loading
+from linkwise.emit.bodies import body_texts, in_docstring, parameter_rules
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
@@ -30,6 +31,7 @@ SHARED_RUNTIME = (
     "dense.py",
     "dynamics.py",
     "interface.py",
+    "parameter_values.py",
     "quantities.py",
     "structure.py",
 )
@@ -76,6 +78,7 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     loadable = {backend: backend.loading for backend in chosen if backend.loading}
     fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
     system, shared = derivation.system, {"version": VERSION}
+    bodies = body_texts(system)
     names = {
         **shared,
         "name": repr(derivation.package),
@@ -85,6 +88,8 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
         "paths": [repr(system.path(j)) for j in range(len(system.links))],
         "linear": repr(tuple(sorted(derivation.linear))),
         "parameters": [(ascii(s.name), repr(float(v))) for s, v in system.parameters.items()],
+        "bodies": bodies,
+        "calls_numpy": any("np." in value for body in bodies for value in body.values),
     }
     init = {
         **shared,
@@ -93,6 +98,7 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
         "makers": [Maker.of(backend, loading) for backend, loading in loadable.items()],
         "fastest_first": [backend.name for backend, _ in fastest_first],
         "parameters": _parameter_lines(system),
+        "about_parameters": parameter_rules(system, bodies),
     }
     yield "__init__.py", render("package/init.py.j2", init)
     yield "names.py", render("package/names.py.j2", names)
@@ -123,7 +129,7 @@ def _parameter_lines(system: System) -> list[str]:
     """Names of the parameters as lines of a docstring, which none of their characters can end."""
     lines: list[str] = []
     for symbol in system.parameters:
-        name = ascii(symbol.name).replace("\\", "\\\\").replace('"', '\\"')
+        name = in_docstring(ascii(symbol.name))
         if lines and len(lines[-1]) + len(name) < LINE:
             lines[-1] += f" {name},"
         else:

@@ -1,6 +1,6 @@
 """From what a file says to a Robot: expand, cut, substitute, merge, and check."""
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from typing import Literal
 
 from linkwise.errors import LinkwiseError
@@ -9,8 +9,9 @@ from linkwise.robot.description import Connection, Description
 from linkwise.robot.joint_types import expand, expansion_notes
 from linkwise.robot.links import check_masses, moving_links
 from linkwise.robot.mass import check_bodies
+from linkwise.robot.naming import Named, Naming
 from linkwise.robot.notes import Note
-from linkwise.robot.parameters import numeric, promoted
+from linkwise.robot.parameters import numeric
 from linkwise.robot.robot import Link, Robot, is_finite
 from linkwise.robot.tree import check_loops, cut, depth_first
 
@@ -19,7 +20,7 @@ from linkwise.robot.tree import check_loops, cut, depth_first
 class Options:
     """How a description becomes a robot; the command line's flags of the same names."""
 
-    parameters: Literal["numeric", "symbolic"] = "numeric"
+    parameters: Literal["numeric", "nonzero", "symbolic"] = "numeric"
     lock: dict[str, float] = field(default_factory=dict)
     base: Literal["fixed", "floating"] = "fixed"
     root: str | None = None
@@ -41,14 +42,15 @@ def build(description: Description, options: Options) -> Robot:
     unphysical = check_bodies(plain.bodies, options.allow_unphysical)
     if not all(is_finite(entry) for entry in plain.gravity):
         raise LinkwiseError("gravity has NaN or infinity in it; give three numbers")
-    if options.parameters == "numeric":
+    naming = _naming(description, options)
+    if naming is None:
         description = plain
     root, connections = _connections(description, options.base)
     joints = [(connection, expand(connection)) for connection in connections]
     axes = tuple(axis for _, parts in joints for axis in parts)
     uncoupled = check_couplings(description.couplings, axes, options.lock, options.free_mimic)
     moving = movement(axes, connections, options.lock, options.free_mimic)
-    assembly = moving_links(description.bodies, joints, moving.motion)
+    assembly = moving_links(description.bodies, joints, moving.motion, naming)
     check_loops(description.loops, assembly.carrier)
     notes = (
         *description.notes,
@@ -62,9 +64,23 @@ def build(description: Description, options: Options) -> Robot:
         *_massless(description, assembly.links),
         *_as_read(connections),
     )
-    links, gravity, parameters = assembly.links, description.gravity, description.parameters
-    robot = Robot(description.name, moving.coordinates, links, gravity, parameters, notes)
-    return promoted(robot) if options.parameters == "symbolic" else replace(robot, parameters=())
+    return Robot(
+        description.name,
+        moving.coordinates,
+        assembly.links,
+        description.gravity,
+        naming.parameters(assembly.links, description.gravity) if naming else (),
+        (*notes, *naming.notes()) if naming else notes,
+        options.allow_unphysical,
+    )
+
+
+def _naming(description: Description, options: Options) -> Naming | None:
+    """Return what gives names to the numbers that may be varied; None where all stay numbers."""
+    if options.parameters == "numeric":
+        return None
+    wanted: Named = "every" if options.parameters == "symbolic" else "nonzero"
+    return Naming("none" if description.only_named else wanted, dict(description.parameters))
 
 
 def _connections(description: Description, base: str) -> tuple[str, tuple[Connection, ...]]:

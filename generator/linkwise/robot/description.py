@@ -12,8 +12,9 @@ IDENTITY: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Body:
-    """A link as the file has it; inertia about the centre of mass, in the link's axes.
+    """A link as the file has it; com and inertia about it in the link's frame.
 
+    `origin` is where that frame's origin is from the place of the link's joint, in the same axes.
     `unphysical` holds the file's own reason for an inertia that no rigid body has (empty: none); `invented`
     says that the reader made the body up, between two axes of one joint.
     """
@@ -24,6 +25,7 @@ class Body:
     inertia: Mat3 = ZERO33
     unphysical: str = ""
     invented: bool = False
+    origin: Vec3 = ZERO3
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Connection:
-    """A joint as the file has it: any type, any axis; axis in the joint's frame.
+    """A joint as the file has it: any type, any axis; its place in the parent's frame, its axis in its own.
 
     Damping (N·m·s/rad or N·s/m) and friction (N·m or N) are reported only. `snapped` says that entries of the
     rotation were rounded to −1, 0 or 1.
@@ -80,7 +82,10 @@ class Connection:
 
 @dataclass(frozen=True)
 class Description:
-    """A robot as its file has it."""
+    """A robot as its file has it.
+
+    With `only_named` nothing but its own parameters may be varied: its numbers say what it is, say planar.
+    """
 
     name: str
     bodies: tuple[Body, ...]
@@ -90,3 +95,4 @@ class Description:
     notes: tuple[Note, ...] = field(default=())
     couplings: tuple[Coupling, ...] = ()
     loops: tuple[Loop, ...] = ()
+    only_named: bool = False

@@ -1,6 +1,6 @@
 """Moving links from the bodies and joints of a description: frames on axes, fixed joints merged away."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
@@ -8,13 +8,14 @@ from linkwise.robot.coordinates import AxisRule
 from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.mass import Placed, merge
+from linkwise.robot.naming import Naming
 from linkwise.robot.notes import IMPOSSIBLE, Note
 from linkwise.robot.robot import Coordinate, Joint, Link, Rotation, Vec3
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a body sits: the moving link it belongs to (None: the ground), and its pose in that frame."""
+    """Where a body is: the moving link that it belongs to (None: the ground), and its frame's pose there."""
 
     link: int | None
     rotation: Rotation = IDENTITY
@@ -23,12 +24,29 @@ class _Place:
 
 @dataclass
 class _Moving:
-    """A moving link while it gathers bodies."""
+    """A moving link while it gathers bodies, in axes of its own.
+
+    Those become the link's frame, with z on the joint's axis, by `shift` and then `turn`.
+    """
 
     name: str
     parent: int | None
     joint: Joint
+    turn: Rotation = IDENTITY
+    shift: Vec3 = ZERO3
     members: list[Placed] = field(default_factory=list)
+
+    def framed(self, position: Vec3) -> Vec3:
+        """Return a place in the link's frame."""
+        return transforms.rotate(self.turn, transforms.add(self.shift, position))
+
+    def link(self, naming: Naming | None) -> Link:
+        """Return the link with what it gathered, its numbers named where `naming` does so."""
+        mass, com, inertia = merge(self.members)
+        if naming:
+            mass, com, inertia = naming.body(self.name, len(self.members) > 1, mass, com, inertia)
+        inertia = transforms.rotate_inertia(self.turn, inertia)
+        return Link(self.name, self.parent, self.joint, mass, self.framed(com), inertia)
 
 
 @dataclass(frozen=True)
@@ -41,31 +59,41 @@ class Assembly:
 
 
 def moving_links(
-    bodies: tuple[Body, ...], joints: list[tuple[Connection, tuple[Axis, ...]]], motion: dict[str, AxisRule]
+    bodies: tuple[Body, ...],
+    joints: list[tuple[Connection, tuple[Axis, ...]]],
+    motion: dict[str, AxisRule],
+    naming: Naming | None = None,
 ) -> Assembly:
     """Return the moving links, each with the bodies that are rigidly connected to it merged.
 
-    `joints` come parents first; a link that no joint carries is on the ground.
+    `joints` come parents first; a link that no joint carries is on the ground. With `naming`, links gather
+    their bodies in the file's own frames, where numbers get their names, and only then turn into linkwise's.
     """
     by_name = {body.name: body for body in bodies}
     moving: list[_Moving] = []
     places: dict[str, _Place] = {}
     notes: list[Note] = []
     for connection, axes in joints:
-        before = places.get(connection.parent, _Place(None))
+        before, child = places.get(connection.parent, _Place(None)), by_name[connection.child]
+        start = connection.translation
+        if naming:
+            # On the ground it shifts everything alike; of a fixed joint it is part of the body it belongs to.
+            moves = any(motion[axis.name].coordinate is not None for axis in axes)
+            start = naming.place(connection, moves and before.link is not None)
         turn = transforms.compose(before.rotation, connection.rotation)
-        shift = transforms.rotate(before.rotation, connection.translation)
+        shift = transforms.rotate(before.rotation, start)
         place = _Place(before.link, turn, transforms.add(before.position, shift))
         for axis in axes:
-            place = _pass(place, axis, motion[axis.name], connection.child, moving)
-        places[connection.child] = place
+            place = _pass(place, axis, motion[axis.name], child, moving, naming is not None)
+        origin = transforms.rotate(place.rotation, child.origin)
+        place = replace(place, position=transforms.add(place.position, origin))
+        places[child.name] = place
         if place.link is not None:
-            member = by_name[connection.child], place.rotation, place.position
-            moving[place.link].members.append(member)
+            moving[place.link].members.append((child, place.rotation, place.position))
         if place.link == before.link:
             onto = "the ground" if place.link is None else moving[place.link].name
-            notes.append(Note("merged", connection.child, f"into {onto}"))
-    links = tuple(Link(link.name, link.parent, link.joint, *merge(link.members)) for link in moving)
+            notes.append(Note("merged", child.name, f"into {onto}"))
+    links = tuple(link.link(naming) for link in moving)
     carrier = {body.name: places[body.name].link if body.name in places else None for body in bodies}
     return Assembly(links, carrier, tuple(notes))
 
@@ -88,10 +116,13 @@ def check_masses(links: tuple[Link, ...], moving: tuple[Coordinate, ...], allow:
     return [Note("unphysical", name, "moves no mass; its torque is zero", IMPOSSIBLE) for name in idle]
 
 
-def _pass(place: _Place, axis: Axis, motion: AxisRule, child: str, moving: list[_Moving]) -> _Place:
+def _pass(
+    place: _Place, axis: Axis, motion: AxisRule, child: Body, moving: list[_Moving], own_axes: bool
+) -> _Place:
     """Pass one axis: a new moving link, or a fixed displacement when it is locked.
 
-    The new link's frame has z on the axis; an offset of the coordinate is folded into the fixed part.
+    The new link's frame has z on the axis; an offset of the coordinate is folded into the fixed part. What it
+    gathers is in that frame, or in the child's `own_axes`.
     """
     align = transforms.align_z(axis.direction)
     rotation, position = transforms.compose(place.rotation, align), place.position
@@ -103,6 +134,14 @@ def _pass(place: _Place, axis: Axis, motion: AxisRule, child: str, moving: list[
     back = transforms.transpose(align)
     if motion.coordinate is None:
         return _Place(place.link, transforms.compose(rotation, back), position)
+    if place.link is not None:
+        parent = moving[place.link]
+        rotation, position = transforms.compose(parent.turn, rotation), parent.framed(position)
     joint = Joint(axis.name, axis.kind, motion.coordinate, rotation, position, motion.ratio)
-    moving.append(_Moving(child if axis.last else f"{child}_{axis.suffix}", place.link, joint))
-    return _Place(len(moving) - 1, back)
+    name, at = child.name if axis.last else f"{child.name}_{axis.suffix}", len(moving)
+    if not own_axes:
+        moving.append(_Moving(name, place.link, joint))
+        return _Place(at, back)
+    origin = child.origin if axis.last else ZERO3
+    moving.append(_Moving(name, place.link, joint, back, origin))
+    return _Place(at, IDENTITY, transforms.minus(origin))

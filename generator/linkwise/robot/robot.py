@@ -92,15 +92,29 @@ class Link:
 
 
 @dataclass(frozen=True)
+class Parameter:
+    """A number that stays an argument: its value in the file, unit (empty: as the file has it), meaning."""
+
+    name: str
+    value: float
+    unit: str = ""
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
 class Robot:
-    """A tree of links, parents before children, moved by `coordinates`; gravity in m/s²."""
+    """A tree of links, parents before children, moved by `coordinates`; gravity in m/s².
+
+    With `allow_unphysical` its parameters may take values that no body has.
+    """
 
     name: str
     coordinates: tuple[Coordinate, ...]
     links: tuple[Link, ...]
     gravity: Vec3 = (0.0, 0.0, -9.81)
-    parameters: tuple[tuple[str, float], ...] = ()
+    parameters: tuple[Parameter, ...] = ()
     notes: tuple[Note, ...] = field(default=(), compare=False)
+    allow_unphysical: bool = False
 
     def __post_init__(self) -> None:
         if not self.coordinates:

@@ -40,6 +40,12 @@ def add(a: Vec3, b: Vec3) -> Vec3:
     return x, y, z
 
 
+def minus(a: Vec3) -> Vec3:
+    """Return −a."""
+    x, y, z = (times(-1.0, e) for e in a)
+    return x, y, z
+
+
 def rotate_inertia(rotation: Rotation, inertia: Mat3) -> Mat3:
     """Return rotation · inertia · rotationᵀ, exactly symmetric."""
     half = [rotate(rotation, row) for row in inertia]  # rows of (R I)ᵀ, as I is symmetric

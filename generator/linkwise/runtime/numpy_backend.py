@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from .arguments import as_array, check_axes, no_common_shape, precision
 from .interface import ClosedForms, Entries
+from .parameter_values import fits
 from .structure import Structure
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
@@ -24,7 +25,9 @@ class NumpyBackend:
     ) -> None:
         self.structure = structure
         self.links = links
-        self.parameters: dict[str, Any] = {k: np.asarray(v, dtype=float) for k, v in parameters.items()}
+        self.parameters: dict[str, Any] = {
+            k: as_array(f"parameter {k!r}", v).astype(float) for k, v in parameters.items()
+        }
 
     def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
@@ -90,6 +93,9 @@ class NumpyBackend:
         return np.concatenate(list(parts), -1)
 
     def _values(self, q: Any) -> dict[str, Any]:
+        for name, value in self.parameters.items():
+            if value.ndim:
+                fits(name, value.shape, q.shape[:-1])
         return {k: v.astype(q.dtype) for k, v in self.parameters.items()}
 
 

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from .arguments import as_array, check_axes, no_common_shape, precision
 from .interface import ClosedForms
+from .parameter_values import fits
 from .structure import Structure
 
 FLOATS = ({torch.float32}, {torch.float64})
@@ -89,6 +90,9 @@ class TorchBackend:
         return torch.cat(list(parts), -1)
 
     def _values(self, q: Tensor) -> dict[str, Tensor]:
+        for name, value in self.parameters.items():
+            if value.ndim:
+                fits(name, value.shape, q.shape[:-1])
         return {k: v.to(q) for k, v in self.parameters.items()}
 
 

@@ -64,7 +64,7 @@ class RigidSystem:
     @property
     def parameters(self) -> dict[sp.Symbol, float]:
         """Run-time parameters and their values."""
-        return {sp.Symbol(name, real=True): value for name, value in self.robot.parameters}
+        return {sp.Symbol(p.name, real=True): p.value for p in self.robot.parameters}
 
     @property
     def link_names(self) -> tuple[str, ...]:

@@ -27,5 +27,10 @@ def planar(n: int) -> Description:
             Connection(f"joint{j}", "revolute", bodies[-2].name, bodies[-1].name, translation=start)
         )
     return Description(
-        f"planar{n}", tuple(bodies), tuple(connections), (0.0, -GRAVITY, 0.0), tuple(parameters)
+        f"planar{n}",
+        tuple(bodies),
+        tuple(connections),
+        (0.0, -GRAVITY, 0.0),
+        tuple(parameters),
+        only_named=True,
     )

@@ -28,12 +28,10 @@ def read_mjcf(path: Path) -> Description:
     except ValueError as error:
         raise LinkwiseError(f"MuJoCo cannot compile it: {error}") from None
     bodies, connections = [Body(_name(model, 0))], list[Connection]()
-    anchors: list[Vec3] = [ZERO3]
     for number in range(1, model.nbody):
-        chain, body, anchor = _body(model, number, anchors)
+        chain, body = _body(model, number)
         connections += chain
         bodies += [Body(c.child, invented=True) for c in chain[:-1]] + [body]
-        anchors.append(anchor)
     name = model.names.split(b"\0")[0].decode()
     x, y, z = map(float, model.opt.gravity)
     return Description(
@@ -60,21 +58,21 @@ class _Joint:
     friction: float = 0.0
 
 
-def _body(model: Any, number: int, anchors: list[Vec3]) -> tuple[list[Connection], Body, Vec3]:
-    """Return a body behind the chain of its joints, massless bodies between them, and its frame's place.
+def _body(model: Any, number: int) -> tuple[list[Connection], Body]:
+    """Return a body behind the chain of its joints, and massless bodies between them.
 
-    The frame sits on the last joint's anchor, which the chain leaves nothing to undo.
+    Its frame is the file's, whose origin need not be the last joint's anchor.
     """
     name, parent = _name(model, number), int(model.body_parentid[number])
     turn, snapped = transforms.snapped(transforms.from_quaternion(*map(float, model.body_quat[number])))
-    position = transforms.add(_vector(model.body_pos[number]), _minus(anchors[parent]))
+    position = _vector(model.body_pos[number])
     chain: list[Connection] = []
     joints, last, start = _joints(model, number, name), ZERO3, _name(model, parent)
     for joint in joints:
         if joint.type == "floating":
             turn, position, snapped = IDENTITY, ZERO3, False
         x, y, z = joint.axis
-        shift = transforms.add(joint.anchor, _minus(last))
+        shift = transforms.add(joint.anchor, transforms.minus(last))
         if joint.type == "prismatic":
             shift = transforms.add(shift, (-joint.rest * x, -joint.rest * y, -joint.rest * z))
         position = transforms.add(position, transforms.rotate(turn, shift))
@@ -84,8 +82,8 @@ def _body(model: Any, number: int, anchors: list[Vec3]) -> tuple[list[Connection
         place, losses = (start, child, turn, position), (joint.damping, joint.friction)
         chain.append(Connection(joint.name, joint.type, *place, joint.axis, None, *losses, snapped))
         turn, position, last, start, snapped = IDENTITY, ZERO3, joint.anchor, child, False
-    com = transforms.add(_vector(model.body_ipos[number]), _minus(last))
-    return chain, Body(name, float(model.body_mass[number]), com, _inertia(model, number)), last
+    mass, com = float(model.body_mass[number]), _vector(model.body_ipos[number])
+    return chain, Body(name, mass, com, _inertia(model, number), origin=transforms.minus(last))
 
 
 def _joints(model: Any, number: int, body: str) -> list[_Joint]:
@@ -118,11 +116,6 @@ def _name(model: Any, number: int) -> str:
 
 def _vector(a: Any) -> Vec3:
     x, y, z = map(float, a)
-    return x, y, z
-
-
-def _minus(a: Vec3) -> Vec3:
-    x, y, z = (transforms.times(-1.0, e) for e in a)
     return x, y, z
 
 
