@@ -286,9 +286,6 @@ def test_energies_take_no_option_of_rigid_bodies(linkwise: Run) -> None:
     assert done.returncode == 2
     named = "not accept --lock, --base, --root, --tip, --allow-unphysical, --free-mimic; change the energies"
     assert named in done.stderr
-    done = linkwise("inspect", DATA / "turntable.py", "--joint-friction")
-    assert done.returncode == 2
-    assert "energies in Python do not accept --joint-friction" in done.stderr
 
 
 HAND = """<mujoco><worldbody><body name="palm"><joint name="a" axis="0 0 1" armature="0.1" damping="0.2"/>
@@ -303,11 +300,15 @@ def test_generate_warns_of_what_the_torques_leave_out(linkwise: Run, tmp_path: P
     done = linkwise("generate", "hand.xml", "--out", "out", "--backend", "c", "--free-mimic")
     assert done.returncode == 0, done.stderr
     assert [line for line in done.stderr.splitlines() if line.startswith("warning")] == [
-        "warning: hand.xml: left out of the torques: "
-        "actuator (1 ×), armature (1 ×), damping (2 ×), spring (1 ×)",
         "warning: hand.xml: moving by themselves, their coupling left out of the torques: "
         "b (coupled to 'c' by an equality)",
+        "warning: hand.xml: damping left out of the torques: a (0.2 N·m·s/rad), c (0.3 N·m·s/rad)",
+        "warning: hand.xml: armature left out of the torques: a (0.1 kg·m²)",
+        "warning: hand.xml: spring left out of the torques: b (3 N·m/rad)",
     ]
+    asked = linkwise("generate", "hand.xml", "--out", "out", "--backend", "c", "--free-mimic", "--details")
+    assert "damping left out of the torques: a (0.2 N·m·s/rad)\n" in asked.stderr
+    assert "damping left out of the torques: c (0.3 N·m·s/rad)\n" in asked.stderr
 
 
 def test_generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be(
@@ -325,14 +326,14 @@ def test_generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be(
     ]
 
 
-def test_inspect_lists_joint_friction_on_request(linkwise: Run, tmp_path: Path) -> None:
+def test_inspect_lists_what_each_joint_leaves_out_on_request(linkwise: Run, tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     (tmp_path / "hand.xml").write_text(HAND)
     told = linkwise("inspect", "hand.xml", "--free-mimic").stdout
     assert "  damping 2 ×; left out of the torques\n" in told
     assert "N·m·s/rad" not in told
-    asked = linkwise("inspect", "hand.xml", "--free-mimic", "--joint-friction").stdout
-    assert "  c 0.3 N·m·s/rad" in asked
+    asked = linkwise("inspect", "hand.xml", "--free-mimic", "--details").stdout
+    assert "  c 0.3 N·m·s/rad; damping left out of the torques\n" in asked
 
 
 @pytest.mark.parametrize("report", ["terms", "reduction"])

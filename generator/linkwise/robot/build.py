@@ -4,9 +4,9 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot.coordinates import check_couplings, movement
+from linkwise.robot.coordinates import AxisRule, check_couplings, movement
 from linkwise.robot.description import Connection, Description
-from linkwise.robot.joint_types import expand, expansion_notes
+from linkwise.robot.joint_types import Axis, expand, expansion_notes
 from linkwise.robot.links import check_masses, moving_links
 from linkwise.robot.mass import check_bodies
 from linkwise.robot.notes import Note
@@ -61,6 +61,7 @@ def build(description: Description, options: Options) -> Robot:
         *check_masses(assembly.links, moving.coordinates, options.allow_unphysical),
         *_massless(description, assembly.links),
         *_as_read(connections),
+        *_left_out(description, joints, moving.motion, assembly.carrier),
     )
     links, gravity, parameters = assembly.links, description.gravity, description.parameters
     robot = Robot(description.name, moving.coordinates, links, gravity, parameters, notes)
@@ -94,14 +95,19 @@ def _massless(description: Description, links: tuple[Link, ...]) -> list[Note]:
 
 
 def _as_read(connections: tuple[Connection, ...]) -> list[Note]:
-    """Rotations that reading rounded; damping and friction as the file has them, which no torque holds."""
-    notes = [
+    """Rotations that reading rounded."""
+    return [
         Note("snapped", c.name, "rotation entries within 1e-12 of -1, 0, 1") for c in connections if c.snapped
     ]
-    for c in connections:
-        angle = c.type != "prismatic"
-        if c.damping:
-            notes.append(Note("damping", c.name, f"{c.damping!r} {'N·m·s/rad' if angle else 'N·s/m'}"))
-        if c.friction:
-            notes.append(Note("friction", c.name, f"{c.friction!r} {'N·m' if angle else 'N'}"))
-    return notes
+
+
+def _left_out(
+    description: Description,
+    joints: list[tuple[Connection, tuple[Axis, ...]]],
+    motion: dict[str, AxisRule],
+    carrier: dict[str, int | None],
+) -> list[Note]:
+    """What no torque holds of joints and bodies that move."""
+    moving = {c.name for c, axes in joints if any(motion[axis.name].coordinate is not None for axis in axes)}
+    carried = {body for body, link in carrier.items() if link is not None}
+    return [omission.note() for omission in description.omissions if omission.acts(moving, carried)]

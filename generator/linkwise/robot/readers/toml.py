@@ -8,6 +8,7 @@ from typing import Any
 from linkwise.errors import LinkwiseError, within
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
+from linkwise.robot.readers.bounded import check_toml_depth, content
 from linkwise.robot.readers.formula import parse_formula
 from linkwise.robot.robot import Mat3, Scalar, Vec3, is_finite
 
@@ -61,7 +62,11 @@ class _Table:
 def read_toml(path: Path) -> Description:
     """Read a robot; raises LinkwiseError naming the table, the key and the remedy."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = content(path).decode("utf-8-sig").replace("\r\n", "\n")
+        check_toml_depth(text)
+        data = tomllib.loads(text)
+    except LinkwiseError:
+        raise
     except (ValueError, RecursionError) as error:  # ValueError: not TOML, not UTF-8, or too many digits
         raise LinkwiseError(f"malformed TOML: {error}") from None
     if type(data.get("schema")) is not int or data["schema"] != 1:
