@@ -320,7 +320,8 @@ def test_generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be(
     assert done.returncode == 0, done.stderr
     assert [line for line in done.stderr.splitlines() if line.startswith("warning")] == [
         "warning: negative.toml: accepted though physically impossible: "
-        "rod (link 'rod' has negative mass -2 kg)",
+        "rod (link 'rod' has negative mass -2 kg), "
+        "'base_yaw', 'base_pitch', 'base_roll', 'hinge' (can move together without moving any mass)",
         "warning: negative.toml: six coordinates without any contact forces, singular at a pitch of ±90°: "
         "base (floating: x, y, z, yaw, pitch, roll)",
     ]

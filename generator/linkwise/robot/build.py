@@ -7,11 +7,12 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot.coordinates import AxisRule, check_couplings, movement
 from linkwise.robot.description import Connection, Description
 from linkwise.robot.joint_types import Axis, expand, expansion_notes
-from linkwise.robot.links import check_masses, moving_links
+from linkwise.robot.links import moving_links
 from linkwise.robot.mass import check_bodies
+from linkwise.robot.mass_matrix import check_mass_matrix
 from linkwise.robot.notes import Note
 from linkwise.robot.parameters import numeric, promoted
-from linkwise.robot.robot import Link, Robot, is_finite
+from linkwise.robot.robot import Link, Robot, unusable
 from linkwise.robot.tree import check_loops, cut, depth_first
 
 
@@ -39,8 +40,8 @@ def build(description: Description, options: Options) -> Robot:
     description = cut(description, options.root, options.tip)
     plain = numeric(description)
     unphysical = check_bodies(plain.bodies, options.allow_unphysical)
-    if not all(is_finite(entry) for entry in plain.gravity):
-        raise LinkwiseError("gravity has NaN or infinity in it; give three numbers")
+    if fault := unusable(*plain.gravity):
+        raise LinkwiseError(f"gravity has {fault} in it; give three numbers, in m/s²")
     if options.parameters == "numeric":
         description = plain
     root, connections = _connections(description, options.base)
@@ -50,6 +51,9 @@ def build(description: Description, options: Options) -> Robot:
     moving = movement(axes, connections, options.lock, options.free_mimic)
     assembly = moving_links(description.bodies, joints, moving.motion)
     check_loops(description.loops, assembly.carrier)
+    numbers = _links(plain, options, moving.motion) if options.parameters == "symbolic" else assembly.links
+    named = {body.name for body in plain.bodies if not body.invented}
+    singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical)
     notes = (
         *description.notes,
         *unphysical,
@@ -58,7 +62,7 @@ def build(description: Description, options: Options) -> Robot:
         *uncoupled,
         *moving.notes,
         *assembly.notes,
-        *check_masses(assembly.links, moving.coordinates, options.allow_unphysical),
+        *singular,
         *_massless(description, assembly.links),
         *_as_read(connections),
         *_left_out(description, joints, moving.motion, assembly.carrier),
@@ -78,6 +82,12 @@ def _connections(description: Description, base: str) -> tuple[str, tuple[Connec
             "no joint moves; give one a moving type, or let the base move with --base floating"
         )
     return root, connections
+
+
+def _links(description: Description, options: Options, motion: dict[str, AxisRule]) -> tuple[Link, ...]:
+    """Return the moving links of a description, with the numbers or the parameters that it has."""
+    joints = [(connection, expand(connection)) for connection in _connections(description, options.base)[1]]
+    return moving_links(description.bodies, joints, motion).links
 
 
 def _on_the_ground(description: Description, root: str) -> list[Note]:

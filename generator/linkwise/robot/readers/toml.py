@@ -10,7 +10,7 @@ from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
 from linkwise.robot.readers.bounded import check_toml_depth, content
 from linkwise.robot.readers.formula import parse_formula
-from linkwise.robot.robot import Mat3, Scalar, Vec3, is_finite
+from linkwise.robot.robot import Mat3, Scalar, Vec3, unusable
 
 TOP = {"schema", "name", "gravity", "base", "parameters", "link", "joint"}
 LINK = {"name", "mass", "com", "inertia", "allow_unphysical"}
@@ -96,8 +96,8 @@ def _parameters(data: Any) -> dict[str, float]:
             )
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise LinkwiseError(f"parameter {name!r} must be a number")
-        if not is_finite(_float(f"parameter {name!r}", value)):
-            raise LinkwiseError(f"parameter {name!r} is NaN or infinite; give a number")
+        if fault := unusable(_float(f"parameter {name!r}", value)):
+            raise LinkwiseError(f"parameter {name!r} has {fault} for a value; give a number")
     return {name: float(value) for name, value in data.items()}
 
 
