@@ -232,8 +232,18 @@ BAD_ARGUMENTS = {
     "lock at nan": (("planar2", "--lock", "joint1=nan"), "is not of the form JOINT=VALUE"),
     "lock of no joint": (("planar2", "--lock", "elbow=0"), "--lock 'elbow' is not a moving joint"),
     "back end": (("planar2", "--backend", "fortran"), "no back end 'fortran'; choose among numpy"),
-    "name": (("planar2", "--name", "../arm"), "'../arm' is not a usable module name"),
-    "keyword": (("planar2", "--name", "class"), "'class' is not a usable module name"),
+    "name": (("planar2", "--name", "../arm"), "as it has '.' at place 1; use up to 60 letters a-z"),
+    "long name": (
+        ("planar2", "--name", "a" * 61),
+        "is not a usable module name, as it has 61 characters; use",
+    ),
+    "empty name": (("planar2", "--name", ""), "'' is not a usable module name, as it is empty; use up to 60"),
+    "digit": (("planar2", "--name", "7dof"), "as it begins with the digit '7'; use up to 60 letters"),
+    "underscore": (("planar2", "--name", "_arm"), "as it begins or ends with '_'; use up to 60 letters"),
+    "keyword": (
+        ("planar2", "--name", "class"),
+        "'class' is not a usable module name, as it is a word of Python's or a module's name",
+    ),
     "parameters": (
         ("planar2", "--parameters", "some"),
         "'some' is not one of 'numeric', 'symbolic'",
@@ -325,6 +335,49 @@ def test_generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be(
         "warning: negative.toml: six coordinates without any contact forces, singular at a pitch of ±90°: "
         "base (floating: x, y, z, yaw, pitch, roll)",
     ]
+
+
+def test_inspect_shows_a_robot_that_generate_refuses_for_a_body_that_cannot_be(
+    linkwise: Run, tmp_path: Path
+) -> None:
+    (tmp_path / "negative.toml").write_text(arm(mass="-2"))
+    reason = "link 'rod' has negative mass -2 kg; correct it, or pass --allow-unphysical"
+    refused = linkwise("generate", "negative.toml", "--out", "out")
+    assert refused.returncode == 2
+    assert reason in refused.stderr
+    shown = linkwise("inspect", "negative.toml")
+    assert shown.returncode == 0
+    assert f"refused by generate: negative.toml: {reason}\n" in shown.stdout
+    assert "  1  rod  (-2 kg; hinge)" in shown.stdout
+    assert "\nunphysical\n  rod link 'rod' has negative mass -2 kg" in shown.stdout
+    assert json.loads(linkwise("inspect", "negative.toml", "--json").stdout)["refused"].endswith(reason)
+    accepted = linkwise("inspect", "negative.toml", "--allow-unphysical", "--json")
+    assert json.loads(accepted.stdout)["refused"] == ""
+
+
+def test_floating_arm_on_a_base_without_mass_is_refused_with_the_joints_that_it_binds(
+    linkwise: Run, tmp_path: Path
+) -> None:
+    refused = linkwise("generate", "puma560", "--base", "floating", "--out", "out")
+    assert refused.returncode == 2
+    assert refused.stderr == (
+        "linkwise: error: puma560: the joints 'base_yaw', 'base_pitch', 'base_roll', 'joint1' can move "
+        "together without moving any mass; give link 'base' between them mass and inertia, "
+        "hold one with --lock joint1=0, or pass --allow-unphysical\n"
+    )
+    assert not (tmp_path / "out").exists()
+    held = ("--base", "floating", "--lock", "joint1=0", "--backend", "numpy")
+    assert linkwise("generate", "puma560", *held, "--out", "out").returncode == 0
+    assert linkwise("check", "out/puma560").returncode == 0
+
+
+def test_xacro_is_told_to_be_expanded(linkwise: Run, tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf.xacro").write_text("<robot/>")
+    refused = linkwise("generate", "arm.urdf.xacro", "--out", "out")
+    assert refused.returncode == 2
+    assert refused.stderr.endswith(
+        "this is xacro, a language of macros; expand it first: xacro FILE > robot.urdf\n"
+    )
 
 
 def test_inspect_lists_what_each_joint_leaves_out_on_request(linkwise: Run, tmp_path: Path) -> None:

@@ -194,15 +194,15 @@ BAD_TOML = {
     ),
     "long key": (
         "schema = 1\n" + ".".join(["a"] * 40_000) + " = 1",
-        "malformed TOML: a dotted key 39999 deep; no robot's file needs more than 256",
+        "malformed TOML: a dotted key 39999 deep; no robot's file needs more than 16",
     ),
     "long quoted key": (
         "schema = 1\n[" + " . ".join(["'a.b'", '"#c"'] * 200) + "]",
         "malformed TOML: a dotted key 399 deep",
     ),
     "large": (
-        "#" * (8 * 2**20 + 1),
-        "the file is larger than 8 MiB, which no robot's description is; give one",
+        "#" * (2**20 + 1),
+        "the file is larger than 1 MiB, which no robot's description is; give one",
     ),
 }
 

@@ -5,11 +5,9 @@ from pathlib import Path
 
 from linkwise.errors import LinkwiseError
 
-MAX_BYTES = 8 * 2**20
-"""A humanoid of 100 joints takes 0.3 MB."""
-
-MAX_DEPTH = 256
-"""Most elements, brackets or parts of a key inside each other: MJCF nests the links of a chain."""
+MIB = 2**20
+MAX_DEPTH = 16
+"""Most brackets, or parts of a key, inside each other; schema 1 has three."""
 
 STRINGS_AND_COMMENTS = re.compile(
     r'"""(?:\\.|[^\\])*?"""'
@@ -22,13 +20,13 @@ STRINGS_AND_COMMENTS = re.compile(
 NOT_OF_A_KEY = re.compile(r"[^\w.\- \t]+")
 
 
-def content(path: Path) -> bytes:
-    """Bytes of a file; raises LinkwiseError for one that is larger than any robot's."""
+def content(path: Path, most: int) -> bytes:
+    """Bytes of a file; raises LinkwiseError for one of more than `most`."""
     with path.open("rb") as file:
-        data = file.read(MAX_BYTES + 1)
-    if len(data) > MAX_BYTES:
+        data = file.read(most + 1)
+    if len(data) > most:
         raise LinkwiseError(
-            f"the file is larger than {MAX_BYTES // 2**20} MiB, which no robot's description is; "
+            f"the file is larger than {most // MIB} MiB, which no robot's description is; "
             "give one without meshes and data in it"
         )
     return data

@@ -8,7 +8,7 @@ from typing import Any
 from linkwise.errors import LinkwiseError, within
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
-from linkwise.robot.readers.bounded import check_toml_depth, content
+from linkwise.robot.readers.bounded import MIB, check_toml_depth, content
 from linkwise.robot.readers.formula import parse_formula
 from linkwise.robot.robot import Mat3, Scalar, Vec3, unusable
 
@@ -62,7 +62,7 @@ class _Table:
 def read_toml(path: Path) -> Description:
     """Read a robot; raises LinkwiseError naming the table, the key and the remedy."""
     try:
-        text = content(path).decode("utf-8-sig").replace("\r\n", "\n")
+        text = content(path, MIB).decode("utf-8-sig").replace("\r\n", "\n")
         check_toml_depth(text)
         data = tomllib.loads(text)
     except LinkwiseError:

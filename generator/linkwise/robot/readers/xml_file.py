@@ -7,9 +7,12 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot.readers.bounded import MAX_DEPTH, content
+from linkwise.robot.readers.bounded import MIB, content
 
 XACRO = "this is xacro, a language of macros; expand it first: xacro FILE > robot.urdf"
+MAX_DEPTH = 256
+"""Most elements inside each other: MJCF nests the links of a chain."""
+
 MACROS = ("${", "$(")
 
 
@@ -40,7 +43,7 @@ class _Builder(TreeBuilder):
 
 def parse(path: Path) -> Element:
     """Root element; raises LinkwiseError for malformed XML, and for xacro, which is to be expanded first."""
-    data = content(path)
+    data = content(path, 4 * MIB)
     parser = DefusedXMLParser(target=_Builder())
     try:
         parser.feed(data)
