@@ -351,6 +351,7 @@ OPTIONS: dict[str, tuple[dict[str, Any], str]] = {
     "root": ({"root": "hip"}, "--root 'hip' is not a link; the links are a, b, c"),
     "tip before root": ({"root": "c", "tip": "a"}, "--tip 'a' is not below --root 'c'"),
     "root at the end": ({"root": "c"}, "no joint moves"),
+    "far lock": ({"lock": {"ab": 1e300}}, "--lock 'ab' has a number beyond 1e+12 for a value; give rad or m"),
     "lock of all": ({"lock": {"ab": 0.0, "bc": 1.0}}, "no joint moves; free at least one"),
 }
 
