@@ -232,8 +232,18 @@ BAD_ARGUMENTS = {
     "lock at nan": (("planar2", "--lock", "joint1=nan"), "is not of the form JOINT=VALUE"),
     "lock of no joint": (("planar2", "--lock", "elbow=0"), "--lock 'elbow' is not a moving joint"),
     "back end": (("planar2", "--backend", "fortran"), "no back end 'fortran'; choose among numpy"),
-    "name": (("planar2", "--name", "../arm"), "'../arm' is not a usable module name"),
-    "keyword": (("planar2", "--name", "class"), "'class' is not a usable module name"),
+    "name": (("planar2", "--name", "../arm"), "as it has '.' at place 1; use up to 60 letters a-z"),
+    "long name": (
+        ("planar2", "--name", "a" * 61),
+        "is not a usable module name, as it has 61 characters; use",
+    ),
+    "empty name": (("planar2", "--name", ""), "'' is not a usable module name, as it is empty; use up to 60"),
+    "digit": (("planar2", "--name", "7dof"), "as it begins with the digit '7'; use up to 60 letters"),
+    "underscore": (("planar2", "--name", "_arm"), "as it begins or ends with '_'; use up to 60 letters"),
+    "keyword": (
+        ("planar2", "--name", "class"),
+        "'class' is not a usable module name, as it is a word of Python's or a module's name",
+    ),
     "parameters": (
         ("planar2", "--parameters", "some"),
         "'some' is not one of 'numeric', 'nonzero', 'symbolic'",
@@ -286,9 +296,6 @@ def test_energies_take_no_option_of_rigid_bodies(linkwise: Run) -> None:
     assert done.returncode == 2
     named = "not accept --lock, --base, --root, --tip, --allow-unphysical, --free-mimic; change the energies"
     assert named in done.stderr
-    done = linkwise("inspect", DATA / "turntable.py", "--joint-friction")
-    assert done.returncode == 2
-    assert "energies in Python do not accept --joint-friction" in done.stderr
 
 
 HAND = """<mujoco><worldbody><body name="palm"><joint name="a" axis="0 0 1" armature="0.1" damping="0.2"/>
@@ -303,11 +310,15 @@ def test_generate_warns_of_what_the_torques_leave_out(linkwise: Run, tmp_path: P
     done = linkwise("generate", "hand.xml", "--out", "out", "--backend", "c", "--free-mimic")
     assert done.returncode == 0, done.stderr
     assert [line for line in done.stderr.splitlines() if line.startswith("warning")] == [
-        "warning: hand.xml: left out of the torques: "
-        "actuator (1 ×), armature (1 ×), damping (2 ×), spring (1 ×)",
         "warning: hand.xml: moving by themselves, their coupling left out of the torques: "
         "b (coupled to 'c' by an equality)",
+        "warning: hand.xml: damping left out of the torques: a (0.2 N·m·s/rad), c (0.3 N·m·s/rad)",
+        "warning: hand.xml: armature left out of the torques: a (0.1 kg·m²)",
+        "warning: hand.xml: spring left out of the torques: b (3 N·m/rad)",
     ]
+    asked = linkwise("generate", "hand.xml", "--out", "out", "--backend", "c", "--free-mimic", "--details")
+    assert "damping left out of the torques: a (0.2 N·m·s/rad)\n" in asked.stderr
+    assert "damping left out of the torques: c (0.3 N·m·s/rad)\n" in asked.stderr
 
 
 def test_generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be(
@@ -319,20 +330,64 @@ def test_generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be(
     assert done.returncode == 0, done.stderr
     assert [line for line in done.stderr.splitlines() if line.startswith("warning")] == [
         "warning: negative.toml: accepted though physically impossible: "
-        "rod (link 'rod' has negative mass -2 kg)",
+        "rod (link 'rod' has negative mass -2 kg), "
+        "'base_yaw', 'base_pitch', 'base_roll', 'hinge' (can move together without moving any mass)",
         "warning: negative.toml: six coordinates without any contact forces, singular at a pitch of ±90°: "
         "base (floating: x, y, z, yaw, pitch, roll)",
     ]
 
 
-def test_inspect_lists_joint_friction_on_request(linkwise: Run, tmp_path: Path) -> None:
+def test_inspect_shows_a_robot_that_generate_refuses_for_a_body_that_cannot_be(
+    linkwise: Run, tmp_path: Path
+) -> None:
+    (tmp_path / "negative.toml").write_text(arm(mass="-2"))
+    reason = "link 'rod' has negative mass -2 kg; correct it, or pass --allow-unphysical"
+    refused = linkwise("generate", "negative.toml", "--out", "out")
+    assert refused.returncode == 2
+    assert reason in refused.stderr
+    shown = linkwise("inspect", "negative.toml")
+    assert shown.returncode == 0
+    assert f"refused by generate: negative.toml: {reason}\n" in shown.stdout
+    assert "  1  rod  (-2 kg; hinge)" in shown.stdout
+    assert "\nunphysical\n  rod link 'rod' has negative mass -2 kg" in shown.stdout
+    assert json.loads(linkwise("inspect", "negative.toml", "--json").stdout)["refused"].endswith(reason)
+    accepted = linkwise("inspect", "negative.toml", "--allow-unphysical", "--json")
+    assert json.loads(accepted.stdout)["refused"] == ""
+
+
+def test_floating_arm_on_a_base_without_mass_is_refused_with_the_joints_that_it_binds(
+    linkwise: Run, tmp_path: Path
+) -> None:
+    refused = linkwise("generate", "puma560", "--base", "floating", "--out", "out")
+    assert refused.returncode == 2
+    assert refused.stderr == (
+        "linkwise: error: puma560: the joints 'base_yaw', 'base_pitch', 'base_roll', 'joint1' can move "
+        "together without moving any mass; give link 'base' between them mass and inertia, "
+        "hold one with --lock joint1=0, or pass --allow-unphysical\n"
+    )
+    assert not (tmp_path / "out").exists()
+    held = ("--base", "floating", "--lock", "joint1=0", "--backend", "numpy")
+    assert linkwise("generate", "puma560", *held, "--out", "out").returncode == 0
+    assert linkwise("check", "out/puma560").returncode == 0
+
+
+def test_xacro_is_told_to_be_expanded(linkwise: Run, tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf.xacro").write_text("<robot/>")
+    refused = linkwise("generate", "arm.urdf.xacro", "--out", "out")
+    assert refused.returncode == 2
+    assert refused.stderr.endswith(
+        "this is xacro, a language of macros; expand it first: xacro FILE > robot.urdf\n"
+    )
+
+
+def test_inspect_lists_what_each_joint_leaves_out_on_request(linkwise: Run, tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     (tmp_path / "hand.xml").write_text(HAND)
     told = linkwise("inspect", "hand.xml", "--free-mimic").stdout
     assert "  damping 2 ×; left out of the torques\n" in told
     assert "N·m·s/rad" not in told
-    asked = linkwise("inspect", "hand.xml", "--free-mimic", "--joint-friction").stdout
-    assert "  c 0.3 N·m·s/rad" in asked
+    asked = linkwise("inspect", "hand.xml", "--free-mimic", "--details").stdout
+    assert "  c 0.3 N·m·s/rad; damping left out of the torques\n" in asked
 
 
 @pytest.mark.parametrize("report", ["terms", "reduction"])

@@ -8,6 +8,8 @@ from linkwise import LinkwiseError, Options, read_system
 from linkwise.robot import effects, read_robot
 from urdf_text import chain, joint, link, mimic, robot
 
+HUGE = "1" * 400
+POINT = '<inertial><mass value="2"/><origin xyz="0 0 0.5"/></inertial>'
 AB = joint("ab", "a", "b")
 BC = joint("bc", "b", "c")
 BAD = {
@@ -27,6 +29,44 @@ BAD = {
     "infinite turn": (chain(joint("ab", "a", "b", rpy="0 inf 0")), "'ab' has NaN or infinity in its origin"),
     "nan mass": (robot(link("a"), link("b", "nan"), AB), "link 'b' has NaN or infinity in its mass"),
     "negative": (robot(link("a"), link("b", "-1"), AB), "link 'b' has negative mass -1 kg"),
+    "long digits": (robot(link("a"), link("b", HUGE), AB), "link 'b' has NaN or infinity in its mass"),
+    "longer digits": (
+        chain(joint("ab", "a", "b", xyz=f"0 {'1' * 5000} 0")),
+        "'ab' has NaN or infinity in its",
+    ),
+    "far origin": (
+        chain(joint("ab", "a", "b", xyz="0 0 1e13")),
+        "'ab' has a number beyond 1e+12 in its orig",
+    ),
+    "long axis": (
+        chain(joint("ab", "a", "b", axis="0 0 1e308")),
+        "'ab' has a number beyond 1e+12 in its axis",
+    ),
+    "huge mimic": (
+        chain(AB, joint("bc", "b", "c", inner=mimic("ab", 1e200))),
+        "joint 'bc' has a number beyond 1e+12 in its mimic; give numbers",
+    ),
+    "deep": (
+        "<robot>" + "<a>" * 300,
+        "malformed XML: elements more than 256 deep, which no robot's file needs",
+    ),
+    "macro": (
+        robot('<xacro:macro xmlns:xacro="http://wiki.ros.org/xacro" name="m"/>', link("a")),
+        "this is xacro, a language of macros; expand it first: xacro FILE > robot.urdf",
+    ),
+    "macro unbound": (
+        robot('<xacro:include filename="a"/>', link("a")),
+        "this is xacro, a language of macro",
+    ),
+    "value of a macro": (
+        chain(joint("ab", "a", "b", xyz="0 0 ${length}")),
+        "this is xacro, a language of ma",
+    ),
+    "several that cannot be": (
+        robot(link("a"), link("b", "-1"), link("c", "-2"), AB, BC),
+        "2 links cannot exist; correct them, or pass --allow-unphysical: 'b' has negative mass -1 kg, "
+        "'c' has negative mass -2 kg",
+    ),
     "two numbers": (
         chain(joint("ab", "a", "b", xyz="1 2")),
         "joint 'ab': <origin xyz='1 2'> needs 3 numbers",
@@ -83,13 +123,24 @@ BAD = {
         chain(AB, joint("bc", "b", "c", inner=mimic("ab", float("nan")))),
         "joint 'bc' has NaN or infinity in its mimic",
     ),
+    "point on the axis": (
+        robot(link("a"), f'<link name="b">{POINT}</link>', joint("ab", "a", "b", axis="0 0 1")),
+        "joint 'ab' moves no inertia at all; give a link beyond it inertia, hold it with --lock ab=0, or",
+    ),
+    "coaxial": (
+        robot(
+            *(link("a"), '<link name="b"/>', link("c"), joint("ab", "a", "b", axis="0 0 1")),
+            joint("bc", "b", "c", xyz="0 0 0.3", rpy="0 0 1", axis="0 0 -1"),
+        ),
+        "the joints 'ab', 'bc' can move together without moving any mass; give link 'b' between them mass "
+        "and inertia, hold one with --lock bc=0, or pass --allow-unphysical",
+    ),
     "massless tip": (
         robot(link("a"), link("b"), '<link name="c"/>', AB, BC),
         "joint 'bc' moves no mass at all; give a link beyond it mass, hold it with --lock bc=0, or pass",
     ),
 }
 
-HUGE = "1" * 400
 ROD = (
     '[[link]]\nname = "rod"\nmass = {mass}\n{more}[[joint]]\nname = "hinge"\nparent = "base"\nchild = "rod"\n'
 )
@@ -103,7 +154,16 @@ PARAMETER = "schema = 1\nparameters = {{ l1 = {} }}"
 BAD_TOML = {
     "nan gravity": (toml(head="schema = 1\ngravity = [0, nan, 0]"), "gravity has NaN or infinity in it"),
     "infinite gravity": (toml(head="schema = 1\ngravity = [0, 0, -inf]"), "gravity has NaN or infinity"),
-    "nan parameter": (toml(head=PARAMETER.format("nan")), "parameter 'l1' is NaN or infinite; give a number"),
+    "huge gravity": (
+        toml(head="schema = 1\ngravity = [1e308, 0, 0]"),
+        "gravity has a number beyond 1e+12 in it; give three numbers, in m/s²",
+    ),
+    "mass beyond": (toml("-2e12"), "link 'rod' has a number beyond 1e+12 in its mass, com or inertia; give"),
+    "nan parameter": (toml(head=PARAMETER.format("nan")), "parameter 'l1' has NaN or infinity for a value;"),
+    "big parameter": (
+        toml(head=PARAMETER.format("1e13")),
+        "'l1' has a number beyond 1e+12 for a value; give",
+    ),
     "huge mass": (toml(HUGE), "link 'rod': 'mass' is too large a number"),
     "huge parameter": (toml(head=PARAMETER.format(HUGE)), "parameter 'l1' is too large a number"),
     "endless number": (toml("1" * 5000), "malformed TOML: Exceeds the limit"),
@@ -119,12 +179,31 @@ BAD_TOML = {
         toml('"1/(l1-0.3) - 1/(l1-0.3)*2"', head=PARAMETER.format(0.3)),
         "has no value: division by zero",
     ),
-    "huge power": (toml('"l1**8"', head=PARAMETER.format(1e300)), "has no value: the result is too large"),
+    "huge power": (
+        toml('"(l1**8)**4"', head=PARAMETER.format(1e10)),
+        "has no value: the result is too large",
+    ),
     "schema true": (toml(head="schema = true"), "the schema is True; write schema = 1 at the top"),
     "schema 1.0": (toml(head="schema = 1.0"), "the schema is 1.0; write schema = 1 at the top"),
     "number for link": ("schema = 1\nlink = [3]", "entry 1 of link must be a table"),
     "number for joint": ("schema = 1\njoint = [{}, 3]", "entry 2 of joint must be a table"),
-    "deep": ("schema = 1\nlink = " + "[" * 5000, "malformed TOML: "),
+    "deep": ("schema = 1\nlink = " + "[" * 5000, "malformed TOML: brackets 5000 deep; no robot's file needs"),
+    "deep tables": (
+        "schema = 1\nlink = " + "{a=" * 300,
+        "malformed TOML: brackets 300 deep; no robot's file",
+    ),
+    "long key": (
+        "schema = 1\n" + ".".join(["a"] * 40_000) + " = 1",
+        "malformed TOML: a dotted key 39999 deep; no robot's file needs more than 16",
+    ),
+    "long quoted key": (
+        "schema = 1\n[" + " . ".join(["'a.b'", '"#c"'] * 200) + "]",
+        "malformed TOML: a dotted key 399 deep",
+    ),
+    "large": (
+        "#" * (2**20 + 1),
+        "the file is larger than 1 MiB, which no robot's description is; give one",
+    ),
 }
 
 
@@ -141,7 +220,7 @@ def test_defect_of_a_toml_file_is_named(case: str, parameters: Any, tmp_path: Pa
 
 
 def test_toml_may_start_with_a_byte_order_mark(tmp_path: Path) -> None:
-    (tmp_path / "good.toml").write_text(toml(), encoding="utf-8-sig")
+    (tmp_path / "good.toml").write_text(toml(more="com = [0.1, 0, 0]\n"), encoding="utf-8-sig")
     assert [c.name for c in read_system(tmp_path / "good.toml").coordinates] == ["hinge"]
 
 
@@ -242,9 +321,9 @@ def test_coupled_joints_of_mjcf_are_refused_unless_freed(tmp_path: Path) -> None
     assert len(read_robot(path, Options(lock={"c": 0.0})).coordinates) == 2
     notes = notes_of(path, Options(free_mimic=True))
     assert ("freed", "c", "coupled to 'b' by an equality") in notes
-    assert ("ignored", "armature", "1 ×") in notes
+    assert ("left out", "a", "0.1 kg·m²") in notes
     touched = effects(read_robot(path, Options(free_mimic=True)).notes)
-    assert "left out of the torques: armature (1 ×)" in touched
+    assert "armature left out of the torques: a (0.1 kg·m²)" in touched
     assert any("coupling left out of the torques: c (coupled to 'b' by an equality)" in t for t in touched)
     assert not [note for note in notes if note[0] == "massless" or note[1] == "geom"]
 
@@ -275,6 +354,7 @@ OPTIONS: dict[str, tuple[dict[str, Any], str]] = {
     "root": ({"root": "hip"}, "--root 'hip' is not a link; the links are a, b, c"),
     "tip before root": ({"root": "c", "tip": "a"}, "--tip 'a' is not below --root 'c'"),
     "root at the end": ({"root": "c"}, "no joint moves"),
+    "far lock": ({"lock": {"ab": 1e300}}, "--lock 'ab' has a number beyond 1e+12 for a value; give rad or m"),
     "lock of all": ({"lock": {"ab": 0.0, "bc": 1.0}}, "no joint moves; free at least one"),
 }
 

@@ -8,6 +8,7 @@ import pytest
 from answers import random_states, relative_error
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
+from linkwise.robot import effects
 from urdf_text import chain, joint, link, mimic, robot
 
 pytest.importorskip("pinocchio")
@@ -168,7 +169,6 @@ def test_notes_say_what_was_done(tmp_path: Path) -> None:
     found = {(note.kind, note.subject, note.detail) for note in notes}
     assert found == {
         ("snapped", "ab", "rotation entries within 1e-12 of -1, 0, 1"),
-        ("ignored", "damping", "1 ×"),
         ("ignored", "limit", "3 ×"),
         ("ignored", "transmission", "2 ×"),
         ("ignored", "visual", "1 ×"),
@@ -176,7 +176,7 @@ def test_notes_say_what_was_done(tmp_path: Path) -> None:
         ("merged", "a", "into the ground, with its 1.5 kg"),
         ("merged", "c", "into b"),
         ("merged", "d", "into b"),
-        ("damping", "ab", "0.5 N·m·s/rad"),
+        ("left out", "ab", "0.5 N·m·s/rad"),
     }
 
 
@@ -187,3 +187,25 @@ def test_turns_of_ninety_degrees_leave_nothing_behind(tmp_path: Path) -> None:
     (tmp_path / "robot.urdf").write_text(chain(right))
     rotation = read_system(tmp_path / "robot.urdf").robot.links[0].joint.rotation
     assert {entry for row in rotation for entry in row} <= {-1.0, 0.0, 1.0}
+
+
+def test_extensions_of_simulators_that_load_joints_are_told(tmp_path: Path) -> None:
+    (tmp_path / "robot.urdf").write_text(
+        robot(
+            *map(link, "abc"),
+            joint("ab", "a", "b"),
+            joint("bc", "b", "c", inner='<rotor_inertia value="0.01"/>'),
+            '<gazebo reference="b"><turnGravityOff>true</turnGravityOff></gazebo>',
+            '<gazebo reference="ab"><springStiffness>3</springStiffness><dampingFactor>0</dampingFactor>',
+            '</gazebo><transmission><joint name="bc"/><actuator><motorInertia>0.2</motorInertia></actuator>',
+            "</transmission>",
+        )
+    )
+    told = {
+        "Gazebo's switch for gravity left out of the torques: b",
+        "spring left out of the torques: ab (3)",
+        "armature left out of the torques: bc (0.01), bc (0.2)",
+    }
+    assert set(effects(read_system(tmp_path / "robot.urdf").robot.notes)) == told
+    held = effects(read_system(tmp_path / "robot.urdf", Options(lock={"bc": 0.0})).robot.notes)
+    assert set(held) == told - {"armature left out of the torques: bc (0.01), bc (0.2)"}

@@ -101,11 +101,9 @@ def test_what_is_not_used_is_named(tmp_path: Path) -> None:
     path = write(tmp_path, loss=0.3, actuator='<actuator><motor joint="swing"/></actuator>')
     notes = read_system(path).robot.notes
     ignored = {note.subject: note.detail for note in notes if note.kind == "ignored"}
-    assert ignored == {"actuator": "1 ×", "damping": "1 ×", "friction": "1 ×"}
-    losses = [
-        (note.kind, note.subject, note.detail) for note in notes if note.kind in ("damping", "friction")
-    ]
-    assert losses == [("damping", "lift", "0.3 N·s/m"), ("friction", "body4_joint", "0.3 N·m")]
+    assert ignored == {"actuator": "1 ×"}
+    losses = [(note.effect, note.subject, note.detail) for note in notes if note.kind == "left out"]
+    assert losses == [("damping left out of the torques", "lift", "0.3 N·s/m")]
     assert ("snapped", "lift") in {(note.kind, note.subject) for note in notes}
 
 

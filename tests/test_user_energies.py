@@ -137,7 +137,7 @@ FILES = {
     "word": (GOOD + "parameters = {sp.Symbol('m'): 'heavy'}", "parameter m has no value as a real number"),
     "complex": (GOOD + "parameters = {sp.Symbol('m'): sp.I}", "parameter m has no value as a real number"),
     "huge": (GOOD + "parameters = {sp.Symbol('m'): 10**400}", "parameter m has no value as a real number"),
-    "infinite": (GOOD + "parameters = {sp.Symbol('m'): sp.oo}", "parameter m is NaN or infinite"),
+    "infinite": (GOOD + "parameters = {sp.Symbol('m'): sp.oo}", "parameter m has NaN or infinity"),
 }
 
 

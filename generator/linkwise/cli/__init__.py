@@ -12,6 +12,9 @@ BUDGET = 2_000_000
 """Terms of one expansion; a polynomial of this size takes about 0.5 GB."""
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
+Details = Annotated[
+    bool, typer.Option("--details", help="Name every joint and link that a remark is about, one by one")
+]
 Budget = Annotated[int, typer.Option(min=1, help="Terms that one expansion may hold")]
 ReportOut = Annotated[Path | None, typer.Option(help="Directory that gets the report's files")]
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from linkwise import pipeline
-from linkwise.cli import counted
+from linkwise.cli import Details, counted
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import checked_identifier
 from linkwise.emit.backend import BACKENDS
@@ -28,6 +28,7 @@ def generate(
     backend: Annotated[
         list[str] | None, typer.Option(help=f"{', '.join(BACKENDS)}; may be repeated; all if not given")
     ] = None,
+    details: Details = False,
 ) -> None:
     """Write the package of a robot."""
     backends = backend or list(BACKENDS)
@@ -39,7 +40,7 @@ def generate(
     with progress() as report:
         files = pipeline.generate(system, backends, name, request, report)
     write_package(files, directory)
-    for effect in effects(system.notes):
+    for effect in effects(system.notes, details):
         typer.echo(f"warning: {robot}: {effect}", err=True)
     typer.echo(
         f"wrote {directory}: {counted(len(system.coordinates), 'joint')}, "

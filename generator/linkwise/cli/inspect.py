@@ -1,23 +1,19 @@
 """The command `inspect`: what a robot is made of, as data and as text."""
 
 import json
-from collections.abc import Collection
-from dataclasses import asdict
-from typing import Annotated, Any
+from dataclasses import asdict, replace
+from typing import Any
 
 import typer
 
 from linkwise import pipeline
-from linkwise.cli import Json, counted
+from linkwise.cli import Details, Json, counted
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import rigid_tree
 from linkwise.errors import LinkwiseError
-from linkwise.robot import Options
+from linkwise.robot import Options, left_out
 from linkwise.robot.robot import Parameter
 from linkwise.symbolic.system import EnergySystem, System
-
-LOSSES = ("damping", "friction")
-"""Kinds of notes that are shown on request."""
 
 app = typer.Typer(add_completion=False)
 
@@ -27,25 +23,33 @@ app = typer.Typer(add_completion=False)
 def inspect(
     robot: RobotName,
     options: Options,
-    joint_friction: Annotated[
-        bool,
-        typer.Option(
-            "--joint-friction", help="Also list the joints' damping and friction, which no torque holds"
-        ),
-    ] = False,
+    details: Details = False,
     as_json: Json = False,
 ) -> None:
-    """Show a robot's joints, links and parameters, and what was merged, locked or ignored."""
-    system = pipeline.read_system(robot, options)
-    if joint_friction and isinstance(system, EnergySystem):
-        raise LinkwiseError(f"{robot}: energies in Python do not accept --joint-friction; leave it out")
-    data = inspection(system, () if joint_friction else LOSSES)
+    """Show a robot's joints, links and parameters, and what was merged, locked, ignored or left out."""
+    system, refused = _system(robot, options)
+    data = inspection(system, details) | {"refused": refused}
     typer.echo(json.dumps(data, indent=1) if as_json else table(data))
 
 
-def inspection(system: System, hidden: Collection[str] = LOSSES) -> dict[str, Any]:
-    """Joints, links, parameters and the notes of the kinds that are not hidden, ready for JSON."""
+def _system(robot: str, options: Options) -> tuple[System, str]:
+    """System, and why `generate` refuses it where that is for what cannot exist; else an empty text."""
+    try:
+        return pipeline.read_system(robot, options), ""
+    except LinkwiseError as error:
+        refused = str(error)
+        try:
+            return pipeline.read_system(robot, replace(options, allow_unphysical=True)), refused
+        except LinkwiseError:
+            raise error from None
+
+
+def inspection(system: System, details: bool = False) -> dict[str, Any]:
+    """Joints, links, parameters and notes, ready for JSON; with `details` on each joint what was left out."""
     tree = rigid_tree(system)
+    notes = system.notes
+    if not details:
+        notes = (*(note for note in notes if note.kind != "left out"), *left_out(notes))
     mass = {body.link: body.mass for body in tree.bodies} if tree else {}
     return {
         "name": system.name,
@@ -59,7 +63,7 @@ def inspection(system: System, hidden: Collection[str] = LOSSES) -> dict[str, An
             for j, name in enumerate(system.link_names)
         ],
         "parameters": [asdict(parameter) for parameter in parameters(system)],
-        "notes": [asdict(note) for note in system.notes if note.kind not in hidden],
+        "notes": [asdict(note) for note in notes],
     }
 
 
@@ -75,6 +79,8 @@ def table(data: dict[str, Any]) -> str:
     lines = [
         f"{data['name']}: {counted(len(data['joints']), 'joint')}, {counted(len(data['links']), 'link')}"
     ]
+    if data["refused"]:
+        lines += ["", f"refused by generate: {data['refused']}"]
     lines += ["", "joints"]
     lines += [f"  {k}  {c['name']} [{c['unit']}]" for k, c in enumerate(data["joints"], 1)]
     lines += ["", "links (mass; moved by)"]

@@ -68,9 +68,25 @@ def checked_identifier(name: str | None, robot: str) -> str:
     package = name if name is not None else identifier(robot)
     if package != identifier(package):
         raise LinkwiseError(
-            f"--name {package[:80]!r} is not a usable module name; use up to 60 letters a-z, digits and _"
+            f"--name {package[:80]!r} is not a usable module name, as it {_fault_of_name(package)}; "
+            f"use up to {LONGEST_NAME} letters a-z, digits and _"
         )
     return package
+
+
+def _fault_of_name(name: str) -> str:
+    """Return why a name is not one of a module: which character, or what else."""
+    if wrong := re.search(r"[^0-9a-z_]", name):
+        return f"has {wrong[0]!r} at place {wrong.start() + 1}"
+    if not name:
+        return "is empty"
+    if len(name) > LONGEST_NAME:
+        return f"has {len(name)} characters"
+    if name[0].isdigit():
+        return f"begins with the digit {name[0]!r}"
+    if name != name.strip("_"):
+        return "begins or ends with '_'"
+    return "is a word of Python's or a module's name"
 
 
 def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iterator[tuple[str, str]]:

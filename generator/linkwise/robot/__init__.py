@@ -1,7 +1,7 @@
 """Robots: what a description says, and the readers for it."""
 
 from linkwise.robot.build import Options
-from linkwise.robot.notes import Note, effects
+from linkwise.robot.notes import Note, effects, left_out
 from linkwise.robot.read import BUILT_IN, DESCRIPTIONS, read_robot
 from linkwise.robot.robot import Coordinate, Joint, Link, Robot
 
@@ -15,5 +15,6 @@ __all__ = [
     "Options",
     "Robot",
     "effects",
+    "left_out",
     "read_robot",
 ]

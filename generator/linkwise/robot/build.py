@@ -4,15 +4,16 @@ from dataclasses import dataclass, field, fields
 from typing import Literal
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot.coordinates import check_couplings, movement
+from linkwise.robot.coordinates import AxisRule, check_couplings, movement
 from linkwise.robot.description import Connection, Description
-from linkwise.robot.joint_types import expand, expansion_notes
-from linkwise.robot.links import check_masses, moving_links
+from linkwise.robot.joint_types import Axis, expand, expansion_notes
+from linkwise.robot.links import moving_links
 from linkwise.robot.mass import check_bodies
+from linkwise.robot.mass_matrix import check_mass_matrix
 from linkwise.robot.naming import Named, Naming
 from linkwise.robot.notes import Note
 from linkwise.robot.parameters import numeric
-from linkwise.robot.robot import Link, Robot, is_finite
+from linkwise.robot.robot import Link, Robot, unusable
 from linkwise.robot.tree import check_loops, cut, depth_first
 
 
@@ -40,8 +41,8 @@ def build(description: Description, options: Options) -> Robot:
     description = cut(description, options.root, options.tip)
     plain = numeric(description)
     unphysical = check_bodies(plain.bodies, options.allow_unphysical)
-    if not all(is_finite(entry) for entry in plain.gravity):
-        raise LinkwiseError("gravity has NaN or infinity in it; give three numbers")
+    if fault := unusable(*plain.gravity):
+        raise LinkwiseError(f"gravity has {fault} in it; give three numbers, in m/s²")
     naming = _naming(description, options)
     if naming is None:
         description = plain
@@ -52,6 +53,9 @@ def build(description: Description, options: Options) -> Robot:
     moving = movement(axes, connections, options.lock, options.free_mimic)
     assembly = moving_links(description.bodies, joints, moving.motion, naming)
     check_loops(description.loops, assembly.carrier)
+    numbers = assembly.links if naming is None else _links(plain, options, moving.motion)
+    named = {body.name for body in plain.bodies if not body.invented}
+    singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical)
     notes = (
         *description.notes,
         *unphysical,
@@ -60,9 +64,10 @@ def build(description: Description, options: Options) -> Robot:
         *uncoupled,
         *moving.notes,
         *assembly.notes,
-        *check_masses(assembly.links, moving.coordinates, options.allow_unphysical),
+        *singular,
         *_massless(description, assembly.links),
         *_as_read(connections),
+        *_left_out(description, joints, moving.motion, assembly.carrier),
     )
     return Robot(
         description.name,
@@ -95,6 +100,12 @@ def _connections(description: Description, base: str) -> tuple[str, tuple[Connec
     return root, connections
 
 
+def _links(description: Description, options: Options, motion: dict[str, AxisRule]) -> tuple[Link, ...]:
+    """Return the moving links of a description, with the numbers or the parameters that it has."""
+    joints = [(connection, expand(connection)) for connection in _connections(description, options.base)[1]]
+    return moving_links(description.bodies, joints, motion).links
+
+
 def _on_the_ground(description: Description, root: str) -> list[Note]:
     return [
         Note("merged", body.name, f"into the ground, with its {body.mass:g} kg")
@@ -110,14 +121,19 @@ def _massless(description: Description, links: tuple[Link, ...]) -> list[Note]:
 
 
 def _as_read(connections: tuple[Connection, ...]) -> list[Note]:
-    """Rotations that reading rounded; damping and friction as the file has them, which no torque holds."""
-    notes = [
+    """Rotations that reading rounded."""
+    return [
         Note("snapped", c.name, "rotation entries within 1e-12 of -1, 0, 1") for c in connections if c.snapped
     ]
-    for c in connections:
-        angle = c.type != "prismatic"
-        if c.damping:
-            notes.append(Note("damping", c.name, f"{c.damping!r} {'N·m·s/rad' if angle else 'N·s/m'}"))
-        if c.friction:
-            notes.append(Note("friction", c.name, f"{c.friction!r} {'N·m' if angle else 'N'}"))
-    return notes
+
+
+def _left_out(
+    description: Description,
+    joints: list[tuple[Connection, tuple[Axis, ...]]],
+    motion: dict[str, AxisRule],
+    carrier: dict[str, int | None],
+) -> list[Note]:
+    """What no torque holds of joints and bodies that move."""
+    moving = {c.name for c, axes in joints if any(motion[axis.name].coordinate is not None for axis in axes)}
+    carried = {body for body, link in carrier.items() if link is not None}
+    return [omission.note() for omission in description.omissions if omission.acts(moving, carried)]

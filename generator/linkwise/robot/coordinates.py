@@ -7,7 +7,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot.description import Connection, Coupling, Mimic
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.notes import UNCOUPLED, Note
-from linkwise.robot.robot import Coordinate
+from linkwise.robot.robot import Coordinate, unusable
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,8 @@ def _check_axes(axes: tuple[Axis, ...], lock: dict[str, float]) -> None:
     for name in lock:
         if name not in counts:
             raise LinkwiseError(f"--lock {name!r} is not a moving joint; the joints are {', '.join(counts)}")
+        if fault := unusable(lock[name]):
+            raise LinkwiseError(f"--lock {name!r} has {fault} for a value; give rad or m")
 
 
 def _mimics(

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from linkwise.robot.notes import Note
+from linkwise.robot.notes import Note, Omission
 from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3
 
 ZERO3: Vec3 = (0.0, 0.0, 0.0)
@@ -63,8 +63,7 @@ class Loop:
 class Connection:
     """A joint as the file has it: any type, any axis; its place in the parent's frame, its axis in its own.
 
-    Damping (N·m·s/rad or N·s/m) and friction (N·m or N) are reported only. `snapped` says that entries of the
-    rotation were rounded to −1, 0 or 1.
+    `snapped` says that entries of the rotation were rounded to −1, 0 or 1.
     """
 
     name: str
@@ -75,8 +74,6 @@ class Connection:
     translation: Vec3 = ZERO3
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     mimic: Mimic | None = None
-    damping: float = 0.0
-    friction: float = 0.0
     snapped: bool = False
 
 
@@ -96,3 +93,4 @@ class Description:
     couplings: tuple[Coupling, ...] = ()
     loops: tuple[Loop, ...] = ()
     only_named: bool = False
+    omissions: tuple[Omission, ...] = ()

@@ -9,7 +9,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
 from linkwise.robot.description import Connection
 from linkwise.robot.notes import FLOATS, TURNS, Note
-from linkwise.robot.robot import is_finite
+from linkwise.robot.robot import unusable
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 Vector = tuple[float, float, float]
@@ -91,8 +91,8 @@ def _parts(connection: Connection) -> tuple[Part, ...]:
 
 def _unit(connection: Connection) -> Vector:
     x, y, z = connection.axis
-    if not all(is_finite(a) for a in connection.axis):
-        raise LinkwiseError(f"joint {connection.name!r} has NaN or infinity in its axis; give numbers")
+    if fault := unusable(x, y, z):
+        raise LinkwiseError(f"joint {connection.name!r} has {fault} in its axis; give numbers")
     length = math.hypot(x, y, z)
     if length < 1e-9:
         raise LinkwiseError(f"joint {connection.name!r} has a zero axis; give its direction, such as 0 0 1")

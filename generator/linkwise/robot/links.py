@@ -2,15 +2,14 @@
 
 from dataclasses import dataclass, field, replace
 
-from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
 from linkwise.robot.coordinates import AxisRule
 from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.mass import Placed, merge
 from linkwise.robot.naming import Naming
-from linkwise.robot.notes import IMPOSSIBLE, Note
-from linkwise.robot.robot import Coordinate, Joint, Link, Rotation, Vec3
+from linkwise.robot.notes import Note
+from linkwise.robot.robot import Joint, Link, Rotation, Vec3
 
 
 @dataclass(frozen=True)
@@ -96,24 +95,6 @@ def moving_links(
     links = tuple(link.link(naming) for link in moving)
     carrier = {body.name: places[body.name].link if body.name in places else None for body in bodies}
     return Assembly(links, carrier, tuple(notes))
-
-
-def check_masses(links: tuple[Link, ...], moving: tuple[Coordinate, ...], allow: bool) -> list[Note]:
-    """Return a note for each coordinate whose joints carry no mass at all; refuse it unless `allow`."""
-    carrying = {index for index, link in enumerate(links) if not link.massless}
-    for index in sorted(carrying, reverse=True):
-        at = links[index].parent
-        while at is not None and at not in carrying:
-            carrying.add(at)
-            at = links[at].parent
-    moved = {links[index].joint.coordinate for index in carrying}
-    idle = [coordinate.name for k, coordinate in enumerate(moving) if k not in moved]
-    if idle and not allow:
-        raise LinkwiseError(
-            f"joint {idle[0]!r} moves no mass at all; give a link beyond it mass, hold it with "
-            f"--lock {idle[0]}=0, or pass --allow-unphysical"
-        )
-    return [Note("unphysical", name, "moves no mass; its torque is zero", IMPOSSIBLE) for name in idle]
 
 
 def _pass(

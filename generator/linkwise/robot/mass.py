@@ -1,13 +1,14 @@
 """Mass properties: merging rigidly connected bodies, and whether a body can exist."""
 
 from collections.abc import Iterable
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.description import ZERO3, ZERO33, Body
 from linkwise.robot.notes import IMPOSSIBLE, Note
-from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3, is_finite
+from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3, unusable
 from linkwise.robot.transforms import add, rotate, rotate_inertia
 
 TRIANGLE = 1e-6
@@ -17,6 +18,7 @@ SPECK = 1e-14
 """m²: moments below mass · (100 nm)² count as zero. The moments of a point mass are zeros that turning
 and rounding leave at 1e-18 or 1e-35, where no relative slack helps; a solid body so small weighs 1e-15 kg."""
 
+Array: TypeAlias = np.ndarray[Any, Any]
 Placed = tuple[Body, Rotation, Vec3]
 
 
@@ -56,35 +58,42 @@ def _empty(body: Body) -> bool:
 def check_bodies(bodies: Iterable[Body], allow: bool) -> list[Note]:
     """Return a note for each body that cannot exist, of bodies with numbers for values.
 
-    Raises LinkwiseError for one unless `allow` or the file itself allows it, and for NaN or infinity always.
+    Raises LinkwiseError for all of them unless `allow` or the file itself allows it, and for what is not a
+    usable number always.
     """
-    notes = []
-    for body in bodies:
-        fault = _fault(body)
-        if fault and not (allow or body.unphysical):
-            raise LinkwiseError(f"{fault}; correct it, or pass --allow-unphysical")
-        if fault:
-            notes.append(Note("unphysical", body.name, body.unphysical or fault, IMPOSSIBLE))
-    return notes
+    faults = [(body, fault) for body in bodies if (fault := _fault(body))]
+    refused = [] if allow else [(body.name, fault) for body, fault in faults if not body.unphysical]
+    if len(refused) == 1:
+        name, fault = refused[0]
+        raise LinkwiseError(f"link {name!r} has {fault}; correct it, or pass --allow-unphysical")
+    if refused:
+        listed = ", ".join(f"{name!r} has {fault}" for name, fault in refused)
+        raise LinkwiseError(
+            f"{len(refused)} links cannot exist; correct them, or pass --allow-unphysical: {listed}"
+        )
+    return [
+        Note("unphysical", body.name, body.unphysical or f"link {body.name!r} has {fault}", IMPOSSIBLE)
+        for body, fault in faults
+    ]
+
+
+def principal(mass: float, inertia: Array) -> tuple[Array, Array]:
+    """Return the principal moments, rounding's left-overs set to zero, in ascending order, and their axes."""
+    moments, axes = np.linalg.eigh(inertia)
+    noise = max(SPECK * mass, np.finfo(float).eps * float(np.abs(moments).max()))
+    return np.where(np.abs(moments) <= noise, 0.0, moments), axes
 
 
 def _fault(body: Body) -> str:
     """Return what is unphysical about a body, or an empty string."""
     values = (body.mass, *body.com, *(entry for row in body.inertia for entry in row))
-    if not all(is_finite(value) for value in values):
-        raise LinkwiseError(
-            f"link {body.name!r} has NaN or infinity in its mass, com or inertia; give numbers"
-        )
+    if fault := unusable(*values):
+        raise LinkwiseError(f"link {body.name!r} has {fault} in its mass, com or inertia; give numbers")
     if float(body.mass) < 0:
-        return f"link {body.name!r} has negative mass {float(body.mass):g} kg"
-    moments = np.linalg.eigvalsh(np.array(body.inertia, dtype=float))
-    noise = max(SPECK * float(body.mass), np.finfo(float).eps * float(np.abs(moments).max()))
-    low, middle, high = (0.0 if abs(moment) <= noise else float(moment) for moment in moments)
+        return f"negative mass {float(body.mass):g} kg"
+    low, middle, high = map(float, principal(float(body.mass), np.array(body.inertia, dtype=float))[0])
     if low < -TRIANGLE * high or high < 0:
-        return f"link {body.name!r} has an inertia that is not positive (principal moment {low:.3g} kg·m²)"
+        return f"an inertia that is not positive (principal moment {low:.3g} kg·m²)"
     if high > low + middle + TRIANGLE * high:
-        return (
-            f"link {body.name!r} has an inertia that breaks the triangle inequality "
-            f"({high:.4g} > {low:.4g} + {middle:.4g} kg·m²)"
-        )
+        return f"an inertia that breaks the triangle inequality ({high:.4g} > {low:.4g} + {middle:.4g} kg·m²)"
     return ""

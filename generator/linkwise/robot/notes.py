@@ -1,12 +1,14 @@
 """What became of things that a file says, and what of that touches the torques."""
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 LEFT_OUT = "left out of the torques"
 UNCOUPLED = "moving by themselves, their coupling left out of the torques"
 IMPOSSIBLE = "accepted though physically impossible"
+WARNED = "MuJoCo warns"
 TURNS = "singular at a pitch of ±90°"
 FLOATS = f"six coordinates without any contact forces, {TURNS}"
 
@@ -33,8 +35,8 @@ class Note:
         "expanded",
         "unphysical",
         "freed",
-        "damping",
-        "friction",
+        "left out",
+        "warned",
         "promoted",
     ]
     subject: str
@@ -42,14 +44,51 @@ class Note:
     effect: str = ""
 
 
-def effects(notes: Iterable[Note]) -> tuple[str, ...]:
-    """One line for each effect on the torques, naming its first subjects and counting the others."""
+@dataclass(frozen=True)
+class Omission:
+    """A force or inertia that a file has, and that no torque holds: `what` it is, of which `subject`.
+
+    It acts while one of its joints or bodies moves, or always where it names none.
+    """
+
+    what: str
+    subject: str
+    detail: str = ""
+    joints: tuple[str, ...] = ()
+    bodies: tuple[str, ...] = ()
+
+    def acts(self, joints: Collection[str], bodies: Collection[str]) -> bool:
+        """Whether it loads a joint, of the joints and bodies that move."""
+        anywhere = not (self.joints or self.bodies)
+        return anywhere or any(j in joints for j in self.joints) or any(b in bodies for b in self.bodies)
+
+    def note(self) -> Note:
+        """Say it."""
+        return Note("left out", self.subject, self.detail, f"{self.what} {LEFT_OUT}")
+
+
+def effects(notes: Iterable[Note], every: bool = False) -> tuple[str, ...]:
+    """Lines on what touches the torques: one for each effect, or one for `every` note that has one.
+
+    A line for an effect names its first subjects and counts the others.
+    """
     subjects: dict[str, list[str]] = {}
     for note in notes:
         if note.effect:
             detail = f" ({note.detail})" if note.detail else ""
             subjects.setdefault(note.effect, []).append(f"{note.subject}{detail}")
+    if every:
+        return tuple(f"{effect}: {item}" for effect, found in subjects.items() for item in found)
     return tuple(f"{effect}: {_listed(found)}" for effect, found in subjects.items())
+
+
+def left_out(notes: Iterable[Note]) -> tuple[Note, ...]:
+    """One note for each kind of thing that was left out, with how often, in place of one for each joint."""
+    counts = Counter(note.effect for note in notes if note.kind == "left out")
+    return tuple(
+        Note("left out", effect.removesuffix(f" {LEFT_OUT}"), f"{count} ×", LEFT_OUT)
+        for effect, count in counts.items()
+    )
 
 
 def _listed(items: list[str]) -> str:

@@ -7,7 +7,7 @@ import sympy as sp
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.description import Body, Description
-from linkwise.robot.robot import Scalar, Vec3, is_finite
+from linkwise.robot.robot import Scalar, Vec3, unusable
 
 Values = Sequence[tuple[str, float]]
 
@@ -28,8 +28,8 @@ def _body(body: Body, values: dict[sp.Symbol, float]) -> Body:
 
 def _symbols(values: Values) -> dict[sp.Symbol, float]:
     for name, value in values:
-        if not is_finite(value):
-            raise LinkwiseError(f"parameter {name!r} is NaN or infinite; give a number")
+        if fault := unusable(value):
+            raise LinkwiseError(f"parameter {name!r} has {fault} for a value; give a number")
     return {sp.Symbol(name, real=True): value for name, value in values}
 
 

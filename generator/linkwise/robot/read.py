@@ -11,6 +11,7 @@ from linkwise.robot.description import Description
 from linkwise.robot.readers.mjcf import read_mjcf
 from linkwise.robot.readers.toml import read_toml
 from linkwise.robot.readers.urdf import read_urdf, root_tag
+from linkwise.robot.readers.xml_file import XACRO
 from linkwise.robot.robot import Robot
 
 
@@ -63,6 +64,8 @@ def _read_file(path: Path) -> Description:
         raise LinkwiseError("this is a directory; give the robot's file")
     if not path.is_file():
         raise LinkwiseError(f"no such file or built-in robot; the built-ins are {', '.join(BUILT_IN)}")
+    if path.suffix.lower() == ".xacro":
+        raise LinkwiseError(XACRO)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise LinkwiseError(f"unknown kind of file {path.suffix!r}; give {', '.join(READERS)} or .py")

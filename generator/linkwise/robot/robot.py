@@ -146,6 +146,13 @@ class Robot:
         return tuple(self.links[at].joint for at in self.chain(link))
 
 
-def is_finite(value: Scalar) -> bool:
-    """Whether a scalar is neither NaN nor infinite; an expression counts as finite."""
-    return not isinstance(value, (int, float)) or math.isfinite(value)
+LARGEST = 1e12
+"""Of a description's numbers, in SI units: three of them multiplied still fit single precision."""
+
+
+def unusable(*values: Scalar) -> str:
+    """Return what is among the numbers that no robot has, in words, or an empty text; expressions pass."""
+    numbers = [value for value in values if isinstance(value, (int, float))]
+    if not all(map(math.isfinite, numbers)):
+        return "NaN or infinity"
+    return f"a number beyond {LARGEST:g}" if any(abs(number) > LARGEST for number in numbers) else ""

@@ -7,7 +7,7 @@ from dataclasses import replace
 from linkwise.errors import LinkwiseError
 from linkwise.robot.description import Connection, Description, Loop
 from linkwise.robot.notes import Note
-from linkwise.robot.robot import is_finite
+from linkwise.robot.robot import unusable
 
 
 def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
@@ -65,11 +65,11 @@ def _check_names(description: Description) -> None:
                 raise LinkwiseError(
                     f"joint {c.name!r} has the {role} {link!r}, which is not a link; correct it or add one"
                 )
-        if c.mimic and not (is_finite(c.mimic.ratio) and is_finite(c.mimic.offset)):
-            raise LinkwiseError(f"joint {c.name!r} has NaN or infinity in its mimic; give numbers")
-        values = [*c.translation, *(entry for row in c.rotation for entry in row)]
-        if not all(is_finite(value) for value in values):
-            raise LinkwiseError(f"joint {c.name!r} has NaN or infinity in its origin; give numbers")
+        mimic = (c.mimic.ratio, c.mimic.offset) if c.mimic else ()
+        origin = (*c.translation, *(entry for row in c.rotation for entry in row))
+        for what, values in (("mimic", mimic), ("origin", origin)):
+            if fault := unusable(*values):
+                raise LinkwiseError(f"joint {c.name!r} has {fault} in its {what}; give numbers")
 
 
 def cut(description: Description, root: str | None, tip: str | None) -> Description:

@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from linkwise.errors import LinkwiseError, within
-from linkwise.robot.robot import Coordinate, is_finite
+from linkwise.robot.robot import Coordinate, unusable
 from linkwise.symbolic.system import EnergySystem, LinkEnergy
 
 
@@ -100,8 +100,8 @@ def _values(
             values[symbol] = float(value)
         except (TypeError, ValueError, OverflowError):
             raise LinkwiseError(f"parameter {symbol} has no value as a real number; give one") from None
-        if not is_finite(values[symbol]):
-            raise LinkwiseError(f"parameter {symbol} is NaN or infinite; give a number")
+        if fault := unusable(values[symbol]):
+            raise LinkwiseError(f"parameter {symbol} has {fault} for a value; give a number")
     return values
 
 

@@ -12,8 +12,10 @@ from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
 from linkwise.robot import transforms
 from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Description
+from linkwise.robot.notes import WARNED, Note
 from linkwise.robot.readers.mjcf_equality import couplings, loops
-from linkwise.robot.readers.mjcf_unmodelled import unused
+from linkwise.robot.readers.mjcf_options import switched_off
+from linkwise.robot.readers.mjcf_unmodelled import omissions, unused
 from linkwise.robot.robot import Mat3, Rotation, Vec3
 
 TYPES = ("floating", "ball", "prismatic", "revolute")
@@ -23,10 +25,7 @@ TYPES = ("floating", "ball", "prismatic", "revolute")
 def read_mjcf(path: Path) -> Description:
     """Read a robot; raises LinkwiseError with MuJoCo's own words, or when MuJoCo is missing."""
     mujoco = extra("mujoco")
-    try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise LinkwiseError(f"MuJoCo cannot compile it: {error}") from None
+    model, warnings = _compiled(mujoco, path)
     bodies, connections = [Body(_name(model, 0))], list[Connection]()
     for number in range(1, model.nbody):
         chain, body = _body(model, number)
@@ -34,15 +33,33 @@ def read_mjcf(path: Path) -> Description:
         bodies += [Body(c.child, invented=True) for c in chain[:-1]] + [body]
     name = model.names.split(b"\0")[0].decode()
     x, y, z = map(float, model.opt.gravity)
+    weightless = "gravity" in switched_off(mujoco, model)
+    joints = [c.name for c in connections if c.type != "fixed"]
+    links = [_name(model, number) for number in range(model.nbody)]
     return Description(
         path.stem if name in ("", "MuJoCo Model") else name,
         tuple(bodies),
         tuple(connections),
-        (x, y, z),
-        notes=unused(model),
-        couplings=couplings(mujoco, model, [c.name for c in connections if c.type != "fixed"]),
-        loops=loops(mujoco, model, [_name(model, number) for number in range(model.nbody)]),
+        ZERO3 if weightless else (x, y, z),
+        notes=(*(Note("warned", text, "", WARNED) for text in warnings), *unused(model)),
+        couplings=couplings(mujoco, model, joints),
+        loops=loops(mujoco, model, links),
+        omissions=omissions(mujoco, model, joints, links),
     )
+
+
+def _compiled(mujoco: Any, path: Path) -> tuple[Any, list[str]]:
+    """Compiled model, and MuJoCo's warnings, which it would write into a file in the working directory."""
+    warnings: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(warnings.append)
+    try:
+        return mujoco.MjModel.from_xml_path(str(path)), warnings
+    except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
+        told = "; ".join(" ".join(text.split()) for text in (str(error), *warnings))
+        raise LinkwiseError(f"MuJoCo cannot compile it: {told}") from None
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 @dataclass(frozen=True)
@@ -54,8 +71,6 @@ class _Joint:
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     anchor: Vec3 = ZERO3
     rest: float = 0.0
-    damping: float = 0.0
-    friction: float = 0.0
 
 
 def _body(model: Any, number: int) -> tuple[list[Connection], Body]:
@@ -79,8 +94,8 @@ def _body(model: Any, number: int) -> tuple[list[Connection], Body]:
         if joint.type == "revolute" and joint.rest:
             turn = transforms.compose(turn, _about(joint.axis, -joint.rest))
         child = name if joint is joints[-1] else f"{name}_{joint.name}"
-        place, losses = (start, child, turn, position), (joint.damping, joint.friction)
-        chain.append(Connection(joint.name, joint.type, *place, joint.axis, None, *losses, snapped))
+        place = start, child, turn, position
+        chain.append(Connection(joint.name, joint.type, *place, joint.axis, None, snapped))
         turn, position, last, start, snapped = IDENTITY, ZERO3, joint.anchor, child, False
     mass, com = float(model.body_mass[number]), _vector(model.body_ipos[number])
     return chain, Body(name, mass, com, _inertia(model, number), origin=transforms.minus(last))
@@ -93,7 +108,7 @@ def _joints(model: Any, number: int, body: str) -> list[_Joint]:
         return [_Joint(f"{body}_weld", "fixed")]
     joints = []
     for index in range(first, first + count):
-        kind, dof = TYPES[int(model.jnt_type[index])], int(model.jnt_dofadr[index])
+        kind = TYPES[int(model.jnt_type[index])]
         single = kind in ("prismatic", "revolute")
         x, y, z = map(float, model.jnt_axis[index])
         joints.append(
@@ -103,8 +118,6 @@ def _joints(model: Any, number: int, body: str) -> list[_Joint]:
                 (x, y, z),
                 _vector(model.jnt_pos[index]),
                 float(model.qpos0[model.jnt_qposadr[index]]) if single else 0.0,
-                float(model.dof_damping[dof]),
-                float(model.dof_frictionloss[dof]),
             )
         )
     return joints

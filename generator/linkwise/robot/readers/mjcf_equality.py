@@ -1,10 +1,11 @@
 """The active equality constraints of a compiled MJCF model: joints that follow others, and loops."""
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
 from linkwise.robot.description import Coupling, Loop
+from linkwise.robot.readers.mjcf_options import switched_off
+from linkwise.robot.readers.mjcf_tendons import joints_of, ties
 
 JOINT, TENDON = "joint", "tendon"
 OF_BODIES = ("connect", "weld")
@@ -39,46 +40,18 @@ def loops(mujoco: Any, model: Any, bodies: list[str]) -> tuple[Loop, ...]:
         elif kind == TENDON:
             tendons = [tendon for tendon in (one, other) if tendon >= 0]
             names = ", ".join(repr(model.tendon(tendon).name) for tendon in tendons)
-            joints = tuple(tie for tendon in tendons for tie in _joints(mujoco, model, tendon, bodies))
-            along = tuple(tie for tendon in tendons for tie in _along(mujoco, model, tendon, bodies))
-            named = f"{what} ties links together by tendon {names}"
-            found.append(Loop(named, CUT, joints or along, of_joints=bool(joints)))
+            of_joints = any(joints_of(mujoco, model, tendon) for tendon in tendons)
+            tied = [tie for tendon in tendons for tie in ties(mujoco, model, tendon, of_joints)]
+            pairs = tuple((bodies[a], bodies[b]) for a, b in tied)
+            found.append(Loop(f"{what} ties links together by tendon {names}", CUT, pairs, of_joints))
         elif kind != JOINT:
             found.append(Loop(f"{what} ties parts of the model together", REMOVE))
     return tuple(found)
 
 
-def _joints(mujoco: Any, model: Any, tendon: int, bodies: list[str]) -> Iterator[tuple[str, str]]:
-    """Parent and child of each joint of a fixed tendon; none of a spatial one."""
-    for kind, joint in _wraps(mujoco, model, tendon):
-        if kind == mujoco.mjtWrap.mjWRAP_JOINT:
-            child = int(model.jnt_bodyid[joint])
-            yield bodies[int(model.body_parentid[child])], bodies[child]
-
-
-def _along(mujoco: Any, model: Any, tendon: int, bodies: list[str]) -> Iterator[tuple[str, str]]:
-    """Neighbours among the bodies that a spatial tendon passes."""
-    wrap = mujoco.mjtWrap
-    passed = []
-    for kind, thing in _wraps(mujoco, model, tendon):
-        if kind == wrap.mjWRAP_SITE:
-            passed.append(bodies[int(model.site_bodyid[thing])])
-        elif kind in (wrap.mjWRAP_SPHERE, wrap.mjWRAP_CYLINDER):
-            passed.append(bodies[int(model.geom_bodyid[thing])])
-    yield from pairwise(passed)
-
-
-def _wraps(mujoco: Any, model: Any, tendon: int) -> Iterator[tuple[Any, int]]:
-    """Kind and object of each thing that a tendon is made of."""
-    first, count = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
-    for at in range(first, first + count):
-        yield mujoco.mjtWrap(int(model.wrap_type[at])), int(model.wrap_objid[at])
-
-
 def _active(mujoco: Any, model: Any) -> Iterator[tuple[int, str, int, int]]:
     """Number, kind and objects of each equality that acts from the start."""
-    off = mujoco.mjtDisableBit.mjDSBL_EQUALITY | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    if int(model.opt.disableflags) & int(off):
+    if "equality" in switched_off(mujoco, model):
         return
     for number in range(int(model.neq)):
         if model.eq_active0[number]:

@@ -1,64 +1,171 @@
-"""What a compiled MJCF model says beyond the dynamics of rigid bodies."""
+"""What a compiled MJCF model says beyond the dynamics of rigid bodies.
 
-from typing import Any
+Of everything in MuJoCo's mjModel that exerts a force or adds inertia there is one row in `ACTING`. A robot's
+torques are those that its actuators must give while it touches nothing and stays within its limits.
+"""
 
-from linkwise.robot.notes import LEFT_OUT, Note
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from linkwise.robot.notes import Note, Omission
+from linkwise.robot.readers.mjcf_options import switched_off, switched_on
+from linkwise.robot.readers.mjcf_tendons import bodies_along, joints_of
 
 COUNTS = {
     "actuator": "nu",
     "camera": "ncam",
     "contact pair": "npair",
     "equality": "neq",
-    "flex": "nflex",
     "keyframe": "nkey",
     "light": "nlight",
     "mocap": "nmocap",
-    "plugin": "nplugin",
     "sensor": "nsensor",
     "site": "nsite",
     "tendon": "ntendon",
 }
-VALUES = {
-    "armature": "dof_armature",
-    "damping": "dof_damping",
-    "friction": "dof_frictionloss",
-    "gravity compensation": "body_gravcomp",
-    "limit": "jnt_limited",
-    "spring": "jnt_stiffness",
-}
-"""Arrays that act on a joint or body where they are not zero. Armature is the inertia of a motor's rotor:
-unlike the others, it belongs to rigid-body dynamics."""
+"""What is counted though it loads no joint by itself."""
 
-TENDON_FORCES = ("tendon_stiffness", "tendon_damping", "tendon_frictionloss", "tendon_armature")
+ARRAYS = {"limit": "jnt_limited"}
+"""What is counted where it is not zero."""
 
-FORCES = {
-    "actuator",
-    "armature",
-    "damping",
-    "flex",
-    "fluid",
-    "friction",
-    "gravity compensation",
-    "plugin",
-    "spring",
-    "tendon",
-}
-"""What exerts forces on moving bodies while they touch nothing and stay within their limits."""
+Owner = Literal["dof", "joint", "body", "tendon", "actuator", "model"]
+
+
+@dataclass(frozen=True)
+class _Acting:
+    """A force or an inertia: what it is, whose, and the arrays that are not zero where it acts.
+
+    `switch` is the word of `mjcf_options` that turns it off; `units` those about a hinge and along a slide.
+    """
+
+    what: str
+    owner: Owner
+    fields: tuple[str, ...]
+    switch: str = ""
+    units: tuple[str, str] = ("", "")
+
+
+ACTING = (
+    _Acting("damping", "dof", ("dof_damping", "dof_dampingpoly"), "damping", ("N·m·s/rad", "N·s/m")),
+    _Acting("friction", "dof", ("dof_frictionloss",), "friction", ("N·m", "N")),
+    _Acting("armature", "dof", ("dof_armature",), "", ("kg·m²", "kg")),
+    _Acting("spring", "joint", ("jnt_stiffness", "jnt_stiffnesspoly"), "spring", ("N·m/rad", "N/m")),
+    _Acting(
+        "gravity compensation", "body", ("body_gravcomp",), "gravity compensation", ("of its weight",) * 2
+    ),
+    _Acting("tendon spring", "tendon", ("tendon_stiffness", "tendon_stiffnesspoly"), "spring"),
+    _Acting("tendon damping", "tendon", ("tendon_damping", "tendon_dampingpoly"), "damping"),
+    _Acting("tendon friction", "tendon", ("tendon_frictionloss",), "friction"),
+    _Acting("tendon armature", "tendon", ("tendon_armature",)),
+    _Acting("armature", "actuator", ("actuator_armature",)),
+    _Acting("damping", "actuator", ("actuator_damping", "actuator_dampingpoly"), "damping"),
+    _Acting("fluid", "model", ("density", "viscosity"), "fluid"),
+    _Acting("flex spring", "model", ("flex_edgestiffness", "flex_stiffness", "flex_bending"), "spring"),
+    _Acting("flex damping", "model", ("flex_edgedamping", "flex_damping"), "damping"),
+    _Acting("plugin", "model", ("nplugin",), "plugin"),
+)
+
+
+@dataclass(frozen=True)
+class _CompiledModel:
+    """A compiled model, and the names of its joints and bodies as the description has them."""
+
+    mujoco: Any
+    model: Any
+    joints: Sequence[str]
+    bodies: Sequence[str]
+
+    def along(self, tendon: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Joints of a fixed tendon, bodies that a spatial one passes."""
+        joints = joints_of(self.mujoco, self.model, tendon)
+        bodies = bodies_along(self.mujoco, self.model, tendon)
+        return tuple(self.joints[j] for j in joints), tuple(self.bodies[b] for b in bodies)
+
+    def values(self, acting: _Acting, index: int) -> list[float]:
+        """Numbers of one joint, body or tendon; a field that this MuJoCo lacks has none."""
+        arrays = (getattr(self.model, name, None) for name in acting.fields)
+        return [float(value) for array in arrays if array is not None for value in np.ravel(array[index])]
+
+
+def omissions(mujoco: Any, model: Any, joints: Sequence[str], bodies: Sequence[str]) -> tuple[Omission, ...]:
+    """Return each force and inertia that no torque holds, by the names of MuJoCo's joints and bodies."""
+    names, off = _CompiledModel(mujoco, model, joints, bodies), switched_off(mujoco, model)
+    acting = [row for row in ACTING if row.switch not in off]
+    found = [omission for row in acting for omission in _OWNERS[row.owner](names, row)]
+    return (*found, *(Omission(what, "by a flag of <option>") for what in switched_on(mujoco, model)))
 
 
 def unused(model: Any) -> tuple[Note, ...]:
-    """Return a note for each kind of thing that is there, with how often."""
-    counts = {what: int(getattr(model, name)) for what, name in COUNTS.items()}
-    counts |= {what: sum(value != 0 for value in getattr(model, name)) for what, name in VALUES.items()}
-    counts["fluid"] = int(model.opt.density != 0 or model.opt.viscosity != 0)
-    acting = FORCES if _pulls(model) else FORCES - {"tendon"}
-    return tuple(
-        Note("ignored", what, f"{count} ×", LEFT_OUT if what in acting else "")
-        for what, count in sorted(counts.items())
-        if count
-    )
+    """Return a note for each kind of thing that is there and loads no joint by itself, with how often."""
+    counts = {what: int(np.count_nonzero(getattr(model, field))) for what, field in ARRAYS.items()}
+    counts |= {what: int(getattr(model, field)) for what, field in COUNTS.items()}
+    return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()) if count)
 
 
-def _pulls(model: Any) -> bool:
-    """Whether a tendon exerts a force by itself: one that only bounds or couples does not."""
-    return any(value != 0 for name in TENDON_FORCES for value in getattr(model, name))
+def _of_joints(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
+    for number, name in enumerate(names.joints):
+        index = int(names.model.jnt_dofadr[number]) if acting.owner == "dof" else number
+        if any(values := names.values(acting, index)):
+            slides = names.model.jnt_type[number] == names.mujoco.mjtJoint.mjJNT_SLIDE
+            yield Omission(acting.what, name, _detail(values, acting.units[slides]), joints=(name,))
+
+
+def _of_bodies(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
+    """Gravity compensation, but on joints whose actuators give it: the torques hold what these must give."""
+    model = names.model
+    for number, name in enumerate(names.bodies):
+        at, joints = number, list[str]()
+        while at:
+            first = int(model.body_jntadr[at])
+            own = range(first, first + int(model.body_jntnum[at]))
+            joints += [names.joints[joint] for joint in own if not model.jnt_actgravcomp[joint]]
+            at = int(model.body_parentid[at])
+        if joints and any(model.opt.gravity) and any(values := names.values(acting, number)):
+            yield Omission(acting.what, name, _detail(values, acting.units[0]), tuple(joints))
+
+
+def _of_tendons(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
+    for number in range(int(names.model.ntendon)):
+        if any(values := names.values(acting, number)):
+            name = names.model.tendon(number).name or f"tendon{number}"
+            yield Omission(acting.what, name, _detail(values, ""), *names.along(number))
+
+
+def _of_actuators(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
+    """Inertia and damping of motors, which act whether or not these are on."""
+    model, kinds = names.model, names.mujoco.mjtTrn
+    for number in range(len(model.actuator_trntype)):
+        if any(values := names.values(acting, number)):
+            kind, target = model.actuator_trntype[number], int(model.actuator_trnid[number][0])
+            along: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+            if kind in (kinds.mjTRN_JOINT, kinds.mjTRN_JOINTINPARENT):
+                along = (names.joints[target],), ()
+            elif kind == kinds.mjTRN_TENDON:
+                along = names.along(target)
+            name = model.actuator(number).name or f"actuator{number}"
+            yield Omission(acting.what, name, _detail(values, ""), *along)
+
+
+def _of_model(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
+    model = names.model
+    arrays = (getattr(model, name, getattr(model.opt, name, 0)) for name in acting.fields)
+    if any(np.any(array) for array in arrays):
+        yield Omission(acting.what, "everywhere in the file")
+
+
+def _detail(values: list[float], unit: str) -> str:
+    """Return the value with its unit, or that there are coefficients of a higher order too."""
+    return f"{values[0]:g} and of higher order" if any(values[1:]) else f"{values[0]:g} {unit}".strip()
+
+
+_OWNERS = {
+    "dof": _of_joints,
+    "joint": _of_joints,
+    "body": _of_bodies,
+    "tendon": _of_tendons,
+    "actuator": _of_actuators,
+    "model": _of_model,
+}

@@ -8,8 +8,9 @@ from typing import Any
 from linkwise.errors import LinkwiseError, within
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
+from linkwise.robot.readers.bounded import MIB, check_toml_depth, content
 from linkwise.robot.readers.formula import parse_formula
-from linkwise.robot.robot import Mat3, Scalar, Vec3, is_finite
+from linkwise.robot.robot import Mat3, Scalar, Vec3, unusable
 
 TOP = {"schema", "name", "gravity", "base", "parameters", "link", "joint"}
 LINK = {"name", "mass", "com", "inertia", "allow_unphysical"}
@@ -61,7 +62,11 @@ class _Table:
 def read_toml(path: Path) -> Description:
     """Read a robot; raises LinkwiseError naming the table, the key and the remedy."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = content(path, MIB).decode("utf-8-sig").replace("\r\n", "\n")
+        check_toml_depth(text)
+        data = tomllib.loads(text)
+    except LinkwiseError:
+        raise
     except (ValueError, RecursionError) as error:  # ValueError: not TOML, not UTF-8, or too many digits
         raise LinkwiseError(f"malformed TOML: {error}") from None
     if type(data.get("schema")) is not int or data["schema"] != 1:
@@ -91,8 +96,8 @@ def _parameters(data: Any) -> dict[str, float]:
             )
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise LinkwiseError(f"parameter {name!r} must be a number")
-        if not is_finite(_float(f"parameter {name!r}", value)):
-            raise LinkwiseError(f"parameter {name!r} is NaN or infinite; give a number")
+        if fault := unusable(_float(f"parameter {name!r}", value)):
+            raise LinkwiseError(f"parameter {name!r} has {fault} for a value; give a number")
     return {name: float(value) for name, value in data.items()}
 
 

@@ -1,0 +1,51 @@
+"""Bounds on a robot's file, held before it is parsed: parsers take memory and time far beyond its length."""
+
+import re
+from pathlib import Path
+
+from linkwise.errors import LinkwiseError
+
+MIB = 2**20
+MAX_DEPTH = 16
+"""Most brackets, or parts of a key, inside each other; schema 1 has three."""
+
+STRINGS_AND_COMMENTS = re.compile(
+    r'"""(?:\\.|[^\\])*?"""'
+    r"|'''.*?'''"
+    r'|"(?:\\.|[^"\\\n])*"'
+    r"|'[^'\n]*'"
+    r"|#[^\n]*",
+    re.DOTALL,
+)
+NOT_OF_A_KEY = re.compile(r"[^\w.\- \t]+")
+
+
+def content(path: Path, most: int) -> bytes:
+    """Bytes of a file; raises LinkwiseError for one of more than `most`."""
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise LinkwiseError(
+            f"the file is larger than {most // MIB} MiB, which no robot's description is; "
+            "give one without meshes and data in it"
+        )
+    return data
+
+
+def check_toml_depth(text: str) -> None:
+    """Raise LinkwiseError for brackets or dotted keys deeper than any robot's file has them.
+
+    Works on the text without its strings and comments: brackets are then those of tables and arrays, and
+    dots with nothing but words between them belong to one key.
+    """
+    structure = STRINGS_AND_COMMENTS.sub("s", text)
+    depth = deepest = 0
+    for bracket in re.findall(r"[\[\]{}]", structure):
+        depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
+        deepest = max(deepest, depth)
+    dots = max(part.count(".") for part in NOT_OF_A_KEY.split(structure))
+    for what, found in (("brackets", deepest), ("a dotted key", dots)):
+        if found > MAX_DEPTH:
+            raise LinkwiseError(
+                f"malformed TOML: {what} {found} deep; no robot's file needs more than {MAX_DEPTH}"
+            )

@@ -1,0 +1,80 @@
+"""What a URDF file says beyond the dynamics of rigid bodies."""
+
+from collections import Counter
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from linkwise.robot.notes import Note, Omission
+from linkwise.robot.readers.xml_file import numbers
+
+USED = {
+    "robot": {"link", "joint"},
+    "link": {"inertial"},
+    "joint": {"parent", "child", "origin", "axis", "mimic", "dynamics"},
+}
+"""What the dynamics use of each element; every other kind of child is noted as ignored."""
+
+LOSSES = {"damping": ("N·m·s/rad", "N·s/m"), "friction": ("N·m", "N")}
+"""Attributes of <dynamics>, with their units about an axis and along one."""
+
+ACTING = {
+    "dampingFactor": "damping",  # Gazebo's, of a link's velocity
+    "springStiffness": "spring",  # Gazebo's
+    "motorInertia": "armature",  # of transmissions
+    "rotorInertia": "armature",
+    "rotor_inertia": "armature",  # Drake's
+}
+"""Extensions of simulators that load joints where their number is not zero."""
+
+WEIGHTLESS = {"turnGravityOff": ("true", "1"), "gravity": ("false", "0")}
+"""Gazebo's ways to take a link's weight away."""
+
+
+def ignored(elements: list[Element]) -> tuple[Note, ...]:
+    """Return a note for each kind of child that loads no joint, with how often."""
+    counts = Counter(
+        str(child.tag) for element in elements for child in element if child.tag not in USED[element.tag]
+    )
+    return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()))
+
+
+def omissions(robot: Element) -> Iterator[Omission]:
+    """Return each force and inertia that the torques leave out."""
+    links = {link.get("name", "") for link in robot.findall("link")}
+    for joint in robot.findall("joint"):
+        name, slides = joint.get("name", ""), joint.get("type") == "prismatic"
+        for losses in joint.findall("dynamics"):
+            for what, units in LOSSES.items():
+                (number,) = numbers(losses, what, "0", 1, f"joint {name!r}")
+                if number:
+                    yield Omission(what, name, f"{number!r} {units[slides]}", joints=(name,))
+    for part in robot:
+        if part.tag == "gazebo":
+            owners = [part.get("reference", "")]
+        elif part.tag == "transmission":
+            owners = [joint.get("name", "") for joint in part.findall("joint")]
+        else:
+            owners = [part.get("name", "")] if part.tag == "joint" else []
+        named = ", ".join(owners) or str(part.tag)
+        bodies = tuple(owner for owner in owners if owner in links)
+        joints = tuple(owner for owner in owners if owner and owner not in links)
+        for what, detail in _acting(part):
+            yield Omission(what, named, detail, joints, bodies)
+
+
+def _acting(part: Element) -> Iterator[tuple[str, str]]:
+    """Return what of an extension loads joints, with its value."""
+    for element in part.iter():
+        tag = str(element.tag).rpartition("}")[2].rpartition(":")[2]
+        text = (element.get("value") or element.text or "").strip()
+        if tag in ACTING and _number(text):
+            yield ACTING[tag], text
+        elif text.lower() in WEIGHTLESS.get(tag, ()):
+            yield "Gazebo's switch for gravity", ""
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0

@@ -1,0 +1,75 @@
+"""XML files: parsed within bounds, and the numbers of their attributes."""
+
+from pathlib import Path
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder
+
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import DefusedXMLParser
+
+from linkwise.errors import LinkwiseError
+from linkwise.robot.readers.bounded import MIB, content
+
+XACRO = "this is xacro, a language of macros; expand it first: xacro FILE > robot.urdf"
+MAX_DEPTH = 256
+"""Most elements inside each other: MJCF nests the links of a chain."""
+
+MACROS = ("${", "$(")
+
+
+class _Builder(TreeBuilder):
+    """Builds the elements of a file that is neither deep nor full of macros."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.depth = 0
+
+    def start(self, tag: str, attrs: dict[str, str]) -> Element:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise LinkwiseError(
+                f"malformed XML: elements more than {MAX_DEPTH} deep, which no robot's file needs"
+            )
+        namespace = tag.rpartition("}")[0]
+        paths = ("filename", "file")
+        texts = [value for name, value in attrs.items() if name not in paths]
+        if "xacro" in namespace or any(macro in text for text in texts for macro in MACROS):
+            raise LinkwiseError(XACRO)
+        return super().start(tag, attrs)
+
+    def end(self, tag: str) -> Element:
+        self.depth -= 1
+        return super().end(tag)
+
+
+def parse(path: Path) -> Element:
+    """Root element; raises LinkwiseError for malformed XML, and for xacro, which is to be expanded first."""
+    data = content(path, 4 * MIB)
+    parser = DefusedXMLParser(target=_Builder())
+    try:
+        parser.feed(data)
+        root: Element = parser.close()
+    except DefusedXmlException:
+        raise LinkwiseError(
+            "malformed XML: it defines entities or refers to other files; write the text out"
+        ) from None
+    except LinkwiseError:
+        raise
+    except (ParseError, UnicodeDecodeError, ValueError, LookupError) as error:
+        if b"<xacro:" in data:
+            raise LinkwiseError(XACRO) from None
+        raise LinkwiseError(f"malformed XML: {error}") from None
+    return root
+
+
+def numbers(element: Element, key: str, default: str, count: int, place: str) -> tuple[float, ...]:
+    """Numbers of an attribute; raises LinkwiseError naming the element where they are not `count`."""
+    text = element.get(key, default)
+    try:
+        values = tuple(float(item) for item in text.split())
+    except ValueError:
+        values = ()
+    if len(values) != count:
+        raise LinkwiseError(
+            f"{place}: <{element.tag} {key}={text!r}> needs {count} number{'s' * (count > 1)}"
+        )
+    return values
