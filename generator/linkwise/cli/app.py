@@ -1,13 +1,17 @@
 """The command line's start: which commands there are, and how a mistake is told."""
 
+import io
 import sys
+import warnings
 from importlib import import_module
-from typing import Any, NoReturn
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from linkwise.cli.endings import MISTAKE, ended_in_one_line
 from linkwise.errors import LinkwiseError
+from linkwise.version import VERSION
 
 COMMANDS = {
     "generate": "Write the package of a robot.",
@@ -55,30 +59,49 @@ def _entry() -> None:
     """Stand in the list of commands."""
 
 
+def _show_version(asked: bool) -> None:
+    if asked:
+        print(f"linkwise {VERSION}")
+        raise typer.Exit
+
+
 app = _group("Which joint's movement loads which joint, through which link.", COMMANDS)
 app.add_typer(_group("Term counts and the cost-reduction curve.", REPORTS), name="report")
 
 
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Print the version")
+    ] = False,
+) -> None:
+    """Stand for the options of the whole."""
+
+
 def main() -> None:
-    """Run the command line; a user's mistake is one line on stderr and exit status 2."""
-    try:
-        status = typer.main.get_command(app)(standalone_mode=False)
-    except LinkwiseError as error:
-        _fail(str(error))
-    except typer.Abort:
-        sys.exit(130)
-    except Exception as error:
-        # Typer's own complaints about options; anything else is not the user's mistake.
-        if not hasattr(error, "format_message"):
-            raise
-        if message := error.format_message():  # empty where the help was shown for want of a command
+    """Run the command line; what ends it early is one line on stderr, and an exit status (see `endings`)."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # whatever letters the terminal lacks
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # of libraries, to programmers
+    status = 0
+    with ended_in_one_line():
+        command = typer.main.get_command(app)
+        try:
+            # Not by calling it, which ends the program at a closed pipe, and at Ctrl-C, in ways of its own.
+            with command.make_context("linkwise", sys.argv[1:]) as context:
+                command.invoke(context)
+        except typer.Exit as ended:
+            status = ended.exit_code
+        except Exception as error:
+            # Typer's own complaints about options; anything else is not its matter.
+            if not hasattr(error, "format_message"):
+                raise
+            if not (message := error.format_message()):
+                sys.exit(MISTAKE)  # the help was shown, for want of a command
             # "Value error, " is pydantic's, which typer asks about values.
             asked = getattr(getattr(error, "ctx", None), "command_path", "linkwise")
-            _fail(f"{message.replace('Value error, ', '').rstrip('.')}. See {asked} --help")
-        sys.exit(2)
-    sys.exit(status if isinstance(status, int) else 0)
-
-
-def _fail(message: str) -> NoReturn:
-    print(f"linkwise: error: {' '.join(message.split())}", file=sys.stderr)
-    sys.exit(2)
+            message = message.replace("Value error, ", "").rstrip(".")
+            raise LinkwiseError(f"{message}. See {asked} --help") from error
+    sys.exit(status)

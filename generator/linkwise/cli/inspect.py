@@ -1,6 +1,5 @@
 """The command `inspect`: what a robot is made of, as data and as text."""
 
-import json
 from collections.abc import Collection
 from dataclasses import asdict
 from typing import Annotated, Any
@@ -12,6 +11,7 @@ from linkwise.cli import Json, counted
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import rigid_tree
 from linkwise.errors import LinkwiseError
+from linkwise.escape import json_text, printable
 from linkwise.robot import Options
 from linkwise.symbolic.system import EnergySystem, System
 
@@ -39,7 +39,7 @@ def inspect(
     if joint_friction and isinstance(system, EnergySystem):
         raise LinkwiseError(f"{robot}: energies in Python do not accept --joint-friction; leave it out")
     data = inspection(system, () if joint_friction else LOSSES)
-    typer.echo(json.dumps(data, indent=1) if as_json else table(data))
+    print(json_text(data, indent=1) if as_json else table(data))
 
 
 def inspection(system: System, hidden: Collection[str] = LOSSES) -> dict[str, Any]:
@@ -85,4 +85,4 @@ def table(data: dict[str, Any]) -> str:
             if note["kind"] == kind:
                 effect = f"; {note['effect']}" if note["effect"] else ""
                 lines.append(f"  {note['subject']} {note['detail']}".rstrip() + effect)
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))

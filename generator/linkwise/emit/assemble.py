@@ -16,6 +16,7 @@ from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
+from linkwise.escape import python_docstring, python_literal
 from linkwise.package.manifest import FILE, BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
 from linkwise.progress import Progress, silent
 from linkwise.robot.robot import Scalar, Vec3
@@ -71,12 +72,12 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     names = {
         **shared,
         "name": repr(derivation.package),
-        "joints": [ascii(c.name) for c in system.coordinates],
+        "joints": [python_literal(c.name) for c in system.coordinates],
         "units": [repr(c.unit) for c in system.coordinates],
-        "links": [ascii(link.name) for link in system.links],
+        "links": [python_literal(link.name) for link in system.links],
         "paths": [repr(system.path(j)) for j in range(len(system.links))],
         "linear": repr(tuple(sorted(derivation.linear))),
-        "parameters": [(ascii(s.name), repr(float(v))) for s, v in system.parameters.items()],
+        "parameters": [(python_literal(s.name), repr(float(v))) for s, v in system.parameters.items()],
     }
     init = {
         **shared,
@@ -115,7 +116,7 @@ def _parameter_lines(system: System) -> list[str]:
     """Names of the parameters as lines of a docstring, which none of their characters can end."""
     lines: list[str] = []
     for symbol in system.parameters:
-        name = ascii(symbol.name).replace("\\", "\\\\").replace('"', '\\"')
+        name = python_docstring(symbol.name)
         if lines and len(lines[-1]) + len(name) < LINE:
             lines[-1] += f" {name},"
         else:

@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from linkwise.escape import listed
+
 LEFT_OUT = "left out of the torques"
 UNCOUPLED = "moving by themselves, their coupling left out of the torques"
 IMPOSSIBLE = "accepted though physically impossible"
@@ -49,9 +51,4 @@ def effects(notes: Iterable[Note]) -> tuple[str, ...]:
         if note.effect:
             detail = f" ({note.detail})" if note.detail else ""
             subjects.setdefault(note.effect, []).append(f"{note.subject}{detail}")
-    return tuple(f"{effect}: {_listed(found)}" for effect, found in subjects.items())
-
-
-def _listed(items: list[str]) -> str:
-    more = f" and {len(items) - SHOWN} more" if len(items) > SHOWN else ""
-    return f"{', '.join(items[:SHOWN])}{more}"
+    return tuple(f"{effect}: {listed(found, SHOWN)}" for effect, found in subjects.items())
