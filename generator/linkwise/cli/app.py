@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from linkwise.cli.endings import MISTAKE, ended_in_one_line
+from linkwise.cli.endings import CLOSED_PIPE, FAULT, INTERRUPTED, MISTAKE, TRACEBACK, ended_in_one_line
 from linkwise.errors import LinkwiseError
 from linkwise.version import VERSION
 
@@ -24,6 +24,11 @@ REPORTS = {
     "terms": "Count terms and operations of the partial torques, and those that one bucket needs.",
     "reduction": "Draw the share of terms of τ_1 that its q̈_1 part does not need (the paper's Fig. 15).",
 }
+
+STATUSES = (
+    f"Exit status: 0 done; 1 a check failed; {MISTAKE} a mistake in the input; {FAULT} a fault of linkwise"
+    f" itself, whose traceback {TRACEBACK}=1 shows; {INTERRUPTED} interrupted; {CLOSED_PIPE} output closed."
+)
 
 
 class OnDemand(TyperGroup):
@@ -42,13 +47,14 @@ class OnDemand(TyperGroup):
         return name, typer.main.get_command(module.app), rest
 
 
-def _group(title: str, commands: dict[str, str]) -> typer.Typer:
+def _group(title: str, commands: dict[str, str], epilog: str | None = None) -> typer.Typer:
     group = typer.Typer(
         cls=OnDemand,
         add_completion=False,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         help=title,
+        epilog=epilog,
     )
     for name, line in commands.items():
         group.command(name, help=line)(_entry)
@@ -65,7 +71,7 @@ def _show_version(asked: bool) -> None:
         raise typer.Exit
 
 
-app = _group("Which joint's movement loads which joint, through which link.", COMMANDS)
+app = _group("Which joint's movement loads which joint, through which link.", COMMANDS, STATUSES)
 app.add_typer(_group("Term counts and the cost-reduction curve.", REPORTS), name="report")
 
 

@@ -8,8 +8,12 @@ from typing import Any
 import numpy as np
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import one_line
 from linkwise.extras import extra
 from linkwise.package.load import Array
+
+LONGEST_REASON = 200
+"""Characters of what pyarrow says."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +65,9 @@ class ParquetLog:
         try:
             return next(batches, None)
         except _unreadable(extra("pyarrow")) as error:
+            reason = one_line(str(error), LONGEST_REASON)
             raise LinkwiseError(
-                f"{self.path}: after row {done}: damaged ({error}); write the file again"
+                f"{self.path}: after row {done}: damaged ({reason}); write the file again"
             ) from error
 
 
