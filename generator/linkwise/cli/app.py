@@ -96,7 +96,8 @@ def main() -> None:
         command = typer.main.get_command(app)
         try:
             # Not by calling it, which ends the program at a closed pipe, and at Ctrl-C, in ways of its own.
-            with command.make_context("linkwise", sys.argv[1:]) as context:
+            called = "python -m linkwise" if sys.argv[0].endswith("__main__.py") else "linkwise"
+            with command.make_context(called, sys.argv[1:]) as context:
                 command.invoke(context)
         except typer.Exit as ended:
             status = ended.exit_code
