@@ -6,7 +6,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -190,14 +189,23 @@ def test_letters_that_the_terminal_lacks_are_written_as_escapes() -> None:
     assert r"| \u03c4_1,1 | link1 |" in done.stdout
 
 
+WAITING = """
+import sys, time
+from linkwise import pipeline
+from linkwise.cli.app import main
+pipeline.read_system = lambda *_: (print("reading", flush=True), time.sleep(60))
+sys.argv = ["linkwise", "generate", "planar3", "--out", "out"]
+main()
+"""
+
+
 def test_ctrl_c_is_one_line_and_leaves_nothing(tmp_path: Path) -> None:
-    with subprocess.Popen(
-        [*COMMAND, "generate", "planar60", "--out", "out"], cwd=tmp_path, stderr=subprocess.PIPE, text=True
-    ) as done:
-        time.sleep(2)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", WAITING], cwd=tmp_path, text=True, **pipes) as done:
+        assert done.stdout.readline() == "reading\n"
         done.send_signal(signal.SIGINT)
         assert (done.wait(), done.stderr.read()) == (130, "linkwise: interrupted\n")
-    assert not list(tmp_path.glob("out/*"))
+    assert not list(tmp_path.iterdir())
 
 
 def test_quick_work_on_no_terminal_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
