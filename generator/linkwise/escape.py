@@ -35,7 +35,7 @@ def printable(text: str, shows: Callable[[str], bool] = str.isprintable) -> str:
 
 def one_line(text: str, most: int) -> str:
     """A message as one printable line of at most `most` characters, its middle left out if it is longer."""
-    return short(printable(" ".join(text.split())), most)
+    return short(printable(re.sub(r"\s*[\r\n]\s*", " ", text.strip())), most)
 
 
 def short(text: str, most: int = 24) -> str:
