@@ -12,7 +12,7 @@ import pytest
 from linkwise.analysis import Processing, Reading, analyze
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.result import Totals
-from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_columns import Column, columns_of
 from linkwise.analysis.run import Wanted, analyze_to
 from linkwise.analysis.show.page import report
 from linkwise.progress import silent
@@ -231,3 +231,28 @@ def test_many_joints_and_long_names_fit(driver, tmp_path, width):
     assert len(set(colours)) == 14
     assert driver.get_log("browser") == []
     driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_names_are_shown_and_not_obeyed(driver, tmp_path):
+    names = ("%{x} %{customdata}", "</script><script>document.title=1</script>", "<b>$x^\n\u202e&lt;")
+    analysis = analyze(write_csv(tmp_path / "a.csv", smooth(40, 3)), PLANAR3)
+    robot = replace(analysis.robot, name=names[1], joints=names, links=names)
+    made = replace(analysis, robot=robot, columns=columns_of(robot, robot.model.layout), source=names[2])
+    (tmp_path / "report.html").write_text(report(made), encoding="utf-8")
+    driver.get((tmp_path / "report.html").as_uri())
+    shown = [*names[:2], "<b>$x^\\n\\u202e&lt;"]
+    assert driver.title == f"{shown[1]} · {shown[2]}"
+    options = "return [...document.querySelectorAll('#joint option')].map((option) => option.title)"
+    assert driver.execute_script(options) == shown
+    rows = [text.partition(" ")[2] for text, *_ in driver.execute_script(TICKS, "ytick")]
+    assert [rows[0], rows[2]] == [shown[0], shown[2]]
+    told = []
+    for curve in range(2):
+        driver.execute_script(
+            "Plotly.Fx.hover('shares', [{curveNumber: arguments[0], pointNumber: 0}])", curve
+        )
+        told += driver.execute_script(
+            "return [...document.querySelectorAll('#shares .hovertext')].map((text) => text.textContent)"
+        )
+    assert [text.partition("% of ")[2] for text in told] == [f"{shown[0]}, {name} q̈" for name in shown[:2]]
+    assert driver.get_log("browser") == []

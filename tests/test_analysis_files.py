@@ -196,7 +196,8 @@ def test_a_missing_extra_is_named(monkeypatch, log, call, tmp_path):
         call("analyze", log, *ROBOT, "--out", tmp_path / "out")
 
 
-def test_progress_in_plain_lines(capsys):
+def test_progress_of_long_work_in_plain_lines(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "QUIET", 0.0)
     with progress.progress() as report:
         for done in range(0, 1001, 10):
             report("analysing", done, 1000)

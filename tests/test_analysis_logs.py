@@ -1,12 +1,13 @@
 """Readers of CSV, OpenSim storage and Parquet, and what they refuse."""
 
+import errno
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from linkwise.analysis.logs import open_log
+from linkwise.analysis.logs import open_log, text
 from linkwise.errors import LinkwiseError
 from motion_logs import JOINTS, smooth, write_csv, write_mot
 
@@ -127,3 +128,89 @@ def test_a_decimal_comma_is_named(tmp_path):
     path.write_text("time;joint1\n0;1\n0,01;2\n", encoding="utf-8")
     with pytest.raises(LinkwiseError, match=r"row 3, column 'time': '0,01' has a decimal comma"):
         whole(path, (0, 1))
+
+
+DIGITS = "9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        (
+            "a.mot",
+            f"nRows={DIGITS}\nendheader\ntime\n0\n",
+            "nRows='9+…9+' in the header is",
+        ),
+        ("a.csv", f"time,{'x' * 140_000}\n", r"row 1: cannot be read as separated values: field larger"),
+        ("a.csv", "x" * 17_000_000, r"row 1 has more than 16,777,216 characters; is it a log\?"),
+        ("a.mot", "a=b\n" * 20_000, "no line 'endheader'"),
+        ("a.csv", "t\0i\0m\0e\0,\0a\0", "row 1: zero bytes among the column names; save it as UTF-8"),
+        ("a.parquet", "PAR1" + "x" * 99 + "PAR1", "not Parquet, or cut off"),
+    ],
+    ids=["digits", "field", "line", "header", "zero bytes", "parquet"],
+)
+def test_no_header_is_taken_that_no_log_has(tmp_path, name, content, message):
+    (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=message):
+        open_log(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("cell", "message"),
+    [
+        ("\0", r"row 3, column 'a': '\\x00' is not a number"),
+        ("1_000", "'1_000' is not a number"),
+        ("１", "'１' is not a number"),
+        (f"x{DIGITS}", "'x9+…9+' is not a number"),
+    ],
+)
+def test_cells_that_python_alone_would_read_are_named(tmp_path, cell, message):
+    path = tmp_path / "a.csv"
+    path.write_text(f"time,a\n0,1\n0.1,{cell}\n", encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=message):
+        whole(path, (0, 1))
+
+
+def test_numbers_of_many_digits_are_numbers(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(f"time,a\n0,0.{DIGITS}\n", encoding="utf-8")
+    np.testing.assert_array_equal(whole(path, (0, 1)), [[0, 1.0]])
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 1000])
+def test_blank_rows_are_found_wherever_a_block_ends(tmp_path, rows):
+    path = tmp_path / "a.csv"
+    path.write_text("time,a\n0,1\n\n\n1,2\n", encoding="utf-8")
+    with pytest.raises(LinkwiseError, match="row 3: blank row"):
+        whole(path, (0, 1), rows)
+    path.write_text("time,a\n0,1\n1,2\n\n\n\n\n", encoding="utf-8")
+    np.testing.assert_array_equal(whole(path, (0, 1), rows), [[0, 1], [1, 2]])
+
+
+def test_long_rows_come_in_small_blocks(tmp_path, monkeypatch):
+    monkeypatch.setattr(text, "LONGEST", 100)
+    path = write_csv(tmp_path / "a.csv", smooth(50, 3))
+    blocks = [block for block, _ in open_log(path).read((0, 1, 2, 3))]
+    assert max(map(len, blocks)) <= 3
+    np.testing.assert_array_equal(np.concatenate(blocks), smooth(50, 3))
+
+
+def test_a_damaged_page_of_parquet_is_named(tmp_path):
+    path = tmp_path / "a.parquet"
+    pq.write_table(pa.table({"time": np.random.default_rng(1).random(9000)}), path, use_dictionary=False)
+    data = bytearray(path.read_bytes())
+    data[4:3000] = b"\0" * 2996
+    path.write_bytes(data)
+    with pytest.raises(LinkwiseError, match=r"a\.parquet: after row 0: damaged \(.*\); write the file again"):
+        whole(path, (0,))
+
+
+def test_a_log_that_may_not_be_read_is_named(tmp_path, monkeypatch):
+    path = write_csv(tmp_path / "a.csv", smooth(5, 1), ("a",))
+
+    def refuse(*_, **__):
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "open", refuse)  # whoever runs the tests may read everything
+    with pytest.raises(LinkwiseError, match=r"a\.csv: cannot be read: Permission denied"):
+        open_log(path)

@@ -37,7 +37,7 @@ def test_names_cannot_end_their_element(analysis):
     robot = replace(analysis.robot, name=EVIL, joints=(EVIL, "b", "c"), links=("a", EVIL, "c"))
     html = report(replace(analysis, robot=robot, source=EVIL))
     assert EVIL not in html
-    assert "alert(" not in html.replace('alert(\\"1', "").replace("alert(&#34;1", "")
+    assert "alert(" not in html.replace('alert(\\"1', "").replace("alert(&quot;1", "")
     block = re.search(r'<script type="application/json" id="data">(.*?)</script>', html, re.S)
     data = json.loads(block[1])
     assert (data["robot"], data["joints"][0]["name"], data["links"][1]) == (EVIL, EVIL, EVIL)

@@ -9,8 +9,8 @@ from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.result_columns import Column
 from linkwise.analysis.show.poses import poses
 from linkwise.errors import LinkwiseError
+from linkwise.escape import short
 from linkwise.package.manifest import BodyEntry
-from linkwise.plotstyle import short
 from matplotlib.figure import Figure
 from motion_logs import JOINTS, PLANAR3, smooth, write_csv
 

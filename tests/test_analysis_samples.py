@@ -184,3 +184,29 @@ def test_a_last_row_that_may_be_cut_is_warned_of(tmp_path):
     (warning,) = read(path).warnings
     assert "the last row has no line end" in warning
     assert "may be cut off" in warning
+
+
+@pytest.mark.parametrize(
+    ("time", "message"),
+    [
+        ("{}e307", r"time column: it comes to 9e\+307 s; give seconds"),
+        ("{}e-323", r"time column: steps of .*e-324 s; give seconds"),
+    ],
+)
+def test_times_that_no_clock_shows(tmp_path, time, message):
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{time.format(at)},1\n" for at in range(10))
+    path.write_text(f"time,joint1\n{rows}", encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=message):
+        read_samples(path, ("joint1",), ("rad",), Reading(), silent)
+
+
+def test_splines_that_overflow_are_told(tmp_path):
+    table = smooth(40, 1)
+    table[20, 1] = 1e308
+    path = write_csv(tmp_path / "a.csv", table, ("joint1",))
+    message = (
+        r"--resample overflows between 0 s and 0\.39 s: the log's values are too large there, up to 1e\+308"
+    )
+    with pytest.raises(LinkwiseError, match=message):
+        read_samples(path, ("joint1",), ("rad",), Reading(resample=50.0), silent)

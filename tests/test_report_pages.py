@@ -1,17 +1,24 @@
 """The pages of the reports, and the templates that they are made from."""
 
+import json
+import math
 from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import pytest
 import sympy as sp
 from linkwise.emit.render import render, variables
 from linkwise.errors import LinkwiseError
+from linkwise.escape import printable
 from linkwise.progress import silent
 from linkwise.report import (
     TermQuery,
     Timing,
     measure,
+    read_seconds,
     reduction_markdown,
     reduction_page,
     seconds,
@@ -25,6 +32,7 @@ from linkwise.report import (
 )
 from linkwise.robot import Coordinate, Options, read_robot
 from linkwise.symbolic.system import EnergySystem, LinkEnergy, System, rigid_system
+from markdown_it import MarkdownIt
 
 
 def planar(n: int) -> System:
@@ -70,3 +78,64 @@ def test_an_arm_whose_first_joint_moves_no_inertia_is_refused() -> None:
     spring = EnergySystem("spring", (a,), (LinkEnergy("coil", sp.S.Zero, a.q**2),))
     with pytest.raises(LinkwiseError, match="no term of τ_1 contains q̈_1"):
         study("spring", spring, 1, 1, 1, 100, silent)
+
+
+TIMING = {"dof": 1, "method": "autograd", "extract": 1.0, "whole": 2.0, "everything": 3.0}
+MEASURED = {
+    "robot": "arm",
+    "batch": 1024,
+    "machine": "a",
+    "python": "3",
+    "numpy": "2",
+    "torch": "2",
+    "timings": [TIMING],
+}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"robot": ["arm"]},
+        {"machine": None},
+        {"batch": "many"},
+        {"timings": 3},
+        {"timings": [TIMING | {"method": "**guess**"}]},
+        {"timings": [TIMING | {"whole": 0}]},
+        {"timings": [TIMING | {"dof": math.inf}]},
+        {"timings": [TIMING | {"extract": math.nan}]},
+        {"remark": math.nan},
+    ],
+    ids=str,
+)
+def test_a_measurement_that_is_none_is_told(change: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "measured.json"
+    path.write_text(json.dumps(MEASURED), encoding="utf-8")
+    assert read_seconds(path) == MEASURED
+    path.write_text(json.dumps(MEASURED | change), encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=r"measured\.json: not a measurement; give the measured\.json"):
+        read_seconds(path)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "9" * 5000, '{"timings": "', "\ufeff{}", "[]"], ids=range(5))
+def test_json_that_is_no_measurement_is_told(text: str, tmp_path: Path) -> None:
+    (tmp_path / "measured.json").write_text(text, encoding="utf-8")
+    with pytest.raises(LinkwiseError, match=r"measured\.json: not a measurement"):
+        read_seconds(tmp_path / "measured.json")
+
+
+@pytest.mark.parametrize("name", ["a|b`c`\\|d", "_a_ *b* <img src=x>", "$x^$ \x1b[31m\n# b |---|"])
+def test_tables_keep_their_cells_whatever_the_names(name: str, tmp_path: Path) -> None:
+    robot = replace(read_robot("planar1", Options(parameters="symbolic")), name=name)
+    robot = replace(robot, links=tuple(replace(link, name=name) for link in robot.links))
+    page = terms_markdown(terms_report(rigid_system(robot), TermQuery(), 1000, False, silent))
+    parsed = MarkdownIt("commonmark").enable("table").parse(page)
+    rows = [[]]
+    for token, cell in pairwise(parsed):
+        if token.type == "tr_open":
+            rows.append([])
+        elif token.type == "td_open":
+            rows[-1].append("".join(child.content for child in cell.children))
+    assert [row[1] for row in rows if len(row) == 5] == [printable(name), "all counted"]
+    assert parsed[0].tag == "h1"
+    heading = "".join(child.content for child in parsed[1].children)
+    assert heading == f"Terms in the partial torques of {printable(name)}"

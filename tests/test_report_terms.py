@@ -272,3 +272,8 @@ def test_a_parameter_named_like_a_coordinate_is_not_a_motion() -> None:
     system = EnergySystem("slide", (x,), (LinkEnergy("cart", mass * x.qd**2 / 2, x.q**2),), {mass: 1.0})
     (row, _) = terms_report(system, TermQuery(), 100, False, silent).rows
     assert (row.count.total, row.kept) == (2, 1)
+
+
+def test_coefficients_beyond_any_float_are_held_against_each_other() -> None:
+    huge = Laurent({0: 10**400, 1: 10**392, 2: 10**390})
+    assert set(huge.pruned(1e-9).terms) == {0, 1}

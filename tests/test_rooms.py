@@ -26,7 +26,9 @@ ROOMS = (
     "plotstyle",
     "extras",
     "progress",
+    "input_file",
     "errors",
+    "escape",
     "version",
 )
 """From the top of the house to its ground: a room imports from rooms below it only."""

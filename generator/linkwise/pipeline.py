@@ -21,6 +21,7 @@ from linkwise.emit.assemble import checked_identifier, package_files
 from linkwise.emit.backend import BACKENDS, chosen_backends
 from linkwise.emit.derivation import Derivation
 from linkwise.errors import LinkwiseError, within
+from linkwise.input_file import is_file
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, read_robot
 from linkwise.robot.robot import Robot
@@ -31,7 +32,7 @@ from linkwise.symbolic.user_energies import read_energies
 def read_system(spec: str | Path, options: Options | None = None) -> System:
     """System of a built-in robot, a robot's file, or a Python file of energies; raises LinkwiseError."""
     options = options or Options()
-    if Path(spec).suffix == ".py" and Path(spec).is_file():
+    if Path(spec).suffix == ".py" and is_file(Path(spec)):
         with within(str(spec)):
             rigid = [f"--{name.replace('_', '-')}" for name in options.given if name != "parameters"]
             if rigid:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from linkwise.escape import printable, short
 from linkwise.extras import extra
 
 # Okabe and Ito 2008, the first three in the paper's order of red, blue and green; their yellow is too pale
@@ -54,12 +55,15 @@ def dash(index: int) -> str:
     return DASHES[index // len(COLOURS) % len(DASHES)]
 
 
-def short(name: str, most: int = 24) -> str:
-    """The name, its middle left out where it is longer than `most`: exporters number names at their end."""
-    if len(name) <= most:
-        return name
-    tail = (most - 1) // 2
-    return f"{name[: most - 1 - tail]}…{name[-tail:]}"
+def drawn(name: str, most: int = 24) -> str:
+    """A name as a plot shows it: literally, what the font has no picture of as an escape, at most so long.
+
+    One that begins with _, which hides a line from legends, begins with a blank that nobody sees.
+    """
+    manager = extra("matplotlib.font_manager")
+    pictures = manager.get_font(manager.findfont(SETTINGS["font.family"])).get_charmap()
+    text = short(printable(name, lambda c: c.isprintable() and ord(c) in pictures), most)
+    return f"\N{ZERO WIDTH SPACE}{text}" if text.startswith("_") else text
 
 
 @contextmanager

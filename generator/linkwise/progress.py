@@ -1,6 +1,11 @@
-"""Progress of long work on stderr: a bar with rate and time left on a terminal, plain lines elsewhere."""
+"""Progress of long work on stderr: a bar with rate and time left on a terminal, plain lines elsewhere.
+
+The bar goes when the work ends, and the lines begin only where it takes long: what is said then, above
+all an error, stands alone.
+"""
 
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
@@ -8,6 +13,9 @@ from rich.console import Console
 from rich.progress import BarColumn, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 from rich.text import Text
+
+QUIET = 10.0
+"""Seconds of work that no plain line tells of."""
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of a stage, how much of it is done, and how much there is."""
@@ -25,7 +33,14 @@ def progress(units: Mapping[str, str] | None = None) -> Iterator[Progress]:
         return
     columns = (TextColumn("{task.description:<10}"), BarColumn(), TextColumn("{task.percentage:>3.0f}%"))
     rate = _Rate(units or {})
-    with Bar(*columns, rate, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+    with Bar(
+        *columns,
+        rate,
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
         tasks: dict[str, int] = {}
 
         def update(stage: str, done: int, whole: int) -> None:
@@ -51,13 +66,16 @@ class _Rate(ProgressColumn):
 
 
 def _lines() -> Progress:
-    """Print a line for each tenth of a stage, or for its end alone where it has few steps."""
+    """Print a line for each tenth of a stage, for its end alone where it has few steps, once work is long."""
     last: dict[str, int] = {}
+    start = time.monotonic()
 
     def update(stage: str, done: int, whole: int) -> None:
         tenth = 10 * done // whole if whole else 10
         if tenth > last.get(stage, -1) and (tenth == 10 or whole > 100):
             last[stage] = tenth
+            if time.monotonic() - start < QUIET:
+                return
             print(f"{stage}: {10 * tenth}%", file=sys.stderr)
 
     return update

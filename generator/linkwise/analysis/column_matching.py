@@ -1,6 +1,7 @@
 """Which column of a log is the time, which is which joint, and in which unit its angles are."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 from linkwise.analysis.logs import Log
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 
 MANY_TURNS = 4 * math.pi
 """An angle past two turns in radians is more likely one in degrees."""
@@ -33,24 +35,26 @@ def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> S
     Raises LinkwiseError for a joint without a column, a column used twice, and a column without a joint
     where that was not allowed.
     """
-    for name in columns:
-        if list(columns).count(name) > 1:
-            raise LinkwiseError(f"column {name!r} stands twice in the header; rename one")
+    twice = [name for name, count in Counter(columns).items() if count > 1]
+    if twice:
+        raise LinkwiseError(f"column {twice[0]!r} stands twice in the header; rename one")
     time = _time(columns, reading)
     source = _mapped(columns, joints, reading)
-    missing = [joint for joint, column in source.items() if column not in columns]
-    free = [c for c in columns if c not in source.values() and c != columns[time]]
+    at_column = {column: at for at, column in enumerate(columns)}
+    missing = [joint for joint, column in source.items() if column not in at_column]
+    used = {*source.values(), columns[time]}
+    free = [column for column in columns if column not in used]
     if missing:
         raise LinkwiseError(
-            f"no column for joint {_list(missing)}; name it with --map COLUMN={missing[0]}"
-            f" (columns not used: {_list(free) if free else 'none'})"
+            f"no column for joint {listed(map(repr, missing))}; name it with --map COLUMN={missing[0]}"
+            f" (columns not used: {listed(map(repr, free)) if free else 'none'})"
         )
     if free and not reading.ignore_extra:
         raise LinkwiseError(
-            f"no joint for column {_list(free)}; leave such columns out with --ignore-extra,"
+            f"no joint for column {listed(map(repr, free))}; leave such columns out with --ignore-extra,"
             " or map them with --map COLUMN=JOINT"
         )
-    found = tuple(list(columns).index(column) for column in source.values())
+    found = tuple(at_column[column] for column in source.values())
     for joint, at in zip(source, found, strict=True):
         if found.count(at) > 1 or at == time:
             raise LinkwiseError(f"column {columns[at]!r} is asked to be joint {joint!r} and more")
@@ -99,13 +103,15 @@ def unit_warnings(
 def _time(columns: Sequence[str], reading: Reading) -> int:
     if reading.time is not None:
         if reading.time not in columns:
-            raise LinkwiseError(f"--time {reading.time}: no such column; the log has {_list(columns)}")
+            raise LinkwiseError(
+                f"--time {reading.time}: no such column; the log has {listed(map(repr, columns))}"
+            )
         return list(columns).index(reading.time)
     for at, name in enumerate(columns):
         if name.lower() in {"time", "t"}:
             return at
     raise LinkwiseError(
-        f"no column 'time' in {_list(columns)}; say which one holds seconds with --time COLUMN"
+        f"no column 'time' in {listed(map(repr, columns))}; say which one holds seconds with --time COLUMN"
     )
 
 
@@ -115,16 +121,13 @@ def _mapped(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> 
     for column, joint in reading.mapping:
         if joint not in source:
             raise LinkwiseError(
-                f"--map {column}={joint}: the robot has no joint {joint!r}; its joints are {_list(joints)}"
+                f"--map {column}={joint}: the robot has no joint {joint!r}; its joints are"
+                f" {listed(map(repr, joints))}"
             )
         if column not in columns:
             raise LinkwiseError(
-                f"--map {column}={joint}: the log has no column {column!r}; it has {_list(columns)}"
+                f"--map {column}={joint}: the log has no column {column!r}; it has"
+                f" {listed(map(repr, columns))}"
             )
         source[joint] = column
     return source
-
-
-def _list(names: Sequence[str]) -> str:
-    shown = ", ".join(repr(name) for name in names[:8])
-    return shown + (f" and {len(names) - 8} more" if len(names) > 8 else "")

@@ -1,6 +1,7 @@
 """Even time: whether a log has it, up to the digits its times are written in, and how to bring it about."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,9 @@ OVERLAP = 64
 """Knots seen past a window. A knot's influence on a cubic spline at least halves from one to the
 next, so what is cut away is below 2⁻⁶⁴ of the signal."""
 
+EXTREME = 1e100
+"""In s, of times, and in Hz, of rates: no clock shows it, and what is computed from it overflows."""
+
 MOST = 100
 """How many times the log's own rate is still a plausible wish, and not a slip of the finger."""
 
@@ -31,6 +35,8 @@ def even_rate(time: Array, first_row: int, strict: bool) -> float:
     """
     if len(time) < 2:
         raise LinkwiseError(f"{len(time)} samples; a movement needs 5 or more")
+    if np.abs(time).max() > EXTREME:
+        raise LinkwiseError(f"time column: it comes to {np.abs(time).max():.3g} s; give seconds")
     steps = np.diff(time)
     _refuse_backwards(time, steps, first_row)
     usual = float(np.median(steps))
@@ -41,6 +47,8 @@ def even_rate(time: Array, first_row: int, strict: bool) -> float:
             f" {steps[worst]:.6g} s where steps are {usual:.6g} s; fill it or cut the log there"
         )
     mean = (time[-1] - time[0]) / (len(time) - 1)
+    if mean < 1 / EXTREME:
+        raise LinkwiseError(f"time column: steps of {mean:.3g} s; give seconds")
     off = np.abs(steps - mean)
     if strict and off.max() > TOLERANCE * mean:
         step = _rounded_step(time)
@@ -52,6 +60,21 @@ def even_rate(time: Array, first_row: int, strict: bool) -> float:
             f" {mean:.6g} s; bring the log to an even rate with --resample {1 / mean:.6g}"
         )
     return float(1 / mean)
+
+
+def _splined(spline: Any, window: Array, at: Array) -> Array:
+    """Values at the times `at` (T,) of splines through a window (S, 1 + n)."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        try:
+            values: Array = spline(window[:, 0], window[:, 1:], axis=0)(at)
+        except ValueError:  # slopes that overflow
+            values = np.full((1, 1), np.nan)
+    if not np.isfinite(values).all():
+        raise LinkwiseError(
+            f"--resample overflows between {window[0, 0]:.6g} s and {window[-1, 0]:.6g} s: the log's values"
+            f" are too large there, up to {np.abs(window[:, 1:]).max():.3g}"
+        )
+    return values
 
 
 def _refuse_backwards(time: Array, steps: Array, first_row: int) -> None:
@@ -102,6 +125,6 @@ def resampled(samples: Array, rate: float, rows: int = 65536, progress: Progress
         low = max(0, int(np.searchsorted(time, at[0])) - OVERLAP)
         high = min(len(time), int(np.searchsorted(time, at[-1])) + OVERLAP)
         window = np.asarray(samples[low:high])
-        values = spline(window[:, 0], window[:, 1:], axis=0)(np.minimum(at, time[-1]))
+        values = _splined(spline, window, np.minimum(at, time[-1]))
         yield np.column_stack([at, values])
         progress("resampling", start + len(at), count)

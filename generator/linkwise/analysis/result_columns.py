@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.escape import column_part
 from linkwise.package.load import PackedLayout
 
 Quantity = Literal["time", "q", "qd", "qdd", "tau", "tau_link", "tau_qdd", "tau_qd", "tau_gravity"]
@@ -53,13 +54,13 @@ def columns_of(robot: LoadedRobot, layout: PackedLayout) -> tuple[Column, ...]:
     motions: tuple[tuple[Quantity, str], ...] = (("q", ""), ("qd", "/s"), ("qdd", "/s²"))
     for quantity, suffix in motions:
         for i, joint in enumerate(robot.joints):
-            out.append(Column(quantity, f"{quantity}/{_escaped(joint)}", robot.units[i] + suffix, i))
+            out.append(Column(quantity, f"{quantity}/{column_part(joint)}", robot.units[i] + suffix, i))
     for i, joint in enumerate(robot.joints):
-        out.append(Column("tau", f"tau/{_escaped(joint)}", load_unit(robot.units[i]), i))
+        out.append(Column("tau", f"tau/{column_part(joint)}", load_unit(robot.units[i]), i))
 
     def load(quantity: Quantity, prefix: str, i: int, j: int, k: int | None = None) -> None:
         parts = [robot.joints[i], robot.links[j], *([robot.joints[k]] if k is not None else [])]
-        name = "/".join([prefix, *map(_escaped, parts)])
+        name = "/".join([prefix, *map(column_part, parts)])
         out.append(Column(quantity, name, load_unit(robot.units[i]), i, j, k))
 
     for i, j in sorted(map(tuple, layout.torque.tolist())):
@@ -79,8 +80,3 @@ def mirrored(layout: PackedLayout) -> list[tuple[int, int, int, int]]:
     for source, (i, j, k) in enumerate(layout.acceleration.tolist()):
         rows |= {(i, j, k, source), (k, j, i, source)}
     return sorted(rows)
-
-
-def _escaped(name: str) -> str:
-    """A joint's or link's name as a part of a column's: no slash in it, and still one to one."""
-    return name.replace("%", "%25").replace("/", "%2F")

@@ -1,6 +1,5 @@
 """`analyze`: from a log and a robot to arrays in memory, or to a directory of files."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from linkwise.analysis.stream import KeptSamples, Sink, Streamed, span_of, strea
 from linkwise.analysis.tables import Format, open_table
 from linkwise.analysis.torques import Decomposer
 from linkwise.errors import LinkwiseError, within
+from linkwise.escape import file_name, json_text
 from linkwise.extras import extra
 from linkwise.output import whole_directory
 from linkwise.package.load import Array
@@ -88,7 +88,7 @@ def analyze_to(
         job = _prepared(log, robot, reading, processing, progress, draft)
         columns = job.decomposer.columns
         kept = KeptSamples(len(columns), stride_for(job.count, len(columns), NUMBERS, SAMPLES))
-        note = json.dumps({"log": log.name, "robot": robot.name, **choices(reading, processing)})
+        note = json_text({"log": log.name, "robot": robot.name, **choices(reading, processing)})
         with open_table(draft / f"analysis.{wanted.table}", columns, note) as table:
 
             def sink(block: Array) -> None:
@@ -103,10 +103,10 @@ def analyze_to(
 
 def _write_beside_table(draft: Path, analysis: Analysis, wanted: Wanted) -> None:
     """Write the record, the figures and the page."""
-    text = json.dumps(analysis.record(), indent=1, ensure_ascii=False, allow_nan=False)
+    text = json_text(analysis.record(), indent=1)
     (draft / RECORD).write_text(text + "\n", encoding="utf-8")
     for name in wanted.figures:
-        file = draft / f"{name.replace(':', '-').replace('/', '-')}.png"
+        file = draft / f"{'-'.join(map(file_name, name.split(':', 1)))}.png"
         file.write_bytes(figure_png(analysis, name))
     if wanted.page:
         (draft / "report.html").write_text(report(analysis), encoding="utf-8")

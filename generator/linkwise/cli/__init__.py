@@ -3,10 +3,13 @@
 Here are the flags that several commands share; those that read a robot are in `options`.
 """
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from linkwise.escape import printable
 
 BUDGET = 2_000_000
 """Terms of one expansion; a polynomial of this size takes about 0.5 GB."""
@@ -17,6 +20,12 @@ Details = Annotated[
 ]
 Budget = Annotated[int, typer.Option(min=1, help="Terms that one expansion may hold")]
 ReportOut = Annotated[Path | None, typer.Option(help="Directory that gets the report's files")]
+
+
+def tell(*lines: str, err: bool = False) -> None:
+    """Print each argument as one line that no name in it can break or colour."""
+    for line in lines:
+        print(printable(line), file=sys.stderr if err else sys.stdout)
 
 
 def counted(number: int, what: str) -> str:

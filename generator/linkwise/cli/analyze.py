@@ -1,6 +1,5 @@
 """The command `analyze`."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -21,8 +20,9 @@ from linkwise.analysis.settings import (
     Units,
 )
 from linkwise.analysis.tables import Format
-from linkwise.cli import Json
+from linkwise.cli import Json, tell
 from linkwise.errors import LinkwiseError
+from linkwise.escape import json_text, listed
 from linkwise.output import ended_by_signal
 from linkwise.progress import progress as shown_progress
 
@@ -106,10 +106,13 @@ def analyze(
     with ended_by_signal(), shown_progress(UNITS) as progress:
         analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress)
     for warning in analysis.warnings:
-        typer.echo(f"warning: {log}: {warning}", err=True)
+        tell(f"warning: {log}: {warning}", err=True)
     if analysis.ignored:
-        typer.echo(f"left out: {', '.join(analysis.ignored)}", err=True)
-    typer.echo(json.dumps(analysis.record(), ensure_ascii=False) if as_json else _told(analysis, files))
+        tell(f"left out: {listed(analysis.ignored)}", err=True)
+    if as_json:
+        print(json_text(analysis.record()))
+    else:
+        tell(*_told(analysis, files))
 
 
 def _lowpass(cutoff: float | None, order: int | None, padding: Padding | None) -> Lowpass | None:
@@ -120,7 +123,7 @@ def _lowpass(cutoff: float | None, order: int | None, padding: Padding | None) -
     return None
 
 
-def _told(analysis: Analysis, files: Sequence[Path]) -> str:
+def _told(analysis: Analysis, files: Sequence[Path]) -> list[str]:
     closure = analysis.closure
     recursion = (
         "no independent value for energies written by hand"
@@ -128,14 +131,12 @@ def _told(analysis: Analysis, files: Sequence[Path]) -> str:
         else f"partial torques agree with an independent Newton-Euler recursion within"
         f" {closure.recursion_relative:.1e}"
     )
-    return "\n".join(
-        [
-            f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {analysis.robot.backend};"
-            f" {recursion}; closure: terms sum to partial torques within {closure.terms_relative:.1e},"
-            f" these to joint torques within {closure.links_relative:.1e} (relative)",
-            *map(str, files),
-        ]
-    )
+    return [
+        f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {analysis.robot.backend};"
+        f" {recursion}; closure: terms sum to partial torques within {closure.terms_relative:.1e},"
+        f" these to joint torques within {closure.links_relative:.1e} (relative)",
+        *map(str, files),
+    ]
 
 
 def _pairs(mapping: list[str]) -> tuple[tuple[str, str], ...]:

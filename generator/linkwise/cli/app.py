@@ -1,13 +1,17 @@
 """The command line's start: which commands there are, and how a mistake is told."""
 
+import io
 import sys
+import warnings
 from importlib import import_module
-from typing import Any, NoReturn
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from linkwise.cli.endings import CLOSED_PIPE, FAULT, INTERRUPTED, MISTAKE, TRACEBACK, ended_in_one_line
 from linkwise.errors import LinkwiseError
+from linkwise.version import VERSION
 
 COMMANDS = {
     "generate": "Write the package of a robot.",
@@ -20,6 +24,11 @@ REPORTS = {
     "terms": "Count terms and operations of the partial torques, and those that one bucket needs.",
     "reduction": "Draw the share of terms of τ_1 that its q̈_1 part does not need (the paper's Fig. 15).",
 }
+
+STATUSES = (
+    f"Exit status: 0 done; 1 a check failed; {MISTAKE} a mistake in the input; {FAULT} a fault of linkwise"
+    f" itself, whose traceback {TRACEBACK}=1 shows; {INTERRUPTED} interrupted; {CLOSED_PIPE} output closed."
+)
 
 
 class OnDemand(TyperGroup):
@@ -38,13 +47,14 @@ class OnDemand(TyperGroup):
         return name, typer.main.get_command(module.app), rest
 
 
-def _group(title: str, commands: dict[str, str]) -> typer.Typer:
+def _group(title: str, commands: dict[str, str], epilog: str | None = None) -> typer.Typer:
     group = typer.Typer(
         cls=OnDemand,
         add_completion=False,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         help=title,
+        epilog=epilog,
     )
     for name, line in commands.items():
         group.command(name, help=line)(_entry)
@@ -55,30 +65,50 @@ def _entry() -> None:
     """Stand in the list of commands."""
 
 
-app = _group("Which joint's movement loads which joint, through which link.", COMMANDS)
+def _show_version(asked: bool) -> None:
+    if asked:
+        print(f"linkwise {VERSION}")
+        raise typer.Exit
+
+
+app = _group("Which joint's movement loads which joint, through which link.", COMMANDS, STATUSES)
 app.add_typer(_group("Term counts and the cost-reduction curve.", REPORTS), name="report")
 
 
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Print the version")
+    ] = False,
+) -> None:
+    """Stand for the options of the whole."""
+
+
 def main() -> None:
-    """Run the command line; a user's mistake is one line on stderr and exit status 2."""
-    try:
-        status = typer.main.get_command(app)(standalone_mode=False)
-    except LinkwiseError as error:
-        _fail(str(error))
-    except typer.Abort:
-        sys.exit(130)
-    except Exception as error:
-        # Typer's own complaints about options; anything else is not the user's mistake.
-        if not hasattr(error, "format_message"):
-            raise
-        if message := error.format_message():  # empty where the help was shown for want of a command
+    """Run the command line; what ends it early is one line on stderr, and an exit status (see `endings`)."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # whatever letters the terminal lacks
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # of libraries, to programmers
+    status = 0
+    with ended_in_one_line():
+        command = typer.main.get_command(app)
+        try:
+            # Not by calling it, which ends the program at a closed pipe, and at Ctrl-C, in ways of its own.
+            called = "python -m linkwise" if sys.argv[0].endswith("__main__.py") else "linkwise"
+            with command.make_context(called, sys.argv[1:]) as context:
+                command.invoke(context)
+        except typer.Exit as ended:
+            status = ended.exit_code
+        except Exception as error:
+            # Typer's own complaints about options; anything else is not its matter.
+            if not hasattr(error, "format_message"):
+                raise
+            if not (message := error.format_message()):
+                sys.exit(MISTAKE)  # the help was shown, for want of a command
             # "Value error, " is pydantic's, which typer asks about values.
             asked = getattr(getattr(error, "ctx", None), "command_path", "linkwise")
-            _fail(f"{message.replace('Value error, ', '').rstrip('.')}. See {asked} --help")
-        sys.exit(2)
-    sys.exit(status if isinstance(status, int) else 0)
-
-
-def _fail(message: str) -> NoReturn:
-    print(f"linkwise: error: {' '.join(message.split())}", file=sys.stderr)
-    sys.exit(2)
+            message = message.replace("Value error, ", "").rstrip(".")
+            raise LinkwiseError(f"{message}. See {asked} --help") from error
+    sys.exit(status)

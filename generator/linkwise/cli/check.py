@@ -1,14 +1,16 @@
 """The command `check`."""
 
-import json
+import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from linkwise.check import check_package
-from linkwise.cli import Json
+from linkwise.check.compare import Result
+from linkwise.cli import Json, tell
+from linkwise.escape import json_text
 
 app = typer.Typer(add_completion=False)
 
@@ -22,9 +24,15 @@ def check(
     """Prove a package right: hashes, back ends, an independent recursion, closure, structure."""
     results = check_package(package, samples)
     if as_json:
-        typer.echo(json.dumps([asdict(result) | {"mark": result.mark} for result in results], indent=1))
+        print(json_text([_row(result) for result in results], indent=1))
     else:
         for result in results:
-            typer.echo(f"{result.mark:<4}  {result.name:<58} {result.detail}")
+            tell(f"{result.mark:<4}  {result.name:<58} {result.detail}")
     if not all(result.passed for result in results):
         raise typer.Exit(1)
+
+
+def _row(result: Result) -> dict[str, Any]:
+    """JSON has no infinite error: the detail says it."""
+    finite = result.error is not None and math.isfinite(result.error)
+    return asdict(result) | {"error": result.error if finite else None, "mark": result.mark}

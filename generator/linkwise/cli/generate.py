@@ -7,10 +7,11 @@ from typing import Annotated
 import typer
 
 from linkwise import pipeline
-from linkwise.cli import Details, counted
+from linkwise.cli import Details, counted, tell
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import checked_identifier
 from linkwise.emit.backend import BACKENDS
+from linkwise.input_file import is_file
 from linkwise.package.write import check_target, write_package
 from linkwise.progress import progress
 from linkwise.robot import Options, effects
@@ -33,7 +34,7 @@ def generate(
     """Write the package of a robot."""
     backends = backend or list(BACKENDS)
     path = Path(robot)
-    request = {"robot": path.name if path.is_file() else robot, "backends": backends, **asdict(options)}
+    request = {"robot": path.name if is_file(path) else robot, "backends": backends, **asdict(options)}
     system = pipeline.read_system(robot, options)
     directory = out / checked_identifier(name, system.name)
     check_target(directory, system.name)
@@ -41,8 +42,8 @@ def generate(
         files = pipeline.generate(system, backends, name, request, report)
     write_package(files, directory)
     for effect in effects(system.notes, details):
-        typer.echo(f"warning: {robot}: {effect}", err=True)
-    typer.echo(
+        tell(f"warning: {robot}: {effect}", err=True)
+    tell(
         f"wrote {directory}: {counted(len(system.coordinates), 'joint')}, "
         f"{counted(len(system.links), 'link')}, {counted(len(files), 'file')}"
     )

@@ -1,6 +1,5 @@
 """The command `inspect`: what a robot is made of, as data and as text."""
 
-import json
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -11,6 +10,7 @@ from linkwise.cli import Details, Json, counted
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import rigid_tree
 from linkwise.errors import LinkwiseError
+from linkwise.escape import json_text, printable
 from linkwise.robot import Options, left_out
 from linkwise.robot.robot import Parameter
 from linkwise.symbolic.system import EnergySystem, System
@@ -29,7 +29,7 @@ def inspect(
     """Show a robot's joints, links and parameters, and what was merged, locked, ignored or left out."""
     system, refused = _system(robot, options)
     data = inspection(system, details) | {"refused": refused}
-    typer.echo(json.dumps(data, indent=1) if as_json else table(data))
+    print(json_text(data, indent=1) if as_json else table(data))
 
 
 def _system(robot: str, options: Options) -> tuple[System, str]:
@@ -98,4 +98,4 @@ def table(data: dict[str, Any]) -> str:
             if note["kind"] == kind:
                 effect = f"; {note['effect']}" if note["effect"] else ""
                 lines.append(f"  {note['subject']} {note['detail']}".rstrip() + effect)
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))

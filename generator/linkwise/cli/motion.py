@@ -1,13 +1,13 @@
 """The command `motion`."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from linkwise.analysis.paper_motions import MOTIONS, RATE, write_motions
-from linkwise.cli import Json
+from linkwise.cli import Json, tell
+from linkwise.escape import json_text
 
 Kind = Literal["recorded", "simulated", "both"]
 
@@ -27,7 +27,7 @@ def motion(
         for file, made in zip(write_motions(out, wanted), wanted, strict=True)
     ]
     if as_json:
-        typer.echo(json.dumps(written))
+        print(json_text(written))
         return
     for entry in written:
-        typer.echo(f"{entry['file']}: {entry['samples']} samples at {RATE:g} Hz")
+        tell(f"{entry['file']}: {entry['samples']} samples at {RATE:g} Hz")

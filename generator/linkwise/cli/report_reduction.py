@@ -14,11 +14,11 @@ from linkwise.output import require_writable, write_files
 from linkwise.pipeline import read_system
 from linkwise.progress import progress
 from linkwise.report import (
-    json_text,
     measure,
     read_seconds,
     reduction_json,
     reduction_markdown,
+    report_json,
     seconds_json,
     seconds_markdown,
     study,
@@ -64,11 +64,11 @@ def reduction(
         write_files(out, study_files(result, found))
     if as_json:
         measurement = {} if found is None else {"measured": found}
-        typer.echo(json_text(reduction_json(result) | measurement), nl=False)
+        print(report_json(reduction_json(result) | measurement), end="")
         return
-    typer.echo(reduction_markdown(result), nl=False)
+    print(reduction_markdown(result), end="")
     if found is not None:
-        typer.echo("\n" + seconds_markdown(result, found), nl=False)
+        print("\n" + seconds_markdown(result, found), end="")
 
 
 def dof_range(text: str) -> tuple[int, int]:

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from linkwise.cli import BUDGET, Budget, Json, ReportOut
+from linkwise.cli import BUDGET, Budget, Json, ReportOut, tell
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.errors import LinkwiseError
 from linkwise.output import require_writable, write_files
@@ -12,9 +12,9 @@ from linkwise.pipeline import read_system
 from linkwise.progress import progress
 from linkwise.report import (
     TermQuery,
-    json_text,
     position,
     progress_line,
+    report_json,
     terms_files,
     terms_json,
     terms_markdown,
@@ -58,6 +58,6 @@ def terms(
         result = terms_report(system, query, budget, partial, advance)
     if out is not None:
         write_files(out, terms_files(result))
-    typer.echo(json_text(terms_json(result)) if as_json else terms_markdown(result), nl=False)
+    print(report_json(terms_json(result)) if as_json else terms_markdown(result), end="")
     if not result.complete:
-        typer.echo(progress_line(result), err=True)
+        tell(progress_line(result), err=True)

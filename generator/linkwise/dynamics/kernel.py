@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from linkwise.dynamics.coefficients import Inputs, LinkForms, inputs
+from linkwise.escape import identifiers
 from linkwise.expression.count import count_operations
 from linkwise.expression.from_sympy import Lowering
 from linkwise.expression.graph import Graph, Node
@@ -38,14 +39,8 @@ def lowering(system: System) -> tuple[Lowering, Inputs]:
 
 def parameter_names(system: System) -> dict[sp.Symbol, str]:
     """Identifiers of the run-time parameters: their names made safe, and told apart when they then agree."""
-    names: dict[sp.Symbol, str] = {}
-    for symbol in system.parameters:
-        safe = "".join(c if c.isascii() and c.isalnum() else "_" for c in symbol.name)
-        name = f"p_{safe}"
-        while name in names.values():
-            name += "_"
-        names[symbol] = name
-    return names
+    symbols = list(system.parameters)
+    return dict(zip(symbols, identifiers([symbol.name for symbol in symbols], "p_"), strict=True))
 
 
 def decomposition_cost(kernels: Iterable[Kernel]) -> int:

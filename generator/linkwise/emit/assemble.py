@@ -13,10 +13,11 @@ import sympy as sp
 from linkwise import runtime
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
 from linkwise.emit.backend import BackendFiles, Loading
-from linkwise.emit.bodies import body_texts, in_docstring, parameter_rules
+from linkwise.emit.bodies import body_texts, parameter_rules
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
+from linkwise.escape import python_docstring, python_literal
 from linkwise.package.manifest import FILE, BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
 from linkwise.progress import Progress, silent
 from linkwise.robot.robot import Scalar, Vec3
@@ -98,12 +99,12 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     names = {
         **shared,
         "name": repr(derivation.package),
-        "joints": [ascii(c.name) for c in system.coordinates],
+        "joints": [python_literal(c.name) for c in system.coordinates],
         "units": [repr(c.unit) for c in system.coordinates],
-        "links": [ascii(link.name) for link in system.links],
+        "links": [python_literal(link.name) for link in system.links],
         "paths": [repr(system.path(j)) for j in range(len(system.links))],
         "linear": repr(tuple(sorted(derivation.linear))),
-        "parameters": [(ascii(s.name), repr(float(v))) for s, v in system.parameters.items()],
+        "parameters": [(python_literal(s.name), repr(float(v))) for s, v in system.parameters.items()],
         "bodies": bodies,
         "calls_numpy": any("np." in value for body in bodies for value in body.values),
     }
@@ -145,7 +146,7 @@ def _parameter_lines(system: System) -> list[str]:
     """Names of the parameters as lines of a docstring, which none of their characters can end."""
     lines: list[str] = []
     for symbol in system.parameters:
-        name = in_docstring(ascii(symbol.name))
+        name = python_docstring(symbol.name)
         if lines and len(lines[-1]) + len(name) < LINE:
             lines[-1] += f" {name},"
         else:

@@ -9,6 +9,7 @@ from linkwise.dynamics.kernel import lowering
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
 from linkwise.emit.straight_line import Code, fetched, straight_line
+from linkwise.escape import python_literal
 from linkwise.symbolic.link_energy import Steps, StepwiseEnergy, link_energies
 from linkwise.symbolic.system import EnergySystem, System
 from linkwise.version import VERSION
@@ -48,7 +49,7 @@ def autograd_files(system: System, linear: frozenset[int]) -> Iterator[tuple[str
             "twist": not isinstance(system, EnergySystem),
             "uses_torch": any(function.calls_torch for function in functions),
             "parent": None if energy.parent is None else energy.parent + 1,
-            "name": ascii(energy.name),
+            "name": python_literal(energy.name),
             "functions": functions,
             "path": repr(system.path(j)),
             "linear": j in linear,

@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 
 from linkwise.emit.printer import PythonPrinter, Text
+from linkwise.escape import python_docstring, python_literal
 from linkwise.expression.from_sympy import Lowering
 from linkwise.expression.graph import Graph, Node, operands, reachable
 from linkwise.robot.robot import Link, Scalar
@@ -59,20 +60,16 @@ def parameter_rules(system: System, checked: Sequence[BodyText]) -> list[str]:
         return []
     if not isinstance(system, RigidSystem):
         return [FREE]
-    links = [ascii(link.name) for link in system.robot.links if _parameters(link)]
-    exempt = sorted(set(links) - {body.link for body in checked})
+    links = {link.name for link in system.robot.links if _parameters(link)}
+    kept = {body.link for body in checked}
+    exempt = sorted(name for name in links if python_literal(name) not in kept)
     made = any(note.kind == "promoted" for note in system.notes)
     rules = [NAMES] if made else []
     if system.robot.allow_unphysical:
         rules.append(ALLOWED)
     elif links:
-        rules += [REFUSED, *([EXEMPT.format(", ".join(map(in_docstring, exempt)))] if exempt else [])]
+        rules += [REFUSED, *([EXEMPT.format(", ".join(map(python_docstring, exempt)))] if exempt else [])]
     return [line for rule in rules for line in wrap(rule, WIDTH)]
-
-
-def in_docstring(text: str) -> str:
-    """Return ASCII text such as none of its characters can end a docstring."""
-    return text.replace("\\", "\\\\").replace('"', '\\"')
 
 
 def _entries(link: Link) -> tuple[Scalar, ...]:
@@ -91,10 +88,10 @@ def _numbers(link: Link, values: dict[sp.Symbol, float]) -> "np.ndarray[tuple[in
 
 def _text(link: Link) -> BodyText:
     symbols, graph = _parameters(link), Graph()
-    lower = Lowering(graph, {s: graph.symbol(f"p[{s.name!a}]") for s in symbols})
-    names = tuple(ascii(s.name) for s in symbols)
+    lower = Lowering(graph, {s: graph.symbol(f"p[{python_literal(s.name)}]") for s in symbols})
+    names = tuple(python_literal(s.name) for s in symbols)
     values = tuple(_inline(graph, lower(entry)) for entry in _entries(link))
-    return BodyText(ascii(link.name), f"({', '.join(names)},)", values)
+    return BodyText(python_literal(link.name), f"({', '.join(names)},)", values)
 
 
 def _inline(graph: Graph, output: Node) -> str:

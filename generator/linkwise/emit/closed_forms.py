@@ -8,6 +8,7 @@ from linkwise.dynamics.kernel import Kernel
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
 from linkwise.emit.straight_line import fetched, straight_line
+from linkwise.escape import python_literal
 from linkwise.expression.count import count_operations, in_words
 from linkwise.expression.graph import Node
 from linkwise.symbolic.system import System
@@ -36,7 +37,7 @@ def closed_form_files(system: System, kernels: Sequence[Kernel]) -> Iterator[tup
         view = {
             "number": j + 1,
             "version": VERSION,
-            "name": ascii(system.link_names[j]),
+            "name": python_literal(system.link_names[j]),
             "path": repr(path),
             "frame": kernel.frame,
             "functions": list(_functions(system, kernel, j + 1)),

@@ -6,6 +6,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, meta
 
+from linkwise.escape import html_text, markdown
+
 
 @cache
 def _environment() -> Environment:
@@ -16,6 +18,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    environment.filters |= {"html_text": html_text, "markdown": markdown}
     return environment
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.printer import ATOM, Printer, Text
+from linkwise.escape import python_literal
 from linkwise.expression.graph import Entry, Graph, Node, operands, reachable
 from linkwise.symbolic.system import System
 
@@ -103,7 +104,7 @@ def fetched(system: System, code: Code, subscript: str = "[{}]") -> tuple[str, .
         lines += [f"{prefix}{k + 1} = {prefix}{subscript.format(k)}" for k in used]
     for symbol, name in parameter_names(system).items():
         if name in code.symbols:
-            lines.append(f"{name} = p[{symbol.name!a}]")
+            lines.append(f"{name} = p[{python_literal(symbol.name)}]")
     return tuple(lines)
 
 

@@ -10,7 +10,7 @@ from linkwise.report.operations import LinkOperations, Operations, link_operatio
 from linkwise.report.plots import SavingsLine, draw_savings, reduction_images, savings_lines, terms_images
 from linkwise.report.reduction_curve import PAPER, CurvePoint, Study, curve, study
 from linkwise.report.reduction_page import reduction_json, reduction_markdown, verdicts
-from linkwise.report.report_files import json_text, study_files, terms_files
+from linkwise.report.report_files import report_json, study_files, terms_files
 from linkwise.report.seconds import Timing, measure
 from linkwise.report.seconds_page import read_seconds, seconds_json, seconds_markdown
 from linkwise.report.term_count import RunningCount, TermCount, TermQuery, count_terms, position
@@ -39,7 +39,6 @@ __all__ = [
     "draw_savings",
     "fit",
     "held_against",
-    "json_text",
     "link_operations",
     "link_torques",
     "measure",
@@ -49,6 +48,7 @@ __all__ = [
     "reduction_images",
     "reduction_json",
     "reduction_markdown",
+    "report_json",
     "savings_lines",
     "seconds_json",
     "seconds_markdown",

@@ -67,7 +67,8 @@ class Laurent:
         """Drop coefficients below `relative` times the largest, which rounding leaves behind."""
         if not relative or not self.terms:
             return self
-        least = relative * max(map(abs, self.terms.values()))
+        top, below = Fraction(relative).as_integer_ratio()  # numerators may be beyond any float
+        least = top * max(map(abs, self.terms.values())) // below
         terms = {key: c for key, c in self.terms.items() if abs(c) > least}
         return Laurent(terms, self.denominator, self.bound)
 

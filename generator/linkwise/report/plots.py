@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from linkwise.extras import extra
-from linkwise.plotstyle import BLUE, GREEN, INK, PURPLE, SKY, VERMILION, saved, short, styled
+from linkwise.plotstyle import BLUE, GREEN, INK, PURPLE, SKY, VERMILION, drawn, saved, styled
 from linkwise.report.curve_fit import Saturation
 from linkwise.report.reduction_curve import Study
-from linkwise.report.seconds import Timing
+from linkwise.report.seconds import METHODS, Timing
 from linkwise.report.torque_terms import TermsReport, TorqueTerms
 
 STEPS = 200
@@ -50,7 +50,7 @@ def _draw_reduction(figure: Any, result: Study) -> None:
     above.set_ylabel("reduction rate  1 − kept / total")
     above.set_ylim(-0.02, 1.02)
     above.legend(loc="lower right")
-    above.set_title(f"{short(result.robot)}: terms of τ₁ that the part with q̈₁ does not need")
+    above.set_title(f"{drawn(result.robot)}: terms of τ₁ that the part with q̈₁ does not need")
     below.margins(y=0.15)
     below.axhline(0.0, color=INK, linewidth=0.8)
     below.set_ylabel("counted\n− curve")
@@ -88,7 +88,7 @@ def savings_lines(result: Study, timings: Sequence[Timing] = ()) -> tuple[Saving
         SavingsLine("operations", "operations, nothing shared", dof, written, SKY, "v", long),
         SavingsLine("operations", "operations as emitted", dof, emitted, VERMILION, "s", "--"),
     ]
-    for method, *look in (("closed form", GREEN, "^", "-."), ("autograd", PURPLE, "D", ":")):
+    for method, look in zip(METHODS, ((GREEN, "^", "-."), (PURPLE, "D", ":")), strict=True):
         chosen = [t for t in timings if t.method == method]
         if chosen:
             n, y = tuple(t.dof for t in chosen), tuple(t.reduction for t in chosen)
@@ -112,7 +112,7 @@ def draw_savings(figure: Any, robot: str, lines: Sequence[SavingsLine]) -> None:
     axes.yaxis.set_major_formatter(lambda value, _: f"{100 * value:.0f} %")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
     *before, last = dict.fromkeys(line.kind for line in lines)
-    axes.set_title(f"{short(robot)}: savings in {', '.join(before)} and {last}")
+    axes.set_title(f"{drawn(robot)}: savings in {', '.join(before)} and {last}")
     _whole_numbers(axes, lines[0].dof)
 
 
@@ -141,7 +141,7 @@ def _draw_terms(figure: Any, report: TermsReport) -> None:
     axes.grid(visible=False)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
-    axes.set_title(f"{short(report.robot)}: terms of τᵢⱼ\nin brackets: those for the {report.query}")
+    axes.set_title(f"{drawn(report.robot)}: terms of τᵢⱼ\nin brackets: those for the {report.query}")
 
 
 def _draw_cell(axes: Any, x: int, y: int, row: TorqueTerms, shade: float) -> None:

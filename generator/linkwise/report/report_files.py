@@ -2,10 +2,10 @@
 
 import csv
 import io
-import json
 from collections.abc import Iterable
 from typing import Any
 
+from linkwise.escape import json_text
 from linkwise.report.plots import reduction_images, savings_images, savings_lines, terms_images
 from linkwise.report.reduction_curve import Study
 from linkwise.report.reduction_page import point_row, reduction_json, reduction_markdown
@@ -17,7 +17,7 @@ from linkwise.report.torque_terms import TermsReport
 def terms_files(result: TermsReport) -> dict[str, bytes]:
     """Files of a terms report: data, table, page and plot."""
     texts = {
-        "terms.json": json_text(terms_json(result)),
+        "terms.json": report_json(terms_json(result)),
         "terms.csv": terms_table(result),
         "terms.md": terms_markdown(result),
     }
@@ -27,14 +27,14 @@ def terms_files(result: TermsReport) -> dict[str, bytes]:
 def study_files(result: Study, measured: dict[str, Any] | None = None) -> dict[str, bytes]:
     """Files of a cost-reduction study; what was measured stays in files of its own."""
     texts = {
-        "reduction.json": json_text(reduction_json(result)),
+        "reduction.json": report_json(reduction_json(result)),
         "reduction.csv": reduction_table(result),
         "reduction.md": reduction_markdown(result, pictures=True),
     }
     images = reduction_images(result)
     images |= savings_images("savings", result.robot, savings_lines(result))
     if measured is not None:
-        texts["measured.json"] = json_text(measured)
+        texts["measured.json"] = report_json(measured)
         texts["measured.md"] = seconds_markdown(result, measured, pictures=True)
         lines = savings_lines(result, timings_of(measured))
         images |= savings_images("savings-measured", result.robot, lines)
@@ -64,9 +64,9 @@ def reduction_table(result: Study) -> str:
     return _csv_text(rows[0], (row.values() for row in rows))
 
 
-def json_text(data: Any) -> str:
+def report_json(data: Any) -> str:
     """JSON as people read it."""
-    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+    return f"{json_text(data, indent=2)}\n"
 
 
 def _csv_text(header: Iterable[str], rows: Iterable[Iterable[object]]) -> str:

@@ -27,6 +27,7 @@ from linkwise.progress import Progress
 from linkwise.symbolic.system import EnergySystem, System, rigid_system
 
 BATCH = 1024
+METHODS = ("closed form", "autograd")
 REPEATS, SHORTEST = 7, 0.02
 """Runs of which the fastest counts, and the least time of one run in s."""
 
@@ -93,7 +94,7 @@ def _closed_form(package: Package, n: int) -> Timing:
     p = robot.parameters
     return Timing(
         n,
-        "closed form",
+        METHODS[0],
         *_fastest(
             lambda: row.extract(q, qd, qdd, p),
             lambda: row.whole(q, qd, qdd, p),
@@ -109,7 +110,7 @@ def _autograd(package: Package, n: int) -> Timing:
     lagrangians = robot.backend.modules
     return Timing(
         n,
-        "autograd",
+        METHODS[1],
         *_fastest(
             lambda: sum(_second(torch, module, q, qd) for module in lagrangians) * qdd[..., :1],
             lambda: robot.inverse_dynamics(q, qd, qdd),

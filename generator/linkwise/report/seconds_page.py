@@ -1,6 +1,7 @@
 """Measured seconds as data and as a page; read back, they draw the same plot again."""
 
 import json
+import math
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -10,12 +11,15 @@ from typing import Any
 import numpy as np
 
 from linkwise.emit.render import render
-from linkwise.errors import LinkwiseError
+from linkwise.errors import LinkwiseError, within
+from linkwise.escape import json_text
 from linkwise.extras import extra
+from linkwise.input_file import require_file
 from linkwise.report.reduction_curve import Study
-from linkwise.report.seconds import BATCH, Timing
+from linkwise.report.seconds import BATCH, METHODS, Timing
 
 DIGITS = 4
+MADE_WITH = ("machine", "python", "numpy", "torch")
 
 
 def seconds_json(robot: str, timings: Sequence[Timing]) -> dict[str, Any]:
@@ -41,15 +45,28 @@ def seconds_json(robot: str, timings: Sequence[Timing]) -> dict[str, Any]:
 def read_seconds(path: Path) -> dict[str, Any]:
     """Read an earlier measurement; raises LinkwiseError for a file that is not one."""
     try:
+        with within(str(path)):
+            require_file(path, "cannot be read (No such file or directory); give --seconds FILE")
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        timings_of(found)
+        _check(found)
+    except LinkwiseError:
+        raise
     except OSError as error:
         raise LinkwiseError(f"{path}: cannot be read ({error.strerror}); give --seconds FILE") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         raise LinkwiseError(
             f"{path}: not a measurement; give the measured.json that --measure writes"
         ) from error
     return found
+
+
+def _check(found: dict[str, Any]) -> None:
+    """Raise what `read_seconds` expects of a file that does not hold what `seconds_json` makes."""
+    json_text(found)  # raises for NaN
+    methods = {timing.method for timing in timings_of(found) if math.isfinite(timing.reduction)}
+    texts = all(isinstance(found[key], str) for key in ("robot", *MADE_WITH))
+    if not (methods <= set(METHODS) and texts and isinstance(found["batch"], int)):
+        raise ValueError
 
 
 def timings_of(found: dict[str, Any]) -> tuple[Timing, ...]:
@@ -74,7 +91,7 @@ def seconds_markdown(result: Study, found: dict[str, Any], pictures: bool = Fals
         "pictures": pictures,
         "robot": found["robot"],
         "batch": found["batch"],
-        "machine": ", ".join(f"{k} {found[k]}" for k in ("machine", "python", "numpy", "torch")),
+        "machine": ", ".join(f"{k} {found[k]}" for k in MADE_WITH),
         "verdicts": [_verdict(result, [t for t in timings if t.method == m]) for m in methods],
         "rows": [_line(t) for t in timings],
     }

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.report.expand import Variables
 from linkwise.report.laurent import DIGIT, Laurent, add, exponents, lifted
 
@@ -37,9 +38,9 @@ def position(text: str, names: Sequence[str], option: str) -> int:
     """Index of a name, or of a number from 1; raises LinkwiseError naming the choices."""
     if text in names:
         return names.index(text)
-    if text.isascii() and text.isdigit() and 1 <= int(text) <= len(names):
+    if text.isascii() and text.isdigit() and len(text) < 10 and 1 <= int(text) <= len(names):
         return int(text) - 1
-    raise LinkwiseError(f"{option} {text!r} is not there; choose 1..{len(names)} or {', '.join(names)}")
+    raise LinkwiseError(f"{option} {text!r} is not there; choose 1..{len(names)} or {listed(names)}")
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.robot.description import Connection, Coupling, Mimic
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.notes import UNCOUPLED, Note
@@ -96,7 +97,7 @@ def _check_axes(axes: tuple[Axis, ...], lock: dict[str, float]) -> None:
             )
     for name in lock:
         if name not in counts:
-            raise LinkwiseError(f"--lock {name!r} is not a moving joint; the joints are {', '.join(counts)}")
+            raise LinkwiseError(f"--lock {name!r} is not a moving joint; the joints are {listed(counts)}")
         if fault := unusable(lock[name]):
             raise LinkwiseError(f"--lock {name!r} has {fault} for a value; give rad or m")
 

@@ -6,6 +6,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.robot.description import ZERO3, ZERO33, Body
 from linkwise.robot.notes import IMPOSSIBLE, Note
 from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3, unusable
@@ -13,6 +14,9 @@ from linkwise.robot.transforms import add, rotate, rotate_inertia
 
 TRIANGLE = 1e-6
 """Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
+
+MOST_NAMED = 20
+"""Bodies that cannot exist, in one message."""
 
 SPECK = 1e-14
 """m²: moments below mass · (100 nm)² count as zero. The moments of a point mass are zeros that turning
@@ -67,9 +71,9 @@ def check_bodies(bodies: Iterable[Body], allow: bool) -> list[Note]:
         name, fault = refused[0]
         raise LinkwiseError(f"link {name!r} has {fault}; correct it, or pass --allow-unphysical")
     if refused:
-        listed = ", ".join(f"{name!r} has {fault}" for name, fault in refused)
+        told = listed((f"{name!r} has {fault}" for name, fault in refused), MOST_NAMED, 150)
         raise LinkwiseError(
-            f"{len(refused)} links cannot exist; correct them, or pass --allow-unphysical: {listed}"
+            f"{len(refused)} links cannot exist; correct them, or pass --allow-unphysical: {told}"
         )
     return [
         Note("unphysical", body.name, body.unphysical or f"link {body.name!r} has {fault}", IMPOSSIBLE)

@@ -5,6 +5,7 @@ from typing import Literal
 
 import sympy as sp
 
+from linkwise.escape import listed
 from linkwise.robot.description import Connection
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import Link, Mat3, Parameter, Scalar, Vec3
@@ -79,7 +80,7 @@ class Naming:
             self._note(value, f"gravity_{axis}")
         used = {symbol.name for value in (*gravity, *_numbers(links)) for symbol in _symbols(value)}
         own = (
-            Parameter(name, value, "", f"of the file's own, for {_listed(self._uses[name])}")
+            Parameter(name, value, "", f"of the file's own, for {listed(self._uses[name], MOST_USES)}")
             for name, value in self.given.items()
             if name in used
         )
@@ -121,8 +122,3 @@ def _symbols(value: Scalar) -> set[sp.Symbol]:
 def _numbers(links: Iterable[Link]) -> Iterator[Scalar]:
     for link in links:
         yield from (link.mass, *link.com, *link.joint.translation, *(e for row in link.inertia for e in row))
-
-
-def _listed(uses: list[str]) -> str:
-    more = f" and {len(uses) - MOST_USES} more" if len(uses) > MOST_USES else ""
-    return f"{', '.join(uses[:MOST_USES])}{more}"

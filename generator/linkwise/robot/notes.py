@@ -5,6 +5,8 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from linkwise.escape import listed
+
 LEFT_OUT = "left out of the torques"
 UNCOUPLED = "moving by themselves, their coupling left out of the torques"
 IMPOSSIBLE = "accepted though physically impossible"
@@ -79,7 +81,7 @@ def effects(notes: Iterable[Note], every: bool = False) -> tuple[str, ...]:
             subjects.setdefault(note.effect, []).append(f"{note.subject}{detail}")
     if every:
         return tuple(f"{effect}: {item}" for effect, found in subjects.items() for item in found)
-    return tuple(f"{effect}: {_listed(found)}" for effect, found in subjects.items())
+    return tuple(f"{effect}: {listed(found, SHOWN)}" for effect, found in subjects.items())
 
 
 def left_out(notes: Iterable[Note]) -> tuple[Note, ...]:
@@ -89,8 +91,3 @@ def left_out(notes: Iterable[Note]) -> tuple[Note, ...]:
         Note("left out", effect.removesuffix(f" {LEFT_OUT}"), f"{count} ×", LEFT_OUT)
         for effect, count in counts.items()
     )
-
-
-def _listed(items: list[str]) -> str:
-    more = f" and {len(items) - SHOWN} more" if len(items) > SHOWN else ""
-    return f"{', '.join(items[:SHOWN])}{more}"

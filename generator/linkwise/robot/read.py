@@ -5,6 +5,7 @@ from importlib import resources
 from pathlib import Path
 
 from linkwise.errors import LinkwiseError, within
+from linkwise.input_file import require_file
 from linkwise.robot.build import Options, build
 from linkwise.robot.builtin.planar import planar
 from linkwise.robot.description import Description
@@ -60,10 +61,8 @@ def _joints(digits: str) -> int:
 
 
 def _read_file(path: Path) -> Description:
-    if path.is_dir():
-        raise LinkwiseError("this is a directory; give the robot's file")
-    if not path.is_file():
-        raise LinkwiseError(f"no such file or built-in robot; the built-ins are {', '.join(BUILT_IN)}")
+    missing = f"no such file or built-in robot; the built-ins are {', '.join(BUILT_IN)}"
+    require_file(path, missing, "the robot's file")
     if path.suffix.lower() == ".xacro":
         raise LinkwiseError(XACRO)
     reader = READERS.get(path.suffix.lower())

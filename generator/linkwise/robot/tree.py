@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.robot.description import Connection, Description, Loop
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import unusable
@@ -29,8 +30,7 @@ def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
         )
     if len(roots) > 1:
         raise LinkwiseError(
-            f"there are several roots ({', '.join(map(repr, roots))}); connect them, or choose one "
-            "with --root"
+            f"there are several roots ({listed(map(repr, roots))}); connect them, or choose one with --root"
         )
     below: dict[str, list[Connection]] = {}
     for c in reversed(description.connections):
@@ -81,7 +81,7 @@ def cut(description: Description, root: str | None, tip: str | None) -> Descript
     known = {body.name for body in description.bodies}
     for flag, link in (("--root", root), ("--tip", tip)):
         if link is not None and link not in known:
-            raise LinkwiseError(f"{flag} {link!r} is not a link; the links are {', '.join(sorted(known))}")
+            raise LinkwiseError(f"{flag} {link!r} is not a link; the links are {listed(sorted(known))}")
     kept = known if root is None else _below(description, root)
     if tip is not None:
         parent = {c.child: c.parent for c in description.connections if c.parent in kept}

@@ -6,7 +6,8 @@ from typing import Protocol
 
 from linkwise.analysis.logs.headers import open_delimited, open_storage
 from linkwise.analysis.logs.parquet import ParquetLog
-from linkwise.errors import LinkwiseError
+from linkwise.errors import LinkwiseError, within
+from linkwise.input_file import require_file
 from linkwise.package.load import Array
 
 
@@ -47,8 +48,8 @@ def open_log(path: Path) -> Log:
     Raises LinkwiseError for a missing file, an unknown suffix, or a header that cannot be read.
     """
     suffix = path.suffix.lower()
-    if not path.is_file():
-        raise LinkwiseError(f"{path}: no such file")
+    with within(str(path)):
+        require_file(path)
     try:
         if suffix in {".csv", ".tsv", ".txt"}:
             return open_delimited(path)
@@ -58,4 +59,6 @@ def open_log(path: Path) -> Log:
             return ParquetLog.open(path)
     except UnicodeDecodeError as error:
         raise LinkwiseError(f"{path}: not UTF-8 text; save it as UTF-8") from error
+    except OSError as error:
+        raise LinkwiseError(f"{path}: cannot be read: {error.strerror}") from error
     raise LinkwiseError(f"{path}: unknown suffix; give a .csv, .mot, .sto or .parquet file")

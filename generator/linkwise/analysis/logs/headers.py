@@ -1,11 +1,15 @@
 """What stands above the numbers of a text log: CSV's one header line, OpenSim's lines up to `endheader`."""
 
 import re
+from itertools import islice
 from pathlib import Path
 
-from linkwise.analysis.logs.text import TextLog, split_cells
-from linkwise.errors import LinkwiseError
+from linkwise.analysis.logs.text import SHOWN, TextLog, is_number, split_cells, whole_lines
+from linkwise.errors import LinkwiseError, within
+from linkwise.escape import short
 
+MOST_FACTS, MOST_DIGITS = 10_000, 15
+"""Lines above `endheader`, and digits of a count: no recording has as many."""
 TAIL = 1 << 16
 """Bytes at the end of a file that are searched for a last row cut off."""
 
@@ -16,13 +20,13 @@ def open_delimited(path: Path) -> TextLog:
     Raises LinkwiseError for a file without a header.
     """
     with path.open(encoding="utf-8-sig") as handle:
-        header = handle.readline()
+        header = next(whole_lines(handle, path, 1), "")
     unquoted = re.sub(r'"[^"]*"', "", header)
     delimiter = next((mark for mark in ",;\t" if mark in unquoted), ",")
-    columns = tuple(name.strip() for name in split_cells(header, delimiter))
+    columns = _columns(path, 1, header, delimiter)
     if not any(columns):
         raise LinkwiseError(f"{path}: row 1: no header; name the columns there, the time first")
-    if all(_is_number(name) for name in columns):
+    if all(is_number(name) for name in columns):
         raise LinkwiseError(f"{path}: row 1 holds numbers; put a header of column names above it")
     return TextLog(path, columns, 2, delimiter, warnings=_warnings_of_the_end(path, delimiter))
 
@@ -33,7 +37,7 @@ def open_storage(path: Path) -> TextLog:
     Raises LinkwiseError for a header that is cut off or contradicts itself.
     """
     facts, names, row = _storage_header(path)
-    columns = tuple(name.strip() for name in split_cells(names.rstrip(), "\t" if "\t" in names else None))
+    columns = _columns(path, row, names.rstrip(), "\t" if "\t" in names else None)
     if not any(columns):
         raise LinkwiseError(f"{path}: row {row}: no column names after 'endheader'")
     promised = _count(path, facts, "nColumns")
@@ -44,7 +48,7 @@ def open_storage(path: Path) -> TextLog:
     told = facts.get("indegrees")
     degrees = None if told is None else {"yes": True, "no": False}.get(told.lower())
     if told is not None and degrees is None:
-        raise LinkwiseError(f"{path}: inDegrees={told!r} in the header is neither yes nor no")
+        raise LinkwiseError(f"{path}: inDegrees={short(told, SHOWN)!r} in the header is neither yes nor no")
     rows = _count(path, facts, "nRows")
     # Values are padded with blanks, so any run of blanks separates them, whatever separates the names.
     return TextLog(path, columns, row + 1, None, degrees, rows, _warnings_of_the_end(path, None))
@@ -54,29 +58,29 @@ def _storage_header(path: Path) -> tuple[dict[str, str], str, int]:
     """Facts `key=value`, by key in lower case, the line of column names, and its number."""
     facts: dict[str, str] = {}
     with path.open(encoding="utf-8-sig") as handle:
-        for row, line in enumerate(handle, 1):
+        lines = whole_lines(handle, path, 1)
+        for row, line in enumerate(islice(lines, MOST_FACTS), 1):
             key, _, value = line.partition("=")
             facts[key.strip().lower()] = value.strip()
             if line.strip().lower() == "endheader":
-                return facts, handle.readline(), row + 1
+                return facts, next(lines, ""), row + 1
     raise LinkwiseError(f"{path}: no line 'endheader'; the file is cut off or not OpenSim's")
+
+
+def _columns(path: Path, row: int, line: str, delimiter: str | None) -> tuple[str, ...]:
+    if "\0" in line:
+        raise LinkwiseError(f"{path}: row {row}: zero bytes among the column names; save it as UTF-8 text")
+    with within(f"{path}: row {row}"):
+        return tuple(name.strip() for name in split_cells(line, delimiter))
 
 
 def _count(path: Path, facts: dict[str, str], key: str) -> int | None:
     text = facts.get(key.lower())
     if text is None:
         return None
-    if not text.isdecimal():
-        raise LinkwiseError(f"{path}: {key}={text!r} in the header is not a count")
+    if not text.isdecimal() or len(text) > MOST_DIGITS:
+        raise LinkwiseError(f"{path}: {key}={short(text, SHOWN)!r} in the header is not a count")
     return int(text)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _warnings_of_the_end(path: Path, delimiter: str | None) -> tuple[str, ...]:
@@ -89,6 +93,6 @@ def _warnings_of_the_end(path: Path, delimiter: str | None) -> tuple[str, ...]:
     if not last.strip() or len(ends) < 3 or lengths[-1] >= min(lengths[1:-1]):
         return ()
     return (
-        f"the last row has no line end, and its last number {ends[-1]!r} is shorter than those before:"
-        " the file may be cut off there",
+        f"the last row has no line end, and its last number {short(ends[-1], SHOWN)!r} is shorter than those"
+        " before: the file may be cut off there",
     )

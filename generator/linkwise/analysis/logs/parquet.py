@@ -3,12 +3,17 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import one_line
 from linkwise.extras import extra
 from linkwise.package.load import Array
+
+LONGEST_REASON = 200
+"""Characters of what pyarrow says."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +34,10 @@ class ParquetLog:
         parquet, arrow = extra("pyarrow.parquet"), extra("pyarrow")
         try:
             metadata = parquet.read_metadata(path)
-        except arrow.ArrowInvalid as error:
+            names = tuple(metadata.schema.to_arrow_schema().names)
+        except _unreadable(arrow) as error:
             raise LinkwiseError(f"{path}: not Parquet, or cut off") from error
-        return cls(path, tuple(metadata.schema.to_arrow_schema().names), metadata.num_rows)
+        return cls(path, names, metadata.num_rows)
 
     def read(self, columns: Sequence[int], rows: int = 65536) -> Iterator[tuple[Array, int]]:
         """Yield blocks (at most `rows`, len(columns)) and the rows read so far.
@@ -41,7 +47,8 @@ class ParquetLog:
         arrow = extra("pyarrow")
         names, done = [self.columns[column] for column in columns], 0
         with extra("pyarrow.parquet").ParquetFile(self.path) as file:
-            for batch in file.iter_batches(rows, columns=names):
+            batches = file.iter_batches(rows, columns=names)
+            while (batch := self._next(batches, done)) is not None:
                 block = np.empty((batch.num_rows, len(names)))
                 for at, name in enumerate(names):
                     try:
@@ -52,3 +59,18 @@ class ParquetLog:
                         ) from error
                 done += len(block)
                 yield block, done
+
+    def _next(self, batches: Iterator[Any], done: int) -> Any:
+        """The next batch, None after the last."""
+        try:
+            return next(batches, None)
+        except _unreadable(extra("pyarrow")) as error:
+            reason = one_line(str(error), LONGEST_REASON)
+            raise LinkwiseError(
+                f"{self.path}: after row {done}: damaged ({reason}); write the file again"
+            ) from error
+
+
+def _unreadable(arrow: Any) -> tuple[type[Exception], ...]:
+    """What pyarrow raises for a file that is not as Parquet has to be."""
+    return arrow.ArrowException, OSError, ValueError, MemoryError, OverflowError

@@ -9,12 +9,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
-from linkwise.errors import LinkwiseError
+from linkwise.errors import LinkwiseError, within
+from linkwise.escape import short
 from linkwise.package.load import Array
 
+LONGEST = 1 << 24
+"""Characters of a line, more than a million columns have; and about how many are in memory at once."""
+SHOWN = 60
+"""Characters of a cell that a message shows."""
+BLANK = ": blank row; delete it, or fill the gap"
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 
 
@@ -43,14 +50,18 @@ class TextLog:
 
         Raises LinkwiseError that names row and column for what is not a number, and for a file cut off.
         """
-        row, done = self.first_row, 0
+        row, done, blank = self.first_row, 0, 0
         with self.path.open(encoding="utf-8-sig") as handle:
-            done += sum(len(line) for line in islice(handle, self.first_row - 1))
             try:
-                while lines := list(islice(handle, rows)):
+                whole = whole_lines(handle, self.path, 1)
+                done += sum(len(line) for line in islice(whole, self.first_row - 1))
+                for lines in _blocks(whole, rows):
+                    if blank and any(map(str.strip, lines)):
+                        raise LinkwiseError(f"{self.path}: row {row}{BLANK}")
                     done += sum(map(len, lines))
+                    count = len(lines)
                     block = self._numbers(lines, columns, row)
-                    row += len(block)
+                    row, blank = row + len(block), blank + count - len(block)
                     yield block, done
             except UnicodeDecodeError as error:
                 raise LinkwiseError(f"{self.path}: row {row} or after: not UTF-8 text") from error
@@ -95,7 +106,8 @@ class TextLog:
     def _first_fault(self, lines: list[str], columns: Sequence[int], row: int) -> LinkwiseError | None:
         """Find the first cell that is not a number, slowly: only ever run on a faulty block."""
         for number, line in enumerate(lines, row):
-            fault = self._fault(line, columns)
+            with within(f"{self.path}: row {number}"):
+                fault = self._fault(line, columns)
             if fault is not None:
                 return LinkwiseError(f"{self.path}: row {number}{fault}")
         return None
@@ -103,7 +115,7 @@ class TextLog:
     def _fault(self, line: str, columns: Sequence[int]) -> str | None:
         """Say what is wrong with a line, to stand behind its number; None where nothing is."""
         if not line.strip():
-            return ": blank row; delete it, or fill the gap"
+            return BLANK
         cells = split_cells(line, self.delimiter)
         counts = f": {len(cells)} cells where the header names {len(self.columns)}"
         if len(cells) <= max(columns):
@@ -111,15 +123,13 @@ class TextLog:
         if any(cell.strip() for cell in cells[len(self.columns) :]):
             return f"{counts}; is there a comma within a number?"
         for column in columns:
-            cell, where = cells[column].strip(), f", column {self.columns[column]!r}"
+            cell, where = cells[column].strip(), f", column {short(self.columns[column], SHOWN)!r}"
             if not cell:
                 return f"{where}: empty; fill the gap"
-            try:
-                float(cell)
-            except ValueError:
-                if DECIMAL_COMMA.fullmatch(cell):
-                    return f"{where}: {cell!r} has a decimal comma; write decimal points"
-                return f"{where}: {cell!r} is not a number"
+            if DECIMAL_COMMA.fullmatch(cell):
+                return f"{where}: {short(cell, SHOWN)!r} has a decimal comma; write decimal points"
+            if not is_number(cell):
+                return f"{where}: {short(cell, SHOWN)!r} is not a number"
         return None
 
 
@@ -127,4 +137,39 @@ def split_cells(line: str, delimiter: str | None) -> list[str]:
     """Cells of a line, quotes taken off."""
     if delimiter is None:
         return line.split()
-    return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True), [])
+    try:
+        return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True), [])
+    except csv.Error as error:  # above all a cell longer than the module takes
+        raise LinkwiseError(f"cannot be read as separated values: {error}") from error
+
+
+def whole_lines(handle: TextIO, path: Path, row: int) -> Iterator[str]:
+    """Lines of a text, the first of which is number `row`; LinkwiseError for one far too long."""
+    while line := handle.readline(LONGEST):
+        if len(line) == LONGEST and not line.endswith("\n"):
+            raise LinkwiseError(f"{path}: row {row} has more than {LONGEST:,} characters; is it a log?")
+        yield line
+        row += 1
+
+
+def _blocks(lines: Iterator[str], rows: int) -> Iterator[list[str]]:
+    """Lines in lists of at most `rows`, or fewer where they are long."""
+    block: list[str] = []
+    held = 0
+    for line in lines:
+        block.append(line)
+        held += len(line)
+        if len(block) == rows or held > LONGEST:
+            yield block
+            block, held = [], 0
+    if block:
+        yield block
+
+
+def is_number(cell: str) -> bool:
+    """Whether NumPy reads it; Python's own float also takes 1_000 and digits of other scripts."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return cell.isascii() and "_" not in cell

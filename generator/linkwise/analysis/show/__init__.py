@@ -8,6 +8,7 @@ from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.paper_figure import paper
 from linkwise.analysis.show.shares_figure import shares
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.plotstyle import saved, styled
 
 if TYPE_CHECKING:
@@ -39,5 +40,5 @@ def check_figure(name: str, robot: LoadedRobot) -> None:
     if kind not in FIGURES or (joint and (kind != "paper" or joint not in robot.joints)):
         raise LinkwiseError(
             f"--figure {name}: give one of {', '.join(FIGURES)}, or paper:JOINT with a joint of"
-            f" {', '.join(robot.joints)}"
+            f" {listed(robot.joints)}"
         )

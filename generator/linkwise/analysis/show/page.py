@@ -1,7 +1,6 @@
 """`report.html`: the analysis as one file that needs no network."""
 
 import base64
-import json
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.poses import poses
 from linkwise.emit.render import render
+from linkwise.escape import printable, script_data
 from linkwise.extras import extra
 from linkwise.package.load import Array
 from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
@@ -36,20 +36,20 @@ def view(result: AnalysisResult) -> dict[str, str]:
 def page_data(result: AnalysisResult) -> str:
     """JSON with numbers as base64 of little-endian float64: the table's, to the last bit.
 
-    No `<` stands in it: a name such as `</script>` cannot end the element it is embedded in.
+    Names are as people read them, but for those of columns, which are the table's.
     """
     robot = result.robot
     data = {
-        "robot": robot.name,
-        "log": result.source,
+        "robot": printable(robot.name),
+        "log": printable(result.source),
         "provenance": result.provenance,
         "rate": result.rate,
         "samples": len(result.time),
         "total": result.total,
         "stride": result.stride,
         "convention": result.processing.convention,
-        "joints": [{"name": n, "unit": u} for n, u in zip(robot.joints, robot.units, strict=True)],
-        "links": list(robot.links),
+        "joints": [{"name": printable(n), "unit": u} for n, u in zip(robot.joints, robot.units, strict=True)],
+        "links": list(map(printable, robot.links)),
         "columns": [
             {
                 "quantity": c.quantity,
@@ -69,8 +69,7 @@ def page_data(result: AnalysisResult) -> str:
         "gravityColour": GRAVITY,
         "bodies": _bodies(result),
     }
-    text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    return script_data(data)
 
 
 def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
@@ -79,9 +78,10 @@ def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
     if not bodies:
         return None
     origins, centres = poses(bodies, result.q)
+    place = {link: j for j, link in enumerate(result.robot.links)}
     return {
         "parents": [-1 if body.parent is None else body.parent for body in bodies],
-        "links": [body.link for body in bodies],
+        "links": [place.get(body.link, -1) for body in bodies],
         "coordinates": [body.coordinate for body in bodies],
         "up": list(result.robot.up),
         "origins": _encode(origins),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import Column, Quantity, load_unit
 from linkwise.extras import extra
-from linkwise.plotstyle import colour, dash, short
+from linkwise.plotstyle import colour, dash, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +44,7 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
     figure.align_ylabels(axes)
     for row, (title, names) in enumerate([("Joints", robot.joints), ("Links", robot.links)], len(panels)):
         _legend(figure.add_subplot(grid[row]), title, names)
-    figure.suptitle(f"{robot.name} · {result.source}", x=0.01, ha="left", fontsize=11)
+    figure.suptitle(f"{drawn(robot.name, 60)} · {drawn(result.source, 60)}", x=0.01, ha="left", fontsize=11)
     foot = "\n".join([*textwrap.wrap(_left_out(result), 125), result.provenance])
     figure.supxlabel(foot, x=0.01, ha="left", fontsize=7, color="#5A6270")
     return figure  # type: ignore[no-any-return]
@@ -54,7 +54,7 @@ def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:
     robot = result.robot
     units = " or ".join(dict.fromkeys(robot.units))
     loads = " or ".join(dict.fromkeys(map(load_unit, robot.units)))
-    on = f"on {short(robot.joints[i])} ({load_unit(robot.units[i])})"
+    on = f"on {drawn(robot.joints[i])} ({load_unit(robot.units[i])})"
     own = own_joints(result)
 
     def own_term(quantity: Quantity) -> Callable[[Column], bool]:
@@ -114,7 +114,7 @@ def _style(at: int) -> dict[str, Any]:
 
 def _legend_columns(names: Sequence[str]) -> int:
     """As many as fit beside one another."""
-    return max(1, min(6, 100 // (max(len(short(name)) for name in names) + 6)))
+    return max(1, min(6, 100 // (max(len(drawn(name)) for name in names) + 6)))
 
 
 def _legend_rows(names: Sequence[str]) -> int:
@@ -127,7 +127,7 @@ def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
     axis.set_axis_off()
     legend = axis.legend(
         [line([], [], **_style(at)) for at in range(len(names))],
-        [short(name) for name in names],
+        [drawn(name) for name in names],
         title=title,
         loc="upper left",
         bbox_to_anchor=(0, 1),
@@ -146,5 +146,5 @@ def _left_out(result: AnalysisResult) -> str:
     others = [name for at, name in enumerate(robot.joints) if at not in own]
     text = "The last two panels show each link's own joint only; the table and the page have every joint."
     if others:
-        text += f" Not in them, as they carry no link with mass directly: {', '.join(map(short, others))}."
+        text += f" Not in them, as they carry no link with mass directly: {', '.join(map(drawn, others))}."
     return text

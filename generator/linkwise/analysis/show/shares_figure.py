@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import Quantity
 from linkwise.extras import extra
-from linkwise.plotstyle import GRAVITY, colour, short
+from linkwise.plotstyle import GRAVITY, colour, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,8 +28,8 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     robot = result.robot
     movement = []
     for k, joint in enumerate(robot.joints):
-        movement.append(_Cause("tau_qdd", k, f"{short(joint)} acceleration", colour(k)))
-        movement.append(_Cause("tau_qd", k, f"{short(joint)} velocity", colour(k), "////"))
+        movement.append(_Cause("tau_qdd", k, f"{drawn(joint)} acceleration", colour(k)))
+        movement.append(_Cause("tau_qd", k, f"{drawn(joint)} velocity", colour(k), "////"))
     every = [_Cause("tau_gravity", None, "gravity", GRAVITY), *movement]
     rows = -(-len(every) // 3)
     figure = extra("matplotlib.figure").Figure(
@@ -40,12 +40,17 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     _bars(right, result, movement)
     left.set_title("everything")
     right.set_title("the movement alone, without gravity")
-    left.set_yticks(range(len(robot.joints)), [short(joint) for joint in robot.joints])
+    left.set_yticks(range(len(robot.joints)), [drawn(joint) for joint in robot.joints])
     left.invert_yaxis()
     left.set_ylabel("loaded joint")
     for axis in (left, right):
         axis.set_xlabel("% of the mean magnitude")
-    figure.suptitle(f"What loads each joint · {robot.name} · {result.source}", x=0.01, ha="left", fontsize=11)
+    figure.suptitle(
+        f"What loads each joint · {drawn(robot.name, 40)} · {drawn(result.source, 50)}",
+        x=0.01,
+        ha="left",
+        fontsize=11,
+    )
     figure.legend(
         bars,
         [cause.label for cause in every],

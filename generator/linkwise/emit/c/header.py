@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise.emit.c.sizes import Span
+from linkwise.escape import c_comment
 from linkwise.runtime.native_compiler import FLAGS, TUNING
 from linkwise.symbolic.system import System
 
@@ -12,8 +13,6 @@ BLOCK = {"double": 8, "float": 16}
 
 TUNED, TUNED_ARM = (" ".join(TUNING[kind]) for kind in ("x86_64", "aarch64"))
 """Flags that make full use of the processor, on x86 and on ARM."""
-LONGEST = 60
-"""Characters of a name that are shown."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ def link_lines(system: System, links: Sequence[Span]) -> Iterator[str]:
             str(link.start.c1),
             str(link.start.g),
             *([str(link.start.h1) if link.size.h1 else "-"] if linear else []),
-            shown(system.links[link.first - 1].name),
+            c_comment(system.links[link.first - 1].name),
         ]
         for link in links
     ]
@@ -58,13 +57,13 @@ def link_lines(system: System, links: Sequence[Span]) -> Iterator[str]:
 
 def joint_lines(system: System) -> Iterator[str]:
     """Return a table: each joint, its unit and its name."""
-    rows = [[str(k), c.unit, shown(c.name)] for k, c in enumerate(system.coordinates, 1)]
+    rows = [[str(k), c.unit, c_comment(c.name)] for k, c in enumerate(system.coordinates, 1)]
     return aligned([["joint", "unit", "name"], *rows])
 
 
 def parameter_lines(system: System) -> list[str]:
     """Return a table: each run-time parameter and the value that the description has."""
-    rows = [[shown(s.name), repr(float(value))] for s, value in system.parameters.items()]
+    rows = [[c_comment(s.name), repr(float(value))] for s, value in system.parameters.items()]
     return list(aligned(rows))
 
 
@@ -81,15 +80,6 @@ def index_tables(system: System, links: Sequence[Span]) -> Iterator[IndexTable]:
         if lines:
             commas = [f"{line}," for line in lines[:-1]] + lines[-1:]
             yield IndexTable(array, array.upper(), 2 if array == "g" else 3, tuple(commas))
-
-
-def shown(name: str) -> str:
-    """Return a name as a comment may hold it: ASCII, in quotes, without what opens or ends a comment."""
-    text = ascii(name)
-    text = text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
-    for pair in ("*/", "/*", "??"):
-        text = text.replace(pair, " ".join(pair))
-    return text
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:

@@ -22,6 +22,7 @@ from linkwise.emit.c.shared_part import SHARED_FILE, SharedWork, shared_work
 from linkwise.emit.c.sizes import link_spans
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
+from linkwise.escape import c_comment
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 
@@ -73,7 +74,7 @@ def _link_kernels(system: System, kernel: Kernel, number: int, rest: KernelFunct
 def _link_view(system: System, number: int, kernels: LinkKernels, frame: tuple[str, ...]) -> dict[str, Any]:
     return {
         "frame": frame,
-        "title": f"Link {number}, {header.shown(system.links[number - 1].name)}",
+        "title": f"Link {number}, {c_comment(system.links[number - 1].name)}",
         "about": (
             "The file that includes this one asks for functions by WANT_DECOMPOSITION, WANT_TORQUE and",
             "WANT_POSITION_GRADIENT, and says how many samples W they take; KERNEL completes their names.",

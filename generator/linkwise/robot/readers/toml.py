@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError, within
+from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
 from linkwise.robot.readers.bounded import MIB, check_toml_depth, content
@@ -28,7 +29,7 @@ class _Table:
         for key in data:
             if key not in known:
                 raise LinkwiseError(
-                    f"{place} has the unknown key {key!r}; known are {', '.join(sorted(known))}"
+                    f"{place} has the unknown key {key!r}; known are {listed(sorted(known), 20)}"
                 )
 
     def text(self, key: str, default: str | None = None) -> str:

@@ -1,0 +1,41 @@
+"""A file that a user names, before it is opened: one that is there, and that has an end."""
+
+import stat
+from pathlib import Path
+
+from linkwise.errors import LinkwiseError
+
+KINDS = {
+    stat.S_IFDIR: "a directory",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFIFO: "a pipe, which cannot be read twice",
+    stat.S_IFSOCK: "a socket",
+}
+
+
+def require_file(path: Path, missing: str = "no such file", wanted: str = "a file") -> None:
+    """Raise LinkwiseError, without the path, unless `path` is a regular file or a link to one.
+
+    Whatever else can be opened may never end, or keep its reader waiting. `missing` is said where nothing
+    is; `wanted` is what else to give.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise LinkwiseError(missing) from error
+    except OSError as error:
+        raise LinkwiseError(f"cannot be read: {error.strerror}") from error
+    except ValueError as error:  # a zero byte
+        raise LinkwiseError(f"cannot be read: {error}") from error
+    if not stat.S_ISREG(mode):
+        raise LinkwiseError(f"this is {KINDS.get(stat.S_IFMT(mode), 'not a file')}; give {wanted}")
+
+
+def is_file(path: Path) -> bool:
+    """Whether `path` is a regular file, for any text that might be a path."""
+    try:
+        require_file(path)
+    except LinkwiseError:
+        return False
+    return True
