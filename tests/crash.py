@@ -60,6 +60,8 @@ def wrong(where: Path, status: int, trees: tuple[Tree, Tree], atomic: bool) -> s
     left = tree(where / "target")
     if left not in trees:
         return "neither the earlier output nor the new one is there"
+    if status not in (0, 2, -9):
+        return "it ended otherwise than by an error that is told"
     if status == 2 and left != trees[0]:
         return "said that nothing was written, but there is a new output"
     if status == 0 and left != trees[1]:

@@ -74,7 +74,7 @@ def missing() -> str:
 
 
 def faults(job: str, where: Path, prepare: Callable[[Path], None], options: Sequence[str]) -> list[Fault]:
-    """A fault for each of the `CALLS` that a job makes once it writes; `prepare` fills the folder it runs in."""
+    """A fault for each of the `CALLS` that a job makes once it writes; `prepare` fills its folder."""
     prepare(where / "0")
     log = where / "calls"
     run(job, where, [Fault("", 0)], (*options, f"--output={log}"))

@@ -5,9 +5,9 @@
     old/NAME    the target, where the file system cannot exchange two folders in one step, between the two
     rest        what is about to be removed
 
-Whoever finds one of their own whose lock is free knows that its writer is dead: NAME goes back to where it was
-unless something is there again, and the folder goes. One that holds anything else was not made by linkwise
-and stays.
+Whoever finds one of their own whose lock is free knows that its writer is dead: NAME goes back to where it
+was unless something is there again, and the folder goes. One that holds anything else was not made by
+linkwise and stays.
 """
 
 import os
