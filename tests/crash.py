@@ -111,7 +111,7 @@ def main() -> int:
         for job in EARLIER:
             linkwise(EARLIER[job], home, home / f"{job}-earlier")
             linkwise(NEXT[job], home, home / f"{job}-new")
-            failures += sum(tried(job, home, way, what) for way in WAYS for what in WHATS)
+            failures += sum(tried(job, home, way, what) for what in WHATS for way in WAYS)
     return 1 if failures else 0
 
 

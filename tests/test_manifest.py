@@ -70,18 +70,21 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda data: bodies(data)[1].update(parent=1),
         "the parent of body 1 of the tree is",
     ),
-    "link": (lambda data: bodies(data)[1].update(link="hand"), "link 'link2' is not in the tree"),
+    "link": (
+        lambda data: bodies(data)[1].update(link="hand"),
+        "links[1].name is 'link2', which is not in the tree",
+    ),
     "turned link": (
         lambda data: data["links"][1].update(path=[1]),
         "the path of link 'link2' is not that of the tree",
     ),
     "joint of the tree": (
         lambda data: bodies(data)[1].update(joint="wrist"),
-        "no body of the tree hangs on joint 'joint2'",
+        "joints[1].name is 'joint2', on which no body of the tree hangs",
     ),
     "unit": (
         lambda data: data["joints"][0].update(unit="m"),
-        "the unit of joint 'joint1' is not that of its kind in the tree",
+        "joints[0].unit is 'm', which is not that of its kind in the tree",
     ),
     "sheared": (
         lambda data: bodies(data)[1].update(rotation=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]),
@@ -193,7 +196,7 @@ def test_an_entry_that_the_package_has_otherwise_fails(case: str, package: Path)
     change, message = SLIPS[case]
     change_manifest(package, change, checksums=True)
     if not message:
-        with pytest.raises(LinkwiseError, match="no body of the tree hangs on joint 'wrist'"):
+        with pytest.raises(LinkwiseError, match=r"joints\[2\].name is 'wrist', on which no body"):
             check_package(package)
         return
     _, result = check_package(package)

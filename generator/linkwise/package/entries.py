@@ -73,9 +73,9 @@ def check_tree(tree: RigidTree, joints: Sequence[JointEntry], links: Sequence[Li
         if not np.array_equal(inertia, inertia.T):
             raise ValueError(f"the inertia of body {index} of the tree is not symmetric")
     by_link = {body.link: path for body, path in zip(tree.bodies, paths, strict=True)}
-    for link in links:
+    for j, link in enumerate(links):
         if link.name not in by_link:
-            raise ValueError(f"link {link.name!r} is not in the tree")
+            raise ValueError(f"links[{j}].name is {link.name!r}, which is not in the tree")
         if set(link.path) != by_link[link.name]:
             raise ValueError(f"the path of link {link.name!r} is not that of the tree")
     _check_joints(tree, joints)
@@ -86,6 +86,6 @@ def _check_joints(tree: RigidTree, joints: Sequence[JointEntry]) -> None:
     for k, joint in enumerate(joints):
         own = [body for body in tree.bodies if body.coordinate == k and body.joint == joint.name]
         if not own:
-            raise ValueError(f"no body of the tree hangs on joint {joint.name!r}")
+            raise ValueError(f"joints[{k}].name is {joint.name!r}, on which no body of the tree hangs")
         if all(units[body.kind] != joint.unit for body in own):
-            raise ValueError(f"the unit of joint {joint.name!r} is not that of its kind in the tree")
+            raise ValueError(f"joints[{k}].unit is {joint.unit!r}, which is not that of its kind in the tree")
