@@ -1,8 +1,9 @@
 """A manifest held against the package beside it: names, units, paths, parameters, back ends, operations."""
 
-import importlib
+import ast
 import re
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -69,51 +70,13 @@ def _not_loaded(backends: Iterable[str], module: ModuleType) -> Iterator[str]:
 
 
 def _operations(manifest: Manifest, module: ModuleType) -> Iterator[int]:
-    """Operations of each link's decomposition, counted while it runs; none for a package without it."""
-    if "forms/__init__.py" not in manifest.files:
-        return
-    forms = importlib.import_module(f"{module.__name__}.forms")
-    for link in forms.LINKS:
-        tally = Tally()
-        x = Counted(tally)
-        link.decomposition(CountedNamespace(tally), x, x, x, dict.fromkeys(manifest.parameters, x))
-        yield tally.count
-
-
-class Tally:
-    """How many operations there have been."""
-
-    def __init__(self) -> None:
-        self.count = 0
-
-
-class Counted:
-    """Stands for every number of a computation; a sign in front of one is free."""
-
-    def __init__(self, tally: Tally) -> None:
-        self._tally = tally
-
-    def _counted(self, other: object) -> "Counted":
-        self._tally.count += 1
-        return self
-
-    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _counted
-
-    def __neg__(self) -> "Counted":
-        return self
-
-    def __getitem__(self, index: object) -> "Counted":
-        return self
-
-
-class CountedNamespace:
-    """Stands for numpy or torch, the sines and the like of which are not counted."""
-
-    def __init__(self, tally: Tally) -> None:
-        self._tally = tally
-
-    def __getattr__(self, name: str) -> Any:
-        return lambda *arguments: Counted(self._tally)
+    """Operations that each link's decomposition consists of, in its text; none for a package without it."""
+    place = Path(module.__file__ or "").parent
+    for number in range(1, len(manifest.links) + 1):
+        if (path := f"forms/link_{number}.py") in manifest.files:
+            text = ast.parse((place / path).read_bytes())
+            [form] = [node for node in text.body if getattr(node, "name", "") == "decomposition"]
+            yield sum(isinstance(node, ast.BinOp) for node in ast.walk(form))
 
 
 def _shown(values: dict[str, Any], place: str) -> str:
