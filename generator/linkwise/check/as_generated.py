@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from linkwise.check.compare import Result, Skipped
-from linkwise.package.agreement import disagreements
+from linkwise.package.agreement import disagreements, miscounted
 from linkwise.package.bytecode import caches, is_compiled_from_source
 from linkwise.package.contents import added, changed
 from linkwise.package.load import Package
@@ -36,7 +36,11 @@ def check_files(directory: Path, manifest: Manifest) -> list[Result]:
 
 def check_manifest(package: Package) -> Result:
     """Hold every entry of the manifest against the package itself, else against its checksum."""
-    wrong = [*disagreements(package.manifest, package.module), *altered_entries(package.directory)]
+    wrong = [
+        *disagreements(package.manifest, package.module),
+        *miscounted(package.directory, package.manifest),
+        *altered_entries(package.directory),
+    ]
     return _result("manifest", wrong, "agrees with the package")
 
 

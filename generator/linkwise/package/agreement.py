@@ -32,7 +32,6 @@ def _said(manifest: Manifest) -> Iterator[tuple[str, Any]]:
     for j, link in enumerate(manifest.links):
         yield f"links[{j}].name", link.name
         yield f"links[{j}].path", link.path
-        yield f"links[{j}].operations", link.operations
     for name, value in manifest.parameters.items():
         yield f"parameters.{name}", value
     request = manifest.request
@@ -50,12 +49,9 @@ def _there(manifest: Manifest, module: ModuleType) -> Iterator[tuple[str, Any]]:
     for k, (name, unit) in enumerate(zip(robot.joint_names, robot.joint_units, strict=True)):
         yield f"joints[{k}].name", name
         yield f"joints[{k}].unit", unit
-    counted = list(_operations(manifest, module))
     for j, (name, path) in enumerate(zip(robot.link_names, robot.paths, strict=True)):
         yield f"links[{j}].name", name
         yield f"links[{j}].path", path
-        if j < len(manifest.links):
-            yield f"links[{j}].operations", counted[j] if counted else manifest.links[j].operations
     for name, value in robot.parameters.items():
         yield f"parameters.{name}", value
     if "backends" in request:
@@ -69,14 +65,19 @@ def _not_loaded(backends: Iterable[str], module: ModuleType) -> Iterator[str]:
     return (name for name in backends if name not in module.BACKENDS)
 
 
-def _operations(manifest: Manifest, module: ModuleType) -> Iterator[int]:
-    """Operations that each link's decomposition consists of, in its text; none for a package without it."""
-    place = Path(module.__file__ or "").parent
-    for number in range(1, len(manifest.links) + 1):
-        if (path := f"forms/link_{number}.py") in manifest.files:
-            text = ast.parse((place / path).read_bytes())
+def miscounted(directory: Path, manifest: Manifest) -> list[str]:
+    """Links whose decomposition has other operations in its text than the manifest says, each in words."""
+    wrong = []
+    for j, link in enumerate(manifest.links):
+        if (path := f"forms/link_{j + 1}.py") in manifest.files:
+            text = ast.parse((directory / path).read_bytes())
             [form] = [node for node in text.body if getattr(node, "name", "") == "decomposition"]
-            yield sum(isinstance(node, ast.BinOp) for node in ast.walk(form))
+            count = sum(isinstance(node, ast.BinOp) for node in ast.walk(form))
+            if count != link.operations:
+                wrong.append(
+                    f"manifest.json has links[{j}].operations {link.operations}, the package {count}"
+                )
+    return wrong
 
 
 def _shown(values: dict[str, Any], place: str) -> str:
