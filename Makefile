@@ -3,7 +3,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint generate bench corpus report clean
+.PHONY: demo test lint generate bench corpus crash report clean
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -42,6 +42,10 @@ report: $(READY)
 # Every real robot at hand, beside Pinocchio: minutes.
 corpus: $(READY)
 	$(BIN)/python tests/corpus.py --out out/corpus
+
+# `generate` and `analyze` killed at each system call that touches files; needs strace: minutes.
+crash: $(READY)
+	$(BIN)/python tests/crash.py
 
 # Speed beside Pinocchio and CasADi, reports and motions at length: minutes, on a quiet machine.
 bench: $(READY)

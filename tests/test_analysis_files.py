@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -51,6 +52,7 @@ def test_parquet_holds_the_analysis(call, log, tmp_path):
     note = json.loads(table.schema.metadata[b"linkwise"])
     assert note["processing"]["lowpass"] == {"cutoff": 9.0, "order": 2, "padding": "odd"}
     record = json.loads((tmp_path / "out" / "analysis.json").read_text(encoding="utf-8"))
+    assert record.pop("files") == ["analysis.json", "analysis.parquet"]
     assert record == json.loads(json.dumps(expected.record()))
     assert sorted(file.name for file in tmp_path.iterdir()) == ["log.csv", "out"]
 
@@ -136,7 +138,7 @@ def test_a_failed_exchange_keeps_the_former_result(call, log, tmp_path, monkeypa
     rename = Path.rename
 
     def fail(path, target):
-        if target == out and not path.name.endswith(".former"):
+        if target == out:
             raise OSError(5, "Input/output error")
         return rename(path, target)
 
@@ -151,8 +153,39 @@ def test_a_failed_exchange_keeps_the_former_result(call, log, tmp_path, monkeypa
 def test_a_link_to_a_former_result_is_not_replaced(call, log, tmp_path):
     call("analyze", log, *ROBOT, "--out", tmp_path / "out", "--no-page")
     (tmp_path / "link").symlink_to(tmp_path / "out")
-    with pytest.raises(LinkwiseError, match="exists and is not a former result"):
+    with pytest.raises(LinkwiseError, match="link is a symbolic link; give another --out"):
         call("analyze", log, *ROBOT, "--out", tmp_path / "link", "--no-page")
+
+
+def test_a_former_result_with_files_of_ones_own_is_not_replaced(call, log, tmp_path):
+    out = tmp_path / "out"
+    call("analyze", log, *ROBOT, "--out", out, "--no-page")
+    (out / "paper.png").write_text("mine")
+    with pytest.raises(LinkwiseError, match=r"out holds 'paper.png', which linkwise did not write; move"):
+        call("analyze", log, *ROBOT, "--out", out, "--no-page")
+    assert (out / "paper.png").read_text() == "mine"
+
+
+def test_the_log_is_not_replaced_by_its_analysis(call, log, tmp_path):
+    call("analyze", log, *ROBOT, "--out", tmp_path / "out", "--no-page", "--format", "csv")
+    written = tmp_path / "out/analysis.csv"
+    with pytest.raises(
+        LinkwiseError, match=r"--out .*out is to be replaced and holds the log .*analysis.csv"
+    ):
+        call("analyze", written, *ROBOT, "--out", tmp_path / "out")
+    assert written.is_file()
+
+
+@pytest.mark.parametrize("command", ["analyze", "motion", "report terms", "report reduction", "generate"])
+def test_nothing_is_written_into_a_package(call, command, log, tmp_path):
+    package = shutil.copytree(PLANAR3, tmp_path / "planar3", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "link").symlink_to(package)
+    before = sorted(package.rglob("*"))
+    arguments = {"analyze": (log, *ROBOT), "report terms": ("planar3",), "generate": ("planar3",)}
+    for out in ("planar3", "link", "planar3/forms/a/b"):
+        with pytest.raises(LinkwiseError, match=r"is in the generated package .*planar3, which"):
+            call(*command.split(), *arguments.get(command, ()), "--out", tmp_path / out)
+    assert sorted(package.rglob("*")) == before
 
 
 def test_motions_are_written_and_analysed(call, tmp_path):

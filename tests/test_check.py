@@ -1,12 +1,18 @@
 """What `linkwise check` accepts, refuses and leaves out."""
 
 import hashlib
+import importlib.util
 import json
+import os
+import py_compile
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import sympy as sp
 from linkwise import (
@@ -95,7 +101,7 @@ def test_a_slightly_wrong_coefficient_fails_all_the_same(
 def test_only_what_is_missing_here_is_left_out(error: str, mark: str, package: Path) -> None:
     change_file(package, "__init__.py", "    if backend not in", f"    raise {error}\n    if backend not in")
     found = marks(package)
-    assert found.pop("hashes") == "ok"
+    assert (found.pop("hashes"), found.pop("manifest")) == ("ok", "ok")
     assert found.pop("back ends") == "FAIL"
     assert list(found.values()) == [mark]
 
@@ -121,18 +127,122 @@ def test_a_package_with_nothing_to_load_has_its_hashes_checked(backend: str, tmp
     results = check_package(tmp_path / "planar2")
     assert [(r.name, r.mark, r.passed) for r in results] == [
         ("hashes", "ok", True),
+        ("manifest", "ok", True),
         ("back ends", "skip", True),
     ]
-    assert results[1].detail.startswith("nothing to load")
+    assert results[2].detail.startswith("nothing to load")
 
 
-def test_files_beyond_the_manifest_fail(package: Path) -> None:
-    (package / "__pycache__").mkdir()
-    (package / "__pycache__/names.pyc").write_bytes(b"")
-    assert check_package(package, 5)[0].passed
-    (package / "forms/more.py").write_text("")
+def link_to(path: Path) -> None:
+    kept = path.rename(path.parents[1] / "elsewhere")
+    path.symlink_to(kept)
+
+
+FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
+    "module": (lambda p: (p / "forms/more.py").touch(), "forms/more.py was added"),
+    "library": (lambda p: (p / "names.so").touch(), "names.so was added"),
+    "bytecode of no cache": (lambda p: (p / "forms/link_1.pyc").touch(), "forms/link_1.pyc was added"),
+    "name of no cache": (lambda p: plant(p, "names.pyc"), "__pycache__/names.pyc was added"),
+    "cache of nothing": (
+        lambda p: plant(p, "more.cpython-311.pyc"),
+        "__pycache__/more.cpython-311.pyc was added",
+    ),
+    "change": (lambda p: (p / "names.py").write_text("#"), "names.py was changed"),
+    "loss": (lambda p: (p / "names.py").unlink(), "names.py is missing"),
+    "link": (lambda p: link_to(p / "names.py"), "names.py is a symbolic link"),
+    "link to nothing": (lambda p: (p / "more").symlink_to("nowhere"), "more was added"),
+    "pipe": (lambda p: os.mkfifo(p / "forms/pipe"), "forms/pipe was added"),
+}
+
+
+def plant(package: Path, name: str) -> None:
+    (package / "__pycache__").mkdir(exist_ok=True)
+    (package / "__pycache__" / name).touch()
+
+
+@pytest.mark.parametrize("case", FAULTS)
+def test_files_other_than_the_manifest_lists_fail(case: str, package: Path) -> None:
+    damage, message = FAULTS[case]
+    damage(package)
     [result] = check_package(package)
-    assert (result.mark, result.detail) == ("FAIL", "forms/more.py was added")
+    assert (result.name, result.mark, result.detail) == ("hashes", "FAIL", message)
+
+
+def test_files_behind_a_linked_folder_fail(package: Path) -> None:
+    link_to(package / "forms")
+    assert "forms/link_1.py is behind the symbolic link forms" in check_package(package)[0].detail
+
+
+def test_a_linked_package_passes(package: Path, tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(package)
+    assert set(marks(tmp_path / "link").values()) == {"ok"}
+
+
+STATE = np.array([[0.1, 0.2], [0.0, 0.0], [0.0, 0.0]])
+
+
+def run_in(package: Path, *options: str) -> str:
+    """What a user's Python says that imports the package and calls it, caching what it compiles."""
+    script = f"import numpy as np, {package.name} as p; print(p.load().partial_torque(*np.{STATE!r})[0, 0])"
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    command = [sys.executable, *options, "-c", script]
+    done = subprocess.run(
+        command, cwd=package.parent, env=environment, check=True, capture_output=True, text=True
+    )
+    return done.stdout
+
+
+@pytest.mark.parametrize("option", ["-O", "-OO", "-B"])
+def test_what_python_caches_of_the_package_passes(option: str, package: Path) -> None:
+    run_in(package, "-Xno_debug_ranges")
+    run_in(package, option)
+    assert set(marks(package).values()) == {"ok"}
+
+
+@pytest.mark.parametrize("mode", list(py_compile.PycInvalidationMode))
+def test_a_planted_cache_fails_and_is_never_run(mode: py_compile.PycInvalidationMode, package: Path) -> None:
+    right = run_in(package)
+    shutil.rmtree(package / "forms/__pycache__")
+    source = package / "forms/link_1.py"
+    text, times = source.read_text(), (source.stat().st_atime_ns, source.stat().st_mtime_ns)
+    source.write_text(text.replace(" = 0.", " = 1.", 1).replace("c1 = xp.cos(q1)", "c1 = xp.sin(q1)"))
+    assert source.stat().st_size == len(text.encode()) != source.read_text() != text
+    os.utime(source, ns=times)
+    py_compile.compile(str(source), invalidation_mode=mode)
+    source.write_text(text)
+    os.utime(source, ns=times)
+    if mode is not py_compile.PycInvalidationMode.CHECKED_HASH:
+        assert run_in(package) != right  # it is the planted one that a user's Python runs
+        torque = open_package(package).load("numpy").partial_torque(*STATE)[0, 0]
+        assert torque == float(right)
+    planted = Path(importlib.util.cache_from_source(source)).relative_to(package)
+    [result] = check_package(package)
+    assert (result.mark, result.detail) == ("FAIL", f"{planted} is not link_1.py compiled, delete it")
+
+
+def test_a_damaged_cache_fails_and_that_of_another_python_is_told(package: Path) -> None:
+    plant(package, "names.cpython-27.pyc")
+    assert marks(package).pop("__pycache__") == "skip"
+    plant(package, Path(importlib.util.cache_from_source("names.py")).name)
+    assert "is not names.py compiled" in check_package(package)[0].detail
+
+
+@pytest.mark.parametrize("case", ["change", "loss", "link"])
+def test_a_package_that_differs_is_not_loaded(case: str, package: Path) -> None:
+    damage, message = FAULTS[case]
+    damage(package)
+    with pytest.raises(LinkwiseError) as caught:
+        open_package(package)
+    assert str(caught.value) == f"{package}: {message}; generate the robot again"
+
+
+def test_a_file_changed_after_the_package_was_opened_is_not_run(package: Path) -> None:
+    opened = open_package(package)
+    for name in [name for name in sys.modules if name.startswith(f"{opened.module.__name__}.forms")]:
+        del sys.modules[name]
+    (package / "forms/link_1.py").write_text("raise SystemExit")
+    with pytest.raises(ImportError, match=r"forms/link_1.py was changed"):
+        opened.load("numpy")
 
 
 def test_a_manifest_that_lists_no_files_fails(package: Path) -> None:
@@ -140,60 +250,8 @@ def test_a_manifest_that_lists_no_files_fails(package: Path) -> None:
     assert check_package(package)[0].detail.startswith("the manifest lists no files; ")
 
 
-def bodies(data: Any) -> Any:
-    return data["tree"]["bodies"]
-
-
-DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
-    **{
-        key: (lambda data, key=key: data.pop(key), f"the whole is not an object with {key}")  # type: ignore[misc]
-        for key in ("joints", "links", "tree", "request", "files")
-    },
-    "no joints": (lambda data: data.update(joints=[]), "there must be a joint and a link"),
-    "joint": (lambda data: data["joints"].append(3), "joints[2] is not an object"),
-    "path": (lambda data: data["links"][0].update(path=[7]), "the path of link 'link1' names a joint"),
-    "path of words": (lambda data: data["links"][0].update(path="ab"), "links[0].path is not a list"),
-    "request": (lambda data: data.update(request=3), "request is not an object"),
-    "gravity": (lambda data: data["tree"].pop("gravity"), "tree is not an object with gravity"),
-    "tree of words": (lambda data: data.update(tree="ab"), "tree is not an object"),
-    "body": (lambda data: bodies(data).append(None), "tree.bodies[2] is not an object"),
-    "mass": (lambda data: bodies(data)[0].update(mass="a"), "tree.bodies[0].mass is not a finite number"),
-    "nan": (
-        lambda data: bodies(data)[1].update(com=[float("nan"), 0, 0]),
-        "tree.bodies[1].com[0] is not a finite number",
-    ),
-    "rotation": (
-        lambda data: bodies(data)[1].update(rotation=[[1]]),
-        "tree.bodies[1].rotation is not a list of 3",
-    ),
-    "coordinate": (lambda data: bodies(data)[1].update(coordinate=5), "body 1 of the tree hangs on no joint"),
-    "kind": (lambda data: bodies(data)[1].update(kind=[]), "tree.bodies[1].kind is not 'revolute' or"),
-    "parent": (
-        lambda data: bodies(data)[1].update(parent=1),
-        "the parent of body 1 of the tree is",
-    ),
-    "link": (lambda data: bodies(data)[1].update(link="hand"), "link 'link2' is not in the tree"),
-}
-
-
-@pytest.mark.parametrize("case", DAMAGES)
-def test_a_damaged_manifest_is_named(case: str, package: Path) -> None:
-    change, message = DAMAGES[case]
-    change_manifest(package, change)
-    with pytest.raises(LinkwiseError) as caught:
-        check_package(package)
-    assert str(caught.value).startswith(f"{package / 'manifest.json'} is damaged: {message}")
-    assert str(caught.value).endswith("; generate the robot again")
-
-
-def test_a_manifest_of_another_version_is_told_apart_from_a_damaged_one(package: Path) -> None:
-    change_manifest(package, lambda data: data.update(schema=1))
-    with pytest.raises(LinkwiseError, match=r"another version of linkwise \(schema 1, this one reads 2\)"):
-        check_package(package)
-
-
 def test_a_manifest_at_odds_with_its_package_is_refused(package: Path) -> None:
     change_manifest(package, lambda data: data["links"].pop())
-    assert marks(package) == {"hashes": "ok", "import": "FAIL"}
-    with pytest.raises(LinkwiseError, match=r"does not agree with its manifest.json: .* links"):
+    assert marks(package) == {"hashes": "ok", "manifest": "FAIL"}
+    with pytest.raises(LinkwiseError, match=r"the entry links of manifest.json was changed"):
         open_package(package)

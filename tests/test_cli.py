@@ -1,6 +1,7 @@
 """The command line: what each command prints and writes, and what it says to bad input."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -73,7 +74,7 @@ def test_generate_replaces_an_earlier_package_whole(linkwise: Run, planar2: Path
 
 def test_manifest_tells_how_to_make_the_package_again(planar2: Path) -> None:
     manifest = json.loads((planar2 / "manifest.json").read_text())
-    assert manifest["schema"] == 2
+    assert manifest["schema"] == 3
     assert manifest["request"] == {"robot": "planar2", "backends": ["numpy"], **asdict(Options())}
     assert [joint["name"] for joint in manifest["joints"]] == ["joint1", "joint2"]
     assert manifest["links"][1]["path"] == [0, 1]
@@ -276,6 +277,42 @@ def test_generate_never_replaces_what_is_not_a_package(linkwise: Run, tmp_path: 
     assert done.returncode == 2
     assert "exists and is not a generated package" in done.stderr
     assert (tmp_path / "out/planar2/thesis.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    "name", ["thesis.txt", "__pycache__/notes.txt", "forms/link_9.py", "c/__pycache__/a.cpython-311.pyc"]
+)
+def test_generate_never_replaces_what_was_added_to_a_package(
+    name: str, linkwise: Run, tmp_path: Path
+) -> None:
+    arguments = ("generate", "planar2", "--out", "out", "--backend", "numpy")
+    assert linkwise(*arguments).returncode == 0
+    own = tmp_path / "out/planar2" / name
+    own.parent.mkdir(parents=True, exist_ok=True)
+    own.write_text("mine")
+    done = linkwise(*arguments)
+    assert done.returncode == 2
+    assert f"out/planar2 holds '{name}', which linkwise did not write; move it away" in done.stderr
+    assert own.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("file", "file is not a folder; choose another --out or --name"),
+        ("link", "link is a symbolic link; choose another --out or --name"),
+        ("file/deeper", "file: nothing was written: it is not a folder; choose another place"),
+        ("file/deeper/still", "file: nothing was written: it is not a folder; choose another place"),
+    ],
+)
+def test_what_blocks_the_target_is_named(target: str, message: str, linkwise: Run, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "link").symlink_to("elsewhere")
+    out, name = ("./" + target).rsplit("/", 1)
+    done = linkwise("generate", "planar2", "--out", out, "--name", name, "--backend", "c")
+    assert (done.returncode, done.stderr) == (2, f"linkwise: error: {message}\n")
+    assert sorted(os.listdir(tmp_path)) == ["elsewhere", "file", "link"]
 
 
 def test_check_of_a_folder_without_a_package_says_so(linkwise: Run, tmp_path: Path) -> None:

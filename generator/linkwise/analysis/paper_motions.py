@@ -11,6 +11,7 @@ import numpy as np
 
 from linkwise.output import write_files
 from linkwise.package.load import Array
+from linkwise.package.write import refuse_inside_package
 
 RATE = 100.0
 """Sampling rate in Hz."""
@@ -105,6 +106,7 @@ def write_motions(
     directory: Path, motions: Sequence[PaperMotion], joints: Sequence[str] = JOINTS
 ) -> tuple[Path, ...]:
     """Write each motion to `directory`/NAME.csv, exactly: all of them, or none and LinkwiseError."""
+    refuse_inside_package(directory)
     return write_files(directory, {f"{motion.name}.csv": _csv(motion, joints) for motion in motions})
 
 

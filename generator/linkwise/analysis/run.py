@@ -20,6 +20,7 @@ from linkwise.escape import file_name, json_text
 from linkwise.extras import extra
 from linkwise.output import whole_directory
 from linkwise.package.load import Array
+from linkwise.package.write import refuse_inside_package
 from linkwise.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -84,6 +85,9 @@ def analyze_to(
     """
     for name in wanted.figures:
         check_figure(name, robot)
+    refuse_inside_package(out)
+    if log.resolve().is_relative_to(out.resolve()):
+        raise LinkwiseError(f"--out {out} is to be replaced and holds the log {log}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
         job = _prepared(log, robot, reading, processing, progress, draft)
         columns = job.decomposer.columns
@@ -103,23 +107,46 @@ def analyze_to(
 
 def _write_beside_table(draft: Path, analysis: Analysis, wanted: Wanted) -> None:
     """Write the record, the figures and the page."""
-    text = json_text(analysis.record(), indent=1)
-    (draft / RECORD).write_text(text + "\n", encoding="utf-8")
     for name in wanted.figures:
         file = draft / f"{'-'.join(map(file_name, name.split(':', 1)))}.png"
         file.write_bytes(figure_png(analysis, name))
     if wanted.page:
         (draft / "report.html").write_text(report(analysis), encoding="utf-8")
+    files = sorted([RECORD, *(file.name for file in draft.iterdir())])
+    record = {**analysis.record(), "files": files}
+    text = json_text(record, indent=1)
+    (draft / RECORD).write_text(text + "\n", encoding="utf-8")
 
 
 def _refuse_unless_result(target: Path) -> None:
-    """Raise LinkwiseError unless `target` is an empty directory or, by its record, a former result."""
-    folder = target.is_dir() and not target.is_symlink()
-    if folder and ((target / RECORD).is_file() or next(target.iterdir(), None) is None):
+    """Raise LinkwiseError unless `target` is an empty directory or a former result, and nothing else."""
+    if target.is_symlink() or not target.is_dir():
+        what = "a symbolic link" if target.is_symlink() else "not a folder"
+        raise LinkwiseError(f"{target} is {what}; give another --out")
+    there = sorted(file.name for file in target.iterdir())
+    if not there:
         return
-    raise LinkwiseError(
-        f"{target}: exists and is not a former result (it has no {RECORD}); give another --out"
-    )
+    written = _files_written(target / RECORD)
+    if not written:
+        raise LinkwiseError(
+            f"{target}: exists and is not a former result (it has no {RECORD}); give another --out"
+        )
+    added = [name for name in there if name not in written or not (target / name).is_file()]
+    if added:
+        raise LinkwiseError(
+            f"{target} holds {added[0][:80]!a}, which linkwise did not write; "
+            "move it away, or give another --out"
+        )
+
+
+def _files_written(record: Path) -> set[str]:
+    """Names of the files of a result, as its record lists them; an empty set for what is no record."""
+    try:
+        said = json.loads(record.read_text(encoding="utf-8")) if record.is_file() else None
+    except (OSError, ValueError, RecursionError):
+        return set()
+    files = said.get("files") if isinstance(said, dict) else None
+    return {name for name in files if isinstance(name, str)} if isinstance(files, list) else set()
 
 
 @dataclass(frozen=True)

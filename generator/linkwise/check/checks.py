@@ -1,12 +1,12 @@
 """The checks of `linkwise check`."""
 
-import hashlib
 from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
+from linkwise.check.as_generated import check_files, check_manifest
 from linkwise.check.compare import (
     Oracle,
     Result,
@@ -20,19 +20,22 @@ from linkwise.check.compare import (
 )
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.load import Model, Package, load_package
-from linkwise.package.manifest import FILE, Manifest
+from linkwise.package.manifest import Manifest
 
 
 def check_package(directory: Path, samples: int = 100) -> list[Result]:
     """Run every check on a package; raises LinkwiseError when `directory` holds none that can be read."""
     manifest = Manifest.read(directory)
-    results = [_hashes(directory, manifest)]
+    results = check_files(directory, manifest)
     if not results[0].passed:
         return results
     try:
         package = load_package(directory, manifest)
+        results.append(check_manifest(package))
     except Exception as error:
         return [*results, Result("import", False, None, _line(error))]
+    if not results[-1].passed:
+        return results
     loaded, missing = _load(package)
     results += missing
     if not loaded:
@@ -45,24 +48,6 @@ def check_package(directory: Path, samples: int = 100) -> list[Result]:
     except Exception as error:
         results.append(Result("answers", False, None, _line(error)))
     return results
-
-
-def _hashes(directory: Path, manifest: Manifest) -> Result:
-    wrong = [] if manifest.files else ["the manifest lists no files"]
-    for path, digest in manifest.files.items():
-        file = directory / path
-        if not file.is_file():
-            wrong.append(f"{path} is missing")
-        elif hashlib.sha256(file.read_bytes()).hexdigest() != digest:
-            wrong.append(f"{path} was changed")
-    known = {FILE, *manifest.files}
-    for file in sorted(directory.rglob("*")):
-        relative = file.relative_to(directory)
-        if file.is_dir() or "__pycache__" in relative.parts or relative.as_posix() in known:
-            continue
-        wrong.append(f"{relative.as_posix()} was added")
-    detail = "; ".join(wrong[:3]) if wrong else f"{len(manifest.files)} files as generated"
-    return Result("hashes", not wrong, None, detail)
 
 
 def _load(package: Package) -> tuple[dict[str, Model], list[Result]]:

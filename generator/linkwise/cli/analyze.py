@@ -23,7 +23,6 @@ from linkwise.analysis.tables import Format
 from linkwise.cli import Json, tell
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, listed
-from linkwise.output import ended_by_signal
 from linkwise.progress import progress as shown_progress
 
 UNITS = {"reading": "B", "resampling": "samples", "analysing": "samples"}
@@ -103,7 +102,7 @@ def analyze(
     )
     wanted = Wanted(format, tuple(figure or ()), page)
     package = load_robot(robot, backend)
-    with ended_by_signal(), shown_progress(UNITS) as progress:
+    with shown_progress(UNITS) as progress:
         analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress)
     for warning in analysis.warnings:
         tell(f"warning: {log}: {warning}", err=True)

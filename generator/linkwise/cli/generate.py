@@ -12,6 +12,7 @@ from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import checked_identifier
 from linkwise.emit.backend import BACKENDS
 from linkwise.input_file import is_file
+from linkwise.output import require_writable
 from linkwise.package.write import check_target, write_package
 from linkwise.progress import progress
 from linkwise.robot import Options, effects
@@ -38,6 +39,7 @@ def generate(
     system = pipeline.read_system(robot, options)
     directory = out / checked_identifier(name, system.name)
     check_target(directory, system.name)
+    require_writable(directory)
     with progress() as report:
         files = pipeline.generate(system, backends, name, request, report)
     write_package(files, directory)

@@ -11,6 +11,7 @@ from linkwise.cli import BUDGET, Budget, Json, ReportOut
 from linkwise.cli.options import reads_robot
 from linkwise.errors import LinkwiseError
 from linkwise.output import require_writable, write_files
+from linkwise.package.write import refuse_inside_package
 from linkwise.pipeline import read_system
 from linkwise.progress import progress
 from linkwise.report import (
@@ -55,6 +56,7 @@ def reduction(
     name, system, beyond = _arm(robot, last, options)
     found = None if seconds is None else read_seconds(seconds)
     if out is not None:
+        refuse_inside_package(out)
         require_writable(out)
     with progress() as advance:
         result = study(name, system, first, last, beyond, budget, advance)

@@ -8,6 +8,7 @@ from linkwise.cli import BUDGET, Budget, Json, ReportOut, tell
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.errors import LinkwiseError
 from linkwise.output import require_writable, write_files
+from linkwise.package.write import refuse_inside_package
 from linkwise.pipeline import read_system
 from linkwise.progress import progress
 from linkwise.report import (
@@ -53,6 +54,7 @@ def terms(
         order,
     )
     if out is not None:
+        refuse_inside_package(out)
         require_writable(out)
     with progress() as advance:
         result = terms_report(system, query, budget, partial, advance)

@@ -1,8 +1,5 @@
 """A generated package, imported from its folder, and its back ends with NumPy arrays in and out."""
 
-import hashlib
-import importlib.util
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +11,10 @@ from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
-from linkwise.package.manifest import FILE, Manifest
+from linkwise.package.agreement import disagreements
+from linkwise.package.contents import changed
+from linkwise.package.importer import import_listed
+from linkwise.package.manifest import Manifest, altered_entries
 
 Array = NDArray[np.float64]
 
@@ -82,52 +82,34 @@ class Package:
 
 
 def open_package(directory: Path) -> Package:
-    """Read and import the package in `directory`; raises LinkwiseError for one that cannot be."""
+    """Read and import the package in `directory`, all files of which must be as generated.
+
+    Raises LinkwiseError for one that cannot be, with the first file or entry of the manifest that differs.
+    """
     manifest = Manifest.read(directory)
+    for fault in (*altered_entries(directory), *changed(directory, manifest.files)):
+        raise LinkwiseError(f"{directory}: {fault}; generate the robot again")
     try:
-        return load_package(directory, manifest)
+        package = load_package(directory, manifest)
     except Exception as error:  # a damaged file may raise anything
         reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
         raise LinkwiseError(
             f"{directory}: cannot be imported ({reason}); generate the robot again"
         ) from error
+    for fault in disagreements(manifest, package.module):
+        raise LinkwiseError(f"{directory}: {fault}; generate the robot again")
+    return package
 
 
 def load_package(directory: Path, manifest: Manifest) -> Package:
-    """Import the package of a manifest; raises ValueError where it has other joints or links than that says,
-    and passes on whatever the package raises."""
-    module = import_package(directory)
-    names = {
-        "joints": (tuple(joint.name for joint in manifest.joints), tuple(module.joint_names)),
-        "links": (tuple(link.name for link in manifest.links), tuple(module.link_names)),
-    }
-    for what, (said, there) in names.items():
-        if said != there:
-            raise ValueError(f"it does not agree with its {FILE}: that has other {what}")
-    return Package(directory, manifest, module)
+    """Import the package of a manifest; passes on whatever the package raises."""
+    return Package(directory, manifest, import_listed(directory, manifest.files))
 
 
 def import_package(directory: Path) -> ModuleType:
-    """Import a package from its folder, under a name of its own; nothing is put on sys.path."""
-    path = directory.resolve()
-    # Of place and content, so that a package generated anew is imported anew.
-    digest = hashlib.sha256(str(path).encode() + (path / FILE).read_bytes()).hexdigest()[:16]
-    name = f"_linkwise_{digest}"
-    if name in sys.modules:
-        return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(
-        name, path / "__init__.py", submodule_search_locations=[str(path)]
-    )
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{path / '__init__.py'} is not a Python module")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
+    """Import a package from its folder; raises LinkwiseError for a damaged manifest, ImportError for files
+    other than that lists."""
+    return import_listed(directory, Manifest.read(directory).files)
 
 
 class TensorModel:

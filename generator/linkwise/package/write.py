@@ -1,55 +1,75 @@
 """Writing a package: all of it or nothing, over an earlier package of the same robot only."""
 
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError
 from linkwise.output import whole_directory
+from linkwise.package.contents import added
 from linkwise.package.manifest import FILE
 
 
 def check_target(directory: Path, robot: str) -> None:
     """Raise LinkwiseError unless a package of the robot named `robot` may be written to `directory`.
 
-    That is so where nothing is, and where an earlier package of the same robot is and nothing else.
+    That is so where nothing is, and where an earlier package of the same robot is and nothing else; in no
+    case inside another package.
     """
+    refuse_inside_package(directory.parent)
+    if not os.path.lexists(directory):
+        return
+    if directory.is_symlink() or not directory.is_dir():
+        what = "a symbolic link" if directory.is_symlink() else "not a folder"
+        raise LinkwiseError(f"{directory} is {what}; choose another --out or --name")
+    earlier = earlier_package(directory)
     try:
-        if not directory.exists() and not directory.is_symlink():
-            return
-        entries = list(directory.rglob("*"))
+        foreign = not earlier and next(directory.iterdir(), None) is not None
+        own = added(directory, earlier.get("files", {}))
     except OSError as error:
         raise LinkwiseError(
             f"cannot write to {directory}: {error.strerror}; choose another --out or --name"
         ) from error
-    earlier = _earlier(directory)
-    listed = {FILE, *earlier.get("files", {})}
-    files = {
-        path.relative_to(directory).as_posix()
-        for path in entries
-        if path.is_file() and "__pycache__" not in path.parts
-    }
-    if directory.is_symlink() or not directory.is_dir() or (files and not files <= listed):
+    if foreign:
         raise LinkwiseError(
-            f"{directory} exists and is not a generated package, or holds files of its own; choose another "
-            "--out or --name"
+            f"{directory} exists and is not a generated package; choose another --out or --name"
         )
-    if files and earlier.get("robot") != robot:
+    if own:
         raise LinkwiseError(
-            f"{directory} holds the package of another robot, {earlier.get('robot')!r}; give this one a "
-            "--name of its own, or remove that one"
+            f"{directory} holds {own[0][:80]!a}, which linkwise did not write; move it away, or choose "
+            "another --out or --name"
+        )
+    if earlier and earlier.get("robot") != robot:
+        raise LinkwiseError(
+            f"{directory} holds the package of another robot, {ascii(earlier.get('robot'))[:80]}; give this "
+            "one a --name of its own, or remove that one"
         )
 
 
-def _earlier(directory: Path) -> dict[str, Any]:
-    """Return what the manifest of a generated package of any version says, or an empty dictionary."""
+def refuse_inside_package(place: Path) -> None:
+    """Raise LinkwiseError for a generated package, or a place inside one: what is written there spoils it."""
+    here = place.resolve()
+    for parent in (here, *here.parents):
+        if earlier_package(parent):
+            raise LinkwiseError(
+                f"{place} is in the generated package {parent}, which it would spoil; choose another --out"
+            )
+
+
+def earlier_package(directory: Path) -> dict[str, Any]:
+    """What the manifest of a generated package of any version says, or an empty dictionary."""
+    path = directory / FILE
     try:
-        data = json.loads((directory / FILE).read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
     except (OSError, ValueError, RecursionError):
         return {}
-    own = isinstance(data, dict) and isinstance(data.get("files"), dict)
-    return data if own and "linkwise" in (data.get("generator") or {}) else {}
+    if not isinstance(data, dict):
+        return {}
+    generator = data.get("generator")
+    own = isinstance(data.get("files"), dict) and isinstance(generator, dict) and "linkwise" in generator
+    return data if own else {}
 
 
 def write_package(files: Mapping[str, str], directory: Path) -> None:

@@ -1,0 +1,114 @@
+"""A finished folder takes the place of another, in one step where the system can."""
+
+import ctypes
+import errno
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+from linkwise.output.workplace import OLD, REST
+
+AT_CWD = -100  # AT_FDCWD of Linux
+SWAP = ctypes.c_uint(2)  # RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS
+TRIES = 100
+TAKEN = (errno.ENOTEMPTY, errno.EEXIST)
+
+
+def put(draft: Path, target: Path) -> bool:
+    """Rename the folder `draft`, of a workplace beside `target`, to that name.
+
+    Returns whether a folder was there, which then is at `draft`. Raises OSError; nothing has changed then.
+    """
+    for _ in range(TRIES):  # another writer may put its own there, or be between its two renames
+        with _tried(*TAKEN):
+            draft.rename(target)  # over nothing or an empty folder
+            return False
+        with _tried(errno.ENOENT, *TAKEN):
+            exchange(draft, target)
+            return True
+    raise OSError(errno.EBUSY, "others keep writing there")
+
+
+def exchange(draft: Path, target: Path) -> None:
+    """Exchange two folders; raises OSError, and then nothing has changed.
+
+    Without the system's help there are two renames, and a kill between them leaves the former target in the
+    workplace, from where `workplace.sweep` brings it back.
+    """
+    if _swapped(draft, target):
+        return
+    former = draft.parent / OLD / target.name
+    former.parent.mkdir(exist_ok=True)
+    steps = ((target, former), (draft, target), (former, draft))
+    done: list[tuple[Path, Path]] = []
+    try:
+        for here, there in steps:
+            here.rename(there)
+            done.append((here, there))
+    except OSError:
+        _undo(done, former)
+        raise
+
+
+def _undo(done: list[tuple[Path, Path]], former: Path) -> None:
+    for here, there in reversed(done):
+        try:
+            there.rename(here)
+        except OSError:
+            # Another writer's is in the place of `former`, which is of no use any more. Where all fails,
+            # `former` is where `workplace.sweep` looks for it.
+            rest = former.parents[1] / REST
+            rest.mkdir(exist_ok=True)
+            if there == former and os.path.lexists(here):
+                former.rename(tempfile.mkdtemp(dir=rest))
+
+
+def flush(folder: Path) -> None:
+    """Have the disk hold all that is in `folder`, so that a power cut after the exchange loses neither."""
+    for place, _, names in os.walk(folder):
+        for name in names:
+            flush_one(Path(place, name))
+        flush_one(Path(place))
+
+
+def flush_one(path: Path) -> None:
+    """The same for one file, or for the list of a folder's entries."""
+    opened = os.open(path, os.O_RDONLY)
+    try:
+        with _tried(errno.EINVAL):  # a file system that has nothing to flush
+            os.fsync(opened)
+    finally:
+        os.close(opened)
+
+
+def _swapped(one: Path, other: Path) -> bool:
+    """Exchange two names in one step; False where that cannot be, for whatever reason."""
+    call = _swap()
+    return call is not None and call(os.fsencode(one), os.fsencode(other)) == 0
+
+
+@cache
+def _swap() -> Callable[[bytes, bytes], int] | None:
+    """The system's call for it, if it has one."""
+    try:
+        library = ctypes.CDLL(None)
+    except (OSError, TypeError):
+        return None
+    if hasattr(library, "renameat2"):
+        return lambda one, other: int(library.renameat2(AT_CWD, one, AT_CWD, other, SWAP))
+    if hasattr(library, "renamex_np"):
+        return lambda one, other: int(library.renamex_np(one, other, SWAP))
+    return None
+
+
+@contextmanager
+def _tried(*numbers: int) -> Iterator[None]:
+    """Suppress an OSError of these numbers only."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in numbers:
+            raise

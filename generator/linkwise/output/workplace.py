@@ -1,0 +1,140 @@
+"""A writer's own folder beside its target: `.linkwise-XXXXXXXX`, locked for as long as the writer lives.
+
+    lock        held by `flock`, which the system lets go with the process, on whatever machine it ran
+    new         what is being written
+    old/NAME    the target, where the file system cannot exchange two folders in one step, between the two
+    rest        what is about to be removed
+
+Whoever finds one of their own whose lock is free knows that its writer is dead: NAME goes back to where it
+was unless something is there again, and the folder goes. One that holds anything else was not made by
+linkwise and stays.
+"""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+PREFIX = ".linkwise-"
+RANDOM = 8
+"""Letters that `mkdtemp` appends."""
+LOCK, NEW, OLD, REST = "lock", "new", "old", "rest"
+
+
+@contextmanager
+def workplace(parent: Path) -> Iterator[Path]:
+    """Yield a new folder in `parent`, which goes at the end with all that is in it; raises OSError."""
+    work, lock = _made(parent)
+    try:
+        yield work
+    finally:
+        try:
+            _cleared(work)
+        except BaseException:  # a signal: tidy up all the same
+            _cleared(work)
+            raise
+        finally:
+            os.close(lock)
+
+
+def sweep(parent: Path) -> None:
+    """Remove what dead writers left in `parent`, and put back what they had taken away.
+
+    Nothing is raised: what cannot be done now, for want of a permission say, is left to the next.
+    """
+    with suppress(OSError), os.scandir(parent) as entries:
+        found = [
+            Path(entry.path)
+            for entry in entries
+            if entry.name.startswith(PREFIX) and len(entry.name) == len(PREFIX) + RANDOM
+            if entry.is_dir(follow_symlinks=False) and _own(entry)
+        ]
+        for work in sorted(found):
+            lock = _held(work, os.O_RDWR)
+            if lock is not None:
+                _cleared(work)
+                os.close(lock)
+                continue
+            with suppress(OSError):
+                work.rmdir()  # empty: its writer died before the lock was there, or after it went
+
+
+def _own(entry: "os.DirEntry[str]") -> bool:
+    """Whether this user made it: in a folder that many write to, another's could be a trap."""
+    return entry.stat(follow_symlinks=False).st_uid == os.geteuid()
+
+
+def _made(parent: Path) -> tuple[Path, int]:
+    """Make a workplace and lock it; another one if somebody swept it away before the lock was held."""
+    while True:
+        work = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+        try:
+            lock = _held(work, os.O_RDWR | os.O_CREAT)
+        except BaseException:
+            with suppress(OSError):
+                work.rmdir()
+            raise
+        if lock is not None:
+            return work, lock
+
+
+def _held(work: Path, flags: int) -> int | None:
+    """Open and lock a workplace; None where somebody else holds it, or it is gone.
+
+    Where locks are not to be had, a writer goes without (its workplace then is never swept).
+    """
+    making = bool(flags & os.O_CREAT)
+    try:
+        lock = os.open(work / LOCK, flags, 0o600)
+    except FileNotFoundError:
+        return None
+    except OSError:
+        if making:
+            raise
+        return None
+    if _locked(lock, otherwise=making) and _is_at(lock, work / LOCK):
+        return lock
+    os.close(lock)
+    return None
+
+
+def _locked(lock: int, otherwise: bool) -> bool:
+    """Lock an open file; False where another has it, `otherwise` where the file system knows no locks."""
+    try:
+        import fcntl
+
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except (ImportError, OSError):
+        return otherwise
+    return True
+
+
+def _is_at(lock: int, path: Path) -> bool:
+    """Whether the open file is still the one of that name."""
+    try:
+        return os.path.samestat(os.fstat(lock), path.stat())
+    except OSError:
+        return False
+
+
+def _cleared(work: Path) -> None:
+    """Put back what is in `old` and remove the workplace, which is locked; errors leave it to a sweep."""
+    with suppress(OSError):
+        if not {LOCK, NEW, OLD, REST}.issuperset(os.listdir(work)):
+            return
+        if (work / OLD).is_dir():
+            for former in (work / OLD).iterdir():
+                with suppress(OSError):
+                    former.rename(work.parent / former.name)  # fails where there is something
+            # Under its own name a half-removed folder would be put back as if it were whole.
+            shutil.rmtree(work / REST, ignore_errors=True)
+            (work / OLD).rename(work / REST)
+        for name in (NEW, REST):
+            shutil.rmtree(work / name, ignore_errors=True)
+        if os.listdir(work) in ([LOCK], []):
+            (work / LOCK).unlink(missing_ok=True)
+            work.rmdir()

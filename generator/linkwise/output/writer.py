@@ -1,0 +1,152 @@
+"""Whole folders, and sets of files in folders that hold others too."""
+
+import errno
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from linkwise.errors import LinkwiseError
+from linkwise.output.exchange import exchange, flush, flush_one, put
+from linkwise.output.workplace import NEW, REST, sweep, workplace
+
+
+@contextmanager
+def whole_directory(target: Path, refuse: Callable[[Path], None]) -> Iterator[Path]:
+    """Yield a folder to write into; it becomes `target` at the end, and goes after an error.
+
+    `refuse` raises LinkwiseError where its argument is there and may not be replaced. LinkwiseError is raised
+    too where `target` cannot be written; what was there then stays.
+    """
+    if target.name in ("", ".."):
+        target = target.resolve()
+    with _ended_by_signal(), _told(target):
+        sweep(target.parent)
+        if os.path.lexists(target):
+            refuse(target)
+        with _folder(target.parent), workplace(target.parent) as work:
+            draft = work / NEW
+            draft.mkdir()
+            yield draft
+            _replace(draft, target, refuse)
+
+
+def write_files(directory: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
+    """Write files, by name, into a folder that may hold others: all, or none and LinkwiseError.
+
+    Each is there whole, old or new, at any moment; a kill between two leaves both kinds side by side.
+    """
+    targets = tuple(directory / name for name in files)
+    with _ended_by_signal(), _told(directory):
+        sweep(directory)
+        for target in targets:
+            if target.is_dir():
+                raise FileExistsError(errno.EEXIST, "a folder of that name is there", str(target))
+        with _folder(directory), workplace(directory) as work:
+            for folder in (NEW, REST):
+                (work / folder).mkdir()
+            for name, content in files.items():
+                (work / NEW / name).write_bytes(content)
+            former = {target for target in targets if os.path.lexists(target)}
+            for target in former:
+                shutil.copy2(target, work / REST, follow_symlinks=False)
+            if former:
+                flush(work / NEW)
+            _replace_files(work, targets, former)
+    return targets
+
+
+def require_writable(directory: Path) -> None:
+    """Raise LinkwiseError, before any work is done, where no file can be made for `directory`."""
+    place = directory
+    while not os.path.lexists(place) and place != place.parent:
+        place = place.parent
+    with _told(directory), tempfile.TemporaryFile(dir=place):
+        pass
+
+
+def _replace(draft: Path, target: Path, refuse: Callable[[Path], None]) -> None:
+    """Put `draft` in the place of `target`, unless something was added there since it was looked at."""
+    if os.path.lexists(target):
+        flush(draft)
+    if not put(draft, target):
+        return
+    try:
+        refuse(draft)
+        flush_one(target.parent)
+    except (LinkwiseError, OSError):
+        exchange(draft, target)
+        refuse(target)  # the same, said of the right place
+        raise
+
+
+def _replace_files(work: Path, targets: tuple[Path, ...], former: set[Path]) -> None:
+    done: list[Path] = []
+    try:
+        for target in targets:
+            done.append(target)
+            os.replace(work / NEW / target.name, target)
+    except BaseException:
+        for target in done:
+            if target in former:
+                os.replace(work / REST / target.name, target)
+            else:
+                target.unlink(missing_ok=True)
+        raise
+
+
+@contextmanager
+def _folder(directory: Path) -> Iterator[None]:
+    """Make a folder and those above it; those made go after an error, if they are empty."""
+    missing = [place for place in (directory, *directory.parents) if not os.path.lexists(place)]
+    try:
+        if not directory.is_dir():
+            directory.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        for place in missing:
+            with suppress(OSError):
+                place.rmdir()
+        raise
+
+
+@contextmanager
+def _told(place: Path) -> Iterator[None]:
+    """Make LinkwiseError of an OSError on the way to `place`: a full disk, above all."""
+    try:
+        yield
+    except OSError as error:
+        blocker, reason = _blocker(place), error.strerror or type(error).__name__
+        if blocker is not None:
+            place, reason = blocker, "it is not a folder"
+        elif isinstance(error, FileExistsError) and error.filename:
+            place = error.filename
+        raise LinkwiseError(f"{place}: nothing was written: {reason}; choose another place") from error
+
+
+def _blocker(place: Path) -> Path | None:
+    """What stands where a folder is needed: the uppermost part of a path that is there and is none."""
+    parts = (*reversed(place.parents), place)
+    return next((part for part in parts if os.path.lexists(part) and not part.is_dir()), None)
+
+
+@contextmanager
+def _ended_by_signal() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP end the work as an error does: what is half written goes."""
+    numbers = [signal.SIGTERM, signal.SIGHUP]
+    if threading.current_thread() is not threading.main_thread():
+        numbers = []  # only the main thread may set handlers
+    former = {number: signal.getsignal(number) for number in numbers}
+    own = [number for number, handler in former.items() if handler == signal.SIG_DFL]
+    try:
+        for number in own:
+            signal.signal(number, lambda number, _: sys.exit(128 + number))
+        yield
+    finally:
+        for number in own:
+            signal.signal(number, signal.SIG_DFL)

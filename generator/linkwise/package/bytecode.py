@@ -1,0 +1,92 @@
+"""Compiled modules that Python keeps in `__pycache__`, which run in place of the sources beside them."""
+
+import importlib.util
+import inspect
+import marshal
+import re
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from types import CodeType
+
+CACHE = "__pycache__"
+NAME = re.compile(
+    r"(?P<module>[^.]+)\.(?P<python>[^.]+)(\.opt-(?P<optimization>\w+))?\.pyc(?P<unfinished>\.\d+)?"
+)
+HEADER = 16
+PLACE = {"co_filename", "co_linetable", "co_lnotab", "co_consts"}
+RUN = sorted(
+    name
+    for name, what in vars(CodeType).items()
+    if name.startswith("co_") and name not in PLACE and inspect.isdatadescriptor(what)
+)
+"""What code does, but for its constants; not from which lines of which file it is."""
+
+
+@dataclass(frozen=True)
+class Cache:
+    """A compiled module: of which source, by which Python ("cpython-311"), and how far optimized."""
+
+    file: Path
+    source: Path
+    python: str
+    optimization: str
+    finished: bool
+
+    @property
+    def readable(self) -> bool:
+        """Whether this Python made it, and would run it."""
+        plain = self.optimization in ("", "1", "2")
+        return self.finished and plain and self.python == sys.implementation.cache_tag
+
+
+def cache_of(file: Path) -> Cache | None:
+    """What the name of a file in `__pycache__` says; None for a name that Python gives to none."""
+    found = NAME.fullmatch(file.name)
+    if found is None:
+        return None
+    source = file.parent.parent / f"{found['module']}.py"
+    return Cache(file, source, found["python"], found["optimization"] or "", not found["unfinished"])
+
+
+def caches(directory: Path, files: Iterable[str]) -> list[Cache]:
+    """The caches of a package's modules; those elsewhere too that PYTHONPYCACHEPREFIX names."""
+    sources = [directory / file for file in files if file.endswith(".py")]
+    places = {source.parent / CACHE for source in sources}
+    found = {file for place in places if place.is_dir() for file in place.iterdir()}
+    known = {cache.file: cache for file in found if (cache := cache_of(file)) is not None}
+    for source in sources:
+        for level in ("", "1", "2"):
+            file = Path(importlib.util.cache_from_source(source, optimization=level))
+            if file.is_file():
+                known[file] = Cache(file, source, sys.implementation.cache_tag or "", level, True)
+    return sorted((cache for cache in known.values() if cache.source in sources), key=lambda c: c.file)
+
+
+def is_compiled_from_source(cache: Cache) -> bool:
+    """Whether the cache of a module does what its source says; compiles that and runs neither.
+
+    The cache is read as Python would read it, which like Python trusts it to be well-formed.
+    """
+    data = cache.file.read_bytes()
+    if data[:4] != importlib.util.MAGIC_NUMBER:
+        return False
+    try:
+        code = marshal.loads(data[HEADER:])
+        level = int(cache.optimization or 0)
+        made = compile(cache.source.read_bytes(), code.co_filename, "exec", dont_inherit=True, optimize=level)
+        return _plain(code) == _plain(made)
+    except Exception:  # a damaged one may raise anything
+        return False
+
+
+def _plain(value: object) -> object:
+    """A constant or code as nested tuples of text: 0, 0.0 and False differ, and a set has no order."""
+    if isinstance(value, CodeType):
+        return (*(repr(getattr(value, name)) for name in RUN), _plain(value.co_consts))
+    if isinstance(value, tuple):
+        return tuple(_plain(item) for item in value)
+    if isinstance(value, frozenset):
+        return ("frozenset", *sorted(repr(_plain(item)) for item in value))
+    return f"{type(value).__name__} {value!r}"

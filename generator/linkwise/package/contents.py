@@ -1,0 +1,64 @@
+"""What lies in the folder of a generated package, held against the files that its manifest lists."""
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from linkwise.package.bytecode import CACHE, cache_of
+from linkwise.package.manifest import FILE
+
+
+def changed(directory: Path, files: Mapping[str, str]) -> list[str]:
+    """What is wrong with the listed files, in words, "forms/link_1.py was changed" say; empty if nothing."""
+    return [f"{path} {fault}" for path, digest in files.items() if (fault := _fault(directory, path, digest))]
+
+
+def added(directory: Path, files: Mapping[str, str]) -> list[str]:
+    """Paths of what the manifest doesn't list, caches of the listed modules aside; raises OSError."""
+    known = {FILE, *files}
+    found = (path.relative_to(directory) for path in entries(directory))
+    return [
+        path.as_posix()
+        for path in sorted(found)
+        if path.as_posix() not in known and not _is_cache(directory / path, path, known)
+    ]
+
+
+def entries(directory: Path) -> Iterator[Path]:
+    """Everything below a folder but folders; links to folders are not followed. Raises OSError."""
+
+    def fail(error: OSError) -> None:
+        raise error
+
+    for place, folders, names in os.walk(directory, onerror=fail):
+        links = [name for name in folders if Path(place, name).is_symlink()]
+        yield from (Path(place, name) for name in (*links, *names))
+
+
+def link_on_the_way(directory: Path, path: str) -> str | None:
+    """First part of a path in a package that is a symbolic link."""
+    parts = (Path(path), *Path(path).parents)[:-1]
+    return next((part.as_posix() for part in reversed(parts) if (directory / part).is_symlink()), None)
+
+
+def _fault(directory: Path, path: str, digest: str) -> str:
+    file = directory / path
+    link = link_on_the_way(directory, path)
+    if link is not None:
+        return "is a symbolic link" if link == path else f"is behind the symbolic link {link}"
+    if not file.is_file():
+        return "is missing"
+    try:
+        with file.open("rb") as opened:
+            return "" if hashlib.file_digest(opened, "sha256").hexdigest() == digest else "was changed"
+    except OSError as error:
+        return f"cannot be read ({error.strerror})"
+
+
+def _is_cache(file: Path, path: Path, known: set[str]) -> bool:
+    """Whether this is what Python leaves beside a listed module when it compiles it."""
+    if path.parent.name != CACHE or file.is_symlink() or file.parent.is_symlink() or not file.is_file():
+        return False
+    cache = cache_of(path)
+    return cache is not None and cache.source.as_posix() in known

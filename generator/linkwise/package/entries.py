@@ -1,0 +1,91 @@
+"""The joints, links and rigid bodies of a manifest, and what must hold among them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+Row = tuple[float, float, float]
+
+ROUNDING = 1e-6
+"""Largest error of an entry of a rotation times its transpose."""
+
+
+@dataclass(frozen=True)
+class JointEntry:
+    """A coordinate's name and unit."""
+
+    name: str
+    unit: Literal["rad", "m"]
+
+
+@dataclass(frozen=True)
+class LinkEntry:
+    """A link's name, the coordinates that move it (counted from 0), and its decomposition's operations."""
+
+    name: str
+    path: tuple[int, ...]
+    operations: int
+
+
+@dataclass(frozen=True)
+class BodyEntry:
+    """A moving frame on its parent's, as `linkwise.robot.robot.Joint` places it, and the mass it carries.
+
+    parent: index of an earlier body, None for the ground; coordinate: index of a joint of the manifest
+    translation, com in m, mass in kg, inertia about the centre of mass in kg·m², in the body's own axes
+    """
+
+    link: str
+    parent: int | None
+    joint: str
+    kind: Literal["revolute", "prismatic"]
+    coordinate: int
+    ratio: float
+    rotation: tuple[Row, Row, Row]
+    translation: Row
+    mass: float
+    com: Row
+    inertia: tuple[Row, Row, Row]
+
+
+@dataclass(frozen=True)
+class RigidTree:
+    """The rigid bodies, parents before children, and gravity in m/s² in the base's axes."""
+
+    gravity: Row
+    bodies: tuple[BodyEntry, ...]
+
+
+def check_tree(tree: RigidTree, joints: Sequence[JointEntry], links: Sequence[LinkEntry]) -> None:
+    """Raise ValueError where bodies contradict each other, the joints or the paths of the links."""
+    paths: list[set[int]] = []
+    for index, body in enumerate(tree.bodies):
+        if not body.coordinate < len(joints):
+            raise ValueError(f"body {index} of the tree hangs on no joint")
+        if body.parent is not None and not body.parent < index:
+            raise ValueError(f"the parent of body {index} of the tree is not an earlier body")
+        paths.append({body.coordinate, *(() if body.parent is None else paths[body.parent])})
+        turn, inertia = np.array(body.rotation), np.array(body.inertia)
+        if not np.allclose(turn @ turn.T, np.eye(3), rtol=0, atol=ROUNDING) or np.linalg.det(turn) < 0:
+            raise ValueError(f"the rotation of body {index} of the tree is not a rotation")
+        if not np.array_equal(inertia, inertia.T):
+            raise ValueError(f"the inertia of body {index} of the tree is not symmetric")
+    by_link = {body.link: path for body, path in zip(tree.bodies, paths, strict=True)}
+    for j, link in enumerate(links):
+        if link.name not in by_link:
+            raise ValueError(f"links[{j}].name is {link.name!r}, which is not in the tree")
+        if set(link.path) != by_link[link.name]:
+            raise ValueError(f"the path of link {link.name!r} is not that of the tree")
+    _check_joints(tree, joints)
+
+
+def _check_joints(tree: RigidTree, joints: Sequence[JointEntry]) -> None:
+    units = {"revolute": "rad", "prismatic": "m"}
+    for k, joint in enumerate(joints):
+        own = [body for body in tree.bodies if body.coordinate == k and body.joint == joint.name]
+        if not own:
+            raise ValueError(f"joints[{k}].name is {joint.name!r}, on which no body of the tree hangs")
+        if all(units[body.kind] != joint.unit for body in own):
+            raise ValueError(f"joints[{k}].unit is {joint.unit!r}, which is not that of its kind in the tree")

@@ -1,0 +1,83 @@
+"""Importing a generated package from its sources alone: what runs is what its manifest lists."""
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.abc import MetaPathFinder, SourceLoader
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from types import ModuleType
+
+from linkwise.package.contents import link_on_the_way
+from linkwise.package.manifest import FILE
+
+
+def import_listed(directory: Path, files: Mapping[str, str]) -> ModuleType:
+    """Import a package by its listed files, under a name of its own; nothing is put on sys.path.
+
+    files: SHA-256 by path. Neither `__pycache__` nor anything else that is not listed is read. Raises
+    ImportError for a file that differs, and passes on whatever the package raises.
+    """
+    path = directory.resolve()
+    # Of place and content, so that a package generated anew is imported anew.
+    digest = hashlib.sha256(str(path).encode() + (path / FILE).read_bytes()).hexdigest()[:16]
+    name = f"_linkwise_{digest}"
+    if name in sys.modules:
+        return sys.modules[name]
+    finder = _Listed(name, path, files)
+    sys.meta_path.insert(0, finder)
+    try:
+        return importlib.import_module(name)
+    except BaseException:
+        sys.meta_path.remove(finder)
+        raise
+
+
+@dataclass(frozen=True, eq=False)
+class _Listed(MetaPathFinder):
+    """Finds the modules of one package."""
+
+    name: str
+    directory: Path
+    files: Mapping[str, str]
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Where a module of the package is; None for one of somebody else."""
+        package, *inner = fullname.split(".")
+        if package != self.name:
+            return None
+        for parts in ([*inner, "__init__.py"], [*inner[:-1], f"{inner[-1]}.py"] if inner else []):
+            if (file := "/".join(parts)) in self.files:
+                # No folder to search: there would be caches and libraries in it.
+                search: list[str] | None = [] if parts[-1] == "__init__.py" else None
+                loader = _Verified(self.directory, file, self.files[file])
+                return importlib.util.spec_from_file_location(
+                    fullname, self.directory / file, loader=loader, submodule_search_locations=search
+                )
+        return None
+
+
+@dataclass(frozen=True)
+class _Verified(SourceLoader):
+    """Compiles one source, if it is as listed; without a time of change Python looks for no cache."""
+
+    directory: Path
+    file: str
+    digest: str
+
+    def get_filename(self, fullname: str) -> str:
+        """Path of the source."""
+        return str(self.directory / self.file)
+
+    def get_data(self, path: str | bytes) -> bytes:
+        """The source; raises ImportError if it isn't as listed."""
+        if link_on_the_way(self.directory, self.file) is None:
+            data = (self.directory / self.file).read_bytes()
+            if hashlib.sha256(data).hexdigest() == self.digest:
+                return data
+        raise ImportError(f"{self.file} was changed", path=str(self.directory / self.file))

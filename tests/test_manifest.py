@@ -1,0 +1,285 @@
+"""A manifest's entries: what of them is refused, and that `check` holds every one."""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from linkwise import LinkwiseError, check_package, generate, read_system, write_package
+from linkwise.package.manifest import LARGEST, Manifest
+
+
+@pytest.fixture(scope="session")
+def planar2(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("manifest") / "planar2"
+    request = {"robot": "planar2", "backends": ["numpy"], "parameters": "numeric", "lock": {}, "root": None}
+    write_package(generate(read_system("planar2"), ["numpy"], request=request), directory)
+    return directory
+
+
+@pytest.fixture
+def package(planar2: Path, tmp_path: Path) -> Path:
+    """A package of one's own to damage."""
+    return shutil.copytree(planar2, tmp_path / "planar2")
+
+
+def change_manifest(package: Path, change: Callable[[Any], object], checksums: bool = False) -> None:
+    """Change what a manifest says, and its checksums as if linkwise had said so."""
+    path = package / "manifest.json"
+    data = json.loads(path.read_text())
+    change(data)
+    if checksums:
+        for key in data["checksums"]:
+            text = json.dumps(data[key], sort_keys=True)
+            data["checksums"][key] = hashlib.sha256(text.encode()).hexdigest()
+    path.write_text(json.dumps(data))
+
+
+def bodies(data: Any) -> Any:
+    return data["tree"]["bodies"]
+
+
+DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
+    **{
+        key: (lambda data, key=key: data.pop(key), f"the whole is not an object with {key}")  # type: ignore[misc]
+        for key in ("joints", "links", "tree", "request", "files")
+    },
+    "no joints": (lambda data: data.update(joints=[]), "there must be a joint and a link"),
+    "joint": (lambda data: data["joints"].append(3), "joints[2] is not an object"),
+    "path": (lambda data: data["links"][0].update(path=[7]), "the path of link 'link1' names a joint"),
+    "path of words": (lambda data: data["links"][0].update(path="ab"), "links[0].path is not a list"),
+    "request": (lambda data: data.update(request=3), "request is not an object"),
+    "gravity": (lambda data: data["tree"].pop("gravity"), "tree is not an object with gravity"),
+    "tree of words": (lambda data: data.update(tree="ab"), "tree is not an object"),
+    "body": (lambda data: bodies(data).append(None), "tree.bodies[2] is not an object"),
+    "mass": (lambda data: bodies(data)[0].update(mass="a"), "tree.bodies[0].mass is not a finite number"),
+    "nan": (
+        lambda data: bodies(data)[1].update(com=[float("nan"), 0, 0]),
+        "tree.bodies[1].com[0] is not a finite number",
+    ),
+    "rotation": (
+        lambda data: bodies(data)[1].update(rotation=[[1]]),
+        "tree.bodies[1].rotation is not a list of 3",
+    ),
+    "coordinate": (lambda data: bodies(data)[1].update(coordinate=5), "body 1 of the tree hangs on no joint"),
+    "kind": (lambda data: bodies(data)[1].update(kind=[]), "tree.bodies[1].kind is not 'revolute' or"),
+    "parent": (
+        lambda data: bodies(data)[1].update(parent=1),
+        "the parent of body 1 of the tree is",
+    ),
+    "link": (
+        lambda data: bodies(data)[1].update(link="hand"),
+        "links[1].name is 'link2', which is not in the tree",
+    ),
+    "turned link": (
+        lambda data: data["links"][1].update(path=[1]),
+        "the path of link 'link2' is not that of the tree",
+    ),
+    "joint of the tree": (
+        lambda data: bodies(data)[1].update(joint="wrist"),
+        "joints[1].name is 'joint2', on which no body of the tree hangs",
+    ),
+    "unit": (
+        lambda data: data["joints"][0].update(unit="m"),
+        "joints[0].unit is 'm', which is not that of its kind in the tree",
+    ),
+    "sheared": (
+        lambda data: bodies(data)[1].update(rotation=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]),
+        "the rotation of body 1 of the tree is not a rotation",
+    ),
+    "mirrored": (
+        lambda data: bodies(data)[1].update(rotation=[[1, 0, 0], [0, 1, 0], [0, 0, -1]]),
+        "the rotation of body 1 of the tree is not a rotation",
+    ),
+    "inertia": (
+        lambda data: bodies(data)[1].update(inertia=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]),
+        "the inertia of body 1 of the tree is not symmetric",
+    ),
+    "joint twice": (
+        lambda data: data["joints"][1].update(name="joint1"),
+        "joints has 'joint1' twice",
+    ),
+    "link twice": (lambda data: data["links"][1].update(name="link1"), "links has 'link1' twice"),
+}
+
+
+@pytest.mark.parametrize("case", DAMAGES)
+def test_a_damaged_manifest_is_named(case: str, package: Path) -> None:
+    change, message = DAMAGES[case]
+    change_manifest(package, change)
+    with pytest.raises(LinkwiseError) as caught:
+        check_package(package)
+    assert str(caught.value).startswith(f"{package / 'manifest.json'} is damaged: {message}")
+    assert str(caught.value).endswith("; generate the robot again")
+
+
+def test_a_manifest_of_another_version_is_told_apart_from_a_damaged_one(package: Path) -> None:
+    change_manifest(package, lambda data: data.update(schema=1))
+    with pytest.raises(LinkwiseError, match=r"another version of linkwise \(schema 1, this one reads 3\)"):
+        check_package(package)
+
+
+def leaves(data: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    """Where the manifest has a number, a string, null, true or false; of a list's items the last."""
+    inner = (
+        data.items()
+        if isinstance(data, dict)
+        else list(enumerate(data))[-1:]
+        if isinstance(data, list)
+        else []
+    )
+    for key, value in inner:
+        yield from leaves(value, (*path, key))
+    if not isinstance(data, (dict, list)):
+        yield path
+
+
+def another(value: Any) -> Any:
+    if isinstance(value, str):
+        return {"rad": "m", "revolute": "prismatic"}.get(value, f"{value} too")
+    return 1 if value is None else value + 1
+
+
+def complaint(package: Path) -> str:
+    """What `check` says of a manifest."""
+    try:
+        [wrong] = [result for result in check_package(package, 1)[:2] if not result.passed]
+    except LinkwiseError as error:
+        return str(error).removeprefix(str(package / "manifest.json"))
+    assert wrong.name == "manifest"
+    return wrong.detail
+
+
+def test_every_entry_is_held_by_name(package: Path) -> None:
+    text = (package / "manifest.json").read_text()
+    held = [path for path in leaves(json.loads(text)) if path[0] not in ("files", "checksums")]
+    assert len(held) > 35
+    for path in held:
+
+        def change(data: Any, path: tuple[str | int, ...] = path) -> None:
+            for key in path[:-1]:
+                data = data[key]
+            data[path[-1]] = another(data[path[-1]])
+
+        (package / "manifest.json").write_text(text)
+        change_manifest(package, change)
+        assert any(str(key) in complaint(package) for key in path), (path, complaint(package))
+
+
+SLIPS: dict[str, tuple[Callable[[Any], object], str]] = {
+    "name": (lambda d: d.update(name="arm"), "name 'arm', the package 'planar2'"),
+    "version": (lambda d: d["generator"].update(linkwise="9"), "generator.linkwise '9', the package '"),
+    "joint": (lambda d: d["joints"].append({"name": "wrist", "unit": "m"}), ""),
+    "operations": (lambda d: d["links"][1].update(operations=46), "links[1].operations 46, the package 47"),
+    "parameter": (lambda d: d.update(parameters={"m": 1.0}), "parameters.m 1.0, the package not at all"),
+    "back ends": (lambda d: d["request"].update(backends=["c"]), "request.backends {'c'}, the package {'"),
+    "energies": (
+        lambda d: (d.update(tree=None), d["links"][1].update(path=[1])),
+        "links[1].path (1,), the package (0, 1)",
+    ),
+    "link": (
+        lambda d: (d.update(tree=None), d["links"][0].update(name="hand")),
+        "links[0].name 'hand', the package 'link1'",
+    ),
+    "unit": (
+        lambda d: (d.update(tree=None), d["joints"][0].update(unit="m")),
+        "joints[0].unit 'm', the package 'rad'",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SLIPS)
+def test_an_entry_that_the_package_has_otherwise_fails(case: str, package: Path) -> None:
+    change, message = SLIPS[case]
+    change_manifest(package, change, checksums=True)
+    if not message:
+        with pytest.raises(LinkwiseError, match=r"joints\[2\].name is 'wrist', on which no body"):
+            check_package(package)
+        return
+    _, result = check_package(package)
+    assert (result.name, result.mark) == ("manifest", "FAIL")
+    assert result.detail.startswith(f"manifest.json has {message}")
+
+
+TEXTS: dict[str, tuple[Callable[[str], str], str]] = {
+    "digits": (
+        lambda t: t.replace('"mass": 0.6', f'"mass": {"9" * 400}'),
+        "tree.bodies[0].mass is not a finite",
+    ),
+    "count": (
+        lambda t: t.replace('"operations": 3', f'"operations": {"9" * 5000}'),
+        "links[0].operations is not a whole",
+    ),
+    "power": (lambda t: t.replace('"mass": 0.6', '"mass": 1e999'), "tree.bodies[0].mass is not a finite"),
+    "below 0": (
+        lambda t: t.replace('"operations": 3', '"operations": -3'),
+        "links[0].operations is not a whole",
+    ),
+    "infinity": (
+        lambda t: t.replace('"root": null', '"root": -Infinity'),
+        "request.root is not a finite number",
+    ),
+    "twice": (lambda t: t.replace('"lock": {}', '"lock": {}, "lock": {}'), "the entry 'lock' is there twice"),
+    "depth": (lambda t: t.replace('"lock": {}', f'"lock": {"[" * 100_000}'), "nested too deeply"),
+    "objects": (
+        lambda t: t.replace('"lock": {}', '"lock": {"a": {"b": {}}}'),
+        "request.lock.a is not a number, a",
+    ),
+    "surrogate": (
+        lambda t: t.replace('"robot": "planar2"', '"robot": "\\ud800"', 1),
+        "robot is not a string of whole",
+    ),
+    "list": (lambda t: "[]", "the whole is not an object"),
+    "nothing": (lambda t: "", "Expecting value"),
+    "schema": (lambda t: t.replace('"schema": 3', '"schema": "3"'), "schema is not the number 3"),
+    "truth": (lambda t: t.replace('"schema": 3', '"schema": true'), "schema is not the number 3"),
+    "no schema": (lambda t: t.replace('"schema": 3,', ""), "schema is not the number 3"),
+    "unknown": (
+        lambda t: t.replace('"lock": {}', '"lock": {}},"more": {"a": 1'),
+        "more is not an entry of a",
+    ),
+    "unknown inside": (
+        lambda t: t.replace('"unit": "rad"', '"unit": "rad", "a\\n": 1', 1),
+        "joints[0].'a\\n' is not an",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", TEXTS)
+def test_a_manifest_that_is_not_one_is_named_in_a_line(case: str, package: Path) -> None:
+    change, message = TEXTS[case]
+    path = package / "manifest.json"
+    text = change(path.read_text())
+    assert text != path.read_text()
+    path.write_text(text)
+    with pytest.raises(LinkwiseError) as caught:
+        check_package(package)
+    assert str(caught.value).startswith(f"{path} is damaged: {message}")
+    assert len(str(caught.value)) < 300
+    assert "\n" not in str(caught.value)
+
+
+def test_a_manifest_too_large_to_be_one_is_not_read(package: Path) -> None:
+    with (package / "manifest.json").open("r+b") as file:
+        file.truncate(LARGEST + 1)
+    with pytest.raises(LinkwiseError, match=f"the file of {LARGEST + 1} bytes is not a manifest"):
+        check_package(package)
+
+
+@pytest.mark.parametrize(
+    "path", ["/etc/passwd", "../other.py", "forms/../names.py", "a//b", "", ".", "a\\b", "manifest.json"]
+)
+def test_a_path_that_leads_out_of_the_package_is_refused(path: str, package: Path) -> None:
+    change_manifest(package, lambda data: data["files"].update({path: "0" * 64}))
+    with pytest.raises(LinkwiseError) as caught:
+        Manifest.read(package)
+    assert f"damaged: files has {path!a}, which is not a path of a file in the package" in str(caught.value)
+
+
+def test_what_is_not_a_hash_is_refused(package: Path) -> None:
+    change_manifest(package, lambda data: data["files"].update({"names.py": "0"}))
+    with pytest.raises(LinkwiseError, match=r"files has for 'names.py' something else than a SHA-256"):
+        Manifest.read(package)
