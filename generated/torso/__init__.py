@@ -22,7 +22,9 @@ parameters = ROBOT.parameters
 """Run-time parameters and their built-in values."""
 
 
-def load(backend: str = "numpy", parameters: Mapping[str, Any] | None = None) -> Dynamics:
+def load(
+    backend: str = "numpy", parameters: Mapping[str, Any] | None = None, check_finite: bool = False
+) -> Dynamics:
     """Return the robot on a back end; all of them answer the same calls.
 
     backend: one of
@@ -33,6 +35,14 @@ def load(backend: str = "numpy", parameters: Mapping[str, Any] | None = None) ->
 
     parameters: none here; generate with --parameters symbolic to keep them.
 
+    check_finite: whether every call looks at q, qd and qdd first and raises ValueError for NaN and infinity.
+
+    The calls take q, qd and qdd as arrays, tensors, lists or tuples. Back ends of arrays (numpy) answer with
+    arrays, those of tensors (torch, autograd) with tensors on the device of the tensors given; native answers with
+    tensors if it is given one. float32 is computed in float32, anything with float64 in float64; integers and
+    lists go along with the others, and alone are computed in float64. Refused are booleans, complex numbers, other
+    floats, and, for numpy, tensors that require a gradient or lie on another device.
+
     Raises ValueError for a back end or a parameter that this package doesn't have.
     """
     if not BACKENDS:
@@ -40,7 +50,7 @@ def load(backend: str = "numpy", parameters: Mapping[str, Any] | None = None) ->
     if backend not in BACKENDS:
         raise ValueError(f"no back end {backend!r} in this package; choose one of {', '.join(BACKENDS)}")
     made = _MAKERS[backend](ROBOT.values(parameters))
-    return Dynamics(ROBOT, made, load, (backend, dict(parameters or {})))
+    return Dynamics(ROBOT, made, load, (backend, dict(parameters or {}), check_finite), check_finite)
 
 
 def _numpy(values: Mapping[str, Any]) -> Backend[Any]:

@@ -161,6 +161,8 @@ void API(decomposition)(size_t count, const real *q, const real *qd, const real 
         scatter(samples, 6, G, g_block, g + s * G);
         scatter(samples, 6, G, tau_block, tau + s * G);
     }
+    if (large)
+        stream_end();
 }
 
 void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, const real *qdd,
@@ -193,6 +195,8 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
             links_1_to_3(&m, &there);
         }
     }
+    if (large)
+        stream_end();
 }
 
 void API(torque)(size_t count, const real *q, const real *qd, const real *qdd, real *tau)

@@ -28,3 +28,12 @@ static inline void stream_rows(size_t entries, const real *block, real *rows, re
     scatter(BLOCK, entries, entries, block, scratch);
     stream(entries * BLOCK, scratch, rows);
 }
+
+/* After the last of it: what went past the cache is in memory before anything that is written later, a flag that tells
+   another thread of it, say. Stores past the cache are not ordered with others otherwise. */
+static inline void stream_end(void)
+{
+#if defined(__AVX512F__)
+    _mm_sfence();
+#endif
+}

@@ -15,6 +15,7 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arguments import check_numbers
 from .dense import Dense
 from .interface import Array, Backend
 from .quantities import Coefficients, GradientPropagation, Packed, Propagation
@@ -25,15 +26,18 @@ class Dynamics:
     """Partial torques of a robot on one back end; made by the package's `load`.
 
     q, qd, qdd: positions, velocities and accelerations of shape (..., n): rad, rad/s, rad/s^2 for a revolute
-    joint, m, m/s, m/s^2 for a prismatic one. They are NumPy arrays or torch tensors, as the back end takes
-    them, of float32 or float64. The shapes before the last axis broadcast.
+    joint, m, m/s, m/s^2 for a prismatic one. They are arrays, tensors, lists or tuples, as `load` says; the
+    shapes before the last axis broadcast.
 
-    Answers are of the same kind, dtype and device; torques in N m, or N where joint i is prismatic.
+    Answers are arrays or tensors, as the back end computes with, of float32 or float64 as the motion is, on
+    its device; torques in N m, or N where joint i is prismatic.
 
-    Every call raises ValueError for a wrong shape, and TypeError for another kind of array and for dtypes or
-    devices that differ; the message names the argument.
+    Every call raises ValueError for a wrong shape, and TypeError for what cannot be taken without a doubt;
+    the message names the argument.
     """
 
+    name: str
+    """Name of the package."""
     n: int
     """Number of joints."""
     N: int
@@ -50,6 +54,8 @@ class Dynamics:
     """Values of the run-time parameters."""
     backend: Backend[Any]
     """What computes; of the native one `threads` may be set."""
+    check_finite: bool
+    """Whether every call looks for NaN and infinity in the motion first."""
 
     def __init__(
         self,
@@ -57,8 +63,10 @@ class Dynamics:
         backend: Backend[Any],
         load: Callable[..., "Dynamics"],
         asked: tuple[Any, ...],
+        check_finite: bool = False,
     ) -> None:
         """`load` makes this robot again from the arguments that it was `asked` with."""
+        self.name, self.check_finite = structure.name, check_finite
         self.n, self.N = structure.n, structure.N
         self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
         self.link_names, self.layout = structure.link_names, structure.layout
@@ -67,7 +75,9 @@ class Dynamics:
         self._dense = Dense(structure, backend)
 
     def __repr__(self) -> str:
-        return f"<{self.n} joints, {self.N} links on {self.backend.name}>"
+        counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}
+        parts = [f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items() if count]
+        return f"<{self.name} on {self.backend.name}: {', '.join(parts)}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled, copied or sent to another process, it is loaded again there."""
@@ -75,13 +85,11 @@ class Dynamics:
 
     def packed(self, q: Array, qd: Array, qdd: Array) -> Packed[Array]:
         """Full decomposition without the zeros: c2, c1 (closing), g, tau, h1, (..., count) each."""
-        return Packed(
-            *self.backend.decomposition(*self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n))
-        )
+        return Packed(*self.backend.decomposition(*self._motion(q=q, qd=qd, qdd=qdd)))
 
     def packed_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """tau_ij on the paths only, (..., count); its indices are `layout.torque`."""
-        tau: Array = self.backend.torque(*self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n))
+        tau: Array = self.backend.torque(*self._motion(q=q, qd=qd, qdd=qdd))
         return tau
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
@@ -96,7 +104,7 @@ class Dynamics:
 
     def coefficients(self, q: Array, qd: Array) -> Coefficients[Array]:
         """c2, c1 (..., n, N, n) and g (..., n, N) of the closing convention."""
-        q, qd = self.backend.arrays({"q": q, "qd": qd}, self.n)
+        q, qd = self._motion(q=q, qd=qd)
         packed = self.packed(q, qd, self.backend.zeros(q, self.n))
         return Coefficients(
             self._dense.spread(packed.acceleration, "acceleration"),
@@ -123,7 +131,7 @@ class Dynamics:
         """
         if convention not in ("closing", "gradient"):
             raise ValueError(f"no convention {convention!r}; choose closing or gradient")
-        q, qd, qdd = self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n)
+        q, qd, qdd = self._motion(q=q, qd=qd, qdd=qdd)
         packed = self.packed(q, qd, qdd)
         c2: Any = self._dense.spread(packed.acceleration, "acceleration")
         c1: Any = self._dense.spread(packed.velocity, "velocity")
@@ -138,7 +146,7 @@ class Dynamics:
 
     def position_gradient(self, q: Array, qd: Array, qdd: Array) -> Array:
         """c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
-        packed = self.backend.position_gradient(*self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n))
+        packed = self.backend.position_gradient(*self._motion(q=q, qd=qd, qdd=qdd))
         c0: Array = self._dense.spread(packed, "velocity")
         return c0
 
@@ -152,7 +160,7 @@ class Dynamics:
             raise ValueError(
                 f"the mask has shape {tuple(np.shape(mask))}; it must be (3, {self.n}): order, coordinate"
             )
-        q, qd, qdd = self.backend.arrays({"q": q, "qd": qd, "qdd": qdd}, self.n)
+        q, qd, qdd = self._motion(q=q, qd=qd, qdd=qdd)
         weights = self.backend.asarray(mask, q)
         coefficients = self.coefficients(q, qd)
         total = coefficients.velocity @ (weights[1] * qd)[..., None, :, None]
@@ -162,3 +170,10 @@ class Dynamics:
             total = total + self.position_gradient(q, qd, qdd) @ (weights[0] * q)[..., None, :, None]
         torque: Array = total[..., 0]
         return torque
+
+    def _motion(self, **named: Any) -> Any:
+        """The motion as the back end computes with it, in one shape, and looked at if that was asked for."""
+        arrays = self.backend.arrays(named, self.n)
+        if self.check_finite:
+            check_numbers(named, self.joint_names)
+        return arrays

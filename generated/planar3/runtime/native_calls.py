@@ -1,8 +1,7 @@
 """Calls of the compiled C: arrays in, arrays out, large batches on several threads."""
 
 import os
-import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -10,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from .arguments import has_tensors
 from .native_build import Sources
-from .native_library import Memory, NumberArray, address, function
+from .native_library import NumberArray, address, function, memory
 from .structure import Structure
 
 PER_THREAD = 1 << 20
@@ -44,7 +44,6 @@ class NativeCalls:
         self._learned = has_tensors(parameters.values())
         self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
         self._functions: dict[tuple[str, np.dtype[Any]], Any] = {}
-        self._memory = Memory()
         self._function("decomposition", np.dtype("f8"))
 
     def run(self, call: str, q: NumberArray, qd: NumberArray, qdd: NumberArray) -> list[NumberArray]:
@@ -52,8 +51,10 @@ class NativeCalls:
         sizes = self.sizes[call]
         kind, shape, n = q.dtype, q.shape[:-1], q.shape[-1]
         count, width = q.size // n, kind.itemsize
-        buffer = self._memory(count * sum(sizes), kind)
-        motion = [a if a.flags.c_contiguous else np.ascontiguousarray(a) for a in (q, qd, qdd)]
+        buffer = memory(count * sum(sizes), kind)
+        motion = [
+            a if a.flags.c_contiguous and a.flags.aligned else np.array(a, order="C") for a in (q, qd, qdd)
+        ]
         inputs = [(address(a), n * width) for a in motion]
         results, outputs, at, start = [], [], 0, address(buffer)
         for size in sizes:
@@ -116,12 +117,6 @@ def result_sizes(structure: Structure) -> dict[str, tuple[int, ...]]:
         "torque": (sizes.tau,),
         "position_gradient": (sizes.c1,),
     }
-
-
-def has_tensors(values: Iterable[Any]) -> bool:
-    """Whether one of the values is a torch tensor; torch isn't imported to find out."""
-    torch = sys.modules.get("torch")
-    return torch is not None and any(isinstance(v, torch.Tensor) for v in values)
 
 
 def _number(value: Any) -> float:

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .parameter_values import ParametricBody, checked_values
+
 Indices = NDArray[np.intp]
 
 
@@ -52,6 +54,8 @@ class Structure:
     """Links whose energy has terms linear in the velocities, as on a moving base."""
     parameters: Mapping[str, float]
     """Run-time parameters and the values they have unless others are given."""
+    bodies: tuple[ParametricBody, ...] = ()
+    """Links that parameters may not make such as no body can be."""
 
     @cached_property
     def n(self) -> int:
@@ -81,12 +85,8 @@ class Structure:
         return Sizes(*map(len, self.layout))
 
     def values(self, given: Mapping[str, Any] | None) -> dict[str, Any]:
-        """All parameters, those `given` in place of their own; raises ValueError for an unknown name."""
-        unknown = sorted(set(given or {}) - set(self.parameters))
-        if unknown:
-            known = ", ".join(self.parameters) or "none: generate with --parameters symbolic"
-            raise ValueError(f"no parameter {unknown[0]!r}; the parameters are {known}")
-        return {**self.parameters, **(given or {})}
+        """All parameters, those `given` in place of their own, checked as the package's `load` says."""
+        return checked_values(self.parameters, given or {}, self.bodies)
 
 
 def _table(rows: list[tuple[int, int]] | list[tuple[int, int, int]], width: int) -> Indices:

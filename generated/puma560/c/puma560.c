@@ -203,6 +203,8 @@ void API(decomposition)(size_t count, const real *q, const real *qd, const real 
         scatter(samples, 21, G, g_block, g + s * G);
         scatter(samples, 21, G, tau_block, tau + s * G);
     }
+    if (large)
+        stream_end();
 }
 
 void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, const real *qdd,
@@ -235,6 +237,8 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
             links_1_to_6(&m, &there);
         }
     }
+    if (large)
+        stream_end();
 }
 
 void API(torque)(size_t count, const real *q, const real *qd, const real *qdd, real *tau)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .arguments import has_tensors
 from .interface import ClosedForms
-from .native_calls import NativeCalls, has_tensors
+from .native_calls import NativeCalls
 from .numpy_backend import NumpyBackend
 from .structure import Structure
 

@@ -20,6 +20,9 @@ TUNING = {
 }
 """What makes full use of this machine's processor, by its kind."""
 
+ANSWERS = 30.0
+"""Seconds in which a compiler says its version."""
+
 
 @dataclass(frozen=True)
 class Compiler:
@@ -33,11 +36,22 @@ class Compiler:
         """What everything is compiled with, for a shared library on this machine."""
         return (*FLAGS, *TUNING.get(platform.machine(), ()), "-fPIC")
 
-    @property
     def version(self) -> str:
-        """What it says of itself."""
+        """What it says of itself; raises RuntimeError for what is not a program, or does not answer."""
         command = [*self.command, "--version"]
-        return subprocess.run(command, capture_output=True, text=True, check=False).stdout
+        try:
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, capture_output=True, timeout=ANSWERS, check=False
+            )
+        except OSError as error:
+            raise RuntimeError(
+                f"{self.command[0]} cannot be run: {error.strerror}; point CC to a C compiler"
+            ) from None
+        except subprocess.TimeoutExpired:
+            raise RuntimeError(
+                f"{' '.join(command)} gives no answer in {ANSWERS:.0f} s; point CC to a C compiler"
+            ) from None
+        return done.stdout.decode(errors="replace")
 
     def compiling(self, source: Path, part: str, target: str) -> list[str]:
         """Command line that compiles one part of a robot's file."""
@@ -57,10 +71,11 @@ def find_compiler() -> Compiler:
     for candidate in [given] if given else [["cc"], ["gcc"], ["clang"]]:
         if shutil.which(candidate[0]):
             return Compiler(tuple(candidate))
+    found = f"no program {given[0]}" if given else "none"
     raise RuntimeError(
-        f"the native back end needs a C compiler and found {'no ' + given[0] if given else 'none'}: install "
-        "the package gcc (Debian, Ubuntu: apt install gcc; Fedora: dnf install gcc; macOS: xcode-select "
-        "--install) or point CC to one; the other back ends need none"
+        f"the native back end needs a C compiler and found {found}: install the package gcc (Debian, "
+        "Ubuntu: apt install gcc; Fedora: dnf install gcc; macOS: xcode-select --install) or point CC to "
+        "one; the other back ends need none"
     )
 
 

@@ -6,8 +6,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import same_kind
+from .arguments import as_array, check_axes, no_common_shape, precision
 from .interface import ClosedForms, Entries
+from .parameter_values import fits
 from .structure import Structure
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
@@ -24,22 +25,28 @@ class NumpyBackend:
     ) -> None:
         self.structure = structure
         self.links = links
-        self.parameters: dict[str, Any] = {k: np.asarray(v, dtype=float) for k, v in parameters.items()}
+        self.parameters: dict[str, Any] = {
+            k: as_array(f"parameter {k!r}", v).astype(float) for k, v in parameters.items()
+        }
 
     def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
-        arrays = {k: value if type(value) is np.ndarray else _array(k, value) for k, value in named.items()}
-        first, *rest = arrays.values()
+        first, *rest = named.values()
         if (
-            first.dtype in FLOATS
+            type(first) is np.ndarray
+            and first.dtype in FLOATS
             and first.shape[-1:] == (n,)
-            and all(a.shape == first.shape and a.dtype == first.dtype for a in rest)
+            and all(type(a) is np.ndarray and a.shape == first.shape and a.dtype == first.dtype for a in rest)
         ):
             return [first, *rest]
-        for name, a in arrays.items():
-            if a.dtype not in FLOATS:
-                raise TypeError(f"{name} has dtype {a.dtype}; give float32 or float64")
-        return np.broadcast_arrays(*same_kind(arrays, n).values())
+        read = {name: as_array(name, value) for name, value in named.items()}
+        kind = precision(named, read)
+        arrays = {name: a.astype(kind, copy=False) for name, a in read.items()}
+        check_axes(arrays, n)
+        try:
+            return np.broadcast_arrays(*arrays.values())
+        except ValueError:
+            raise no_common_shape(arrays, n) from None
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
@@ -75,7 +82,7 @@ class NumpyBackend:
 
     def asarray(self, value: Any, like: Any) -> Any:
         """Anything array-like, in the dtype of `like`."""
-        return np.asarray(value, dtype=like.dtype)
+        return as_array("the mask", value).astype(like.dtype)
 
     def zeros(self, like: Any, count: int) -> Any:
         """Zeros of shape (..., count) for `like` of shape (..., m)."""
@@ -86,6 +93,9 @@ class NumpyBackend:
         return np.concatenate(list(parts), -1)
 
     def _values(self, q: Any) -> dict[str, Any]:
+        for name, value in self.parameters.items():
+            if value.ndim:
+                fits(name, value.shape, q.shape[:-1])
         return {k: v.astype(q.dtype) for k, v in self.parameters.items()}
 
 
@@ -103,12 +113,3 @@ class _Columns:
             return
         for column, value in enumerate(entries, start):
             self.array[..., column] = value
-
-
-def _array(name: str, value: Any) -> NDArray[Any]:
-    """Anything array-like as an array; what an array cannot hold is refused."""
-    if hasattr(value, "detach"):
-        raise TypeError(f"{name} is a tensor; this back end takes arrays, torch and native take tensors")
-    if isinstance(value, np.ma.MaskedArray):
-        raise TypeError(f"{name} is a masked array; fill its gaps first")
-    return np.asarray(value)

@@ -1,18 +1,100 @@
-"""What every back end asks of its arguments."""
+"""What every back end takes for q, qd and qdd, and in which precision it then computes.
 
-from collections.abc import Mapping
+    float32, float64    computed in as they are; where both occur, in float64
+    integers, lists     have no precision of their own: that of the others, float64 if there is none
+    arrays              where tensors are computed: become tensors, on the device of the others
+    CPU tensors         where arrays are computed: become arrays, unless a gradient would be lost
 
-from .interface import Array
+The rest is refused by name: booleans, complex numbers, other floats, gaps, tensors on different devices.
+"""
+
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FLOATS = ("float32", "float64")
+INTEGERS = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 
 
-def same_kind(arrays: Mapping[str, Array], n: int) -> Mapping[str, Array]:
-    """Return the arrays if their last axis is n and their dtypes agree; else raise, naming the argument."""
-    first_name, first = next(iter(arrays.items()))
+def has_tensors(values: Iterable[Any]) -> bool:
+    """Whether one of the values is a torch tensor; torch isn't imported to find out."""
+    torch = sys.modules.get("torch")
+    return torch is not None and any(isinstance(v, torch.Tensor) for v in values)
+
+
+def as_array(name: str, value: Any) -> NDArray[Any]:
+    """Anything that reads as an array; raises TypeError or ValueError for what does not, or not wholly."""
+    if has_tensors([value]):
+        return _array_of_tensor(name, value)
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError(f"{name} is a masked array; fill its gaps first")
+    if isinstance(value, list | tuple) and has_tensors(value):
+        raise TypeError(f"{name} is a {type(value).__name__} of tensors; join them with torch.stack")
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise ValueError(f"{name} does not read as an array: {_first_line(error)}") from None
+
+
+def precision(given: Mapping[str, Any], read: Mapping[str, Any]) -> str:
+    """float32 or float64: what to compute in, for values as they were given, and as arrays or tensors."""
+    for name, a in read.items():
+        if _dtype(a) not in (*FLOATS, *INTEGERS):
+            raise TypeError(f"{name} has dtype {_dtype(a)}; give float32, float64 or integers")
+    own = {_dtype(a) for name, a in read.items() if hasattr(given[name], "dtype")}
+    return "float32" if own.intersection(FLOATS) == {"float32"} else "float64"
+
+
+def check_axes(arrays: Mapping[str, Any], n: int) -> None:
+    """Raise ValueError, which names the argument, where a last axis is not n."""
     for name, a in arrays.items():
         if a.ndim == 0 or a.shape[-1] != n:
             raise ValueError(
                 f"{name} has shape {tuple(a.shape)}; its last axis must be {n}, one for each joint"
             )
-        if a.dtype != first.dtype:
-            raise TypeError(f"{name} has dtype {a.dtype}, {first_name} has {first.dtype}; give them the same")
-    return arrays
+
+
+def no_common_shape(arrays: Mapping[str, Any], n: int) -> ValueError:
+    """What to raise for arrays (..., n) that do not broadcast."""
+    shapes = ", ".join(f"{name} {tuple(a.shape)}" for name, a in arrays.items())
+    return ValueError(
+        f"the shapes do not go together: {shapes}; before the last axis, {n} for the joints, "
+        "axes must be equal or 1"
+    )
+
+
+def check_numbers(given: Mapping[str, Any], joint_names: Sequence[str]) -> None:
+    """Raise ValueError, which names argument, sample and joint, for the first NaN or infinity."""
+    for name, value in given.items():
+        seen = as_array(name, value.detach().cpu() if has_tensors([value]) else value)
+        wrong = np.argwhere(~np.isfinite(seen))
+        if len(wrong):
+            *sample, joint = wrong[0].tolist()
+            where = f"at sample {', '.join(map(str, sample))} " if sample else ""
+            raise ValueError(f"{name} is {seen[tuple(wrong[0])]:g} {where}for joint {joint_names[joint]!r}")
+
+
+def _array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
+    if tensor.requires_grad and sys.modules["torch"].is_grad_enabled():
+        raise TypeError(
+            f"{name} requires a gradient, which arrays do not carry; load torch, or pass {name}.detach()"
+        )
+    if tensor.device.type != "cpu":
+        raise TypeError(f"{name} lies on {tensor.device}; load torch, or pass {name}.cpu()")
+    try:
+        array: NDArray[Any] = tensor.detach().resolve_conj().resolve_neg().numpy()
+    except (TypeError, RuntimeError) as error:  # a dtype that NumPy lacks; inside torch.func
+        raise TypeError(f"{name} does not read as an array: {_first_line(error)}") from None
+    return array
+
+
+def _dtype(a: Any) -> str:
+    """Name of an array's or a tensor's dtype, whatever its byte order."""
+    return a.dtype.name if isinstance(a, np.ndarray) else str(a.dtype).removeprefix("torch.")
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -3,12 +3,16 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from .arguments import same_kind
+from .arguments import as_array, check_axes, no_common_shape, precision
 from .interface import ClosedForms
+from .parameter_values import fits
 from .structure import Structure
+
+FLOATS = ({torch.float32}, {torch.float64})
 
 
 class TorchBackend:
@@ -29,14 +33,16 @@ class TorchBackend:
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
-        for name, a in named.items():
-            if not torch.is_tensor(a):
-                raise TypeError(f"{name} is {type(a).__name__}; this back end takes torch tensors")
-            if a.dtype not in (torch.float32, torch.float64):
-                raise TypeError(f"{name} has dtype {a.dtype}; give float32 or float64")
-        if len({a.device for a in named.values()}) > 1:
+        given = [value for value in named.values() if torch.is_tensor(value)]
+        if len({t.device for t in given}) > 1:
             raise TypeError(f"{', '.join(named)} lie on different devices; move them to one")
-        return torch.broadcast_tensors(*same_kind(named, n).values())  # type: ignore[no-any-return, no-untyped-call]
+        if len(given) < len(named) or {t.dtype for t in given} not in FLOATS:
+            named = _tensors(named, given[0].device if given else torch.device("cpu"))
+        check_axes(named, n)
+        try:
+            return torch.broadcast_tensors(*named.values())  # type: ignore[no-any-return, no-untyped-call]
+        except RuntimeError:
+            raise no_common_shape(named, n) from None
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
@@ -84,7 +90,23 @@ class TorchBackend:
         return torch.cat(list(parts), -1)
 
     def _values(self, q: Tensor) -> dict[str, Tensor]:
+        for name, value in self.parameters.items():
+            if value.ndim:
+                fits(name, value.shape, q.shape[:-1])
         return {k: v.to(q) for k, v in self.parameters.items()}
+
+
+def _tensors(named: Mapping[str, Any], device: torch.device) -> dict[str, Tensor]:
+    """Motion of any kind as tensors of one dtype; arrays are copied, as a gradient may need them later."""
+    read = {k: value if torch.is_tensor(value) else as_array(k, value) for k, value in named.items()}
+    kind = precision(named, read)
+    dtype = torch.float32 if kind == "float32" else torch.float64
+    return {
+        k: a.to(dtype)
+        if torch.is_tensor(a)
+        else torch.from_numpy(np.array(a, dtype=kind, order="C")).to(device)
+        for k, a in read.items()
+    }
 
 
 def _stacked(q: Tensor, entries: Sequence[Any]) -> Tensor:

@@ -1,5 +1,6 @@
 """`analyze`: from a log and a robot to arrays in memory, or to a directory of files."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -81,7 +81,7 @@ def effects(notes: Iterable[Note], every: bool = False) -> tuple[str, ...]:
             subjects.setdefault(note.effect, []).append(f"{note.subject}{detail}")
     if every:
         return tuple(f"{effect}: {item}" for effect, found in subjects.items() for item in found)
-    return tuple(f"{effect}: {listed(found, SHOWN)}" for effect, found in subjects.items())
+    return tuple(f"{effect}: {listed(found, SHOWN, LONGEST)}" for effect, found in subjects.items())
 
 
 def left_out(notes: Iterable[Note]) -> tuple[Note, ...]:

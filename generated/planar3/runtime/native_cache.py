@@ -1,0 +1,114 @@
+"""The directory that keeps compiled libraries: who may write there, and whether a library is still whole.
+
+Code that another user may change would run as this one, and a library cut short ends the interpreter that
+calls it. So the directory must belong to this user, or to root, and be closed to the others; beside each
+library lies the hash of its bytes, which are read and compared before they are loaded.
+"""
+
+import errno
+import hashlib
+import os
+import stat
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from io import BufferedReader
+from pathlib import Path
+
+ELSEWHERE = "set LINKWISE_CACHE to another directory"
+OTHERS = stat.S_IWGRP | stat.S_IWOTH
+NOT_OWN = "it is not a plain file of your own; remove it"
+
+
+def cache_directory() -> Path:
+    """LINKWISE_CACHE, or linkwise in the user's cache directory; made if need be.
+
+    Raises RuntimeError where it cannot be made, and where another user may write to it.
+    """
+    path = _chosen_directory()
+    try:
+        path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path = path.resolve()  # a link that leads there may lead elsewhere later
+        found = path.stat()
+    except OSError as error:
+        raise RuntimeError(f"cannot make the cache {path}: {error.strerror}; {ELSEWHERE}") from None
+    if found.st_uid not in _trusted():
+        raise RuntimeError(f"the cache {path} belongs to another user; {ELSEWHERE}, one of your own")
+    if found.st_mode & OTHERS:
+        raise RuntimeError(f"other users may write to the cache {path}; chmod go-w it, or {ELSEWHERE}")
+    return path
+
+
+def _chosen_directory() -> Path:
+    given, shared = os.environ.get("LINKWISE_CACHE"), os.environ.get("XDG_CACHE_HOME", "")
+    if given:
+        return Path(given).absolute()
+    if os.path.isabs(shared):  # a relative one is void, by the rules that XDG stands for
+        return Path(shared) / "linkwise"
+    try:
+        return Path.home() / ".cache/linkwise"
+    except RuntimeError:
+        raise RuntimeError("no home directory to keep compiled code in; set LINKWISE_CACHE") from None
+
+
+def is_whole(library: Path) -> bool:
+    """Whether a library is a file that no other user may change, with the bytes that its hash is of."""
+    try:
+        with _opened(library) as file, _opened(_digest_of(library)) as digest:
+            closed = not os.fstat(file.fileno()).st_mode & OTHERS
+            return closed and hashlib.file_digest(file, "sha256").hexdigest().encode() == digest.read(65)
+    except OSError:
+        return False
+
+
+def keep(made: Path, library: Path) -> None:
+    """Move a library, made on the same disk, to its place, and the hash of its bytes beside it."""
+    digest = made.with_suffix(".sha256")
+    with made.open("rb") as file:
+        digest.write_text(hashlib.file_digest(file, "sha256").hexdigest(), encoding="ascii")
+    made.chmod(0o644)
+    # Whoever looks between the two finds a hash that does not fit, waits for the lock, and looks again.
+    os.replace(digest, _digest_of(library))
+    os.replace(made, library)
+
+
+@contextmanager
+def locked(path: Path, tell: Callable[[str], None]) -> Iterator[None]:
+    """Keep other processes out while one builds; the lock goes with the process that holds it.
+
+    `tell` is called where another one holds it. Raises RuntimeError if there can be no lock.
+    """
+    import fcntl
+
+    with ExitStack() as held:
+        try:
+            file = held.enter_context(_opened(path, os.O_RDWR | os.O_CREAT))
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                tell("another process is at it")
+                fcntl.flock(file, fcntl.LOCK_EX)
+        except OSError as error:
+            raise RuntimeError(f"cannot lock {path}: {error.strerror}; {ELSEWHERE}") from None
+        yield
+
+
+def _opened(path: Path, flags: int = os.O_RDONLY) -> BufferedReader:
+    """A plain file of a trusted user; raises OSError for another user's, for links and for pipes."""
+    try:
+        descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o600)
+    except OSError as error:
+        raise (OSError(error.errno, NOT_OWN) if error.errno == errno.ELOOP else error) from None
+    found = os.fstat(descriptor)
+    if not stat.S_ISREG(found.st_mode) or found.st_uid not in _trusted():
+        os.close(descriptor)
+        raise OSError(errno.EPERM, NOT_OWN)
+    return os.fdopen(descriptor, "rb")
+
+
+def _digest_of(library: Path) -> Path:
+    return library.with_suffix(".sha256")
+
+
+def _trusted() -> tuple[int, int]:
+    """Numbers of the users whose files are taken: this one's own, and root's, who can do anything anyway."""
+    return os.geteuid(), 0

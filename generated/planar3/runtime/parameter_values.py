@@ -1,0 +1,195 @@
+"""Values of the run-time parameters: known by name, real numbers, and such as a body can have."""
+
+import difflib
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+TRIANGLE = 1e-6
+"""Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
+SPECK = 1e-14
+"""m^2: moments below mass times this count as zero; a point mass has only what rounding leaves of them."""
+MOST_NAMES = 6
+LONGEST = 60
+
+
+@dataclass(frozen=True)
+class ParametricBody:
+    """A link whose mass and inertia hang on parameters."""
+
+    link: str
+    parameters: tuple[str, ...]
+    """Those that they hang on."""
+    mass_and_inertia: Callable[[Mapping[str, Any]], Sequence[Any]]
+    """Mass in kg; xx, yy, zz, xy, xz, yz of the inertia about the centre of mass in kg m^2, in any axes."""
+
+
+def checked_values(
+    own: Mapping[str, float], given: Mapping[str, Any], bodies: Sequence[ParametricBody]
+) -> dict[str, Any]:
+    """All parameters, those `given` in place of their `own` values; raises what the package's `load` says."""
+    if not given:
+        return dict(own)
+    if not isinstance(given, Mapping):
+        example = dict(list(own.items())[:1])
+        raise TypeError(f"parameters is {type(given).__name__}; give values by name, such as {example}")
+    for name in given:
+        if name not in own:
+            raise ValueError(_unknown(name, own))
+    tensors = {name: value for name, value in given.items() if _is_tensor(value)}
+    seen = {name: _number(name, value) for name, value in given.items() if name not in tensors}
+    plain = {**own, **seen}
+    seen |= {name: _number(name, value) for name, value in _looked_at(tensors).items()}
+    hidden = tensors.keys() - seen.keys()
+    touched = [
+        body
+        for body in bodies
+        if not seen.keys().isdisjoint(body.parameters) and hidden.isdisjoint(body.parameters)
+    ]
+    if touched:
+        _check_bodies(touched, {**own, **seen}, seen)
+    return {**plain, **tensors}
+
+
+def _number(name: str, value: Any) -> Any:
+    """A value as a float or an array of them.
+
+    Raises TypeError for what is not a real number or an array of them, ValueError for NaN and infinity.
+    """
+    if type(value) is float and math.isfinite(value):
+        return value
+    try:
+        array = np.asarray(value)
+        real = array.dtype.kind in "fiu" or (
+            array.dtype.kind == "O" and all(isinstance(x, Real) for x in array.flat)
+        )
+        array = array.astype(np.float64) if real else array
+    except (TypeError, ValueError, OverflowError):  # lists of unequal lengths; numbers too large
+        real = False
+    if not real or isinstance(value, np.ma.MaskedArray):
+        raise TypeError(
+            f"parameter {_short(name)} is {_short(value)}; give a number, or an array of one for each sample"
+        )
+    if not np.isfinite(array).all():
+        raise ValueError(f"parameter {_short(name)} is NaN or infinite; give a finite number")
+    return array if array.ndim else float(array)
+
+
+def fits(name: str, shape: Sequence[int], batch: Sequence[int]) -> None:
+    """Raise ValueError for a parameter that is neither one number nor one for each sample of the motion."""
+    missing = len(batch) - len(shape)
+    if missing < 0 or any(size not in (1, b) for size, b in zip(shape, batch[missing:], strict=True)):
+        raise ValueError(
+            f"parameter {_short(name)} has shape {tuple(shape)}, the motion has samples of shape "
+            f"{tuple(batch)}; give one number, or one for each sample"
+        )
+
+
+def faults(values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """What is unphysical of bodies (..., 7), listed as by a `ParametricBody`: an index of REASONS each."""
+    mass, (xx, yy, zz, xy, xz, yz) = values[..., 0], np.moveaxis(values[..., 1:], -1, 0)
+    broken: NDArray[np.bool_] = np.logical_not(np.isfinite(values).all(-1))
+    tensor = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], -1)
+    tensor = np.where(np.expand_dims(broken, -1), 0.0, tensor).reshape(*mass.shape, 3, 3)
+    moments = np.linalg.eigvalsh(tensor)
+    noise = np.maximum(SPECK * mass, np.finfo(float).eps * np.abs(moments).max(-1))
+    moments = np.where(np.abs(moments) <= noise[..., None], 0.0, moments)
+    low, middle, high = np.moveaxis(moments, -1, 0)
+    triangle = high > low + middle + TRIANGLE * high
+    negative = (low < -TRIANGLE * high) | (high < 0)
+    return np.select([broken, mass < 0, negative, triangle], [1, 2, 3, 4], 0)
+
+
+REASONS = (
+    "",
+    "a mass or an inertia that is NaN or infinite",
+    "a negative mass",
+    "an inertia that is not positive: a principal moment is negative",
+    "an inertia that breaks the triangle inequality: a principal moment exceeds the sum of the others",
+)
+
+
+def _check_bodies(
+    bodies: Sequence[ParametricBody], known: Mapping[str, Any], given: Mapping[str, Any]
+) -> None:
+    known = {name: np.float64(value) if type(value) is float else value for name, value in known.items()}
+    with np.errstate(all="ignore"):  # numbers of NumPy divide by zero without raising
+        rows = [body.mass_and_inertia(known) for body in bodies]
+    flat = [entry for row in rows for entry in row]
+    try:
+        entries = np.array(np.broadcast_arrays(*flat) if any(map(np.ndim, flat)) else flat, dtype=float)
+    except ValueError:
+        raise ValueError(
+            f"parameters {_listed(given, given)} differ in shape; give each one number a sample"
+        ) from None
+    found = faults(np.moveaxis(entries.reshape(len(bodies), 7, *entries.shape[1:]), 1, -1))
+    for body, found_here in zip(bodies, found, strict=True):
+        if found_here.any():
+            names = [name for name in given if name in body.parameters]
+            raise ValueError(
+                f"link {_short(body.link)} would have {REASONS[found_here.max()]}, "
+                f"with {_listed(names, given)}; no body has that: correct it, or generate the package with "
+                "--allow-unphysical"
+            )
+
+
+def _unknown(name: str, own: Mapping[str, float]) -> str:
+    if not own:
+        return f"no parameter {_short(name)}; the parameters are none: generate with --parameters symbolic"
+    if len(own) <= MOST_NAMES:
+        return f"no parameter {_short(name)}; the parameters are {', '.join(map(_plain, own))}"
+    near = difflib.get_close_matches(str(name), own, MOST_NAMES, 0.5) or list(own)[:MOST_NAMES]
+    names = ", ".join(map(_plain, near))
+    return f"no parameter {_short(name)}; near it are {names}, and `parameters` has all {len(own)}"
+
+
+def _is_tensor(value: Any) -> bool:
+    """Whether a value is a torch tensor; torch isn't imported to find out."""
+    torch = sys.modules.get("torch")
+    return torch is not None and isinstance(value, torch.Tensor)
+
+
+def _looked_at(tensors: Mapping[str, Any]) -> dict[str, Any]:
+    """Values that tensors have now, without gradients, in one transfer a kind.
+
+    Those inside torch.func and torch.compile, and those without data, cannot be looked at and are left out.
+    """
+    torch: Any = sys.modules.get("torch")
+    if not tensors or torch.compiler.is_compiling() or torch._C._are_functorch_transforms_active():
+        return {}
+    kinds: dict[Any, dict[str, Any]] = {}
+    for name, tensor in tensors.items():
+        if not tensor.is_meta:
+            kinds.setdefault((tensor.device, tensor.dtype, tensor.shape), {})[name] = tensor.detach()
+    values: dict[str, Any] = {}
+    for (_, dtype, shape), group in kinds.items():
+        stacked = torch.stack(list(group.values())).cpu().resolve_conj()
+        array = (stacked if dtype.is_complex else stacked.double()).numpy()
+        values |= zip(group, array if shape else array.tolist(), strict=True)
+    return values
+
+
+def _listed(names: Sequence[str] | Mapping[str, Any], values: Mapping[str, Any]) -> str:
+    """The first few parameters with their values."""
+    shown = [
+        _plain(name) if np.ndim(values[name]) else f"{_plain(name)} = {values[name]:g}"
+        for name in list(names)[:MOST_NAMES]
+    ]
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return f"{', '.join(shown)}{more}"
+
+
+def _plain(name: str) -> str:
+    """A name as one line may hold it."""
+    return name if name.isprintable() and len(name) <= LONGEST else _short(name)
+
+
+def _short(value: Any) -> str:
+    text = repr(value).replace("\n", " ")
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
