@@ -80,16 +80,15 @@ def about_z(angle: float) -> Rotation:
 def align_z(axis: Sequence[float]) -> Rotation:
     """Return a rotation whose third column is the unit vector `axis`; a permutation for ±x, ±y, ±z."""
     x, y, z = snap([list(axis)])[0]
-    if z == 1.0:
-        return snap([[1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    if abs(x) == 1.0:
+    # An entry 1e-12 off 1 snaps to it with the axis 1e-6 off: the other two have to be 0.
+    if y == z == 0.0:
         return snap([[0, 0, x], [x, 0, 0], [0, 1, 0]])
-    if abs(y) == 1.0:
+    if x == z == 0.0:
         return snap([[0, 1, 0], [0, 0, y], [y, 0, 0]])
-    if z == -1.0:
-        return snap([[1, 0, 0], [0, -1, 0], [0, 0, -1]])
-    # The shortest turn from z to the axis (Rodrigues).
-    f = 1.0 / (1.0 + z)
+    if x == y == 0.0:
+        return snap([[1, 0, 0], [0, z, 0], [0, 0, z]])
+    # The shortest turn from z to the axis (Rodrigues); 1 / (1 + z) in the form that keeps its digits.
+    f = 1.0 / (1.0 + z) if z > 0.0 else (1.0 - z) / (x * x + y * y)
     return snap([[1 - f * x * x, -f * x * y, x], [-f * x * y, 1 - f * y * y, y], [-x, -y, z]])
 
 
