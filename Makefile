@@ -3,7 +3,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint generate bench corpus report clean
+.PHONY: demo test lint generate bench corpus random fuzz same report clean
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -42,6 +42,18 @@ report: $(READY)
 # Every real robot at hand, beside Pinocchio: minutes.
 corpus: $(READY)
 	$(BIN)/python tests/corpus.py --out out/corpus
+
+# 200 random robots of up to 15 joints, each link beside Pinocchio: ten minutes.
+random: $(READY)
+	$(BIN)/python tests/numeric/random_robots.py --count 200
+
+# Broken robots, logs, manifests and command lines: an hour.
+fuzz: $(READY)
+	$(BIN)/python tests/fuzz/run.py --minutes 60
+
+# The same bytes whatever the surroundings, one change at a time: minutes.
+same: $(READY)
+	$(BIN)/python tests/same_bytes.py
 
 # Speed beside Pinocchio and CasADi, reports and motions at length: minutes, on a quiet machine.
 bench: $(READY)
