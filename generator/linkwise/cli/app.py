@@ -63,7 +63,7 @@ app.add_typer(_group("Term counts and the cost-reduction curve.", REPORTS), name
 def main() -> None:
     """Run the command line; a user's mistake is one line on stderr and exit status 2."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # where a terminal or a pipe takes no τ, it gets \\u03c4
+        if isinstance(stream, TextIOWrapper):  # where a terminal or a pipe takes no τ, it gets \u03c4
             stream.reconfigure(errors="backslashreplace")
     try:
         status = typer.main.get_command(app)(standalone_mode=False)
