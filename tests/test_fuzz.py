@@ -10,7 +10,7 @@ import pytest
 from fuzz.case import Case
 from fuzz.cases import KINDS
 from fuzz.client import Client
-from hypothesis import Phase, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 TESTS = Path(__file__).parent
@@ -25,7 +25,14 @@ def client() -> Iterator[Client]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_broken_input_is_refused_in_one_line_or_answered(kind: str, client: Client) -> None:
     # The same cases each time; making one smaller takes minutes, and the message has all of it.
-    @settings(max_examples=30, derandomize=True, deadline=None, database=None, phases=[Phase.generate])
+    @settings(
+        max_examples=25,
+        derandomize=True,
+        deadline=None,
+        database=None,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
     @given(st.randoms(use_true_random=False))
     def run(rng: Random) -> None:
         case = KINDS[kind](rng)

@@ -20,7 +20,7 @@ def _robot_case(rng: Random, name: str, content: bytes, files: dict[str, bytes] 
     if chance < 0.1:
         command = ("generate", file, "--out", "{out}", *NUMPY)
     elif chance < 0.13:
-        command = ("generate", file, "--out", "{out}", "--backend", "c", "--backend", "formulas")
+        command = ("generate", file, "--out", "{out}", "--backend", "c", "--backend", "autograd")
     elif chance < 0.15:
         command = ("report", "terms", file, "--budget", "2000", "--out", "{out}")
     elif chance < 0.4:
@@ -93,10 +93,9 @@ def energies(rng: Random) -> Case:
     """Energies in Python; the parts put in do nothing but compute."""
     text = ENERGIES
     for _ in range(rng.randint(1, 3)):
-        places = [
-            found.span() for part in PARTS for found in re.finditer(rf"(?<!\w){re.escape(part)}(?!\w)", text)
-        ]
-        start, end = rng.choice(places)
+        # Whole words, and none that is assigned to: sp.oo = 1 would last for the process.
+        found = [re.finditer(rf"(?<!\w){re.escape(part)}(?!\w| =|, \w+ =)", text) for part in PARTS]
+        start, end = rng.choice([match.span() for matches in found for match in matches])
         text = text[:start] + rng.choice(PARTS) + text[end:]
     case = _robot_case(rng, "energies.py", encoded(rng, text) if rng.random() < 0.1 else text.encode())
     rigid = ("--allow-unphysical", "--free-mimic", "--base=floating")

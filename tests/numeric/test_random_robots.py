@@ -6,7 +6,7 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 pytest.importorskip("pinocchio")
@@ -17,7 +17,14 @@ from numeric.random_robots import LIMIT, drawn, features, largest_error
 
 
 # Making a failing robot smaller takes minutes; the message has its file.
-@settings(max_examples=15, derandomize=True, deadline=None, database=None, phases=[Phase.generate])
+@settings(
+    max_examples=15,
+    derandomize=True,
+    deadline=None,
+    database=None,
+    phases=[Phase.generate],
+    suppress_health_check=list(HealthCheck),
+)
 @given(st.randoms(use_true_random=False), st.integers(1, 5))
 def test_decomposition_of_a_random_robot_is_pinocchios(rng: Random, joints: int) -> None:
     robot = random_robot(rng, joints, 10)
