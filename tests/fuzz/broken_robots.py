@@ -94,7 +94,7 @@ def energies(rng: Random) -> Case:
     text = ENERGIES
     for _ in range(rng.randint(1, 3)):
         # Whole words, and none that is assigned to: sp.oo = 1 would last for the process.
-        found = [re.finditer(rf"(?<!\w){re.escape(part)}(?!\w| =|, \w+ =)", text) for part in PARTS]
+        found = [re.finditer(rf"(?<!\w){re.escape(part)}(?!\w|(, \w+)* =)", text) for part in PARTS]
         start, end = rng.choice([match.span() for matches in found for match in matches])
         text = text[:start] + rng.choice(PARTS) + text[end:]
     case = _robot_case(rng, "energies.py", encoded(rng, text) if rng.random() < 0.1 else text.encode())
