@@ -12,6 +12,7 @@ COMMANDS = (
     "generate skew.toml --out out",
     "generate torso --out out --backend numpy --backend c",
     "generate cart.py --out out",
+    "check out/torso --samples 5",
     "report terms planar3 --joint all --out out/terms",
     "report reduction --dof 1..2 --out out/reduction",
     "motion --out out/motion",
