@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from operator import mul
 
 from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3
 
@@ -17,7 +18,7 @@ def times(number: float, value: Scalar) -> Scalar:
 
 def rotate(rotation: Rotation, a: Sequence[Scalar]) -> Vec3:
     """Return rotation · a."""
-    x, y, z = (_sum(times(r, v) for r, v in zip(row, a, strict=True)) for row in rotation)
+    x, y, z = (total(times(r, v) for r, v in zip(row, a, strict=True)) for row in rotation)
     return x, y, z
 
 
@@ -29,14 +30,12 @@ def transpose(rotation: Rotation) -> Rotation:
 
 def compose(a: Rotation, b: Rotation) -> Rotation:
     """Return a · b, snapped."""
-    return snap(
-        [[sum(x * y for x, y in zip(row, col, strict=True)) for col in zip(*b, strict=True)] for row in a]
-    )
+    return snap([[float(total(map(mul, row, column))) for column in zip(*b, strict=True)] for row in a])
 
 
 def add(a: Vec3, b: Vec3) -> Vec3:
     """Return a + b."""
-    x, y, z = (_sum((p, q)) for p, q in zip(a, b, strict=True))
+    x, y, z = (total((p, q)) for p, q in zip(a, b, strict=True))
     return x, y, z
 
 
@@ -114,10 +113,11 @@ def _near_whole(e: float) -> float:
     return float(round(e)) + 0.0 if abs(e - round(e)) < SNAP else float(e)
 
 
-def _sum(terms: Iterable[Scalar]) -> Scalar:
-    total: Scalar = 0.0
+def total(terms: Iterable[Scalar]) -> Scalar:
+    """Sum in the order of the terms, which from Python 3.12 on `sum` rounds in another way than before."""
+    result: Scalar = 0.0
     for term in terms:
         if isinstance(term, float) and term == 0.0:
             continue
-        total = term if isinstance(total, float) and total == 0.0 else total + term
-    return total
+        result = term if isinstance(result, float) and result == 0.0 else result + term
+    return result
