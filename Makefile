@@ -62,6 +62,7 @@ bench: $(READY)
 	$(BIN)/python tests/benchmarks/growth.py --out out/bench
 	$(BIN)/python tests/benchmarks/bench_report.py
 	$(BIN)/python tests/benchmarks/bench_motion.py million out/planar3
+	$(BIN)/python tests/benchmarks/bench_motion.py ten-hours generated/torso
 
 clean:
 	rm -rf out $(VENV)
