@@ -2,7 +2,6 @@
 
 import sys
 from importlib import import_module
-from io import TextIOWrapper
 from typing import Any, NoReturn
 
 import typer
@@ -62,9 +61,6 @@ app.add_typer(_group("Term counts and the cost-reduction curve.", REPORTS), name
 
 def main() -> None:
     """Run the command line; a user's mistake is one line on stderr and exit status 2."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # where a terminal or a pipe takes no τ, it gets \u03c4
-            stream.reconfigure(errors="backslashreplace")
     try:
         status = typer.main.get_command(app)(standalone_mode=False)
     except LinkwiseError as error:
