@@ -3,7 +3,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint generate bench corpus crash report clean
+.PHONY: demo test lint generate bench corpus crash random fuzz same report clean
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -47,6 +47,18 @@ corpus: $(READY)
 crash: $(READY)
 	$(BIN)/python tests/crash.py
 
+# 200 random robots of up to 15 joints, each link beside Pinocchio: ten minutes.
+random: $(READY)
+	$(BIN)/python tests/numeric/random_robots.py --count 200
+
+# Broken robots, logs, manifests and command lines: an hour.
+fuzz: $(READY)
+	$(BIN)/python tests/fuzz/run.py --minutes 60
+
+# The same bytes whatever the surroundings, one change at a time: minutes.
+same: $(READY)
+	$(BIN)/python tests/same_bytes.py
+
 # Speed beside Pinocchio and CasADi, reports and motions at length: minutes, on a quiet machine.
 bench: $(READY)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[bench]'
@@ -54,6 +66,7 @@ bench: $(READY)
 	$(BIN)/python tests/benchmarks/growth.py --out out/bench
 	$(BIN)/python tests/benchmarks/bench_report.py
 	$(BIN)/python tests/benchmarks/bench_motion.py million out/planar3
+	$(BIN)/python tests/benchmarks/bench_motion.py ten-hours generated/torso
 
 clean:
 	rm -rf out $(VENV)

@@ -117,7 +117,7 @@ def main() -> None:
     if arguments.one:
         print(json.dumps(study(arguments.one, json.loads(arguments.options), arguments.samples)))
         return
-    from corpus_report import HEAD, line, write
+    from corpus_report import COUNTS, HEAD, line, sorted_out, write
 
     rows: list[dict[str, Any]] = []
     print(HEAD)
@@ -126,6 +126,9 @@ def main() -> None:
             rows += (new := ways(path, arguments.samples))
             print("\n".join(map(line, new)), flush=True)
     print(write(rows, arguments.out))
+    counts = {key: len(files) for key, files in sorted_out(rows).items()}
+    if not arguments.only and counts != COUNTS:
+        sys.exit(f"the README says {COUNTS}, here it is {counts}")
 
 
 if __name__ == "__main__":

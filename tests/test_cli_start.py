@@ -27,6 +27,14 @@ def loaded(code: str, *arguments: str) -> set[str]:
     return set(done.stdout.splitlines()[-1].split()[1:])
 
 
+def test_what_stdout_cannot_encode_is_escaped() -> None:
+    command = [sys.executable, "-m", "linkwise", "report", "terms", "planar1"]
+    environment = {"PYTHONIOENCODING": "latin-1"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "expand: 100%\n")
+    assert "| \\u03c4_1,1 | link1 |" in done.stdout
+
+
 def test_import_loads_no_heavy_library() -> None:
     assert loaded("import linkwise; linkwise.LinkwiseError, dir(linkwise), linkwise.__version__") == set()
     assert "sympy" in loaded("import linkwise; linkwise.System")

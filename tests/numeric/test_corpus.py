@@ -7,11 +7,11 @@ import pytest
 pytest.importorskip("pinocchio")
 
 from corpus import ROBOTS, study
+from corpus_report import LIMIT
 
 if not ROBOTS.is_dir():
     pytest.skip("needs the package example-robot-data", allow_module_level=True)
 
-LIMIT = 1e-9
 ROBOT: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "kinova": ({}, {"joints": 6, "links": 6, "merged": 6}),
     "panda": ({}, {"joints": 8, "links": 9, "mimic": 1}),

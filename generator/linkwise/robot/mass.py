@@ -10,7 +10,7 @@ from linkwise.escape import listed
 from linkwise.robot.description import ZERO3, ZERO33, Body
 from linkwise.robot.notes import IMPOSSIBLE, Note
 from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3, unusable
-from linkwise.robot.transforms import add, rotate, rotate_inertia
+from linkwise.robot.transforms import add, rotate, rotate_inertia, total
 
 TRIANGLE = 1e-6
 """Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
@@ -41,11 +41,11 @@ def merge(bodies: list[Placed]) -> tuple[Scalar, Vec3, Mat3]:
         return 0.0, ZERO3, ZERO33
     if len(placed) == 1:
         return placed[0]
-    mass = sum((m for m, _, _ in placed), start=0.0)
+    mass = total(m for m, _, _ in placed)
     if mass == 0.0:
         com = placed[0][1]
     else:
-        x, y, z = (sum((m * c[i] for m, c, _ in placed), start=0.0) / mass for i in range(3))
+        x, y, z = (total(m * c[i] for m, c, _ in placed) / mass for i in range(3))
         com = (x, y, z)
     inertia = np.zeros((3, 3), dtype=object)
     for m, c, i in placed:

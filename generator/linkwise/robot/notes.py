@@ -16,6 +16,8 @@ FLOATS = f"six coordinates without any contact forces, {TURNS}"
 
 SHOWN = 5
 """Most subjects that one line of effects names."""
+LONGEST_ITEM = 150
+"""Characters of a subject and its reason."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def effects(notes: Iterable[Note], every: bool = False) -> tuple[str, ...]:
             subjects.setdefault(note.effect, []).append(f"{note.subject}{detail}")
     if every:
         return tuple(f"{effect}: {item}" for effect, found in subjects.items() for item in found)
-    return tuple(f"{effect}: {listed(found, SHOWN, LONGEST)}" for effect, found in subjects.items())
+    return tuple(f"{effect}: {listed(found, SHOWN, LONGEST_ITEM)}" for effect, found in subjects.items())
 
 
 def left_out(notes: Iterable[Note]) -> tuple[Note, ...]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from operator import mul
 
 from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3
 
@@ -17,7 +18,7 @@ def times(number: float, value: Scalar) -> Scalar:
 
 def rotate(rotation: Rotation, a: Sequence[Scalar]) -> Vec3:
     """Return rotation · a."""
-    x, y, z = (_sum(times(r, v) for r, v in zip(row, a, strict=True)) for row in rotation)
+    x, y, z = (total(times(r, v) for r, v in zip(row, a, strict=True)) for row in rotation)
     return x, y, z
 
 
@@ -29,14 +30,12 @@ def transpose(rotation: Rotation) -> Rotation:
 
 def compose(a: Rotation, b: Rotation) -> Rotation:
     """Return a · b, snapped."""
-    return snap(
-        [[sum(x * y for x, y in zip(row, col, strict=True)) for col in zip(*b, strict=True)] for row in a]
-    )
+    return snap([[float(total(map(mul, row, column))) for column in zip(*b, strict=True)] for row in a])
 
 
 def add(a: Vec3, b: Vec3) -> Vec3:
     """Return a + b."""
-    x, y, z = (_sum((p, q)) for p, q in zip(a, b, strict=True))
+    x, y, z = (total((p, q)) for p, q in zip(a, b, strict=True))
     return x, y, z
 
 
@@ -86,16 +85,15 @@ def about_z(angle: float) -> Rotation:
 def align_z(axis: Sequence[float]) -> Rotation:
     """Return a rotation whose third column is the unit vector `axis`; a permutation for ±x, ±y, ±z."""
     x, y, z = snap([list(axis)])[0]
-    if z == 1.0:
-        return snap([[1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    if abs(x) == 1.0:
+    # An entry 1e-12 off 1 snaps to it with the axis 1e-6 off: the other two have to be 0.
+    if y == z == 0.0:
         return snap([[0, 0, x], [x, 0, 0], [0, 1, 0]])
-    if abs(y) == 1.0:
+    if x == z == 0.0:
         return snap([[0, 1, 0], [0, 0, y], [y, 0, 0]])
-    if z == -1.0:
-        return snap([[1, 0, 0], [0, -1, 0], [0, 0, -1]])
-    # The shortest turn from z to the axis (Rodrigues).
-    f = 1.0 / (1.0 + z)
+    if x == y == 0.0:
+        return snap([[1, 0, 0], [0, z, 0], [0, 0, z]])
+    # The shortest turn from z to the axis (Rodrigues); 1 / (1 + z) in the form that keeps its digits.
+    f = 1.0 / (1.0 + z) if z > 0.0 else (1.0 - z) / (x * x + y * y)
     return snap([[1 - f * x * x, -f * x * y, x], [-f * x * y, 1 - f * y * y, y], [-x, -y, z]])
 
 
@@ -121,10 +119,11 @@ def _near_whole(e: float) -> float:
     return float(round(e)) + 0.0 if abs(e - round(e)) < SNAP else float(e)
 
 
-def _sum(terms: Iterable[Scalar]) -> Scalar:
-    total: Scalar = 0.0
+def total(terms: Iterable[Scalar]) -> Scalar:
+    """Sum in the order of the terms, which from Python 3.12 on `sum` rounds in another way than before."""
+    result: Scalar = 0.0
     for term in terms:
         if isinstance(term, float) and term == 0.0:
             continue
-        total = term if isinstance(total, float) and total == 0.0 else total + term
-    return total
+        result = term if isinstance(result, float) and result == 0.0 else result + term
+    return result

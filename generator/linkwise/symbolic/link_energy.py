@@ -17,6 +17,7 @@ from typing import TypeAlias
 import sympy as sp
 
 from linkwise.robot.robot import Coordinate, Joint, Mat3, Scalar, Vec3
+from linkwise.robot.transforms import total
 from linkwise.symbolic.system import EnergySystem, System
 
 HALF = sp.Rational(1, 2)
@@ -223,5 +224,5 @@ def _cross(a: Vec3, b: Vec3) -> Vec3:
 
 def _transposed(rotation: Mat3, a: Vec3) -> Vec3:
     """Return rotationᵀ a."""
-    x, y, z = (sum(rotation[i][k] * a[i] for i in range(3)) for k in range(3))
+    x, y, z = (total(rotation[i][k] * a[i] for i in range(3)) for k in range(3))
     return x, y, z

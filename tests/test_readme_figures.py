@@ -1,0 +1,63 @@
+"""The README's figures are those of the code; docs/trust.md says where those that take long are held."""
+
+import json
+import re
+from collections.abc import Callable
+from math import exp
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from conftest import PANDA
+from corpus_report import COUNTS, LIMIT
+from linkwise.progress import silent
+from linkwise.report import CurvePoint, curve
+from linkwise.robot import Options, read_robot
+from linkwise.symbolic.system import rigid_system
+
+README = " ".join((Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8").split())
+
+
+def stated(pattern: str) -> tuple[float, ...]:
+    """The numbers of the one sentence of the README that matches."""
+    found = re.findall(pattern, README)
+    assert len(found) == 1, f"{pattern}: {len(found)} times in the README"
+    groups = found[0] if isinstance(found[0], tuple) else (found[0],)
+    return tuple(float(number.replace(",", "")) for number in groups)
+
+
+@pytest.fixture(scope="module")
+def points() -> tuple[CurvePoint, ...]:
+    return curve(rigid_system(read_robot("planar10", Options("symbolic"))), 10, 10**6, silent)
+
+
+def test_shares_of_terms_and_operations(points: tuple[CurvePoint, ...]) -> None:
+    five, ten = points[4], points[9]
+    (terms,) = stated(r"At 10 joints (\d+) % of the expanded terms")
+    (operations,) = stated(r"so there about (\d+) % of the operations")
+    assert round(100 * ten.reduction) == terms
+    assert round(100 * ten.operations_reduction) == operations
+    counted, papers = stated(r"\(([\d.]+) redundant for each kept\) nor the paper's own curve \(([\d.]+)\)")
+    assert round((five.total - five.kept) / five.kept, 1) == counted
+    y = 0.95 * (1 - exp(-0.44 * 5))
+    assert round(y / (1 - y), 1) == papers
+
+
+def test_numbers_and_operations_of_panda(
+    directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    if not PANDA.is_file():
+        pytest.skip("needs the package example-robot-data")
+    manifest = json.loads((directory_of(str(PANDA)) / "manifest.json").read_text())
+    (operations,) = stated(r"The full decomposition costs ([\d,]+) additions and multiplications")
+    assert manifest["shared_operations"] == operations
+    (numbers,) = stated(r"\(7 joints, (\d+) numbers a sample")
+    assert sum(map(len, package_of(str(PANDA)).load("numpy").layout)) == numbers
+
+
+def test_counts_of_the_corpus_are_those_that_make_corpus_holds() -> None:
+    pattern = r"runs the (\d+) URDFs .*? 1 to 101 joints: (\d+) generate as they are, (\d+) need"
+    whole, plain, helped = stated(pattern)
+    assert {"plain": plain, "helped": helped, "never": whole - plain - helped} == COUNTS
+    (error,) = stated(r"own torque agree with Pinocchio to ([\de-]+) of the largest")
+    assert error <= LIMIT <= 10 * error
