@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Unreadable(Exception):
-    """A notation that is not read here; its text is the message."""
+    """No formula; the text where reading ended is the message."""
 
 
 class LatexReader:
@@ -63,7 +63,8 @@ class LatexReader:
             above = self._group()
             return above / self._group()
         if self._taken(r"\sqrt"):
-            return np.sqrt(self._group())
+            root = self._closed(self._sum(), "]") if self._taken("[") else 2.0
+            return np.power(self._group(), 1 / root)
         if self._taken(r"\left("):
             return self._closed(self._sum(), r"\right)")
         if self._taken(r"\left|"):
