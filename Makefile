@@ -3,7 +3,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint generate bench corpus crash random fuzz same report clean
+.PHONY: demo test lint generate bench corpus crash random fuzz same mutate report clean
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -29,6 +29,11 @@ generate: $(READY)
 
 test: $(READY)
 	$(BIN)/python -m pytest
+
+# What could be wrong without a test, or without `linkwise check`, noticing: an hour. ONLY="dynamics emit" takes rooms.
+mutate: $(READY)
+	$(BIN)/python tests/mutation/emitted.py --out out/mutate
+	$(BIN)/python tests/mutation/run.py --out out/mutate $(if $(ONLY),--only $(ONLY))
 
 lint: $(READY)
 	$(BIN)/ruff format --check .

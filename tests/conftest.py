@@ -1,5 +1,6 @@
 """Packages that tests share: each robot is generated once a session and imported from its folder."""
 
+import os
 import shutil
 import sysconfig
 from collections.abc import Callable, Iterator
@@ -25,9 +26,10 @@ needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs g
 
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Compiled packages go into a directory of the session, not the user's."""
+    """Compiled packages go into a directory of the session, not the user's; mutants share one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("LINKWISE_CACHE", str(tmp_path_factory.mktemp("cache")))
+        shared = os.environ.get("LINKWISE_TEST_CACHE")
+        patch.setenv("LINKWISE_CACHE", shared or str(tmp_path_factory.mktemp("cache")))
         yield
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from conftest import DATA
 from linkwise import (
     Coordinate,
     LinkEnergy,
@@ -32,6 +33,16 @@ from linkwise.package.load import open_package
 def planar2(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("check") / "planar2"
     write_package(generate(read_system("planar2"), ["numpy"]), directory)
+    return directory
+
+
+@pytest.fixture(scope="session")
+def every_text(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A package with a text of every kind, which passes."""
+    directory = tmp_path_factory.mktemp("every") / "planar2"
+    write_package(generate(read_system("planar2"), ["numpy", "autograd", "c", "formulas"]), directory)
+    assert set(marks(directory).values()) == {"ok"}
+    shutil.rmtree(directory / "__pycache__", ignore_errors=True)
     return directory
 
 
@@ -70,13 +81,13 @@ def test_a_coefficient_that_is_zero_but_for_rounding_passes(tmp_path: Path) -> N
     write_package(generate(system, ["numpy", "torch", "autograd"]), tmp_path / "pendulum")
     found = marks(tmp_path / "pendulum")
     assert set(found.values()) == {"ok"}
-    assert "numpy against autograd: c1" in found
+    assert "numpy: c1 against Lagrangians differentiated" in found
 
 
 @pytest.mark.parametrize(
     ("old", "new", "failing"),
     [
-        ("0.0,  # c1(2, 2, 2)", "1e-7,  # c1(2, 2, 2)", "numpy: decomposition closes to tau_ij"),
+        ("0.0,  # c1(2, 2, 2)", "1e-7,  # c1(2, 2, 2)", "numpy: c1 against Newton-Euler recursion"),
         (" = 0.005 + ", " = 0.00500001 + ", "numpy: M^j against Newton-Euler recursion"),
     ],
 )
@@ -85,6 +96,54 @@ def test_a_slightly_wrong_coefficient_fails_all_the_same(
 ) -> None:
     change_file(package, "forms/link_2.py", old, new)
     assert marks(package)[failing] == "FAIL"
+
+
+WRONG = {
+    "position gradient": ("forms/link_2.py", "t6 + 0.25 * t5),", "t6 - 0.25 * t5),", "numpy: c0 against"),
+    "torques alone": ("forms/link_2.py", "t3,  # tau(2, 2)", "t3 + 1e-7,  # tau(2, 2)", "numpy: all calls"),
+    "gravity": ("forms/link_2.py", "t6,  # g(2, 2)", "t7,  # g(2, 2)", "numpy: g against"),
+    "energy": (
+        "energies/link_2.py",
+        "0.6 * u2",
+        "0.6000001 * u2",
+        "autograd: Lagrangians against the bodies'",
+    ),
+    "text": ("formulas.txt", "588399*cos(q_1 + q_2)", "588399*cos(q_1 - q_2)", "formulas.txt: tau_ij"),
+    "latex": ("formulas.tex", r"\frac{23 \ddot{q}_{2}}", r"\frac{23 \dot{q}_{2}}", "formulas.tex: tau_ij"),
+    "last samples of a batch": (
+        "c/planar2.c",
+        "scatter(samples, 5, C1, c1",
+        "scatter(samples, 4, C1, c1",
+        "c: planar2_d",
+    ),
+    "large batches": (
+        "c/planar2.c",
+        "stream_rows(G, g_block, g + s",
+        "stream_rows(G, g_block, g + 0 * s",
+        "c: planar2_d",
+    ),
+    "one link alone": (
+        "c/planar2.c",
+        "m.sine, m.cosine, c2, c1",
+        "m.cosine, m.cosine, c2, c1",
+        "c: planar2_link_2f",
+    ),
+    "beyond the arrays": (
+        "c/planar2.c",
+        "scatter(samples, 3, G, tau",
+        "scatter(8, 3, G, tau",
+        "c: planar2_torque",
+    ),
+    "index": ("c/planar2_index.h", "{2, 2, 2}", "{2, 2, 1}", "c: numbers and indices"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_one_wrong_formula_in_any_file_fails(case: str, every_text: Path, tmp_path: Path) -> None:
+    file, old, new, failing = WRONG[case]
+    package = shutil.copytree(every_text, tmp_path / "planar2")
+    change_file(package, file, old, new)
+    assert [name for name, mark in marks(package).items() if mark == "FAIL" and name.startswith(failing)]
 
 
 @pytest.mark.parametrize(
@@ -114,23 +173,33 @@ def test_a_package_that_cannot_be_imported_or_asked_fails(package: Path) -> None
     assert marks(package)["answers"] == "FAIL"
 
 
-def test_energies_without_an_oracle_are_left_out(tmp_path: Path) -> None:
-    x = Coordinate("x", "m")
-    system = energy_system("puck", [x], [LinkEnergy("disc", x.qd**2, x.q)])
-    write_package(generate(system, ["numpy"]), tmp_path / "puck")
-    assert marks(tmp_path / "puck")["numpy: oracle"] == "skip"
+def test_closed_forms_of_a_users_energies_are_held_against_their_own_torques(tmp_path: Path) -> None:
+    package = tmp_path / "turntable"
+    write_package(generate(read_system(str(DATA / "turntable.py")), ["numpy"]), package)
+    assert set(marks(package).values()) == {"ok"}
+    change_file(package, "forms/link_1.py", "0.5 * (t6 + 1.36)", "0.5 * (t6 + 1.36001)")
+    failing = {name for name, mark in marks(package).items() if mark == "FAIL"}
+    assert "numpy: c1 against differences of numpy's torques" in failing
 
 
-@pytest.mark.parametrize("backend", ["c", "formulas"])
-def test_a_package_with_nothing_to_load_has_its_hashes_checked(backend: str, tmp_path: Path) -> None:
-    write_package(generate(read_system("planar2"), [backend]), tmp_path / "planar2")
-    results = check_package(tmp_path / "planar2")
-    assert [(r.name, r.mark, r.passed) for r in results] == [
-        ("hashes", "ok", True),
-        ("manifest", "ok", True),
-        ("back ends", "skip", True),
+@pytest.mark.parametrize("spec", ["planar2", str(DATA / "cart_pendulum.py")])
+def test_c_alone_is_compiled_and_held_against_what_there_is(spec: str, tmp_path: Path) -> None:
+    write_package(generate(read_system(spec), ["c"], "robot_c"), tmp_path / "robot_c")
+    results = check_package(tmp_path / "robot_c", 10)
+    assert all(result.passed for result in results)
+    assert {"c: robot_c_decomposition_blocksf", "c: robot_c_link_1"} <= {result.name for result in results}
+
+
+def test_formulas_that_nothing_can_be_held_against_are_left_out(tmp_path: Path) -> None:
+    write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["formulas"]), tmp_path / "cart")
+    assert [(r.name, r.mark) for r in check_package(tmp_path / "cart")] == [
+        ("hashes", "ok"),
+        ("manifest", "ok"),
+        ("back ends", "skip"),
+        ("formulas.txt: not checked", "skip"),
+        ("formulas.tex: not checked", "skip"),
+        ("numbers", "skip"),
     ]
-    assert results[2].detail.startswith("nothing to load")
 
 
 def link_to(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sympy as sp
 from answers import random_states, relative_error
 from conftest import DATA, LOCKED_FINGERS, PANDA
 from evaluation import evaluate
@@ -9,12 +10,17 @@ from linkwise import Options, read_system
 from linkwise.dynamics.coefficients import LinkForms
 from linkwise.dynamics.derive import derive, link_kernel
 from linkwise.dynamics.euler_lagrange import euler_lagrange
+from linkwise.dynamics.frame_search import FrameSearch
 from linkwise.dynamics.kernel import lowering
+from linkwise.dynamics.link_motion import Origin
+from linkwise.dynamics.principal_axes import principal_axes
+from linkwise.dynamics.screws import CommonAxes, Orientation
 from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Graph
 from linkwise.symbolic.link_energy import lineage, link_energies
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import RigidSystem, System
 
+TURNED = principal_axes(((0.01, 0.001, 0.002), (0.001, 0.02, -0.001), (0.002, -0.001, 0.015)))
 BLOCKS = ("acceleration", "velocity", "gravity", "torque", "position_gradient")
 
 
@@ -35,17 +41,21 @@ def numbers(graph: Graph, forms: LinkForms, block: str, states: list[dict[str, f
     return np.array([evaluate(graph, values, state) for state in states])
 
 
-@pytest.mark.parametrize("block", BLOCKS)
-def test_rigid_link_rule_is_euler_lagrange_of_the_energy(block: str) -> None:
-    system = read_system(DATA / "skew.toml")
-    states = [
+def states_of_three(samples: int) -> list[dict[str, float]]:
+    return [
         {
             f"{kind}{k + 1}": row[k]
             for kind, row in zip(("q", "qd", "qdd"), rows, strict=True)
             for k in range(3)
         }
-        for rows in zip(*random_states(3, 10), strict=True)
+        for rows in zip(*random_states(3, samples), strict=True)
     ]
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_rigid_link_rule_is_euler_lagrange_of_the_energy(block: str) -> None:
+    system = read_system(DATA / "skew.toml")
+    states = states_of_three(10)
     by_rule, by_energy = [], []
     for link in range(3):
         kernel = link_kernel(system, link)
@@ -54,6 +64,85 @@ def test_rigid_link_rule_is_euler_lagrange_of_the_energy(block: str) -> None:
         by_rule.append(numbers(kernel.graph, kernel.forms[0], block, states))
         by_energy.append(numbers(graph, forms, block, states))
     assert relative_error(np.hstack(by_rule), np.hstack(by_energy)) <= 1e-12
+
+
+FRAMES = [
+    (CommonAxes(-1), Origin(-1), ("the base's", "the base's, at rest")),
+    (
+        CommonAxes(0),
+        Origin(1),
+        ("of the frame that joint 1 moves", "where joint 2 is at the instant, at rest"),
+    ),
+    (CommonAxes(2, before=True), Origin(0), ("of the frame before joint 3 moves", "where joint 1 is at ")),
+    (
+        CommonAxes(1),
+        Origin(by_points=True),
+        ("of the frame that joint 2", "the link's centre of mass, moving"),
+    ),
+    (
+        CommonAxes(1, before=True),
+        Origin(),
+        ("of the frame before joint 2", "the link's centre of mass, moving"),
+    ),
+    (
+        CommonAxes(2, turned=TURNED),
+        Origin(2),
+        ("the link's principal axes", "where joint 3 is at the instant"),
+    ),
+    (
+        CommonAxes(2, turned=TURNED),
+        Origin(by_points=True),
+        ("the link's principal axes", "the link's centre"),
+    ),
+]
+
+
+@pytest.mark.parametrize(("axes", "origin", "words"), FRAMES)
+def test_every_common_frame_gives_the_same_numbers_and_says_which_it_is(
+    axes: CommonAxes, origin: Origin, words: tuple[str, str]
+) -> None:
+    system = read_system(DATA / "skew.toml")
+    assert isinstance(system, RigidSystem)
+    states, tree = states_of_three(3), [(f - 1, joint) for f, joint in enumerate(system.links[2].joints)]
+    kernel = FrameSearch(system, [2], tree, [range(3)]).build(axes, origin)
+    assert all(found.startswith(said) for found, said in zip(kernel.frame, words, strict=True))
+    assert kernel.frame[1].endswith("square root of its mass, 0.4 kg") == (origin.frame is None)
+    graph, forms = from_the_energy(system, 2)
+    for block in BLOCKS:
+        by_rule = numbers(kernel.graph, kernel.forms[0], block, states)
+        assert relative_error(by_rule, numbers(graph, forms, block, states)) <= 1e-12, block
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_principal_axes_diagonalise_the_inertia(seed: int) -> None:
+    half = np.random.default_rng(seed).standard_normal((3, 3))
+    inertia = half @ half.T + np.diag([0.0, 1e-3 * seed, 5.0])
+    axes = np.array(principal_axes(tuple(map(tuple, inertia.tolist()))))
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-14)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    turned = axes @ inertia @ axes.T
+    np.testing.assert_allclose(turned, np.diag(np.diag(turned)), atol=1e-13)
+
+
+def test_principal_axes_that_are_the_links_own_or_unknown_are_not_tried() -> None:
+    assert principal_axes(((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0))) is None
+    i = sp.Symbol("i")
+    assert principal_axes(((1.0, i, 0.0), (i, 2.0, 0.0), (0.0, 0.0, 3.0))) is None
+    for place in ((0, 1), (0, 2), (1, 2)):
+        inertia = np.diag([1.0, 2.0, 3.0])
+        inertia[place] = inertia[place[::-1]] = 0.1
+        assert principal_axes(tuple(map(tuple, inertia.tolist()))) is not None
+
+
+def test_joints_that_follow_one_coordinate_have_labels_of_their_own() -> None:
+    system = read_system(DATA / "skew.toml")
+    assert isinstance(system, RigidSystem)
+    lower, x = lowering(system)
+    turning, other = system.links[2].joints[0], system.links[2].joints[2]
+    tree = [(f - 1, turning) for f in range(30)] + [(29, other), (30, other)]
+    labels = Orientation(lower, tree, (0.0, 0.0, 0.0), CommonAxes(-1), x).labels
+    assert labels[:3] + labels[25:] == ["1", "1b", "1c", "1z", "1aa", "1ab", "1ac", "1ad", "3", "3b"]
+    assert len(set(labels)) == len(labels)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from linkwise.dynamics.derive import derive
+from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
 from linkwise.plotstyle import styled
@@ -24,6 +25,7 @@ from linkwise.report import (
     held_against,
     link_operations,
     reduction_images,
+    reduction_json,
     reduction_markdown,
     savings_lines,
     study,
@@ -143,6 +145,45 @@ def test_the_study_says_where_the_claim_holds() -> None:
     assert "Holds: 10 DoF.** 15.9 redundant" in said
     assert "falls like 10/n^2" in said
     assert "Weaker: emitted code" in said
+
+
+def test_the_page_holds_every_count_and_what_it_saves() -> None:
+    result = study("arm", planar(9), 1, 3, 9, 10**6, silent)
+    rows = [line.strip("| ").split(" | ") for line in reduction_markdown(result).splitlines() if "| " in line]
+    table = [row for row in rows if row[0].isdigit()]
+    assert [row[:5] for row in table[:3]] == [
+        ["1", "3", "2", "0.3333", "0.5"],
+        ["2", "14", "6", "0.5714", "1.3"],
+        ["3", "44", "13", "0.7045", "2.4"],
+    ]
+    assert result.fitted is not None
+    for at, (row, point) in enumerate(zip(table[:3], result.points, strict=True)):
+        y = 1 - point.kept / point.total
+        assert float(row[5]) == pytest.approx(y - result.fitted(point.dof), abs=1e-4)
+        assert float(row[6]) == pytest.approx(y - 0.95 * (1 - np.exp(-0.44 * point.dof)), abs=1e-4)
+        torque, part, reduction, written, kept, saved, everything = map(float, table[3 + at][1:])
+        assert reduction == pytest.approx(1 - part / torque, abs=1e-4)
+        assert saved == pytest.approx(1 - kept / written, abs=1e-4)
+        assert part <= torque <= written
+        assert everything == decomposition_cost(derive(planar(3))[: at + 1])
+
+
+def test_the_data_hold_what_the_page_shows() -> None:
+    result = study("arm", planar(9), 1, 3, 9, 10**6, silent)
+    data = reduction_json(result)
+    assert [row["reduction"] for row in data["points"]] == [0.333333, 0.571429, 0.704545]
+    for row in data["points"]:
+        assert row["operations_reduction"] == pytest.approx(
+            1 - row["kept_operations"] / row["operations"], abs=1e-6
+        )
+        saved = 1 - row["kept_operations_written_out"] / row["operations_written_out"]
+        assert row["written_out_reduction"] == pytest.approx(saved, abs=1e-6)
+    assert data["polynomials"]["total"]["newton_coefficients"][:3] == [3, 11, 19]
+    assert data["polynomials"]["kept"] == {
+        "newton_coefficients": [2, 4, 3, 1],
+        "fitted_to_dof": 4,
+        "checked_to_dof": 9,
+    }
 
 
 def test_page_and_plots_are_the_same_bytes_each_time() -> None:

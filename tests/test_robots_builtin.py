@@ -49,5 +49,7 @@ def test_arms_of_the_torso_mirror_each_other() -> None:
 
 
 def test_torso_agrees_with_an_independent_recursion(tmp_path: Path) -> None:
-    write_package(generate(read_system("torso"), ["numpy"]), tmp_path / "torso")
+    files = generate(read_system("torso"), ["numpy", "c"])
+    assert "shared_part" in files["c/links_together.h"]
+    write_package(files, tmp_path / "torso")
     assert all(result.passed for result in check_package(tmp_path / "torso", samples=20))

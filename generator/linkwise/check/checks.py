@@ -1,24 +1,28 @@
 """The checks of `linkwise check`."""
 
-from collections.abc import Iterator
-from itertools import combinations
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from linkwise.check.as_generated import check_files, check_manifest
-from linkwise.check.compare import (
-    Oracle,
-    Result,
-    Skipped,
-    States,
-    against_oracle,
-    agreement,
-    difference_oracle,
-    recursion_oracle,
-    structure,
-)
+from linkwise.check.c_functions import CFunctions, compile_c
+from linkwise.check.compare import Result, Skipped
+from linkwise.check.compiled_c import CompiledPackage
+from linkwise.check.formula_texts import check_formulas
+from linkwise.check.magnitudes import Magnitudes
+from linkwise.check.model_calls import Named, against_reference
 from linkwise.check.newton_euler import NewtonEuler
+from linkwise.check.packed_layout import IndexRows
+from linkwise.check.reference import (
+    Reference,
+    States,
+    lagrangian_reference,
+    random_states,
+    recursion_reference,
+    torque_reference,
+)
 from linkwise.package.load import Model, Package, load_package
 from linkwise.package.manifest import Manifest
 
@@ -38,13 +42,10 @@ def check_package(directory: Path, samples: int = 100) -> list[Result]:
         return results
     loaded, missing = _load(package)
     results += missing
-    if not loaded:
-        return results
-    generator, shape = np.random.default_rng(0), (samples, len(manifest.joints))
-    q = generator.uniform(-np.pi, np.pi, shape)
-    states = States(q, *generator.uniform(-2.0, 2.0, (2, *shape)))
+    checks = _Checks(package, loaded, random_states(len(manifest.joints), samples))
     try:
-        results += _numbers(package, loaded, states)
+        with np.errstate(all="ignore"):  # energies of a user's own need not be defined everywhere
+            results += checks.run()
     except Exception as error:
         results.append(Result("answers", False, None, _line(error)))
     return results
@@ -52,7 +53,7 @@ def check_package(directory: Path, samples: int = 100) -> list[Result]:
 
 def _load(package: Package) -> tuple[dict[str, Model], list[Result]]:
     if not package.backends:
-        return {}, [Skipped("back ends", "nothing to load: C and formulas only; their hashes were checked")]
+        return {}, [Skipped("back ends", "nothing to load: C and formulas only")]
     loaded: dict[str, Model] = {}
     missing: list[Result] = []
     for name in package.backends:
@@ -75,22 +76,80 @@ def _lacks(error: Exception, package: str) -> bool:
     return isinstance(error, RuntimeError) and "install" in str(error) and " failed: " not in str(error)
 
 
-def _numbers(package: Package, loaded: dict[str, Model], states: States) -> Iterator[Result]:
-    oracle = _oracle(package, loaded, states)
-    for name, model in loaded.items():
-        yield from against_oracle(name, model, oracle, states)
-        yield from structure(name, model, package.manifest, states)
-    for (name, model), (other_name, other) in combinations(loaded.items(), 2):
-        yield from agreement(name, model, other_name, other, states)
+@dataclass(frozen=True)
+class _Checks:
+    """The checks of one package's numbers: its formulas, its C, and the back ends that load here."""
 
+    package: Package
+    loaded: Mapping[str, Model]
+    states: States
 
-def _oracle(package: Package, loaded: dict[str, Model], states: States) -> Oracle | None:
-    manifest = package.manifest
-    if manifest.tree is not None:
-        return recursion_oracle(NewtonEuler(manifest, manifest.tree), states)
-    backends = [model.backend for model in loaded.values()]
-    lagrangians = next((backend.modules for backend in backends if hasattr(backend, "modules")), None)
-    return None if lagrangians is None else difference_oracle(lagrangians, states)
+    def run(self) -> Iterator[Result]:
+        """Everything for the parameters as generated, and, where there are some, for others too."""
+        manifest = self.package.manifest
+        rows = IndexRows.of_paths([link.path for link in manifest.links], self.package.module.ROBOT.linear)
+        compiled = None
+        if f"c/{manifest.name}.h" in manifest.files:
+            compiled, result = compile_c(manifest, self.package.directory, rows)
+            yield result
+        values = dict(manifest.parameters)
+        yield from self._numbers("", values, self.loaded, rows, compiled)
+        if values:
+            yield from self._other_parameters(rows, compiled)
+
+    def _numbers(
+        self,
+        label: str,
+        values: Mapping[str, float],
+        loaded: Mapping[str, Model],
+        rows: IndexRows,
+        compiled: CompiledPackage | None,
+    ) -> Iterator[Result]:
+        manifest, c_passes = self.package.manifest, True
+        functions = CFunctions(manifest, compiled, rows, values) if compiled else None
+        reference = self._bodies() if not label else None
+        reference = reference or self._own_reference(loaded, functions)
+        yield from check_formulas(self.package, rows, values, label, reference)
+        if reference is None:
+            yield Skipped(
+                f"numbers{label}", "energies of a user's own, and nothing here that computes with them"
+            )
+            return
+        for result in functions.check(f"c{label}", reference) if functions else ():
+            c_passes &= result.passed
+            yield result
+        for name, model in loaded.items():
+            if name == "native" and not c_passes:
+                # What writes beyond its arrays takes the interpreter with it.
+                yield Skipped(f"{name}{label}: not called", "its C is wrong, see above")
+            else:
+                yield from against_reference(Named(f"{name}{label}", model, rows, reference), manifest)
+
+    def _other_parameters(self, rows: IndexRows, compiled: CompiledPackage | None) -> Iterator[Result]:
+        """Every parameter changed by a few percent of its own: equal ones tell no longer one from another."""
+        values = dict(self.package.manifest.parameters)
+        changes = np.random.default_rng(2).uniform(0.97, 1.03, len(values))
+        changed = {
+            name: value * change for (name, value), change in zip(values.items(), changes, strict=True)
+        }
+        loaded = {name: self.package.load(name, changed) for name in self.loaded}
+        yield from self._numbers(", other parameters", changed, loaded, rows, compiled)
+
+    def _bodies(self) -> Reference | None:
+        manifest = self.package.manifest
+        if manifest.tree is None:
+            return None
+        tree = manifest.tree
+        return recursion_reference(NewtonEuler(manifest, tree), Magnitudes(manifest, tree), self.states)
+
+    def _own_reference(self, loaded: Mapping[str, Model], functions: CFunctions | None) -> Reference | None:
+        """The package's Lagrangians, else the torques of one of its back ends, else those of its C."""
+        for model in loaded.values():
+            if hasattr(model.backend, "modules"):
+                return lagrangian_reference(model.backend.modules, self.states)
+        for name, model in loaded.items():
+            return torque_reference(name, model.partial_torque, self.states)
+        return torque_reference("c", functions.torque, self.states) if functions else None
 
 
 def _line(error: Exception) -> str:

@@ -1,6 +1,6 @@
 """A generated package, imported from its folder, and its back ends with NumPy arrays in and out."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -40,6 +40,9 @@ class Model(Protocol):
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """τ_ij (..., n, N)."""
 
+    def packed_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """τ_ij on the paths only (..., count)."""
+
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
         """τ_i (..., n)."""
 
@@ -54,6 +57,9 @@ class Model(Protocol):
 
     def position_gradient(self, q: Array, qd: Array, qdd: Array) -> Array:
         """c0 (..., n, N, n)."""
+
+    def masked(self, q: Array, qd: Array, qdd: Array, mask: Array) -> Array:
+        """Chosen terms of the decomposition (..., n, N)."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +80,9 @@ class Package:
         """The same, the fastest for large batches first."""
         return tuple(self.module.FASTEST_FIRST)
 
-    def load(self, backend: str) -> Model:
+    def load(self, backend: str, parameters: Mapping[str, float] | None = None) -> Model:
         """Model on a back end; passes on whatever the package raises, a missing library say."""
-        dynamics = self.module.load(backend)
+        dynamics = self.module.load(backend, parameters)
         model: Model = TensorModel(dynamics) if dynamics.backend.takes_tensors else dynamics
         return model
 

@@ -1,0 +1,150 @@
+"""Every function that a package's C header declares, in double and float, against the reference."""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from linkwise.check.compare import Entries, Result, Skipped, compare
+from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype
+from linkwise.check.model_calls import FLOAT32
+from linkwise.check.packed_layout import IndexRows, Rows
+from linkwise.check.reference import Reference
+from linkwise.errors import LinkwiseError
+from linkwise.package.load import Array
+from linkwise.package.manifest import Manifest
+
+ROWS, BLOCKS = (0, 1, 7, 8, 9, 17, 107), (1, 2, 8)
+"""Numbers of samples, and of blocks: none, one, some that fill no block, some that do, many."""
+
+MANY = 192
+"""Bytes for each result of a sample that still count as few: 24 samples in double, 48 in float."""
+
+
+class CFunctions:
+    """A package's compiled C for given parameters, beside the indices of what it answers with."""
+
+    def __init__(
+        self, manifest: Manifest, compiled: CompiledPackage, rows: IndexRows, parameters: Mapping[str, float]
+    ) -> None:
+        self.manifest, self.rows, self.compiled = manifest, rows, compiled
+        self.n = len(manifest.joints)
+        self.parameters = np.array([parameters[name] for name in manifest.parameters])
+
+    def torque(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Dense τ_ij (samples, n, N) of the function for torques alone, in double."""
+        function = next(f for f in self.compiled.prototypes if f.name == "torque")
+        given = {"q": q, "qd": qd, "qdd": qdd, "p": self.parameters}
+        found = self.compiled.call(function, len(q), given, {"tau": len(q) * len(self.rows.tau)}, 0)
+        dense = np.full((len(q), self.n, len(self.manifest.links)), np.nan if found is None else 0.0)
+        if found is not None:
+            dense[(slice(None), *self.rows.tau.T)] = found["tau"].reshape(len(q), -1)
+        return dense
+
+    def check(self, label: str, reference: Reference) -> Iterator[Result]:
+        """One result a function; `label` stands before its name."""
+        for function in self.compiled.prototypes:
+            name = f"{label}: {self.manifest.name}_{function.name}"
+            single = FLOAT32 if function.real == "float" else {"tolerance": reference.tolerance}
+            try:
+                yield compare(name, list(self._calls(function, reference)), **single)
+            except _OutOfBounds as error:
+                yield Result(name, False, None, f"{error.args[0]} wrote beyond its arrays")
+
+    def _calls(self, function: Prototype, reference: Reference) -> Iterator[Entries]:
+        """Calls of a function for several numbers of samples, its outputs on a cache line and off it."""
+        link = re.fullmatch(r"link_(\d+)", function.short)
+        if link:
+            yield from self._link(function, reference, int(link[1]) - 1)
+            return
+        width = 1
+        if function.short.endswith("_blocks"):
+            width = self.compiled.constants["BLOCKF" if function.real == "float" else "BLOCK"]
+        for count in BLOCKS if width > 1 else ROWS:
+            at = np.arange(count * width) * 3 % max(len(reference.states.q), 1)
+            for shift in (0, 1):
+                yield from self._rows(function, reference, at, width, shift)
+
+    def _rows(
+        self, function: Prototype, reference: Reference, at: Rows, width: int, shift: int
+    ) -> Iterator[Entries]:
+        sizes = {what: len(self.rows.of(what)) for what in function.outputs}
+        motion = zip(("q", "qd", "qdd"), reference.states.at(at).motion, strict=True)
+        given = {what: _blocks(x, width) for what, x in motion}
+        found = self._call(
+            function, len(at) // width, given, {k: len(at) * v for k, v in sizes.items()}, shift
+        )
+        for what, size in sizes.items():
+            flat = found[what].reshape(len(at) // width, size, width).swapaxes(1, 2).reshape(len(at), size)
+            yield _packed(what, flat, self.rows.of(what), reference, at)
+
+    def _link(self, function: Prototype, reference: Reference, link: int) -> Iterator[Entries]:
+        own = {what: self.rows.of(what)[self.rows.of(what)[:, 1] == link] for what in function.outputs}
+        for row in range(0, len(reference.states.q), max(1, len(reference.states.q) // 8)):
+            motion = zip(("q", "qd", "qdd"), reference.states.at(row).motion, strict=True)
+            found = self._call(function, 1, dict(motion), {k: len(v) for k, v in own.items()}, row % 2)
+            for what, rows in own.items():
+                yield _packed(what, found[what][None], rows, reference, np.array([row]))
+
+    def _call(
+        self,
+        function: Prototype,
+        count: int,
+        given: Mapping[str, Numbers],
+        sizes: Mapping[str, int],
+        shift: int,
+    ) -> dict[str, Numbers]:
+        found = self.compiled.call(function, count, {**given, "p": self.parameters}, sizes, shift)
+        if found is None:
+            raise _OutOfBounds(function.name)
+        return found
+
+
+class _OutOfBounds(Exception):
+    """A function wrote beyond its arrays."""
+
+
+def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[CompiledPackage | None, Result]:
+    """Compile a package's C, and hold the numbers and indices of its headers against the manifest's paths."""
+    results = sum(len(rows.of(what)) for what in ("c2", "c1", "g", "tau", "h1"))
+    try:
+        compiled = CompiledPackage(manifest.name, directory / "c", MANY * results)
+    except RuntimeError as error:
+        return None, Skipped("c: not checked", " ".join(str(error).split()))
+    except (LinkwiseError, OSError) as error:
+        return None, Result("c: compiles", False, None, " ".join(str(error).split()))
+    wrong = _wrong_number(manifest, compiled, rows) or _wrong_table(manifest, directory, rows)
+    detail = wrong or "as the manifest's paths say"
+    return compiled, Result("c: numbers and indices of the headers", not wrong, None, detail)
+
+
+def _wrong_number(manifest: Manifest, compiled: CompiledPackage, rows: IndexRows) -> str:
+    sizes = {what.upper(): len(rows.of(what)) for what in ("c2", "c1", "g", "h1")}
+    expected = {"JOINTS": len(manifest.joints), "LINKS": len(manifest.links), "BLOCK": 8, "BLOCKF": 16}
+    expected |= {key: size for key, size in sizes.items() if size or key != "H1"}
+    expected |= {"PARAMETERS": len(manifest.parameters)} if manifest.parameters else {}
+    wrong = sorted(set(expected.items()) ^ set(compiled.constants.items()))
+    return f"{wrong[0][0]} is wrong" if wrong else ""
+
+
+def _wrong_table(manifest: Manifest, directory: Path, rows: IndexRows) -> str:
+    text = (directory / "c" / f"{manifest.name}_index.h").read_text(encoding="utf-8")
+    for what in ("c2", "c1", "g", "h1"):
+        body = re.search(rf"_{what}_index\[[^=]*= \{{(.*?)\n\}};", text, re.DOTALL)
+        found = re.findall(r"\{([\d, ]+)\}", body[1]) if body else []
+        listed = [[int(number) - 1 for number in row.split(",")] for row in found]
+        if listed != rows.of(what).tolist():
+            return f"the indices of {what} are wrong"
+    return ""
+
+
+def _blocks(motion: Array, width: int) -> Array:
+    """Samples (count, n) in blocks of `width`, samples innermost; rows for a width of 1."""
+    return motion.reshape(-1, width, motion.shape[-1]).swapaxes(1, 2)
+
+
+def _packed(what: str, value: Any, rows: Rows, reference: Reference, at: Rows) -> Entries:
+    picked = reference.values[what][at][(slice(None), *rows.T)]
+    return Entries(what, value, picked, reference.scales[what][tuple(rows.T)])

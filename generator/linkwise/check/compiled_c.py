@@ -1,0 +1,156 @@
+"""A package's C, compiled here and called through the functions that its header declares."""
+
+import ctypes
+import re
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.errors import LinkwiseError
+from linkwise.runtime.native_compiler import Compiler, find_compiler
+
+Numbers = NDArray[Any]
+
+FLAGS = ("-std=c99", "-O0", "-fPIC", "-shared")
+"""As quick to compile as can be; the native back end, held against the same, has its own."""
+
+GUARD = 4096
+"""Bytes before and behind each output, which nothing may write to."""
+LINE = 64
+"""Bytes of a cache line; half of the calls write to arrays that start on one."""
+
+
+@dataclass(frozen=True)
+class Prototype:
+    """A function of the header: its name without the package's, its number type, and its arrays in order."""
+
+    name: str
+    real: str
+    counted: bool
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """NumPy's word for its number type."""
+        return np.dtype(np.float32 if self.real == "float" else np.float64)
+
+    @property
+    def short(self) -> str:
+        """Name without the f of single precision."""
+        return self.name.removesuffix("f") if self.real == "float" else self.name
+
+
+class CompiledPackage:
+    """The functions of a package's NAME.c and NAMEf.c; arrays in, arrays out, guards around every output.
+
+    large: bytes of results above which they go past the cache, far fewer here, so that this way is tried.
+    """
+
+    def __init__(self, name: str, directory: Path, large: int) -> None:
+        """Raise LinkwiseError where the sources do not compile, RuntimeError where there is no compiler."""
+        self.header = (directory / f"{name}.h").read_text(encoding="utf-8")
+        self.name = name
+        self.constants = _constants(name, self.header)
+        self.prototypes = _prototypes(name, self.header)
+        with tempfile.TemporaryDirectory() as folder:
+            library = Path(folder) / "checked.so"
+            sources = [directory / f"{name}.c", directory / f"{name}f.c"]
+            _compile(find_compiler(), sources, library, large)
+            self.library = ctypes.CDLL(str(library))
+
+    def call(
+        self,
+        function: Prototype,
+        count: int,
+        given: Mapping[str, Numbers],
+        sizes: Mapping[str, int],
+        shift: int,
+    ) -> dict[str, Numbers] | None:
+        """Outputs of the given sizes, flat; None where the function wrote beyond one of them.
+
+        shift: numbers between a cache line and where each output starts
+        """
+        inputs = [np.ascontiguousarray(given[name], function.dtype) for name in function.inputs]
+        guarded = [_Guarded(sizes[name], function.dtype, shift) for name in function.outputs]
+        entry = getattr(self.library, f"{self.name}_{function.name}")
+        entry.restype = None
+        counts = [ctypes.c_size_t(count)] if function.counted else []
+        pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in (*inputs, *(g.array for g in guarded))]
+        entry(*counts, *pointers)
+        if not all(g.whole for g in guarded):
+            return None
+        return {name: g.array for name, g in zip(function.outputs, guarded, strict=True)}
+
+
+class _Guarded:
+    """An array of NaN between two stretches of memory that must stay as they are."""
+
+    def __init__(self, size: int, dtype: np.dtype[Any], shift: int) -> None:
+        self._memory = np.full(2 * GUARD + LINE + (size + shift) * dtype.itemsize, 0xA5, np.uint8)
+        start = GUARD + -(self._memory.ctypes.data + GUARD) % LINE + shift * dtype.itemsize
+        self._inside = slice(start, start + size * dtype.itemsize)
+        self.array = self._memory[self._inside].view(dtype)
+        self.array[:] = np.nan
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing outside the array was written to."""
+        outside = np.delete(self._memory, self._inside)
+        return bool((outside == 0xA5).all())
+
+
+def _constants(name: str, header: str) -> dict[str, int]:
+    found = re.findall(rf"\b{re.escape(name.upper())}_(\w+) = (\d+)", header)
+    return {key: int(value) for key, value in found}
+
+
+def _prototypes(name: str, header: str) -> tuple[Prototype, ...]:
+    found = []
+    for function, arguments in re.findall(rf"\bvoid {re.escape(name)}_(\w+)\(([^)]*)\);", header):
+        arrays = re.findall(r"(const )?(double|float) \*(\w+)", arguments)
+        kinds = {kind for _, kind, _ in arrays}
+        found.append(
+            Prototype(
+                function,
+                "float" if "float" in kinds else "double",
+                "size_t" in arguments,
+                tuple(array for const, _, array in arrays if const),
+                tuple(array for const, _, array in arrays if not const),
+            )
+        )
+    return tuple(found)
+
+
+def _compile(compiler: Compiler, sources: Sequence[Path], library: Path, large: int) -> None:
+    """Both number types side by side, then one library of them."""
+    tuning = [flag for flag in compiler.flags if flag.startswith("-m")]
+    objects = [library.with_name(f"{source.name}.o") for source in sources]
+    running = [
+        subprocess.Popen(
+            [*compiler.command, *FLAGS[:-1], *tuning, f"-DLARGE={large}", "-c", str(source), "-o", str(made)],
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for source, made in zip(sources, objects, strict=True)
+    ]
+    errors = [process.communicate()[1] for process in running]
+    codes = [process.returncode for process in running]
+    if not any(codes):
+        linked = subprocess.run(
+            [*compiler.command, *FLAGS, *map(str, objects), "-lm", "-o", str(library)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        errors, codes = [linked.stderr], [linked.returncode]
+    for text, code in zip(errors, codes, strict=True):
+        if code:
+            complaint = next((line for line in text.splitlines() if "error" in line), text.strip()[:200])
+            raise LinkwiseError(f"{compiler.command[0]} failed: {complaint}")

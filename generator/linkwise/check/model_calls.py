@@ -1,0 +1,186 @@
+"""Every public call of a back end against the reference."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from linkwise.check.compare import Entries, Result, compare, dense
+from linkwise.check.packed_layout import IndexRows, Rows, spread
+from linkwise.check.reference import Reference, States
+from linkwise.package.load import Array, Model
+from linkwise.package.manifest import Manifest
+
+FLOAT32 = {"tolerance": 1e-4, "epsilon": 2.0**-23}
+"""How exact single precision is asked to be."""
+
+
+class Named(NamedTuple):
+    """A back end's name and model, the packed layout that its package must have, and the reference."""
+
+    name: str
+    model: Model
+    rows: IndexRows
+    reference: Reference
+
+
+def against_reference(checked: Named, manifest: Manifest) -> Iterator[Result]:
+    """Every quantity, every call, batches of all shapes, single precision, and what holds for any robot."""
+    name, model, rows, reference = checked
+    states = reference.states
+    yield _layout(checked)
+    packed = model.packed(*states.motion)
+    fields = {**rows.fields(packed), "c0": model.position_gradient(*states.motion)}
+    for what, value in fields.items():
+        shown = {"tau": "tau_ij", "c2": "M^j"}.get(what, what)
+        full = value if what == "c0" else spread(value, rows.of(what), reference, what)
+        yield compare(
+            f"{name}: {shown} against {reference.name}", [dense(what, full, reference)], reference.tolerance
+        )
+    yield compare(f"{name}: all calls agree with these", _calls(checked), reference.tolerance)
+    yield compare(f"{name}: single samples and odd batches", _batches(checked), reference.tolerance)
+    yield compare(f"{name}: single precision", _single(checked), **FLOAT32)
+    if hasattr(model.backend, "modules"):
+        yield from _energies(checked)
+    yield from _structure(checked, manifest)
+
+
+def _layout(checked: Named) -> Result:
+    rows = checked.rows
+    pairs = [
+        (rows.c2, checked.model.layout.acceleration),
+        (rows.c1, checked.model.layout.velocity),
+        (rows.tau, checked.model.layout.gravity),
+        (rows.tau, checked.model.layout.torque),
+    ]
+    same = all(np.array_equal(expected, found) for expected, found in pairs)
+    paths = [tuple(rows.tau[rows.tau[:, 1] == j, 0]) for j in range(len(checked.model.link_names))]
+    forms = [link.PATH for link in getattr(checked.model.backend, "links", ())]
+    same = same and (not forms or forms == paths)
+    detail = "as the manifest's paths say" if same else "not that of the manifest's paths"
+    return Result(f"{checked.name}: layout of packed values", same, None, detail)
+
+
+def _calls(checked: Named) -> Iterator[Entries]:
+    """The dense calls, masks, sums and both conventions."""
+    _, model, rows, reference = checked
+    q, qd, qdd = reference.states.motion
+    values, scales = reference.values, reference.scales
+    yield dense("tau", spread(model.packed_torque(q, qd, qdd), rows.tau, reference, "tau"), reference)
+    yield dense("tau", model.partial_torque(q, qd, qdd), reference)
+    sums = Entries("tau_i", model.inverse_dynamics(q, qd, qdd), values["tau"].sum(-1), scales["tau"].sum(-1))
+    yield sums
+    coefficients = model.coefficients(q, qd)
+    for what, value in zip(("c2", "c1", "g"), coefficients, strict=True):
+        yield dense(what, value, reference)
+    most = [np.abs(x).max(axis=0) for x in (q, qd, qdd)]
+    slopes = {"closing": values["c1"], "gradient": 2 * values["c1"] - values["h1"]}
+    for convention, c1 in slopes.items():
+        parts = model.propagation(q, qd, qdd, convention=convention)
+        yield Entries("c2 qdd", parts[0], values["c2"] * _over(qdd), scales["c2"] * most[2])
+        yield Entries(f"c1 qd ({convention})", parts[1], c1 * _over(qd), 2 * scales["c1"] * most[1])
+        yield dense("g", parts[2], reference)
+        if convention == "closing":
+            closed = parts[0].sum(-1) + parts[1].sum(-1) + parts[2]
+            yield Entries("sum of propagation torques", closed, values["tau"], scales["tau"])
+    mask = np.random.default_rng(1).uniform(0.5, 1.5, (3, q.shape[1]))
+    for weights in (mask, mask * [[0.0], [1.0], [1.0]]):
+        orders = list(zip(("c0", "c1", "c2"), weights, (q, qd, qdd), most, strict=True))
+        expected = np.sum([(values[c] @ _column(w * x))[..., 0] for c, w, x, _ in orders], axis=0)
+        scale = np.sum([scales[c] @ (w * m) for c, w, _, m in orders], axis=0)
+        yield Entries("masked", model.masked(q, qd, qdd, weights), expected, scale)
+
+
+def _batches(checked: Named) -> Iterator[Entries]:
+    """One sample, batches that fill no block, of two axes, of no samples, and a q that all samples share."""
+    reference = checked.reference
+    states, count = reference.states, len(reference.states.q)
+    if not count:
+        return
+    for shape in ((), (1,), (7,), (9,), (17,), (2, 3), (0,)):
+        at = np.arange(int(np.prod(shape))).reshape(shape) * 5 % count
+        yield from _few(checked, states.at(at), at)
+    same = np.zeros(5, dtype=int)
+    alike = States(states.q[0], states.qd[same], states.qdd[:1])
+    yield from _few(checked, alike, same)
+
+
+def _few(checked: Named, states: States, at: Rows) -> Iterator[Entries]:
+    _, model, rows, reference = checked
+    packed = rows.fields(model.packed(*states.motion))
+    values = {what: spread(value, rows.of(what), reference, what) for what, value in packed.items()}
+    if at.size in (1, 7, 6):
+        values["c0"] = model.position_gradient(*states.motion)
+    yield from (_flat(what, value, reference, at) for what, value in values.items())
+    yield _flat("tau", model.partial_torque(*states.motion), reference, at)
+
+
+def _flat(what: str, value: Array, reference: Reference, at: Rows) -> Entries:
+    """Entries whose batch of shape `at` became one axis."""
+    inner = reference.scales[what].shape
+    if value.shape != (*at.shape, *inner):
+        return Entries(what, value, np.empty((*at.shape, *inner)), reference.scales[what])
+    return dense(what, value.reshape(-1, *inner), reference, at.reshape(-1))
+
+
+def _single(checked: Named) -> Iterator[Entries]:
+    """The same in float32, in a large batch and in one that fills no block."""
+    _, model, rows, reference = checked
+    count = len(reference.states.q)
+    for at in (slice(None), slice(0, min(7, count)), slice(0, 1)):
+        motion: list[Any] = [x[at].astype(np.float32) for x in reference.states.motion]
+        packed = rows.fields(model.packed(*motion))
+        for what, value in packed.items():
+            yield dense(what, spread(value, rows.of(what), reference, what), reference, at)
+        yield dense("tau", spread(model.packed_torque(*motion), rows.tau, reference, "tau"), reference, at)
+        yield dense("c0", model.position_gradient(*motion), reference, at)
+
+
+def _energies(checked: Named) -> Iterator[Result]:
+    """Each module's Lagrangian against the recursion's kinetic less potential energy."""
+    name, model, _, reference = checked
+    if reference.lagrangian is None:
+        return
+    expected, scale = reference.lagrangian
+    value = _lagrangians(model, reference.states)
+    entries = Entries("L", value, expected, scale)
+    yield compare(f"{name}: Lagrangians against the bodies' energies", [entries], reference.tolerance)
+
+
+def _lagrangians(model: Model, states: States) -> Array:
+    from linkwise.extras import extra
+
+    torch = extra("torch")
+    motion = [torch.from_numpy(x) for x in (states.q, states.qd)]
+    return np.stack([module(*motion).detach().numpy() for module in model.backend.modules], -1)
+
+
+def _structure(checked: Named, manifest: Manifest) -> Iterator[Result]:
+    """Zeros off the path, the mass matrix, and power: what joints do to a link is what its energy gains."""
+    name, model, rows, reference = checked
+    q, qd, qdd = reference.states.motion
+    tau = model.partial_torque(q, qd, qdd)
+    if reference.power is not None:
+        power = np.einsum("sij,si->sj", tau, qd)
+        scale = np.abs(qd).max(axis=0) @ reference.scales["tau"]
+        entries = Entries("power", power, reference.power, scale)
+        yield compare(f"{name}: power is what each link's energy gains", [entries], reference.tolerance)
+    off = np.ones(tau.shape[1:], dtype=bool)
+    off[rows.tau[:, 0], rows.tau[:, 1]] = False
+    error = float(np.abs(tau[:, off]).max(initial=0.0))
+    yield Result(f"{name}: tau_ij = 0 off the path", error == 0.0, error, f"largest value {error:.1e}")
+    mass = model.coefficients(q, qd).acceleration.sum(2)
+    smallest = float(np.linalg.eigvalsh(mass).min(initial=np.inf))
+    unphysical = bool(manifest.request.get("allow_unphysical")) or manifest.tree is None
+    detail = f"smallest eigenvalue {smallest:.1e}"
+    yield Result(f"{name}: total mass matrix positive definite", smallest > 0 or unphysical, smallest, detail)
+
+
+def _over(motion: Array) -> Array:
+    """Motion (samples, n) beside coefficients (samples, n, N, n)."""
+    return motion[:, None, None, :]
+
+
+def _column(motion: Array) -> Array:
+    """Motion (samples, n) as columns to multiply with coefficients (samples, n, N, n)."""
+    return motion[:, None, :, None]

@@ -1,0 +1,165 @@
+"""Does `linkwise check` alone catch a wrong formula? One change in one emitted file, hashes made to fit.
+
+python tests/mutation/emitted.py --out out/mutate [--each 40] [--only planar3]
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import random
+import shutil
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from linkwise import Options, check_package, generate, read_system, write_package
+from mutants import Mutant, Rules, mutants
+from urdf_text import chain, joint, link, mimic, robot
+
+DATA = Path(__file__).parents[1] / "data"
+FORMULAS = ("forms/link_*.py", "energies/link_*.py", "c/*.h", "c/*.c", "formulas.txt", "formulas.tex")
+SHARED = {"numbers.h", "sines.h", "rows.h", "stream.h"}
+BACKENDS = ("numpy", "autograd", "c", "formulas")
+SAMPLES = 20
+RULES = Rules(share=1e-6, names=True)
+"""Constants change by a millionth of their own."""
+EVERY_JOINT = robot(
+    *map(link, "abcdef"),
+    joint("slide", "a", "b", type="prismatic", axis="1 -2 0.5"),
+    joint("turn", "b", "c", type="continuous", axis="0 0.6 -0.8"),
+    joint("follow", "c", "d", type="prismatic", inner=mimic("turn", 0.3, -0.2)),
+    joint("echo", "d", "e", inner=mimic("turn", -1.7, 0.4)),
+    joint("plane", "c", "f", type="planar", axis="0.2 0.3 0.9"),
+)
+ROBOTS = {
+    "planar3": ("planar3", {}),
+    "planar2_symbolic": ("planar2", {"parameters": "symbolic"}),
+    "puma560": ("puma560", {}),
+    "torso": ("torso", {}),
+    "every_joint": (chain, {}),
+    "turntable": (str(DATA / "turntable.py"), {}),
+    "cart_pendulum": (str(DATA / "cart_pendulum.py"), {"parameters": "symbolic"}),
+}
+
+
+def package(name: str, folder: Path) -> Path:
+    """Generate one of the packages."""
+    spec, options = ROBOTS[name]
+    if name == "every_joint":
+        spec = folder / "every_joint.urdf"
+        spec.write_text(EVERY_JOINT)
+    system = read_system(spec, Options(**options))
+    write_package(generate(system, BACKENDS, name), folder / name)
+    return folder / name
+
+
+def formula_mutants(directory: Path) -> list[Mutant]:
+    """All mutants of the emitted formulas of a package."""
+    found: list[Mutant] = []
+    for pattern in FORMULAS:
+        for path in sorted(directory.glob(pattern)):
+            if path.name not in SHARED:
+                found += mutants(path.relative_to(directory).as_posix(), path.read_text(), RULES)
+    return [mutant for mutant in found if not _prose(mutant)]
+
+
+def _prose(mutant: Mutant) -> bool:
+    """Whether it changes no formula: the head of a text, a pointer's name, a class's docstring."""
+    text = mutant.text
+    if mutant.path.startswith("formulas"):
+        return not text.startswith(("tau_", r"\["))
+    return text.startswith(("import", "from", "LINK =", "raise"))
+
+
+def caught(directory: Path, mutant: Mutant | None, timeout: float = 120.0) -> bool:
+    """Whether `check` refuses the package with this change, in a process of its own.
+
+    The parent may compute nothing with torch: what it has forked could not.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        changed = Path(folder) / directory.name
+        shutil.copytree(directory, changed, ignore=shutil.ignore_patterns("__pycache__"))
+        if mutant:
+            damage(changed, mutant)
+        child = os.fork()
+        if child == 0:
+            with open(os.devnull, "w") as silence:
+                os.dup2(silence.fileno(), 1)
+                os.dup2(silence.fileno(), 2)
+            try:
+                passed = all(result.passed for result in check_package(changed, SAMPLES))
+            except BaseException:
+                passed = False
+            os._exit(0 if passed else 1)
+        return _status(child, timeout) != 0
+
+
+def damage(directory: Path, mutant: Mutant) -> None:
+    """Apply a mutant to a package, and write the manifest's hash anew, so that only numbers can tell."""
+    file, manifest = directory / mutant.path, directory / "manifest.json"
+    file.write_text(mutant.applied(file.read_text()))
+    data = json.loads(manifest.read_text())
+    data["files"][mutant.path] = hashlib.sha256(file.read_bytes()).hexdigest()
+    manifest.write_text(json.dumps(data))
+
+
+def _status(child: int, timeout: float) -> int:
+    """Exit status of a process; one that takes too long is ended, which is a catch too."""
+    end = time.monotonic() + timeout
+    while time.monotonic() < end:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            return status
+        time.sleep(0.01)
+    os.kill(child, 9)
+    os.waitpid(child, 0)
+    return -1
+
+
+def sample(found: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
+    """Some of the mutants: as many of each file as of any other, the same ones each time."""
+    chosen = random.Random(seed)
+    by_file: dict[str, list[Mutant]] = {}
+    for mutant in found:
+        by_file.setdefault(mutant.path, []).append(mutant)
+    for group in by_file.values():
+        chosen.shuffle(group)
+    rounds = [group[k] for k in range(len(found)) for group in by_file.values() if k < len(group)]
+    return rounds[:count]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("out/mutate"))
+    parser.add_argument("--each", type=int, default=60, help="mutants of each package")
+    parser.add_argument("--only", nargs="*", default=list(ROBOTS))
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    import torch.func  # noqa: F401  # loaded once, for all processes that are forked from this one
+
+    options.out.mkdir(parents=True, exist_ok=True)
+    record, counts = [], Counter[tuple[str, bool]]()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["LINKWISE_CACHE"] = folder
+        for name in options.only:
+            directory = package(name, Path(folder))
+            assert not caught(directory, None), name
+            for mutant in sample(formula_mutants(directory), options.each, options.seed):
+                killed = caught(directory, mutant)
+                counts[name, killed] += 1
+                record.append({"package": name, "mutant": mutant.key, "caught": killed})
+                if not killed:
+                    print(f"survives: {name}/{mutant.key}", flush=True)
+            print(f"{name}: {counts[name, True]} caught, {counts[name, False]} survive", flush=True)
+    (options.out / "emitted.json").write_text(json.dumps(record, indent=1))
+    sys.exit(any(not entry["caught"] for entry in record))
+
+
+if __name__ == "__main__":
+    main()

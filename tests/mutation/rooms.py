@@ -1,0 +1,119 @@
+"""Which files are changed, and which tests must notice: the room's and its users', cheap ones first.
+
+Comparisons with checked-in bytes are in no list: they tell that a text changed, not that it became wrong.
+"""
+
+from dataclasses import dataclass
+from fnmatch import fnmatch
+
+CHECK = "tests/test_check.py"
+
+
+@dataclass(frozen=True)
+class Room:
+    """Files by pattern, below the project's root; tests as pytest names them."""
+
+    files: tuple[str, ...]
+    tests: tuple[str, ...]
+    leave: tuple[str, ...] = ()
+
+    def holds(self, path: str) -> bool:
+        """Whether a file is one of this room's."""
+        return any(fnmatch(path, p) for p in self.files) and not any(fnmatch(path, p) for p in self.leave)
+
+
+def _house(room: str) -> tuple[str, ...]:
+    return (f"generator/linkwise/{room}/*.py", f"generator/linkwise/{room}.py")
+
+
+ROOMS: dict[str, Room] = {
+    "expression": Room(
+        _house("expression"),
+        ("tests/test_expression.py", "tests/test_dynamics.py", "tests/test_user_energies.py"),
+    ),
+    "dynamics": Room(
+        _house("dynamics"),
+        (
+            "tests/test_dynamics.py",
+            "tests/test_robots_joints.py",
+            "tests/test_user_energies.py",
+            "tests/numeric/test_position_gradient.py",
+        ),
+    ),
+    "symbolic": Room(
+        _house("symbolic"),
+        (
+            "tests/test_dynamics.py",
+            "tests/test_user_energies.py",
+            "tests/numeric/test_against_sympy.py",
+            "tests/test_report_terms.py",
+        ),
+    ),
+    "emit": Room(
+        (*_house("emit"), "generator/linkwise/emit/c/*.py"),
+        (
+            "tests/test_templates.py",
+            CHECK,
+            "tests/test_runtime.py",
+            "tests/test_package_import.py",
+            "tests/test_names.py",
+            "tests/test_emitted_c.py",
+            "tests/test_user_energies.py",
+        ),
+    ),
+    "templates": Room(
+        tuple(f"templates/{kind}/*.j2" for kind in ("c", "closed_forms", "energies", "formulas", "package")),
+        (
+            "tests/test_templates.py",
+            CHECK,
+            "tests/test_package_import.py",
+            "tests/test_package_calls.py",
+            "tests/test_emitted_c.py",
+        ),
+    ),
+    "check": Room(_house("check"), ("tests/test_check_sources.py", CHECK)),
+    "package": Room(
+        _house("package"), (CHECK, "tests/test_package_import.py", "tests/test_cli.py"), leave=("*/write.py",)
+    ),
+    "runtime": Room(
+        _house("runtime"),
+        ("tests/test_package_calls.py", "tests/test_runtime.py", "tests/test_user_energies.py", CHECK),
+        leave=("*/native_*.py",),
+    ),
+    "native": Room(
+        ("generator/linkwise/runtime/native_*.py",),
+        ("tests/test_native.py", "tests/test_package_calls.py", "tests/test_runtime.py"),
+    ),
+    "c headers": Room(("generator/linkwise/runtime/c/*.h",), (CHECK, "tests/test_emitted_c.py")),
+    "report": Room(
+        (*_house("report"), "templates/report/*.j2"),
+        (
+            "tests/test_report_terms.py",
+            "tests/test_report_reduction.py",
+            "tests/test_report_pages.py",
+            "tests/test_report_commands.py",
+        ),
+        leave=("*/plots.py", "*/seconds.py", "*/seconds_page.py"),
+    ),
+    "analysis": Room(
+        _house("analysis"),
+        (
+            "tests/test_analysis_derivatives.py",
+            "tests/test_analysis_ends.py",
+            "tests/test_analysis_samples.py",
+            "tests/test_analysis_run.py",
+            "tests/test_analysis_logs.py",
+            "tests/test_analysis_files.py",
+        ),
+    ),
+    "robot": Room(
+        (*_house("robot"), "generator/linkwise/robot/readers/*.py"),
+        (
+            "tests/test_robots_builtin.py",
+            "tests/test_robots_bad.py",
+            "tests/test_robots_joints.py",
+            "tests/test_robots_mjcf.py",
+            "tests/test_cli.py",
+        ),
+    ),
+}

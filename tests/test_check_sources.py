@@ -1,0 +1,217 @@
+"""What `linkwise check` holds packages against: recursion, magnitudes, differences, readers of formulas."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import DATA, needs_compiler
+from linkwise.check.compare import ROUNDINGS, Entries, compare
+from linkwise.check.formula_texts import FUNCTIONS
+from linkwise.check.latex_reader import LatexReader, Unreadable
+from linkwise.check.magnitudes import Magnitudes
+from linkwise.check.newton_euler import NewtonEuler
+from linkwise.check.packed_layout import IndexRows
+from linkwise.check.reference import (
+    Reference,
+    lagrangian_reference,
+    random_states,
+    recursion_reference,
+    torque_reference,
+)
+from linkwise.package.manifest import Manifest
+
+LEG, TURNTABLE = str(DATA / "leg.toml"), str(DATA / "turntable.py")
+EPSILON = 2.0**-52
+
+
+def sources(directory: Path) -> tuple[NewtonEuler, Magnitudes]:
+    manifest = Manifest.read(directory)
+    assert manifest.tree is not None
+    return NewtonEuler(manifest, manifest.tree), Magnitudes(manifest, manifest.tree)
+
+
+@pytest.fixture(scope="module")
+def leg(directory_of: Callable[[str], Path]) -> tuple[NewtonEuler, Magnitudes]:
+    """Of slides and hinges."""
+    return sources(directory_of(LEG))
+
+
+def test_magnitudes_bound_the_torques_and_energies_that_they_are_of(
+    leg: tuple[NewtonEuler, Magnitudes],
+) -> None:
+    recursion, magnitudes = leg
+    rng = np.random.default_rng(0)
+    for scales in ((1.0, 0.0, 0.0), (1.0, 2.0, 0.0), (1.0, 0.0, 3.0), (9.0, 5.0, 4.0)):
+        motion = [s * rng.uniform(-1.0, 1.0, (200, 6)) for s in scales]
+        most = [np.abs(m).max(axis=0) for m in motion]
+        for gravity in (True, False):
+            tau = np.abs(recursion.partial_torque(*motion, gravity=gravity)).max(axis=0)
+            bound = magnitudes.partial_torque(*most, gravity=gravity)
+            assert (tau <= bound).all()
+            assert (bound[tau > 1e-9] <= 1e4 * tau[tau > 1e-9]).all()
+        kinetic, potential = recursion.energies(*motion[:2])
+        assert ((kinetic + np.abs(potential)).max(axis=0) <= magnitudes.lagrangian(*most[:2])).all()
+
+
+def test_energies_of_the_recursion_change_by_the_power_of_its_torques(
+    leg: tuple[NewtonEuler, Magnitudes],
+) -> None:
+    recursion, _ = leg
+    q, qd, qdd = random_states(6, 20).motion
+    tau, t = recursion.partial_torque(q, qd, qdd), 1e-4
+    later, before = (recursion.energies(q + s * qd + 0.5 * s * s * qdd, qd + s * qdd) for s in (t, -t))
+    rate = (sum(later) - sum(before)) / (2 * t)
+    np.testing.assert_allclose(np.einsum("sij,si->sj", tau, qd), rate, rtol=1e-6, atol=1e-4)
+
+
+def same(one: Reference, other: Reference, tolerance: float) -> None:
+    for what, value in one.values.items():
+        np.testing.assert_allclose(other.values[what], value, rtol=tolerance, atol=tolerance, err_msg=what)
+
+
+def test_three_references_of_one_robot_agree(
+    directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    states, package = random_states(3, 5), package_of("planar3")
+    by_bodies = recursion_reference(*sources(directory_of("planar3")), states)
+    same(by_bodies, lagrangian_reference(package.load("autograd").backend.modules, states), 1e-9)
+    same(by_bodies, torque_reference("it", package.load("numpy").partial_torque, states), 1e-7)
+
+
+def test_terms_linear_in_the_velocities_are_found_by_either_way(
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    states = random_states(2, 5)
+    by_energy = lagrangian_reference(package_of(TURNTABLE).load("autograd").backend.modules, states)
+    by_torque = torque_reference("it", package_of(TURNTABLE).load("numpy").partial_torque, states)
+    same(by_energy, by_torque, 1e-9)
+    np.testing.assert_allclose(by_energy.values["h1"][:, 0, 0, 1], -2 * 0.4 * 1.7)
+    np.testing.assert_allclose(by_energy.values["h1"][:, 1, 0, 0], 2 * 0.4 * 1.7)
+
+
+def test_states_that_energies_are_not_defined_for_are_left_out() -> None:
+    def torque(q: Any, qd: Any, qdd: Any) -> Any:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return (np.log(q) + qdd)[:, :, None]
+
+    states = random_states(1, 40)
+    with np.errstate(invalid="ignore"):
+        reference = torque_reference("it", torque, states)
+    assert 5 < len(reference.states.q) < 40
+    assert (reference.states.q > 0).all()
+    assert len(reference.values["c0"]) == len(reference.states.q)
+
+
+def test_random_states_are_apart_from_zero_in_every_quadrant_and_some_at_rest() -> None:
+    q, qd, qdd = random_states(3, 100).motion
+    assert len(q) == 104
+    assert all((np.abs(x[:100]) >= 0.25).all() for x in (qd, qdd))
+    for k in range(3):
+        assert set(np.floor(q[:100, k] / (np.pi / 2))) == {-2, -1, 0, 1}
+        assert {-1.0, 1.0} == set(np.sign(qd[:100, k])) == set(np.sign(qdd[:100, k]))
+    assert [[bool(x[row].any()) for x in (q, qd, qdd)] for row in range(100, 104)] == [
+        [False, False, False],
+        [True, False, False],
+        [True, True, False],
+        [True, False, True],
+    ]
+    assert all((x.astype(np.float32) == x).all() for x in (q, qd, qdd))
+    np.testing.assert_array_equal(random_states(3, 100).q, q)
+
+
+def entries(error: float, place: int, small: float, scale: float = 1.0) -> Entries:
+    expected = np.array([[100.0, small], [50.0, -0.5 * small]])
+    value = expected.copy()
+    value[1, place] += error
+    return Entries("c1", value, expected, np.array([100.0, scale]))
+
+
+def test_an_entry_is_measured_by_its_own_largest_value() -> None:
+    assert compare("c1", [entries(0.9e-9 * 100.0, 0, 1e-3)]).passed
+    assert not compare("c1", [entries(1.1e-9 * 100.0, 0, 1e-3)]).passed
+    assert compare("c1", [entries(0.9e-12, 1, 1e-3)]).passed
+    wrong = compare("c1", [entries(0.0, 0, 1.0), entries(1.1e-12, 1, 1e-3)])
+    assert not wrong.passed
+    assert wrong.detail == "largest relative error 1.1e-09 at c1(2)"
+
+
+def test_an_entry_that_is_zero_but_for_rounding_is_measured_by_what_it_is_summed_from() -> None:
+    rounding = ROUNDINGS * EPSILON
+    assert compare("c1", [entries(0.9 * rounding, 1, 0.0)]).passed
+    assert not compare("c1", [entries(1.1 * rounding, 1, 0.0)]).passed
+    assert compare("c1", [entries(9 * rounding, 1, 0.0, scale=10.0)]).passed
+    assert not compare("c1", [entries(1e-300, 1, 0.0, scale=0.0)], tolerance=1e-9).passed
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_an_answer_that_is_no_number_fails(wrong: float) -> None:
+    assert not compare("c1", [entries(wrong, 0, 1.0)]).passed
+
+
+def test_another_shape_is_named() -> None:
+    result = compare("c1", [Entries("c1", np.zeros((2, 3)), np.zeros((2, 2)), np.zeros(2))])
+    assert (result.passed, result.detail) == (False, "c1 has shape (2, 3) instead of (2, 2)")
+    assert compare("c1", [Entries("c1", np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(2))]).error == 0.0
+
+
+def test_packed_values_go_link_by_link_then_by_joint_then_by_cause() -> None:
+    rows = IndexRows.of_paths([(0,), (0, 2)], linear=[1])
+    assert rows.tau.tolist() == [[0, 0], [0, 1], [2, 1]]
+    assert rows.c1.tolist() == [[0, 0, 0], [0, 1, 0], [0, 1, 2], [2, 1, 0], [2, 1, 2]]
+    assert rows.c2.tolist() == [[0, 0, 0], [0, 1, 0], [0, 1, 2], [2, 1, 2]]
+    assert rows.h1.tolist() == rows.c1.tolist()[1:]
+
+
+LATEX = {
+    r"- \frac{3 \dot{q}_{1} q_{12}^{2} \sin{\left(q_{1} + q_{12} \right)}}{80} + 2": -3
+    * 5
+    * 49
+    * np.sin(9)
+    / 80
+    + 2,
+    r"1.5 \cdot 10^{-3} q_{1} - \left(q_{1} - 1\right)^{2}": 0.003 - 1,
+    r"\sin^{2}{\left(q_{1} \right)} \cos{\left(q_{1} \right)}": np.sin(2) ** 2 * np.cos(2),
+    r"\sqrt{q_{1}} + \sqrt[3]{q_{12}} + \frac{1}{\sqrt{q_{12}}}": 2**0.5 + 7 ** (1 / 3) + 7**-0.5,
+    r"e^{- q_{1}} + \pi \log{\left(\left|{- q_{1}}\right| \right)}": np.exp(-2) + np.pi * np.log(2),
+    r"\operatorname{atan}{\left(q_{1} \right)} + \tanh{\left(q_{12} \right)}": np.arctan(2) + np.tanh(7),
+}
+
+
+def latex(text: str) -> float:
+    symbols = {"q_{1}": 2.0, "q_{12}": 7.0, r"\dot{q}_{1}": 5.0, r"\pi": np.pi, "e": np.e}
+    return float(LatexReader(text, symbols, FUNCTIONS).value())
+
+
+@pytest.mark.parametrize("text", LATEX)
+def test_latex_is_read_as_the_formula_it_shows(text: str) -> None:
+    assert latex(text) == pytest.approx(LATEX[text], rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "text", ["q_{1} +", "q_{2}", r"\frac{1}", r"\foo{q_{1}}", "(q_{1})", "q_{1}}", r"\left(q_{1}", ""]
+)
+def test_latex_that_is_no_formula_is_refused(text: str) -> None:
+    with pytest.raises(Unreadable):
+        latex(text)
+
+
+@needs_compiler
+def test_writing_beside_an_array_is_noticed_on_either_side(tmp_path: Path) -> None:
+    from linkwise.check.compiled_c import CompiledPackage
+
+    (tmp_path / "x.h").write_text("void x_at(size_t count, const double *q, double *c2);\n")
+    (tmp_path / "x.c").write_text(
+        "void x_at(unsigned long n, const double *q, double *c2) { c2[(int)q[0]] = n; }\n"
+    )
+    (tmp_path / "xf.c").write_text("")
+    compiled = CompiledPackage("x", tmp_path, 1)
+    (at,) = compiled.prototypes
+    for place, shift in ((0, 0), (2, 1), (-1, 0), (3, 1), (40, 0), (-40, 0)):
+        found = compiled.call(at, 7, {"q": np.array([float(place)])}, {"c2": 3}, shift)
+        assert (found is not None) == (0 <= place < 3)
+        if found is not None:
+            assert found["c2"][place] == 7.0
+            assert np.isnan(np.delete(found["c2"], place)).all()
