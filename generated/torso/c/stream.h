@@ -6,7 +6,9 @@
 #include <string.h>
 
 /* Above this many bytes, results are better not kept in the cache. */
+#ifndef LARGE
 #define LARGE ((size_t)64 << 20)
+#endif
 
 /* `count` values past the cache, if `to` starts on a cache line, as it does wherever that matters, and the processor
    can; otherwise an ordinary copy. */
