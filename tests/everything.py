@@ -9,7 +9,7 @@ from typing import Any
 
 COMMANDS = (
     "generate planar3 --out out --parameters symbolic",
-    "generate skew.toml --out out",
+    "generate skew.toml --out out --backend numpy --backend autograd --backend native",
     "generate torso --out out --backend numpy --backend c",
     "generate cart.py --out out",
     "check out/torso --samples 5",

@@ -92,6 +92,13 @@ def test_check_prints_the_largest_error_of_each(linkwise: Run, planar2: Path) ->
     assert {"name", "passed", "error", "detail", "mark"} == set(results[0])
 
 
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd", "native"])
+def test_a_package_of_one_back_end_passes_its_check(backend: str, linkwise: Run) -> None:
+    assert linkwise("generate", "planar1", "--out", "out", "--backend", backend).returncode == 0
+    done = linkwise("check", "out/planar1", "--samples", "1")
+    assert (done.returncode, "FAIL" in done.stdout) == (0, False), done.stdout
+
+
 def test_check_catches_a_tampered_file(linkwise: Run, planar2: Path) -> None:
     (planar2 / "forms/link_2.py").write_text("# mine now\n")
     (planar2 / "names.py").unlink()

@@ -44,6 +44,10 @@ def test_broken_input_is_refused_in_one_line_or_answered(kind: str, client: Clie
 
 BAD = {
     "traceback": (Case(("inspect", "{in}/a.py"), {"a.py": b"raise BaseException"}), "BaseException"),
+    "two lines": (
+        Case(("inspect", "{in}/a.py"), {"a.py": b"import sys; print('x', file=sys.stderr); 1 / 0"}),
+        "2 lines on stderr with exit status 2",
+    ),
     "file outside": (
         Case(("inspect", "{in}/a.py"), {"a.py": b"open('/tmp/linkwise-fuzz', 'w')"}),
         "outside: open /tmp/linkwise-fuzz",
@@ -51,10 +55,6 @@ BAD = {
     "file left": (Case(("inspect", "{in}/a.py"), {"a.py": b"open('left', 'w')"}), "left work/left behind"),
     "memory": (Case(("inspect", "{in}/a.py"), {"a.py": b"x = b'1' * (3 << 29)"}), "took 1."),
     "hang": (Case(("inspect", "{in}/a.py"), {"a.py": b"while True: pass"}), "Hang"),
-    "warning": (
-        Case(("inspect", "{in}/a.py"), {"a.py": b"import warnings; warnings.warn('x')"}),
-        "prints a warning of Python's",
-    ),
     "death": (Case(("inspect", "{in}/a.py"), {"a.py": b"import os; os.kill(os.getpid(), 9)"}), "status -9"),
 }
 

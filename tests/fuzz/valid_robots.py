@@ -101,7 +101,8 @@ def random_robot(rng: Random, joints: int, coordinates: int = 24) -> RobotData:
         links.append(LinkData(f"{name} link"))
     leaves = {link.name for link in links} - {joint.parent for joint in made}
     bodies = [
-        link if link.name not in leaves and rng.random() < 0.2 else _body(rng, link.name) for link in links
+        _body(rng, link.name, link.name in leaves) if link.name in leaves or rng.random() < 0.8 else link
+        for link in links
     ]
     return RobotData(form, gravity, tuple(bodies), tuple(_mimicking(rng, made)))
 
@@ -135,10 +136,14 @@ def _place(rng: Random) -> tuple[Row, Row]:
     return _vector(rng, 0.5), _vector(rng, 3.0)
 
 
-def _body(rng: Random, name: str) -> LinkData:
-    """A body with second moments of mass a, b, c ≥ 0, so that its inertia can be, turned at random."""
+def _body(rng: Random, name: str, solid: bool) -> LinkData:
+    """A body with second moments of mass a, b, c ≥ 0, so that its inertia can be, turned at random.
+
+    A solid one has inertia about every axis; another may be a rod or a point.
+    """
     mass = 10.0 ** rng.uniform(-1.5, 1.5)
-    a, b, c = (mass * rng.choice((0.0, *(10.0 ** rng.uniform(-5, -1) for _ in range(2)))) for _ in range(3))
+    flat = 1.0 if solid else rng.choice((0.0, 1.0))
+    a, b, c = (mass * rng.choice((1.0, flat)) * 10.0 ** rng.uniform(-5, -1) for _ in range(3))
     turn = rotation(*(_vector(rng, 3.0) if rng.random() < 0.7 else (0.0, 0.0, 0.0)))
     tensor = turn @ np.diag([b + c, a + c, a + b]) @ turn.T
     rows = [[float(tensor[min(i, k), max(i, k)]) for k in range(3)] for i in range(3)]

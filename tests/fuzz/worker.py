@@ -2,7 +2,7 @@
 
 Cases come in on stdin and outcomes go out on stdout, pickled. A case may succeed, or exit with status 2, one
 line on stderr and nothing written. It may not write outside its `--out`, leave a file behind, take more than
-10 s of CPU time or 1 GB, start a program, or print a traceback or a warning of Python's.
+10 s of CPU time or 1 GB, start a program, or print a traceback.
 """
 
 import contextlib
@@ -16,7 +16,6 @@ import sys
 import tempfile
 import traceback
 import unicodedata
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,9 +25,10 @@ from fuzz.case import Case
 from fuzz.room import Room, Watch
 
 GIGABYTE = 1 << 30
-LONGEST = 1000
-"""Characters of a message, the file's path apart."""
-PYTHON_WARNING = re.compile(r"\.py:\d+: \w*Warning")
+LONGEST = 1100
+"""Characters of a message and what stands before it, the folder apart."""
+FAULT = re.compile(r"linkwise: fault: (\w+ \([^)]*\))")
+"""How a fault of linkwise itself is told, and where it was."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,6 @@ class Worker:
         used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (used + 3 * GIGABYTE, resource.RLIM_INFINITY))
         resource.setrlimit(resource.RLIMIT_FSIZE, (GIGABYTE, resource.RLIM_INFINITY))
-        warnings.simplefilter("always")
         self.watch = Watch()
 
     @staticmethod
@@ -86,6 +85,8 @@ class Worker:
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
         if peak > GIGABYTE:
             faults.append(f"took {peak / GIGABYTE:.1f} GB")
+        if fault := FAULT.search(error):
+            place = fault[1]
         self.watch.seen.clear()
         for name in [name for name in sys.modules if name.startswith("_linkwise_")]:
             del sys.modules[name]
@@ -128,8 +129,6 @@ class Worker:
     def _faults(self, status: int | None, error: str, trace: str, case: Case) -> Iterator[str]:
         if status is None:
             yield trace.strip().splitlines()[-1][:200]
-        if PYTHON_WARNING.search(error):
-            yield "prints a warning of Python's"
         lines = error.splitlines()
         if status == 2:
             if len(lines) != 1 or not error.endswith("\n"):
@@ -139,7 +138,7 @@ class Worker:
             if len(error.replace(str(self.room.root), "")) > LONGEST:
                 yield f"a message of {len(error)} characters"
         if status not in (0, 2, None) and not (status == 1 and case.arguments[0] == "check"):
-            yield f"exit status {status}"
+            yield f"exit status {status}: {error[:300]}"
         if odd := {
             mark for mark in error.replace("\n", "") if unicodedata.category(mark) in ("Cc", "Cs", "Zl", "Zp")
         }:

@@ -10,7 +10,7 @@ from linkwise import pipeline
 from linkwise.cli import Details, counted, tell
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import checked_identifier
-from linkwise.emit.backend import BACKENDS
+from linkwise.emit.backend import BACKENDS, chosen_backends
 from linkwise.input_file import is_file
 from linkwise.output import require_writable
 from linkwise.package.write import check_target, write_package
@@ -33,7 +33,7 @@ def generate(
     details: Details = False,
 ) -> None:
     """Write the package of a robot."""
-    backends = backend or list(BACKENDS)
+    backends = [chosen.name for chosen in chosen_backends(backend or BACKENDS)]
     path = Path(robot)
     request = {"robot": path.name if is_file(path) else robot, "backends": backends, **asdict(options)}
     system = pipeline.read_system(robot, options)

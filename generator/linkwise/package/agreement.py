@@ -44,7 +44,8 @@ def _said(manifest: Manifest) -> Iterator[tuple[str, Any]]:
 def _there(manifest: Manifest, module: ModuleType) -> Iterator[tuple[str, Any]]:
     robot, request = module.ROBOT, manifest.request
     yield "name", robot.name
-    found = GENERATED_BY.search(module.__doc__ or "")
+    # From the file, for `python -OO` leaves docstrings out.
+    found = GENERATED_BY.search(Path(str(module.__file__)).read_text(encoding="utf-8"))
     yield "generator.linkwise", found[1] if found else None
     for k, (name, unit) in enumerate(zip(robot.joint_names, robot.joint_units, strict=True)):
         yield f"joints[{k}].name", name
