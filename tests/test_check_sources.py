@@ -101,6 +101,7 @@ def test_states_that_energies_are_not_defined_for_are_left_out() -> None:
     with np.errstate(invalid="ignore"):
         reference = torque_reference("it", torque, states)
     assert 5 < len(reference.states.q) < 40
+    np.testing.assert_allclose(reference.values["c0"][:, 0, 0, 0], 1 / reference.states.q[:, 0], rtol=1e-8)
     assert (reference.states.q > 0).all()
     assert len(reference.values["c0"]) == len(reference.states.q)
 
