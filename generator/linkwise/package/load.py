@@ -82,7 +82,7 @@ class Package:
 
     def load(self, backend: str, parameters: Mapping[str, float] | None = None) -> Model:
         """Model on a back end; passes on whatever the package raises, a missing library say."""
-        dynamics = self.module.load(backend, parameters)
+        dynamics = self.module.load(backend, parameters, allow_unphysical=True)
         model: Model = TensorModel(dynamics) if dynamics.backend.takes_tensors else dynamics
         return model
 
