@@ -146,6 +146,15 @@ def test_one_wrong_formula_in_any_file_fails(case: str, every_text: Path, tmp_pa
     assert [name for name, mark in marks(package).items() if mark == "FAIL" and name.startswith(failing)]
 
 
+def test_c_that_does_not_compile_fails_with_the_compilers_words(every_text: Path, tmp_path: Path) -> None:
+    package = shutil.copytree(every_text, tmp_path / "planar2")
+    change_file(package, "c/planar2.c", "struct block x;", "struct brick x;")
+    (result,) = (result for result in check_package(package, 3) if result.name == "c: compiles")
+    assert not result.passed
+    assert "failed: " in result.detail
+    assert "error: " in result.detail
+
+
 @pytest.mark.parametrize(
     ("error", "mark"),
     [

@@ -56,6 +56,15 @@ def test_magnitudes_bound_the_torques_and_energies_that_they_are_of(
         assert ((kinetic + np.abs(potential)).max(axis=0) <= magnitudes.lagrangian(*most[:2])).all()
 
 
+def test_magnitudes_grow_with_the_square_of_the_velocities(leg: tuple[NewtonEuler, Magnitudes]) -> None:
+    _, magnitudes = leg
+    q, qd = np.random.default_rng(1).uniform(0.5, 1.0, (2, 6))
+    once, twice = (magnitudes.partial_torque(q, s * qd, 0 * q, gravity=False) for s in (1.0, 2.0))
+    np.testing.assert_allclose(twice, 4 * once)
+    rest, once, twice = (magnitudes.lagrangian(q, s * qd) for s in (0.0, 1.0, 2.0))
+    np.testing.assert_allclose(twice - rest, 4 * (once - rest))
+
+
 def test_energies_of_the_recursion_change_by_the_power_of_its_torques(
     leg: tuple[NewtonEuler, Magnitudes],
 ) -> None:
@@ -167,6 +176,7 @@ def test_packed_values_go_link_by_link_then_by_joint_then_by_cause() -> None:
 
 
 LATEX = {
+    "q_{1} ": 2.0,
     r"- \frac{3 \dot{q}_{1} q_{12}^{2} \sin{\left(q_{1} + q_{12} \right)}}{80} + 2": -3
     * 5
     * 49
