@@ -27,7 +27,6 @@ class LatexReader:
     def value(self) -> Any:
         """Value of the whole; raises Unreadable where anything is left over."""
         result = self._sum()
-        self._skip()
         if self._at < len(self._text):
             raise self._lost()
         return result
@@ -51,7 +50,6 @@ class LatexReader:
             result = result * self._power()
 
     def _ends(self) -> bool:
-        self._skip()
         return bool(re.match(r"[+\-})\]]|\\right|$", self._text[self._at :]))
 
     def _power(self) -> Any:
@@ -103,7 +101,6 @@ class LatexReader:
         return None
 
     def _matched(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
-        self._skip()
         found = pattern.match(self._text, self._at)
         if found:
             self._at = found.end()
