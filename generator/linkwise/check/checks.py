@@ -129,12 +129,8 @@ class _Checks:
                 yield from against_reference(Named(f"{name}{label}", model, rows, reference), manifest)
 
     def _other_parameters(self, rows: IndexRows, compiled: CompiledPackage | None) -> Iterator[Result]:
-        """Every parameter changed by a few percent of its own: equal ones tell no longer one from another."""
-        values = dict(self.package.manifest.parameters)
-        changes = np.random.default_rng(2).uniform(0.97, 1.03, len(values))
-        changed = {
-            name: value * change for (name, value), change in zip(values.items(), changes, strict=True)
-        }
+        """Every parameter changed a little: equal ones tell no longer one from another, and none is zero."""
+        changed = _changed(self.package.manifest.parameters)
         loaded = {name: self.package.load(name, changed) for name in self.loaded}
         yield from self._numbers(", other parameters", changed, loaded, rows, compiled)
 
@@ -153,6 +149,24 @@ class _Checks:
         for name, model in loaded.items():
             return torque_reference(name, model.partial_torque, self.states)
         return torque_reference("c", functions.torque, self.states) if functions else None
+
+
+def _changed(values: Mapping[str, float]) -> dict[str, float]:
+    """Each value changed by up to 3 % of its own; a zero, by 1 to 3 % of the smallest of its kind.
+
+    Of a kind are names that begin alike: masses m_…, centres of mass c_…, inertias I_….
+    """
+    generator = np.random.default_rng(2)
+    smallest: dict[str, float] = {}
+    for name, value in values.items():
+        if value:
+            kind = name.partition("_")[0]
+            smallest[kind] = min(abs(value), smallest.get(kind, np.inf))
+    return {
+        name: value * generator.uniform(0.97, 1.03)
+        or smallest.get(name.partition("_")[0], 1.0) * generator.uniform(0.01, 0.03)
+        for name, value in values.items()
+    }
 
 
 def _line(error: Exception) -> str:

@@ -11,6 +11,7 @@ from linkwise.check.compare import Entries, Result, Skipped, compare
 from linkwise.check.latex_reader import LatexReader, Unreadable
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.reference import Reference
+from linkwise.emit.formula_symbols import MOTION, motion_symbol, parameter_symbols
 from linkwise.package.load import Array, Package
 from linkwise.package.manifest import Manifest
 
@@ -90,7 +91,9 @@ def _names(parameters: Mapping[str, float], reference: Reference) -> dict[str, A
         for symbol, motion in zip(("q", "qd", "qdd"), states.motion, strict=True)
         for k in range(motion.shape[1])
     }
-    return {**CONSTANTS, **parameters, **named}
+    symbols = parameter_symbols(list(parameters))
+    shown = {symbol.text: value for symbol, value in zip(symbols, parameters.values(), strict=True)}
+    return {**CONSTANTS, **shown, **named}
 
 
 def _filled(value: Any, reference: Reference) -> Array:
@@ -131,13 +134,6 @@ def _latex_row(manifest: Manifest) -> Callable[[str], Callable[[Mapping[str, Any
 def _latex_symbols(manifest: Manifest, names: Mapping[str, Any]) -> dict[str, Any]:
     """Values by the LaTeX of their symbols."""
     n = len(manifest.joints)
-    symbols = {r"\pi": np.pi, "e": np.e}
-    for k in range(1, n + 1):
-        symbols[f"q_{{{k}}}"] = names[f"q_{k}"]
-        symbols[rf"\dot{{q}}_{{{k}}}"] = names[f"qd_{k}"]
-        symbols[rf"\ddot{{q}}_{{{k}}}"] = names[f"qdd_{k}"]
-    if manifest.parameters:
-        import sympy as sp  # spells a symbol; half a second that most robots are spared
-
-        symbols |= {str(sp.latex(sp.Symbol(name))): names[name] for name in manifest.parameters}
-    return symbols
+    motion = [motion_symbol(kind, k) for kind in MOTION for k in range(1, n + 1)]
+    symbols = (*motion, *parameter_symbols(list(manifest.parameters)))
+    return {r"\pi": np.pi, "e": np.e, **{symbol.latex: names[symbol.text] for symbol in symbols}}

@@ -169,9 +169,13 @@ def _structure(checked: Named, manifest: Manifest) -> Iterator[Result]:
     error = float(np.abs(tau[:, off]).max(initial=0.0))
     yield Result(f"{name}: tau_ij = 0 off the path", error == 0.0, error, f"largest value {error:.1e}")
     mass = model.coefficients(q, qd).acceleration.sum(2)
-    smallest = float(np.linalg.eigvalsh(mass).min(initial=np.inf))
+    # Of the matrix with ones on its diagonal: a hand's inertia is not lost beside a body's.
+    diagonal = np.einsum("sii->si", mass)
+    size = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    scaled = mass / (size[:, :, None] * size[:, None, :])
+    smallest = float(np.linalg.eigvalsh(scaled).min(initial=np.inf))
     unphysical = bool(manifest.request.get("allow_unphysical")) or manifest.tree is None
-    detail = f"smallest eigenvalue {smallest:.1e}"
+    detail = f"smallest eigenvalue, scaled, {smallest:.1e}"
     yield Result(f"{name}: total mass matrix positive definite", smallest > 0 or unphysical, smallest, detail)
 
 

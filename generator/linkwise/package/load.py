@@ -81,7 +81,7 @@ class Package:
         return tuple(self.module.FASTEST_FIRST)
 
     def load(self, backend: str, parameters: Mapping[str, float] | None = None) -> Model:
-        """Model on a back end; passes on whatever the package raises, a missing library say."""
+        """Model on a back end, for any parameters; passes on what the package raises."""
         dynamics = self.module.load(backend, parameters, allow_unphysical=True)
         model: Model = TensorModel(dynamics) if dynamics.backend.takes_tensors else dynamics
         return model
