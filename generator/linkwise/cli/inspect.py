@@ -26,7 +26,7 @@ def inspect(
     details: Details = False,
     as_json: Json = False,
 ) -> None:
-    """Show a robot's joints, links and parameters, and what was merged, locked, ignored or left out."""
+    """Show joints, links and parameters, and what was merged, locked, ignored or left out."""
     system, refused = _system(robot, options)
     data = inspection(system, details) | {"refused": refused}
     print(json_text(data, indent=1) if as_json else table(data))
