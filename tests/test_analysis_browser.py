@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from linkwise.analysis.run import Wanted, analyze_to
 from linkwise.analysis.show.page import report
 from linkwise.progress import silent
 from motion_logs import PLANAR3, smooth, write_csv
+from selenium.webdriver.support.wait import WebDriverWait
 
 pytestmark = pytest.mark.browser
 
@@ -233,6 +235,14 @@ def test_many_joints_and_long_names_fit(driver, tmp_path, width):
     driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
+def hovered(driver, before):
+    """What the shares' label says; nothing while it says what it said before, for Plotly waits a little."""
+    said = driver.execute_script(
+        "return [...document.querySelectorAll('#shares .hovertext')].map((text) => text.textContent)"
+    )
+    return said if said != before[-1:] else []
+
+
 def test_names_are_shown_and_not_obeyed(driver, tmp_path):
     names = ("%{x} %{customdata}", "</script><script>document.title=1</script>", "<b>$x^\n\u202e&lt;")
     analysis = analyze(write_csv(tmp_path / "a.csv", smooth(40, 3)), PLANAR3)
@@ -251,8 +261,6 @@ def test_names_are_shown_and_not_obeyed(driver, tmp_path):
         driver.execute_script(
             "Plotly.Fx.hover('shares', [{curveNumber: arguments[0], pointNumber: 0}])", curve
         )
-        told += driver.execute_script(
-            "return [...document.querySelectorAll('#shares .hovertext')].map((text) => text.textContent)"
-        )
+        told += WebDriverWait(driver, 10).until(partial(hovered, before=told))
     assert [text.partition("% of ")[2] for text in told] == [f"{shown[0]}, {name} q̈" for name in shown[:2]]
     assert driver.get_log("browser") == []

@@ -1,6 +1,7 @@
 """`analyze`: from a log and a robot to arrays in memory, or to a directory of files."""
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,7 +88,7 @@ def analyze_to(
     for name in wanted.figures:
         check_figure(name, robot)
     refuse_inside_package(out)
-    if log.resolve().is_relative_to(out.resolve()):
+    if os.path.realpath(log).startswith(os.path.join(os.path.realpath(out), "")):
         raise LinkwiseError(f"--out {out} is to be replaced and holds the log {log}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
         job = _prepared(log, robot, reading, processing, progress, draft)

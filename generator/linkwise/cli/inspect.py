@@ -26,9 +26,9 @@ def inspect(
     details: Details = False,
     as_json: Json = False,
 ) -> None:
-    """Show joints, links and parameters, and what was merged, locked, ignored or left out."""
+    """Show a robot's joints, links, parameters, and what was merged, locked, ignored or left out."""
     system, refused = _system(robot, options)
-    data = inspection(system, details) | {"refused": refused}
+    data = inspection(system, details, refused)
     print(json_text(data, indent=1) if as_json else table(data))
 
 
@@ -44,7 +44,7 @@ def _system(robot: str, options: Options) -> tuple[System, str]:
             raise error from None
 
 
-def inspection(system: System, details: bool = False) -> dict[str, Any]:
+def inspection(system: System, details: bool = False, refused: str = "") -> dict[str, Any]:
     """Joints, links, parameters and notes, ready for JSON; with `details` on each joint what was left out."""
     tree = rigid_tree(system)
     notes = system.notes
@@ -64,6 +64,7 @@ def inspection(system: System, details: bool = False) -> dict[str, Any]:
         ],
         "parameters": [asdict(parameter) for parameter in parameters(system)],
         "notes": [asdict(note) for note in notes],
+        "refused": refused,
     }
 
 

@@ -24,7 +24,7 @@ def whole_directory(target: Path, refuse: Callable[[Path], None]) -> Iterator[Pa
     too where `target` cannot be written; what was there then stays.
     """
     if target.name in ("", ".."):
-        target = target.resolve()
+        target = Path(os.path.realpath(target))
     with _ended_by_signal(), _told(target):
         sweep(target.parent)
         if os.path.lexists(target):

@@ -3,6 +3,7 @@
 import hashlib
 import importlib
 import importlib.util
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ def import_listed(directory: Path, files: Mapping[str, str]) -> ModuleType:
     files: SHA-256 by path. Neither `__pycache__` nor anything else that is not listed is read. Raises
     ImportError for a file that differs, and passes on whatever the package raises.
     """
-    path = directory.resolve()
+    path = Path(os.path.realpath(directory))
     # Of place and content, so that a package generated anew is imported anew.
     digest = hashlib.sha256(str(path).encode() + (path / FILE).read_bytes()).hexdigest()[:16]
     name = f"_linkwise_{digest}"

@@ -50,7 +50,7 @@ def check_target(directory: Path, robot: str) -> None:
 
 def refuse_inside_package(place: Path) -> None:
     """Raise LinkwiseError for a generated package, or a place inside one: what is written there spoils it."""
-    here = place.resolve()
+    here = Path(os.path.realpath(place))
     for parent in (here, *here.parents):
         if earlier_package(parent):
             raise LinkwiseError(
