@@ -182,6 +182,15 @@ def test_closed_forms_of_a_users_energies_are_held_against_their_own_torques(tmp
     assert "numpy: c1 against differences of numpy's torques" in failing
 
 
+def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp_path: Path) -> None:
+    x = Coordinate("x", "m")
+    for name, potential in (("near", sp.sqrt(x.q)), ("nowhere", sp.sqrt(x.q - 4))):
+        system = energy_system(name, [x], [LinkEnergy("bead", x.qd**2, potential)])
+        write_package(generate(system, ["numpy"]), tmp_path / name)
+    assert set(marks(tmp_path / "near").values()) == {"ok"}
+    assert marks(tmp_path / "nowhere")["numbers"] == "skip"
+
+
 @pytest.mark.parametrize("spec", ["planar2", str(DATA / "cart_pendulum.py")])
 def test_c_alone_is_compiled_and_held_against_what_there_is(spec: str, tmp_path: Path) -> None:
     write_package(generate(read_system(spec), ["c"], "robot_c"), tmp_path / "robot_c")

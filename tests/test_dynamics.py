@@ -134,6 +134,12 @@ def test_principal_axes_that_are_the_links_own_or_unknown_are_not_tried() -> Non
         assert principal_axes(tuple(map(tuple, inertia.tolist()))) is not None
 
 
+def test_deriving_says_how_far_it_is() -> None:
+    said: list[tuple[str, int, int]] = []
+    derive(read_system("planar2"), lambda *progress: said.append(progress))
+    assert said == [("derive", 0, 2), ("derive", 1, 2), ("derive", 2, 2)]
+
+
 def test_joints_that_follow_one_coordinate_have_labels_of_their_own() -> None:
     system = read_system(DATA / "skew.toml")
     assert isinstance(system, RigidSystem)

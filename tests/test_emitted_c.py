@@ -1,6 +1,7 @@
 """The emitted C compiles without a warning and says what NumPy says, in either precision, for any count."""
 
 import ctypes
+import os
 import platform
 import re
 import shutil
@@ -336,3 +337,16 @@ def test_links_of_energies_with_and_without_linear_terms_go_together(tmp_path: P
     for compiler in COMPILERS:
         if shutil.which(compiler):
             compile_library(tmp_path / "pair", tmp_path / "library.so", COMPILERS[compiler])
+
+
+def test_no_samples_touch_no_memory(directory_of: Callable[[str], Path]) -> None:
+    library = Compiled(directory_of("planar3")).library
+    outputs = {"decomposition": 4, "decomposition_blocks": 4, "torque": 1, "position_gradient": 1}
+    child = os.fork()
+    if child == 0:
+        for name, count in outputs.items():
+            for suffix in ("", "f"):
+                nowhere = [ctypes.c_void_p(None)] * (3 + count)
+                getattr(library, f"planar3_{name}{suffix}")(ctypes.c_size_t(0), *nowhere)
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0

@@ -4,8 +4,11 @@ import math
 import random
 
 import pytest
+import sympy as sp
 from evaluation import evaluate
+from linkwise.expression.count import count_operations, in_words
 from linkwise.expression.differentiate import derivative, substitute
+from linkwise.expression.from_sympy import Lowering
 from linkwise.expression.graph import FUNCTIONS, Graph, Node
 
 SMOOTH_AT_HALF = sorted(FUNCTIONS)
@@ -27,6 +30,121 @@ def test_constants_fold_and_units_vanish() -> None:
     assert g.add(x, g.zero) == g.mul(x, g.one) == x
     assert g.mul(x, g.zero) == g.sub(x, x) == g.zero
     assert g.mul(g.const(2.0), g.mul(g.const(3.0), x)) == g.mul(g.const(6.0), x)
+
+
+def test_simplifications_are_these() -> None:
+    g = Graph()
+    x, y, two = g.symbol("x"), g.symbol("y"), g.const(2.0)
+    same = [
+        (g.add(g.neg(x), g.neg(y)), g.neg(g.add(x, y))),
+        (g.add(x, g.neg(y)), g.sub(x, y)),
+        (g.add(g.neg(x), y), g.sub(y, x)),
+        (g.add(g.const(-2.0), x), g.sub(x, two)),
+        (g.add(x, g.const(-2.0)), g.sub(x, two)),
+        (g.sub(x, g.const(-2.0)), g.add(x, two)),
+        (g.sub(x, g.neg(y)), g.add(x, y)),
+        (g.sub(g.neg(x), y), g.neg(g.add(x, y))),
+        (g.sub(g.zero, x), g.neg(x)),
+        (g.sub(x, g.zero), x),
+        (g.add(x, x), g.mul(two, x)),
+        (g.neg(g.neg(x)), x),
+        (g.mul(x, g.const(-2.0)), g.neg(g.mul(two, x))),
+        (g.mul(g.neg(x), g.neg(y)), g.mul(x, y)),
+        (g.mul(y, x), g.mul(x, y)),
+        (g.div(x, g.const(4.0)), g.mul(g.const(0.25), x)),
+        (g.div(g.neg(x), y), g.neg(g.div(x, y))),
+        (g.div(g.zero, x), g.zero),
+        (g.call("cos", g.neg(x)), g.call("cos", x)),
+        (g.call("sin", g.neg(x)), g.neg(g.call("sin", x))),
+        (g.const(-0.0), g.zero),
+        (g.add(g.const(1.5), g.const(-1.5)), g.zero),
+    ]
+    assert [at for at, (one, other) in enumerate(same) if one != other] == []
+    assert g.call("tanh", g.neg(x)) != g.call("tanh", x)
+    with pytest.raises(ZeroDivisionError, match="an expression divides by zero"):
+        g.div(x, g.zero)
+
+
+def test_constants_fold_by_their_decimals() -> None:
+    g = Graph()
+    assert g.value(g.add(g.const(0.1), g.const(0.2))) == 0.3
+    assert g.value(g.sub(g.const(0.3), g.const(0.1))) == 0.2
+    assert g.value(g.mul(g.const(0.1), g.const(3.0))) == 0.3
+    third = g.div(g.one, g.const(3.0))
+    assert g.value(g.mul(third, g.const(3.0))) == 1.0
+    root = g.call("sqrt", g.const(2.0))
+    assert g.value(g.mul(root, root)) == 2.0
+    assert g.value(g.call("sin", g.const(0.5))) == math.sin(0.5)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_folds_keeps_its_value(seed: int) -> None:
+    choice, g = random.Random(seed), Graph()
+    at = {"x": 0.7, "y": -0.4, "z": 1.1}
+    known = {g.symbol(name): value for name, value in at.items()}
+    known |= {g.const(value): value for value in (0.0, 1.0, -1.0, 2.0, -0.3, 0.5)}
+    results = []
+    for _ in range(60):
+        a, b = (choice.choice(list(known)) for _ in range(2))
+        (u, v), operation = (
+            (known[a], known[b]),
+            choice.choice(("add", "sub", "mul", "div", "neg", "cos", "sin")),
+        )
+        if operation in ("cos", "sin"):
+            node, value = g.call(operation, a), getattr(math, operation)(u)
+        elif operation == "neg":
+            node, value = g.neg(a), -u
+        elif operation == "div":
+            if abs(v) < 0.05:
+                continue
+            node, value = g.div(a, b), u / v
+        else:
+            node = getattr(g, operation)(a, b)
+            value = {"add": u + v, "sub": u - v, "mul": u * v}[operation]
+        if abs(value) < 1e3:
+            results.append((node, value))
+            known[node] = value
+    found = evaluate(g, [node for node, _ in results], at)
+    assert found == pytest.approx([value for _, value in results], rel=1e-9, abs=1e-12)
+
+
+def test_operations_are_counted_once_and_by_kind() -> None:
+    g = Graph()
+    x, y = g.symbol("x"), g.symbol("y")
+    shared = g.mul(x, y)
+    outputs = [g.add(shared, x), g.sub(shared, y), g.neg(g.div(g.call("sin", shared), g.add(y, x)))]
+    count = count_operations(g, outputs)
+    assert (count.additions, count.multiplications, count.divisions, count.functions) == (3, 1, 1, 1)
+    assert count.arithmetic == 5
+    assert (count + count).arithmetic == 10
+    assert (count + count).functions == 2
+    assert in_words(count) == "4 additions and multiplications, 1 division, 1 sine or the like"
+    without = count_operations(g, outputs, {shared})
+    assert (without.multiplications, without.arithmetic) == (0, 4)
+    assert in_words(count_operations(g, [shared])) == "1 addition or multiplication"
+    assert in_words(count + count).endswith("2 divisions, 2 sines, cosines and the like")
+
+
+X, Y = sp.symbols("x y")
+LOWERED = [
+    X**3 / Y,
+    -X / (2 * Y**2),
+    sp.sqrt(X) * Y,
+    X ** sp.Rational(3, 2),
+    X ** sp.Rational(-1, 2),
+    X ** sp.Rational(1, 3) + X ** sp.Rational(-2, 3),
+    X**Y,
+    Y * sp.sin(X) ** 2 + sp.exp(-X) - sp.log(Y) / 7,
+    sp.atan(X * Y) + sp.pi * X - sp.sqrt(2),
+]
+
+
+@pytest.mark.parametrize("expression", LOWERED, ids=str)
+def test_a_sympy_expression_keeps_its_value(expression: sp.Expr) -> None:
+    g = Graph()
+    lower = Lowering(g, {X: g.symbol("x"), Y: g.symbol("y")})
+    at = {"x": 1.7, "y": 0.6}
+    assert evaluate(g, [lower(expression)], at) == pytest.approx([float(expression.subs(at))], rel=1e-14)
 
 
 def random_expression(g: Graph, leaves: list[Node], steps: int, seed: int) -> Node:

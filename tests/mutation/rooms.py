@@ -35,9 +35,8 @@ ROOMS: dict[str, Room] = {
         _house("dynamics"),
         (
             "tests/test_dynamics.py",
-            "tests/test_robots_joints.py",
+            "tests/test_robots_builtin.py",
             "tests/test_user_energies.py",
-            "tests/numeric/test_position_gradient.py",
         ),
     ),
     "symbolic": Room(
@@ -109,6 +108,8 @@ ROOMS: dict[str, Room] = {
     "robot": Room(
         (*_house("robot"), "generator/linkwise/robot/readers/*.py"),
         (
+            "tests/test_robots_transforms.py",
+            "tests/test_robots_names.py",
             "tests/test_robots_builtin.py",
             "tests/test_robots_bad.py",
             "tests/test_robots_joints.py",

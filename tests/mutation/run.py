@@ -164,9 +164,10 @@ def room_mutants(room: Room, each: int, seed: int) -> list[Mutant]:
         for path in sorted((ROOT / top).rglob("*")):
             name = path.relative_to(ROOT).as_posix()
             if path.is_file() and room.holds(name) and "__pycache__" not in name:
-                group = list(mutants(name, path.read_text(encoding="utf-8")))
+                text = path.read_text(encoding="utf-8")
+                group = list(mutants(name, text))
                 chosen.shuffle(group)
-                groups.append(group)
+                groups.append([mutant for mutant in group[: each * 2] if mutant.parses(text)])
     total = sum(map(len, groups))
     # Long files get more: each line has the same chance.
     drawn = [(k / len(group), g, group[k]) for g, group in enumerate(groups) for k in range(len(group))]

@@ -131,8 +131,11 @@ def _wrong_number(manifest: Manifest, compiled: CompiledPackage, rows: IndexRows
 
 def _wrong_table(manifest: Manifest, directory: Path, rows: IndexRows) -> str:
     text = (directory / "c" / f"{manifest.name}_index.h").read_text(encoding="utf-8")
+    name = re.escape(manifest.name)
     for what in ("c2", "c1", "g", "h1"):
-        body = re.search(rf"_{what}_index\[[^=]*= \{{(.*?)\n\}};", text, re.DOTALL)
+        size = f"{name.upper()}_{what.upper()}"
+        head = rf"static const short {name}_{what}_index\[{size}\]\[{rows.of(what).shape[1]}\]"
+        body = re.search(rf"^{head} = \{{(.*?)\n\}};", text, re.DOTALL | re.MULTILINE)
         found = re.findall(r"\{([\d, ]+)\}", body[1]) if body else []
         listed = [[int(number) - 1 for number in row.split(",")] for row in found]
         if listed != rows.of(what).tolist():

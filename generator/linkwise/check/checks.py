@@ -109,6 +109,9 @@ class _Checks:
         functions = CFunctions(manifest, compiled, rows, values) if compiled else None
         reference = self._bodies() if not label else None
         reference = reference or self._own_reference(loaded, functions)
+        if reference is not None and not len(reference.states.q):
+            yield Skipped(f"numbers{label}", "the energies are defined at none of the random states")
+            return
         yield from check_formulas(self.package, rows, values, label, reference)
         if reference is None:
             yield Skipped(

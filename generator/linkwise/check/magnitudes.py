@@ -1,8 +1,8 @@
 """How large the numbers are that a partial torque is summed from: what its rounding is measured by.
 
-The Newton–Euler recursion with lengths for vectors: sums add magnitudes, products multiply them, so that
-nothing cancels. A torque that is 0 by geometry has no size of its own; of its operands, which have this one,
-rounding leaves some 1e-16.
+Spatial vectors about the base, with lengths for vectors: sums add magnitudes, products multiply them,
+so that nothing cancels. Closed forms in a common frame add such numbers too, and lose what cancels of them.
+A torque that is 0 by geometry has no size of its own; of its operands rounding leaves some 1e-16.
 """
 
 from dataclasses import dataclass
@@ -15,11 +15,14 @@ from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
 @dataclass(frozen=True)
 class _Sizes:
-    """Of a frame: distance from the base, speed of its origin, |ω|, |α|, and |acceleration − gravity|."""
+    """Of a frame: distance from the base; |ω|, |v|, |α|, |a − gravity| of its twist and its change.
+
+    v and a are those of the point at the base's origin, moving with the frame.
+    """
 
     reach: float = 0.0
-    v: float = 0.0
     omega: float = 0.0
+    v: float = 0.0
     alpha: float = 0.0
     a: float = 0.0
 
@@ -39,14 +42,14 @@ class Magnitudes:
         frames = self._frames(q, qd, qdd, self.gravity if gravity else 0.0)
         tau = np.zeros((self.n, len(self.links)))
         for j, at in enumerate(self.links):
-            body, frame, lever = self.bodies[at], frames[at], _length(self.bodies[at].com)
+            body, frame, reach = self.bodies[at], frames[at], self._com(frames, at)
             turning = frame.alpha + frame.omega**2
-            force = body.mass * (frame.a + turning * lever)
-            moment = float(np.linalg.norm(body.inertia)) * turning
+            force = body.mass * (frame.a + frame.omega * frame.v + turning * reach)
+            moment = reach * force + float(np.linalg.norm(body.inertia)) * turning
             back: int | None = at
             while back is not None:
                 upper = self.bodies[back]
-                about = moment + (frame.reach + lever + frames[back].reach) * force
+                about = moment + frames[back].reach * force
                 tau[upper.coordinate, j] += abs(upper.ratio) * (about if upper.kind == "revolute" else force)
                 back = upper.parent
         return tau
@@ -56,13 +59,14 @@ class Magnitudes:
         frames = self._frames(q, qd, 0.0 * qd, 0.0)
         sizes = []
         for at in self.links:
-            body, frame, lever = self.bodies[at], frames[at], _length(self.bodies[at].com)
-            speed = frame.v + frame.omega * lever
+            body, frame, reach = self.bodies[at], frames[at], self._com(frames, at)
+            speed = frame.v + frame.omega * reach
             spin = float(np.linalg.norm(body.inertia)) * frame.omega**2
-            sizes.append(
-                0.5 * (body.mass * speed**2 + spin) + body.mass * self.gravity * (frame.reach + lever)
-            )
+            sizes.append(0.5 * (body.mass * speed**2 + spin) + body.mass * self.gravity * reach)
         return np.array(sizes)
+
+    def _com(self, frames: list[_Sizes], at: int) -> float:
+        return frames[at].reach + _length(self.bodies[at].com)
 
     def _frames(self, q: Array, qd: Array, qdd: Array, gravity: float) -> list[_Sizes]:
         frames: list[_Sizes] = []
@@ -74,13 +78,17 @@ class Magnitudes:
 
 
 def _carried(body: BodyEntry, up: _Sizes, turn: float, rate: float, change: float) -> _Sizes:
+    """A frame on `up`: V + S q̇ and A + S q̈ + V × S q̇, with S = (z, s), |s| the distance of a hinge's axis."""
     sliding = body.kind == "prismatic"
-    arm = _length(body.translation) + (turn if sliding else 0.0)
-    v = up.v + up.omega * arm
-    a = up.a + (up.alpha + up.omega**2) * arm
-    if sliding:
-        return _Sizes(up.reach + arm, v + rate, up.omega, up.alpha, a + 2 * up.omega * rate + change)
-    return _Sizes(up.reach + arm, v, up.omega + rate, up.alpha + change + up.omega * rate, a)
+    reach = up.reach + _length(body.translation) + (turn if sliding else 0.0)
+    z, s = (0.0, 1.0) if sliding else (1.0, reach)
+    return _Sizes(
+        reach,
+        up.omega + rate * z,
+        up.v + rate * s,
+        up.alpha + change * z + rate * up.omega * z,
+        up.a + change * s + rate * (up.omega * s + up.v * z),
+    )
 
 
 def _length(vector: tuple[float, float, float]) -> float:

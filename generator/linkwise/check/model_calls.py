@@ -8,6 +8,7 @@ import numpy as np
 from linkwise.check.compare import Entries, Result, compare, dense
 from linkwise.check.packed_layout import IndexRows, Rows, spread
 from linkwise.check.reference import Reference, States
+from linkwise.extras import extra
 from linkwise.package.load import Array, Model
 from linkwise.package.manifest import Manifest
 
@@ -148,8 +149,6 @@ def _energies(checked: Named) -> Iterator[Result]:
 
 
 def _lagrangians(model: Model, states: States) -> Array:
-    from linkwise.extras import extra
-
     torch = extra("torch")
     motion = [torch.from_numpy(x) for x in (states.q, states.qd)]
     return np.stack([module(*motion).detach().numpy() for module in model.backend.modules], -1)

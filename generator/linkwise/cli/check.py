@@ -21,7 +21,7 @@ def check(
     samples: Annotated[int, typer.Option(min=1, help="Random states")] = 100,
     as_json: Json = False,
 ) -> None:
-    """Prove a package right: hashes, back ends, an independent recursion, closure, structure."""
+    """Prove a package right: hashes, and every entry of every formula, back end and C function."""
     results = check_package(package, samples)
     if as_json:
         print(json_text([_row(result) for result in results], indent=1))
