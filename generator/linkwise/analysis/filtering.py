@@ -16,7 +16,7 @@ from linkwise.package.load import Array
 def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536) -> None:
     """Filter q (samples, n) in place; `rate` in Hz, `rows` the length of a block.
 
-    Raises LinkwiseError for a cutoff too low to be computed, or not below half the rate, and for a log too short.
+    Raises LinkwiseError for a cutoff too low to compute, or not below half the rate, and a log too short.
     """
     signal = extra("scipy.signal")
     if settings.cutoff >= rate / 2:
