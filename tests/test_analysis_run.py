@@ -112,6 +112,14 @@ def test_too_few_samples(tmp_path):
         analyze(path, PLANAR3)
 
 
+def test_a_cutoff_too_low_to_be_computed_is_named(tmp_path):
+    path = write_csv(tmp_path / "a.csv", smooth(30, 3))
+    with pytest.raises(
+        LinkwiseError, match=r"a.csv: --cutoff 1e-09 Hz is too low for a sampling rate of 100"
+    ):
+        analyze(path, PLANAR3, processing=Processing(lowpass=Lowpass(1e-9)))
+
+
 def test_a_robot_that_does_not_close_is_refused():
     Closure(terms_relative=1e-13).check()
     for bad in (1e-3, float("nan")):

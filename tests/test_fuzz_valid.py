@@ -11,7 +11,7 @@ from fuzz.valid_logs import random_log
 from fuzz.valid_robots import random_robot
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from linkwise import generate, read_system, write_package
+from linkwise import Options, generate, read_system, write_package
 from linkwise.analysis.logs import open_log
 from linkwise.package.manifest import Manifest
 
@@ -39,7 +39,7 @@ def test_a_manifest_reads_back_exactly(rng: Random) -> None:
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"robot.{robot.form}"
         path.write_text(robot.text, encoding="utf-8")
-        files = generate(read_system(path), ["numpy"], "robot")
+        files = generate(read_system(path, Options(allow_unphysical=True)), ["numpy"], "robot")
         write_package(files, Path(folder) / "robot")
         manifest = Manifest.read(Path(folder) / "robot")
     assert manifest.text() == files["manifest.json"]

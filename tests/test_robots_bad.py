@@ -368,6 +368,15 @@ def test_unknown_name_in_an_option_is_named(case: str, tmp_path: Path) -> None:
     assert message in str(caught.value)
 
 
+def test_a_robot_whose_moving_links_weigh_nothing_is_refused_whatever_is_allowed(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_text(robot(link("a"), '<link name="b"/>', AB))
+    with pytest.raises(
+        LinkwiseError, match=r"robot.urdf: no moving link has mass, so no torque is to be had"
+    ):
+        read_system(path, Options(allow_unphysical=True))
+
+
 def test_named_options_get_past(tmp_path: Path) -> None:
     path = tmp_path / "robot.urdf"
     path.write_text(BAD["negative"][0])

@@ -16,7 +16,7 @@ from linkwise.package.load import Array
 def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536) -> None:
     """Filter q (samples, n) in place; `rate` in Hz, `rows` the length of a block.
 
-    Raises LinkwiseError for a cutoff at or above half the rate, or a log shorter than the padding.
+    Raises LinkwiseError for a cutoff too low to compute, or not below half the rate, and a log too short.
     """
     signal = extra("scipy.signal")
     if settings.cutoff >= rate / 2:
@@ -31,7 +31,12 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536) -> None
         )
     front = _extension(q[: pad + 1], settings.padding)
     back = _extension(q[-1 : -pad - 2 : -1], settings.padding)[::-1]
-    rest = signal.sosfilt_zi(sos)[:, :, None]
+    try:
+        rest = signal.sosfilt_zi(sos)[:, :, None]
+    except np.linalg.LinAlgError:  # its poles round to 1
+        raise LinkwiseError(
+            f"--cutoff {settings.cutoff:g} Hz is too low for a sampling rate of {rate:g} Hz; raise it"
+        ) from None
     blocks = [(at, min(at + rows, len(q))) for at in range(0, len(q), rows)]
 
     state = rest * (front[0] if pad else q[0])
