@@ -23,7 +23,10 @@ parameters = ROBOT.parameters
 
 
 def load(
-    backend: str = "numpy", parameters: Mapping[str, Any] | None = None, check_finite: bool = False
+    backend: str = "numpy",
+    parameters: Mapping[str, Any] | None = None,
+    check_finite: bool = False,
+    allow_unphysical: bool = False,
 ) -> Dynamics:
     """Return the robot on a back end; all of them answer the same calls.
 
@@ -34,6 +37,8 @@ def load(
         native: the C code, compiled by this system's compiler
 
     parameters: none here; generate with --parameters symbolic to keep them.
+
+    allow_unphysical: whether values of parameters are taken that no body has: there are none here.
 
     check_finite: whether every call looks at q, qd and qdd first and raises ValueError for NaN and infinity.
 
@@ -49,8 +54,9 @@ def load(
         raise ValueError("this package has no back end to load; generate it with --backend numpy, say")
     if backend not in BACKENDS:
         raise ValueError(f"no back end {backend!r} in this package; choose one of {', '.join(BACKENDS)}")
-    made = _MAKERS[backend](ROBOT.values(parameters))
-    return Dynamics(ROBOT, made, load, (backend, dict(parameters or {}), check_finite), check_finite)
+    made = _MAKERS[backend](ROBOT.values(parameters, allow_unphysical))
+    asked = backend, dict(parameters or {}), check_finite, allow_unphysical
+    return Dynamics(ROBOT, made, load, asked, check_finite)
 
 
 def _numpy(values: Mapping[str, Any]) -> Backend[Any]:
