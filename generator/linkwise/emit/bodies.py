@@ -25,8 +25,8 @@ FREE = "They are those of the energies: any finite value is taken."
 ALLOWED = "Any finite value is taken, also such as no body has: generated with --allow-unphysical."
 REFUSED = (
     "Values that no rigid body has are refused unless `allow_unphysical`: a negative mass, a negative "
-    "principal moment of inertia, or one above the sum of the others. They are looked at here, not again when "
-    "a tensor changes later, and not inside torch.func and torch.compile."
+    "principal moment of inertia, or one above the sum of the others. They are looked at here, not again "
+    "when a tensor changes later, and not inside torch.func and torch.compile."
 )
 EXEMPT = "Free of that, as they break it in the file already: {}."
 WIDTH = 108
