@@ -56,6 +56,8 @@ ROOMS: dict[str, Room] = {
             "tests/test_runtime.py",
             "tests/test_package_import.py",
             "tests/test_names.py",
+            "tests/test_parameters.py",
+            "tests/test_escape.py",
             "tests/test_emitted_c.py",
             "tests/test_user_energies.py",
         ),
@@ -72,18 +74,38 @@ ROOMS: dict[str, Room] = {
     ),
     "check": Room(_house("check"), ("tests/test_check_sources.py", CHECK)),
     "package": Room(
-        _house("package"), (CHECK, "tests/test_package_import.py", "tests/test_cli.py"), leave=("*/write.py",)
+        _house("package"),
+        ("tests/test_manifest.py", CHECK, "tests/test_package_import.py", "tests/test_cli.py"),
     ),
     "runtime": Room(
         _house("runtime"),
-        ("tests/test_package_calls.py", "tests/test_runtime.py", "tests/test_user_energies.py", CHECK),
+        (
+            "tests/test_package_arguments.py",
+            "tests/test_package_calls.py",
+            "tests/test_parameters.py",
+            "tests/test_runtime.py",
+            "tests/test_user_energies.py",
+            CHECK,
+        ),
         leave=("*/native_*.py",),
     ),
     "native": Room(
         ("generator/linkwise/runtime/native_*.py",),
-        ("tests/test_native.py", "tests/test_package_calls.py", "tests/test_runtime.py"),
+        (
+            "tests/test_native.py",
+            "tests/test_native_cache.py",
+            "tests/test_package_calls.py",
+            "tests/test_runtime.py",
+        ),
     ),
     "c headers": Room(("generator/linkwise/runtime/c/*.h",), (CHECK, "tests/test_emitted_c.py")),
+    "output": Room(
+        (
+            *_house("output"),
+            *(f"generator/linkwise/{name}.py" for name in ("escape", "errors", "input_file")),
+        ),
+        ("tests/test_escape.py", "tests/test_output.py", "tests/test_cli_endings.py", "tests/test_cli.py"),
+    ),
     "report": Room(
         (*_house("report"), "templates/report/*.j2"),
         (
@@ -114,6 +136,9 @@ ROOMS: dict[str, Room] = {
             "tests/test_robots_bad.py",
             "tests/test_robots_joints.py",
             "tests/test_robots_mjcf.py",
+            "tests/test_robots_mjcf_options.py",
+            "tests/test_parameters.py",
+            "tests/numeric/test_parameters_of_file.py",
             "tests/test_cli.py",
         ),
     ),
