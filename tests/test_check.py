@@ -20,6 +20,7 @@ from linkwise import (
     Coordinate,
     LinkEnergy,
     LinkwiseError,
+    Options,
     check_package,
     energy_system,
     generate,
@@ -59,11 +60,11 @@ def change_manifest(package: Path, change: Callable[[Any], object]) -> None:
     path.write_text(json.dumps(data))
 
 
-def change_file(package: Path, name: str, old: str, new: str) -> None:
+def change_file(package: Path, name: str, old: str, new: str, count: int = -1) -> None:
     """Change a file and its hash."""
     text = (package / name).read_text()
     assert old in text
-    text = text.replace(old, new)
+    text = text.replace(old, new, count)
     (package / name).write_text(text)
     digest = hashlib.sha256(text.encode()).hexdigest()
     change_manifest(package, lambda data: data["files"].update({name: digest}))
@@ -71,6 +72,54 @@ def change_file(package: Path, name: str, old: str, new: str) -> None:
 
 def marks(directory: Path) -> dict[str, str]:
     return {result.name: result.mark for result in check_package(directory, 10)}
+
+
+ODD = """schema = 1
+name = "odd"
+gravity = [0, 0, -9.81]
+[[link]]
+name = "up $<per"
+mass = 1.2
+com = [0.1, 0, 0]
+inertia = { xx = 0.001, yy = 0.01, zz = 0.011 }
+[[joint]]
+name = "a joint"
+type = "revolute"
+parent = "base"
+child = "up $<per"
+axis = [0, 1, 0]
+"""
+
+
+@pytest.mark.parametrize("parameters", ["symbolic", "nonzero"])
+def test_names_that_no_formula_can_hold_are_read_back(parameters: Any, tmp_path: Path) -> None:
+    (tmp_path / "odd.toml").write_text(ODD)
+    system = read_system(str(tmp_path / "odd.toml"), Options(parameters))
+    backends = ["numpy", "formulas"]
+    request = {"backends": backends, "parameters": parameters}
+    write_package(generate(system, backends, "odd", request), tmp_path / "odd")
+    assert set(marks(tmp_path / "odd").values()) == {"ok"}
+
+
+def test_a_wrong_term_of_a_parameter_that_is_zero_fails(tmp_path: Path) -> None:
+    (tmp_path / "odd.toml").write_text(ODD)
+    system = read_system(str(tmp_path / "odd.toml"), Options("symbolic"))
+    write_package(generate(system, ["numpy"], "odd"), tmp_path / "odd")
+    change_file(
+        tmp_path / "odd",
+        "forms/link_1.py",
+        "n1_c2_y,  # c2(1, 1, 1)",
+        "n1_c2_y - p_c_up___per_z,  # c2(1, 1, 1)",
+    )
+    failing = {name for name, mark in marks(tmp_path / "odd").items() if mark == "FAIL"}
+    assert "numpy, other parameters: M^j against differences of numpy's torques" in failing
+
+
+def test_a_result_given_twice_is_computed_once(tmp_path: Path) -> None:
+    theta, x = Coordinate("theta"), Coordinate("x", "m")
+    links = [LinkEnergy("cart", x.qd**2 + theta.qd**2, 0), LinkEnergy("spring", 0, 4.9 * sp.cos(theta.q))]
+    write_package(generate(energy_system("two", [x, theta], links), ["numpy"]), tmp_path / "two")
+    assert marks(tmp_path / "two")["manifest"] == "ok"
 
 
 def test_a_coefficient_that_is_zero_but_for_rounding_passes(tmp_path: Path) -> None:

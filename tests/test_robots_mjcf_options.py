@@ -154,6 +154,8 @@ def test_nothing_is_told_of_a_joint_that_is_held_or_cut_off(tmp_path: Path) -> N
     assert [line.partition(":")[0] for line in held] == ["gravity compensation left out of the torques"]
     cut = effects(read_system(path, Options(root="upper")).robot.notes)
     assert [line.partition(":")[0] for line in cut] == ["gravity compensation left out of the torques"]
+    left = effects(read_system(path, Options(tip="upper")).robot.notes)
+    assert "gravity compensation left out of the torques" not in [line.partition(":")[0] for line in left]
 
 
 def test_accelerations_as_differences_are_told(tmp_path: Path) -> None:

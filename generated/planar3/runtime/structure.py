@@ -84,7 +84,7 @@ class Structure:
         """Number of packed values of one sample: c2, c1, g, tau, h1."""
         return Sizes(*map(len, self.layout))
 
-    def values(self, given: Mapping[str, Any] | None, allow_unphysical: bool) -> dict[str, Any]:
+    def values(self, given: Mapping[str, Any] | None, allow_unphysical: bool = False) -> dict[str, Any]:
         """All parameters, those `given` in place of their own, checked as the package's `load` says."""
         return checked_values(self.parameters, given or {}, () if allow_unphysical else self.bodies)
 

@@ -61,6 +61,9 @@ class _Writer:
         self.graph, self.printer, self.given = graph, printer, given
         computed = [node for node in order if node not in given]
         self.uses = Counter(o for node in computed for o in operands(graph.nodes[node])) + Counter(outputs)
+        for node in reversed(computed):  # a sign is no variable: what it stands before is used as often
+            if graph.nodes[node][0] == "neg":
+                self.uses[operands(graph.nodes[node])[0]] += self.uses[node] - 1
         leaves = (graph.nodes[node][1] for node in order if graph.nodes[node][0] == "symbol")
         self.names = _Names([*leaves, *given.values()])
         self.texts: dict[Node, Text] = {}

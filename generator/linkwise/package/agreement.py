@@ -59,7 +59,8 @@ def _there(manifest: Manifest, module: ModuleType) -> Iterator[tuple[str, Any]]:
         # C alone and formulas are files: no part of what can be loaded.
         yield "request.backends", {*module.BACKENDS, *_not_loaded(request["backends"], module)}
     if "parameters" in request:
-        yield "request.parameters", "symbolic" if robot.parameters else request["parameters"]
+        wanted = request["parameters"]
+        yield "request.parameters", "symbolic" if robot.parameters and wanted == "numeric" else wanted
 
 
 def _not_loaded(backends: Iterable[str], module: ModuleType) -> Iterator[str]:

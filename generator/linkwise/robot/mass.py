@@ -1,5 +1,6 @@
 """Mass properties: merging rigidly connected bodies, and whether a body can exist."""
 
+import math
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
@@ -99,5 +100,7 @@ def _fault(body: Body) -> str:
     if low < -TRIANGLE * high or high < 0:
         return f"an inertia that is not positive (principal moment {low:.3g} kg·m²)"
     if high > low + middle + TRIANGLE * high:
-        return f"an inertia that breaks the triangle inequality ({high:.4g} > {low:.4g} + {middle:.4g} kg·m²)"
+        excess = 100 * (high / (low + middle) - 1) if low + middle else math.inf
+        numbers = f"{high:.4g} > {low:.4g} + {middle:.4g} kg·m², by {excess:.2g} %"
+        return f"an inertia that breaks the triangle inequality ({numbers})"
     return ""

@@ -52,7 +52,8 @@ class Note:
 class Omission:
     """A force or inertia that a file has, and that no torque holds: `what` it is, of which `subject`.
 
-    It acts while one of its joints or bodies moves, or always where it names none.
+    It acts while one of its joints or bodies moves, or always where it names none, and only while all that it
+    `needs` is carried along.
     """
 
     what: str
@@ -60,9 +61,12 @@ class Omission:
     detail: str = ""
     joints: tuple[str, ...] = ()
     bodies: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
 
     def acts(self, joints: Collection[str], bodies: Collection[str]) -> bool:
         """Whether it loads a joint, of the joints and bodies that move."""
+        if any(body not in bodies for body in self.needs):
+            return False
         anywhere = not (self.joints or self.bodies)
         return anywhere or any(j in joints for j in self.joints) or any(b in bodies for b in self.bodies)
 

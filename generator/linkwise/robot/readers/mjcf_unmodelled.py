@@ -124,7 +124,7 @@ def _of_bodies(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
             joints += [names.joints[joint] for joint in own if not model.jnt_actgravcomp[joint]]
             at = int(model.body_parentid[at])
         if joints and any(model.opt.gravity) and any(values := names.values(acting, number)):
-            yield Omission(acting.what, name, _detail(values, acting.units[0]), tuple(joints))
+            yield Omission(acting.what, name, _detail(values, acting.units[0]), tuple(joints), needs=(name,))
 
 
 def _of_tendons(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
