@@ -105,12 +105,8 @@ def test_a_wrong_term_of_a_parameter_that_is_zero_fails(tmp_path: Path) -> None:
     (tmp_path / "odd.toml").write_text(ODD)
     system = read_system(str(tmp_path / "odd.toml"), Options("symbolic"))
     write_package(generate(system, ["numpy"], "odd"), tmp_path / "odd")
-    change_file(
-        tmp_path / "odd",
-        "forms/link_1.py",
-        "n1_c2_y,  # c2(1, 1, 1)",
-        "n1_c2_y - p_c_up___per_z,  # c2(1, 1, 1)",
-    )
+    first = "p_c_up___per_z * s1", "p_c_up___per_z * q1", 1
+    change_file(tmp_path / "odd", "forms/link_1.py", *first)
     failing = {name for name, mark in marks(tmp_path / "odd").items() if mark == "FAIL"}
     assert "numpy, other parameters: M^j against differences of numpy's torques" in failing
 
