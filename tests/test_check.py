@@ -118,6 +118,16 @@ def test_a_result_given_twice_is_computed_once(tmp_path: Path) -> None:
     assert marks(tmp_path / "two")["manifest"] == "ok"
 
 
+def test_c_that_ends_the_process_fails(tmp_path: Path) -> None:
+    package = tmp_path / "planar2"
+    write_package(generate(read_system("planar2"), ["c"]), package)
+    change_file(
+        package, "c/planar2.c", "    struct block x;\n", "    struct block x;\n    *(volatile int *)0 = 0;\n"
+    )
+    failing = {result.name: result.detail for result in check_package(package, 10) if not result.passed}
+    assert failing == {"c: runs to its end": "it ended the process by SIGSEGV"}
+
+
 def test_a_coefficient_that_is_zero_but_for_rounding_passes(tmp_path: Path) -> None:
     theta, length = Coordinate("theta"), 0.7
     vx, vy = (sp.diff(length * f(theta.q), theta.q) * theta.qd for f in (sp.sin, sp.cos))

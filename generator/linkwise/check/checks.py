@@ -14,6 +14,7 @@ from linkwise.check.formula_texts import check_formulas
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.model_calls import Named, against_reference
 from linkwise.check.newton_euler import NewtonEuler
+from linkwise.check.own_process import Ended, in_own_process
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.reference import (
     Reference,
@@ -118,7 +119,7 @@ class _Checks:
                 f"numbers{label}", "energies of a user's own, and nothing here that computes with them"
             )
             return
-        for result in functions.check(f"c{label}", reference) if functions else ():
+        for result in _c_results(functions, f"c{label}", reference) if functions else ():
             c_passes &= result.passed
             yield result
         for name, model in loaded.items():
@@ -148,7 +149,17 @@ class _Checks:
                 return lagrangian_reference(model.backend.modules, self.states)
         for name, model in loaded.items():
             return torque_reference(name, model.partial_torque, self.states)
-        return torque_reference("c", functions.torque, self.states) if functions else None
+        if functions is None:
+            return None
+        return in_own_process(lambda: torque_reference("c", functions.torque, self.states))
+
+
+def _c_results(functions: CFunctions, name: str, reference: Reference) -> list[Result]:
+    """What each function of the C gives; a wrong one may write anywhere."""
+    try:
+        return in_own_process(lambda: list(functions.check(name, reference)))
+    except Ended as ended:
+        return [Result(f"{name}: runs to its end", False, None, str(ended))]
 
 
 def _changed(values: Mapping[str, float]) -> dict[str, float]:

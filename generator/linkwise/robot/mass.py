@@ -1,6 +1,5 @@
 """Mass properties: merging rigidly connected bodies, and whether a body can exist."""
 
-import math
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
@@ -100,7 +99,7 @@ def _fault(body: Body) -> str:
     if low < -TRIANGLE * high or high < 0:
         return f"an inertia that is not positive (principal moment {low:.3g} kg·m²)"
     if high > low + middle + TRIANGLE * high:
-        excess = 100 * (high / (low + middle) - 1) if low + middle else math.inf
-        numbers = f"{high:.4g} > {low:.4g} + {middle:.4g} kg·m², by {excess:.2g} %"
-        return f"an inertia that breaks the triangle inequality ({numbers})"
+        numbers = f"{high:.4g} > {low:.4g} + {middle:.4g} kg·m²"
+        excess = f" by {100 * (high / (low + middle) - 1):.2g} %" if low + middle else ""
+        return f"an inertia that breaks the triangle inequality ({numbers}){excess}"
     return ""
