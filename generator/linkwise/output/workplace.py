@@ -12,6 +12,7 @@ linkwise and stays.
 
 import os
 import shutil
+import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -26,8 +27,14 @@ LOCK, NEW, OLD, REST = "lock", "new", "old", "rest"
 @contextmanager
 def workplace(parent: Path) -> Iterator[Path]:
     """Yield a new folder in `parent`, which goes at the end with all that is in it; raises OSError."""
-    work, lock = _made(parent)
+    mask = _hold_signals()
     try:
+        work, lock = _made(parent)
+    except BaseException:
+        _release_signals(mask)
+        raise
+    try:
+        _release_signals(mask)  # one that came meanwhile strikes here, where the folder is tidied up
         yield work
     finally:
         try:
@@ -37,6 +44,18 @@ def workplace(parent: Path) -> Iterator[Path]:
             raise
         finally:
             os.close(lock)
+
+
+def _hold_signals() -> set[int] | None:
+    """Let signals wait, where the system can; returns what `_release_signals` needs."""
+    if not hasattr(signal, "pthread_sigmask"):
+        return None
+    return signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
+
+
+def _release_signals(mask: set[int] | None) -> None:
+    if mask is not None:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 def sweep(parent: Path) -> None:
