@@ -128,6 +128,13 @@ def test_c_that_ends_the_process_fails(tmp_path: Path) -> None:
     assert failing == {"c: runs to its end": "it ended the process by SIGSEGV"}
 
 
+def test_a_singular_mass_matrix_is_not_called_positive_definite(tmp_path: Path) -> None:
+    theta, x = Coordinate("theta"), Coordinate("x", "m")
+    system = energy_system("one", [x, theta], [LinkEnergy("both", (x.qd + theta.qd) ** 2, 0)])
+    write_package(generate(system, ["numpy"]), tmp_path / "one")
+    assert marks(tmp_path / "one")["numpy: total mass matrix positive definite"] == "skip"
+
+
 def test_a_coefficient_that_is_zero_but_for_rounding_passes(tmp_path: Path) -> None:
     theta, length = Coordinate("theta"), 0.7
     vx, vy = (sp.diff(length * f(theta.q), theta.q) * theta.qd for f in (sp.sin, sp.cos))

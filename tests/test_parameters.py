@@ -1,5 +1,6 @@
 """Run-time parameters: their names, what `inspect` says of them, and which values `load` refuses."""
 
+import copy
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -207,6 +208,11 @@ def test_values_that_no_body_has_are_refused_by_name(backend: str, case: str, ar
     given, message = REFUSED[case]
     with pytest.raises(ValueError, match=message):
         arm.load(backend, given)
+
+
+def test_values_that_no_body_has_are_taken_where_that_is_asked_for(arm: ModuleType) -> None:
+    robot = arm.load("numpy", {"m_upper": -1.0}, allow_unphysical=True)
+    assert copy.deepcopy(robot).parameters["m_upper"] == -1.0
 
 
 @pytest.mark.parametrize("case", NO_NUMBER)
