@@ -108,7 +108,7 @@ def test_a_wrong_term_of_a_parameter_that_is_zero_fails(tmp_path: Path) -> None:
     first = "p_c_up___per_z * s1", "p_c_up___per_z * q1", 1
     change_file(tmp_path / "odd", "forms/link_1.py", *first)
     failing = {name for name, mark in marks(tmp_path / "odd").items() if mark == "FAIL"}
-    assert "numpy, other parameters: M^j against differences of numpy's torques" in failing
+    assert "numpy, other parameters: M^j against Newton-Euler recursion" in failing
 
 
 def test_a_result_given_twice_is_computed_once(tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_a_coefficient_that_is_zero_but_for_rounding_passes(tmp_path: Path) -> N
     write_package(generate(system, ["numpy", "torch", "autograd"]), tmp_path / "pendulum")
     found = marks(tmp_path / "pendulum")
     assert set(found.values()) == {"ok"}
-    assert "numpy: c1 against Lagrangians differentiated" in found
+    assert "numpy: c1 against energies differentiated" in found
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ WRONG = {
         "energies/link_2.py",
         "0.6 * u2",
         "0.6000001 * u2",
-        "autograd: Lagrangians against the bodies'",
+        "autograd: Lagrangians against the energies",
     ),
     "text": ("formulas.txt", "588399*cos(q_1 + q_2)", "588399*cos(q_1 - q_2)", "formulas.txt: tau_ij"),
     "latex": ("formulas.tex", r"\frac{23 \ddot{q}_{2}}", r"\frac{23 \dot{q}_{2}}", "formulas.tex: tau_ij"),
@@ -225,13 +225,14 @@ def test_c_that_does_not_compile_fails_with_the_compilers_words(every_text: Path
         ('ValueError("strange")', "FAIL"),
         ('ImportError("gone", name=__package__ + ".forms")', "FAIL"),
         ('RuntimeError("needs a C compiler: apt install gcc")', "skip"),
+        ('RuntimeError("cannot make the cache /x: No space left; set LINKWISE_CACHE to another")', "skip"),
         ('ImportError("No module named torch", name="torch")', "skip"),
     ],
 )
 def test_only_what_is_missing_here_is_left_out(error: str, mark: str, package: Path) -> None:
     change_file(package, "__init__.py", "    if backend not in", f"    raise {error}\n    if backend not in")
     found = marks(package)
-    assert (found.pop("hashes"), found.pop("manifest")) == ("ok", "ok")
+    assert (found.pop("hashes"), found.pop("manifest"), found.pop("runtime")) == ("ok", "ok", "ok")
     assert found.pop("back ends") == "FAIL"
     assert list(found.values()) == [mark]
 
@@ -244,13 +245,84 @@ def test_a_package_that_cannot_be_imported_or_asked_fails(package: Path) -> None
     assert marks(package)["answers"] == "FAIL"
 
 
-def test_closed_forms_of_a_users_energies_are_held_against_their_own_torques(tmp_path: Path) -> None:
+def test_closed_forms_are_held_against_the_energies_that_a_user_wrote(tmp_path: Path) -> None:
     package = tmp_path / "turntable"
     write_package(generate(read_system(str(DATA / "turntable.py")), ["numpy"]), package)
     assert set(marks(package).values()) == {"ok"}
     change_file(package, "forms/link_1.py", "0.5 * (t6 + 1.36)", "0.5 * (t6 + 1.36001)")
     failing = {name for name, mark in marks(package).items() if mark == "FAIL"}
-    assert "numpy: c1 against differences of numpy's torques" in failing
+    assert "numpy: c1 against energies differentiated" in failing
+
+
+def test_a_lagrangian_that_is_not_the_one_that_a_user_wrote_fails(tmp_path: Path) -> None:
+    package = tmp_path / "turntable"
+    write_package(generate(read_system(str(DATA / "turntable.py")), ["autograd"]), package)
+    assert set(marks(package).values()) == {"ok"}
+    change_file(package, "energies/link_1.py", "1.7", "1.70001")
+    failing = {name for name, mark in marks(package).items() if mark == "FAIL"}
+    assert {
+        "autograd: Lagrangians against the energies",
+        "autograd: h1 against energies differentiated",
+    } <= failing
+
+
+def test_without_torch_a_users_energies_are_held_against_their_own_torques_which_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("linkwise.check.checks.find_spec", lambda name: None)
+    package = tmp_path / "turntable"
+    write_package(generate(read_system(str(DATA / "turntable.py")), ["numpy"]), package)
+    found = marks(package)
+    assert (found["energies"], found["numpy: c1 against differences of numpy's torques"]) == ("skip", "ok")
+    change_file(package, "forms/link_1.py", "0.5 * (t6 + 1.36)", "0.5 * (t6 + 1.36001)")
+    assert marks(package)["numpy: c1 against differences of numpy's torques"] == "FAIL"
+
+
+@pytest.fixture(scope="session")
+def of_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A package all of whose numbers are run-time parameters."""
+    directory = tmp_path_factory.mktemp("parameters") / "odd"
+    (directory.parent / "odd.toml").write_text(ODD)
+    write_package(
+        generate(read_system(str(directory.parent / "odd.toml"), Options("symbolic")), ["numpy"]), directory
+    )
+    assert set(marks(directory).values()) == {"ok"}
+    shutil.rmtree(directory / "__pycache__", ignore_errors=True)
+    return directory
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "failing"),
+    [
+        (
+            "forms/link_1.py",
+            "p_m_up___per = p['m_up $<per']",
+            "p_m_up___per = 1.2",
+            "numpy, other parameters: g against Newton-Euler recursion",
+        ),
+        (
+            "names.py",
+            "p['I_up $<per_yy']",
+            "p['I_up $<per_zz']",
+            "parameters, other parameters: bodies that load looks at",
+        ),
+        ("names.py", "('m_up $<per', ", "(", "parameters: bodies that load looks at"),
+    ],
+)
+def test_what_is_right_for_the_parameters_own_values_alone_fails(
+    file: str, old: str, new: str, failing: str, of_parameters: Path, tmp_path: Path
+) -> None:
+    package = shutil.copytree(of_parameters, tmp_path / "odd")
+    change_file(package, file, old, new)
+    assert marks(package)[failing] == "FAIL"
+
+
+def test_a_runtime_file_that_is_not_linkwises_own_fails(package: Path) -> None:
+    change_file(package, "runtime/arguments.py", "import ", "import  ", 1)
+    wrong = [result for result in check_package(package, 3) if not result.passed]
+    assert [(result.name, result.detail.split(" is ")[0]) for result in wrong] == [
+        ("runtime", "runtime/arguments.py")
+    ]
 
 
 def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp_path: Path) -> None:
@@ -270,15 +342,15 @@ def test_c_alone_is_compiled_and_held_against_what_there_is(spec: str, tmp_path:
     assert {"c: robot_c_decomposition_blocksf", "c: robot_c_link_1"} <= {result.name for result in results}
 
 
-def test_formulas_that_nothing_can_be_held_against_are_left_out(tmp_path: Path) -> None:
+def test_formulas_alone_are_held_against_the_energies(tmp_path: Path) -> None:
     write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["formulas"]), tmp_path / "cart")
     assert [(r.name, r.mark) for r in check_package(tmp_path / "cart")] == [
         ("hashes", "ok"),
         ("manifest", "ok"),
+        ("runtime", "ok"),
         ("back ends", "skip"),
-        ("formulas.txt: not checked", "skip"),
-        ("formulas.tex: not checked", "skip"),
-        ("numbers", "skip"),
+        ("formulas.txt: tau_ij against energies differentiated", "ok"),
+        ("formulas.tex: tau_ij against energies differentiated", "ok"),
     ]
 
 

@@ -1,6 +1,7 @@
 """What `linkwise check` holds packages against: recursion, magnitudes, differences, readers of formulas."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -8,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import DATA, needs_compiler
+from linkwise import Options, read_system
 from linkwise.check.compare import ROUNDINGS, Entries, compare
-from linkwise.check.formula_texts import FUNCTIONS
 from linkwise.check.latex_reader import LatexReader, Unreadable
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.packed_layout import IndexRows
+from linkwise.check.parametric_tree import check_bodies, tree_with
 from linkwise.check.reference import (
     Reference,
     lagrangian_reference,
@@ -21,6 +23,9 @@ from linkwise.check.reference import (
     recursion_reference,
     torque_reference,
 )
+from linkwise.check.text_reader import NAMES, NUMPY, TextFormula, torch_functions
+from linkwise.emit.definition import rigid_tree
+from linkwise.expression.graph import FUNCTIONS
 from linkwise.package.manifest import Manifest
 
 LEG, TURNTABLE = str(DATA / "leg.toml"), str(DATA / "turntable.py")
@@ -193,7 +198,7 @@ LATEX = {
 
 def latex(text: str) -> float:
     symbols = {"q_{1}": 2.0, "q_{12}": 7.0, r"\dot{q}_{1}": 5.0, r"\pi": np.pi, "e": np.e}
-    return float(LatexReader(text, symbols, FUNCTIONS).value())
+    return float(LatexReader(text, symbols, NUMPY).value())
 
 
 @pytest.mark.parametrize("text", LATEX)
@@ -207,6 +212,54 @@ def test_latex_is_read_as_the_formula_it_shows(text: str) -> None:
 def test_latex_that_is_no_formula_is_refused(text: str) -> None:
     with pytest.raises(Unreadable):
         latex(text)
+
+
+def test_formulas_of_bodies_give_their_numbers_and_others_for_other_parameters() -> None:
+    system = read_system("planar2", Options("symbolic"))
+    values = {symbol.name: value for symbol, value in system.parameters.items()}
+    tree = rigid_tree(system)
+    assert tree is not None
+    assert tree_with(tree, values) == tree
+    assert tree_with(tree, values | {"l_1": 0.4}).bodies[1].translation == (0.4, 0.0, 0.0)
+    wrong = replace(tree, formulas=tree.formulas | {"bodies[1].com[0]": "1.001*r_2"})
+    told = [r.detail for r in check_bodies(wrong, [], values, True, "") if not r.passed]
+    assert told == ["com of link 'link2'"]
+
+
+def test_text_is_read_as_the_formula_it_shows() -> None:
+    values = {"q_1": 2.0, "c": 7.0}
+    found = TextFormula("-q_1**2/3 + 2.5e-1*(c - q_1 - 1)*sqrt(c) - 1/q_1 + pi").value(values)
+    assert found == pytest.approx(-4 / 3 + 0.25 * 4 * 7**0.5 - 0.5 + np.pi, rel=1e-14)
+    long = " - ".join(["q_1*sin(c)"] * 20_000)
+    assert TextFormula(long).value(values) == pytest.approx(-19_998 * 2 * np.sin(7), rel=1e-9)
+    assert TextFormula(long).names() == {"q_1", "c"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "q_1 +",
+        "q_2",
+        "q_1 if c else 0",
+        "__import__('os')",
+        "sin(q_1, c)",
+        "q_1.real",
+        "1/0",
+        "(" * 9_999,
+        "",
+    ],
+)
+def test_text_that_is_no_formula_is_refused(text: str) -> None:
+    with pytest.raises(Unreadable):
+        TextFormula(text).value({"q_1": 2.0, "c": 7.0})
+
+
+def test_every_function_of_energies_can_be_read_back() -> None:
+    torch = pytest.importorskip("torch")
+    assert set(FUNCTIONS) <= set(NAMES)
+    for name in NAMES:
+        found = torch_functions()[name](torch.tensor(0.3, dtype=torch.float64))
+        assert float(found) == pytest.approx(NUMPY[name](0.3), rel=1e-14)
 
 
 @needs_compiler

@@ -102,6 +102,19 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda data: data["joints"][1].update(name="joint1"),
         "joints has 'joint1' twice",
     ),
+    "neither bodies nor energies": (lambda data: data.update(tree=None), "there must be either a tree or"),
+    "energies of other links": (
+        lambda data: data.update(tree=None, energies=[]),
+        "energies is not of the links, one for each",
+    ),
+    "formula of nothing": (
+        lambda data: data["tree"]["formulas"].update({"bodies[2].mass": "m"}),
+        "tree.formulas has 'bodies[2].mass', which is not a place of the tree",
+    ),
+    "formula of a rotation": (
+        lambda data: data["tree"]["formulas"].update({"bodies[0].rotation[0][0]": "m"}),
+        "tree.formulas has 'bodies[0].rotation[0][0]', which is not a place",
+    ),
     "link twice": (lambda data: data["links"][1].update(name="link1"), "links has 'link1' twice"),
 }
 
@@ -118,7 +131,7 @@ def test_a_damaged_manifest_is_named(case: str, package: Path) -> None:
 
 def test_a_manifest_of_another_version_is_told_apart_from_a_damaged_one(package: Path) -> None:
     change_manifest(package, lambda data: data.update(schema=1))
-    with pytest.raises(LinkwiseError, match=r"another version of linkwise \(schema 1, this one reads 3\)"):
+    with pytest.raises(LinkwiseError, match=r"another version of linkwise \(schema 1, this one reads 4\)"):
         check_package(package)
 
 
@@ -169,6 +182,12 @@ def test_every_entry_is_held_by_name(package: Path) -> None:
         assert any(str(key) in complaint(package) for key in path), (path, complaint(package))
 
 
+def as_energies(data: Any) -> None:
+    """A manifest of energies that a user wrote in place of bodies."""
+    rows = [{"link": link["name"], "kinetic": "0", "potential": "0"} for link in data["links"]]
+    data.update(tree=None, energies=rows)
+
+
 SLIPS: dict[str, tuple[Callable[[Any], object], str]] = {
     "name": (lambda d: d.update(name="arm"), "name 'arm', the package 'planar2'"),
     "version": (lambda d: d["generator"].update(linkwise="9"), "generator.linkwise '9', the package '"),
@@ -177,15 +196,15 @@ SLIPS: dict[str, tuple[Callable[[Any], object], str]] = {
     "parameter": (lambda d: d.update(parameters={"m": 1.0}), "parameters.m 1.0, the package not at all"),
     "back ends": (lambda d: d["request"].update(backends=["c"]), "request.backends {'c'}, the package {'"),
     "energies": (
-        lambda d: (d.update(tree=None), d["links"][1].update(path=[1])),
+        lambda d: (as_energies(d), d["links"][1].update(path=[1])),
         "links[1].path (1,), the package (0, 1)",
     ),
     "link": (
-        lambda d: (d.update(tree=None), d["links"][0].update(name="hand")),
+        lambda d: (d["links"][0].update(name="hand"), as_energies(d)),
         "links[0].name 'hand', the package 'link1'",
     ),
     "unit": (
-        lambda d: (d.update(tree=None), d["joints"][0].update(unit="m")),
+        lambda d: (as_energies(d), d["joints"][0].update(unit="m")),
         "joints[0].unit 'm', the package 'rad'",
     ),
 }
@@ -234,9 +253,9 @@ TEXTS: dict[str, tuple[Callable[[str], str], str]] = {
     ),
     "list": (lambda t: "[]", "the whole is not an object"),
     "nothing": (lambda t: "", "Expecting value"),
-    "schema": (lambda t: t.replace('"schema": 3', '"schema": "3"'), "schema is not the number 3"),
-    "truth": (lambda t: t.replace('"schema": 3', '"schema": true'), "schema is not the number 3"),
-    "no schema": (lambda t: t.replace('"schema": 3,', ""), "schema is not the number 3"),
+    "schema": (lambda t: t.replace('"schema": 4', '"schema": "3"'), "schema is not the number 4"),
+    "truth": (lambda t: t.replace('"schema": 4', '"schema": true'), "schema is not the number 4"),
+    "no schema": (lambda t: t.replace('"schema": 4,', ""), "schema is not the number 4"),
     "unknown": (
         lambda t: t.replace('"lock": {}', '"lock": {}},"more": {"a": 1'),
         "more is not an entry of a",

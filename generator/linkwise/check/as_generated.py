@@ -1,5 +1,6 @@
 """Whether a package is as generated: its files, what Python compiled of them, and its manifest."""
 
+from importlib.resources import files
 from pathlib import Path
 
 from linkwise.check.compare import Result, Skipped
@@ -8,6 +9,7 @@ from linkwise.package.bytecode import caches, is_compiled_from_source
 from linkwise.package.contents import added, changed
 from linkwise.package.load import Package
 from linkwise.package.manifest import Manifest, altered_entries
+from linkwise.version import VERSION
 
 TOLD = 3
 """Faults that one line tells."""
@@ -42,6 +44,31 @@ def check_manifest(package: Package) -> Result:
         *altered_entries(package.directory),
     ]
     return _result("manifest", wrong, "agrees with the package")
+
+
+def check_runtime(directory: Path, manifest: Manifest) -> Result:
+    """Hold the files that every package has alike against linkwise's own, where this version wrote it."""
+    version = manifest.generator.get("linkwise")
+    if version != VERSION:
+        return Skipped("runtime", f"that of linkwise {version}, which is not at hand to compare with")
+    own = {path: _own(path) for path in manifest.files}
+    wrong = [
+        f"{path} is not that of linkwise {VERSION}"
+        for path, text in own.items()
+        if text is not None and text != (directory / path).read_bytes()
+    ]
+    return _result(
+        "runtime", wrong, f"{sum(text is not None for text in own.values())} files are linkwise's own"
+    )
+
+
+def _own(path: str) -> bytes | None:
+    """The file of linkwise that a package has a copy of at this path; None where that is no copy."""
+    folder, _, name = path.rpartition("/")
+    places = {"runtime": files("linkwise.runtime"), "c": files("linkwise.runtime").joinpath("c")}
+    if folder in places and (file := places[folder].joinpath(name)).is_file():
+        return file.read_bytes()
+    return None
 
 
 def _result(name: str, wrong: list[str], right: str) -> Result:

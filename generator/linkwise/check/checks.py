@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
-from linkwise.check.as_generated import check_files, check_manifest
+from linkwise.check.as_generated import check_files, check_manifest, check_runtime
 from linkwise.check.c_functions import CFunctions, compile_c
 from linkwise.check.compare import Result, Skipped
 from linkwise.check.compiled_c import CompiledPackage
@@ -16,6 +17,7 @@ from linkwise.check.model_calls import Named, against_reference
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.own_process import Ended, in_own_process
 from linkwise.check.packed_layout import IndexRows
+from linkwise.check.parametric_tree import check_bodies, tree_with
 from linkwise.check.reference import (
     Reference,
     States,
@@ -24,6 +26,7 @@ from linkwise.check.reference import (
     recursion_reference,
     torque_reference,
 )
+from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.package.load import Model, Package, load_package
 from linkwise.package.manifest import Manifest
 
@@ -41,6 +44,7 @@ def check_package(directory: Path, samples: int = 100) -> list[Result]:
         return [*results, Result("import", False, None, _line(error))]
     if not results[-1].passed:
         return results
+    results.append(check_runtime(directory, manifest))
     loaded, missing = _load(package)
     results += missing
     checks = _Checks(package, loaded, random_states(len(manifest.joints), samples))
@@ -71,10 +75,11 @@ def _load(package: Package) -> tuple[dict[str, Model], list[Result]]:
 
 
 def _lacks(error: Exception, package: str) -> bool:
-    """Whether a library or the compiler is missing here, which is not the package's fault."""
+    """Whether a library, the compiler or a place to compile is missing here: not the package's fault."""
     if isinstance(error, ImportError):
         return not (error.name or "").startswith(package)
-    return isinstance(error, RuntimeError) and "install" in str(error) and " failed: " not in str(error)
+    here = any(word in str(error) for word in ("install", "LINKWISE_CACHE"))
+    return isinstance(error, RuntimeError) and here and " failed: " not in str(error)
 
 
 @dataclass(frozen=True)
@@ -107,17 +112,25 @@ class _Checks:
         compiled: CompiledPackage | None,
     ) -> Iterator[Result]:
         manifest, c_passes = self.package.manifest, True
+        if manifest.tree is not None and values:
+            unphysical = bool(manifest.request.get("allow_unphysical"))
+            yield from check_bodies(
+                manifest.tree, self.package.module.ROBOT.bodies, values, unphysical, label
+            )
         functions = CFunctions(manifest, compiled, rows, values) if compiled else None
-        reference = self._bodies() if not label else None
-        reference = reference or self._own_reference(loaded, functions)
+        reference = self._bodies(values) or self._energies(values)
+        if reference is None:
+            reference = self._own_reference(loaded, functions)
+            yield Skipped(
+                f"energies{label}",
+                "a user's own, and no torch here to differentiate them: its own torques are what counts",
+            )
         if reference is not None and not len(reference.states.q):
             yield Skipped(f"numbers{label}", "the energies are defined at none of the random states")
             return
         yield from check_formulas(self.package, rows, values, label, reference)
         if reference is None:
-            yield Skipped(
-                f"numbers{label}", "energies of a user's own, and nothing here that computes with them"
-            )
+            yield Skipped(f"numbers{label}", "nothing here computes with the energies")
             return
         for result in _c_results(functions, f"c{label}", reference) if functions else ():
             c_passes &= result.passed
@@ -135,18 +148,22 @@ class _Checks:
         loaded = {name: self.package.load(name, changed) for name in self.loaded}
         yield from self._numbers(", other parameters", changed, loaded, rows, compiled)
 
-    def _bodies(self) -> Reference | None:
+    def _bodies(self, values: Mapping[str, float]) -> Reference | None:
         manifest = self.package.manifest
         if manifest.tree is None:
             return None
-        tree = manifest.tree
+        tree = tree_with(manifest.tree, values)
         return recursion_reference(NewtonEuler(manifest, tree), Magnitudes(manifest, tree), self.states)
 
+    def _energies(self, values: Mapping[str, float]) -> Reference | None:
+        """The energies that a user wrote, from the manifest's text; None without torch."""
+        energies = self.package.manifest.energies
+        if energies is None or find_spec("torch") is None:
+            return None
+        return lagrangian_reference([TextLagrangian(entry, values) for entry in energies], self.states)
+
     def _own_reference(self, loaded: Mapping[str, Model], functions: CFunctions | None) -> Reference | None:
-        """The package's Lagrangians, else the torques of one of its back ends, else those of its C."""
-        for model in loaded.values():
-            if hasattr(model.backend, "modules"):
-                return lagrangian_reference(model.backend.modules, self.states)
+        """The torques of one of the package's back ends, else those of its C."""
         for name, model in loaded.items():
             return torque_reference(name, model.partial_torque, self.states)
         if functions is None:

@@ -1,6 +1,5 @@
 """formulas.txt and formulas.tex, read back as formulas and held against the reference."""
 
-import ast
 import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -11,32 +10,13 @@ from linkwise.check.compare import Entries, Result, Skipped, compare
 from linkwise.check.latex_reader import LatexReader, Unreadable
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.reference import Reference
+from linkwise.check.text_reader import NUMPY, TextFormula, parameter_values
 from linkwise.emit.formula_symbols import MOTION, motion_symbol, parameter_symbols
 from linkwise.package.load import Array, Package
 from linkwise.package.manifest import Manifest
 
 DIGITS = 1e-12
 """Numbers in these texts are rounded to twelve digits, and terms smaller than this are left out."""
-
-CONSTANTS = {"pi": np.pi, "E": np.e}
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    name: getattr(np, spelled)
-    for name, spelled in {
-        **{
-            name: name for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "sinh", "cosh", "tanh", "sign")
-        },
-        **{"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "Abs": "abs"},
-    }.items()
-}
-OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
-    ast.Add: np.add,
-    ast.Sub: np.subtract,
-    ast.Mult: np.multiply,
-    ast.Div: np.divide,
-    ast.Pow: np.power,
-    ast.USub: np.negative,
-    ast.UAdd: np.positive,
-}
 
 
 def check_formulas(
@@ -91,9 +71,7 @@ def _names(parameters: Mapping[str, float], reference: Reference) -> dict[str, A
         for symbol, motion in zip(("q", "qd", "qdd"), states.motion, strict=True)
         for k in range(motion.shape[1])
     }
-    symbols = parameter_symbols(list(parameters))
-    shown = {symbol.text: value for symbol, value in zip(symbols, parameters.values(), strict=True)}
-    return {**CONSTANTS, **shown, **named}
+    return {**parameter_values(parameters), **named}
 
 
 def _filled(value: Any, reference: Reference) -> Array:
@@ -101,32 +79,12 @@ def _filled(value: Any, reference: Reference) -> Array:
 
 
 def _text_row(formula: str) -> Callable[[Mapping[str, Any]], Any]:
-    try:
-        tree = ast.parse(formula, mode="eval").body
-    except SyntaxError as error:
-        raise Unreadable(f"{formula[:40]!r}") from error
-    return lambda names: _evaluated(tree, names)
-
-
-def _evaluated(node: ast.AST, names: Mapping[str, Any]) -> Any:
-    """Value of a formula in Python's notation; numbers, names, operators and known functions only."""
-    match node:
-        case ast.Constant(value=int() | float() as number):
-            return float(number)
-        case ast.Name(id=name) if name in names:
-            return names[name]
-        case ast.UnaryOp(op=op, operand=operand) if type(op) in OPERATORS:
-            return OPERATORS[type(op)](_evaluated(operand, names))
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
-            return OPERATORS[type(op)](_evaluated(left, names), _evaluated(right, names))
-        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
-            return FUNCTIONS[name](*(_evaluated(argument, names) for argument in arguments))
-    raise Unreadable(ast.unparse(node)[:40])
+    return TextFormula(formula).value
 
 
 def _latex_row(manifest: Manifest) -> Callable[[str], Callable[[Mapping[str, Any]], Any]]:
     def read(formula: str) -> Callable[[Mapping[str, Any]], Any]:
-        return lambda names: LatexReader(formula, _latex_symbols(manifest, names), FUNCTIONS).value()
+        return lambda names: LatexReader(formula, _latex_symbols(manifest, names), NUMPY).value()
 
     return read
 

@@ -12,7 +12,7 @@ from linkwise.extras import extra
 from linkwise.package.load import Array, Model
 from linkwise.package.manifest import Manifest
 
-FLOAT32 = {"tolerance": 1e-4, "epsilon": 2.0**-23}
+FLOAT32 = {"tolerance": 1e-5, "epsilon": 2.0**-23}
 """How exact single precision is asked to be."""
 
 
@@ -138,14 +138,14 @@ def _single(checked: Named) -> Iterator[Entries]:
 
 
 def _energies(checked: Named) -> Iterator[Result]:
-    """Each module's Lagrangian against the recursion's kinetic less potential energy."""
+    """Each module's Lagrangian against kinetic less potential energy."""
     name, model, _, reference = checked
     if reference.lagrangian is None:
         return
     expected, scale = reference.lagrangian
     value = _lagrangians(model, reference.states)
     entries = Entries("L", value, expected, scale)
-    yield compare(f"{name}: Lagrangians against the bodies' energies", [entries], reference.tolerance)
+    yield compare(f"{name}: Lagrangians against the energies", [entries], reference.tolerance)
 
 
 def _lagrangians(model: Model, states: States) -> Array:

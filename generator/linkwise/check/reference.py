@@ -1,8 +1,8 @@
 """What answers are held against: every quantity of every link, from a source that shares no text with them.
 
 - rigid bodies: the Newton–Euler recursion over the manifest's tree,
-- a user's energies: their Lagrangians as the autograd back end holds them, differentiated by torch.func,
-- neither at hand: the package's own torques alone, from which all coefficients follow by exact differences.
+- a user's energies: the manifest's text of them, differentiated by torch.func,
+- without torch for that: the package's own torques alone, from which all else follows by exact differences.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -126,7 +126,8 @@ def lagrangian_reference(modules: Sequence[Any], states: States) -> Reference:
     rows = [[part.numpy() for part in torch.func.vmap(_Link(module))(*motion)] for module in modules]
     names = ("tau", "c2", "c1", "g", "c0", "h1")
     values = {name: np.stack(parts, 2) for name, parts in zip(names, zip(*rows, strict=True), strict=True)}
-    return _finite("Lagrangians differentiated", TOLERANCE, states, values)
+    batched = [torch.func.vmap(module)(*motion[:2]).numpy() for module in modules]
+    return _finite("energies differentiated", TOLERANCE, states, values, np.stack(batched, 1))
 
 
 class _Link:
@@ -187,7 +188,9 @@ def _central(f: Callable[[Array], Array], x: Array, direction: Array, step: floa
     return slope
 
 
-def _finite(name: str, tolerance: float, states: States, values: dict[str, Array]) -> Reference:
+def _finite(
+    name: str, tolerance: float, states: States, values: dict[str, Array], lagrangian: Array | None = None
+) -> Reference:
     """A reference over those states that the energies are defined for.
 
     A coefficient that is 0 but for rounding has no size of its own: what counts is how large one is that
@@ -212,7 +215,12 @@ def _finite(name: str, tolerance: float, states: States, values: dict[str, Array
         key: np.broadcast_to((link / over[key]).reshape(1, -1, *[1] * (value.ndim - 3)), value.shape[1:])
         for key, value in values.items()
     }
-    return Reference(name, tolerance, states, values, scales)
+    energy = (
+        None
+        if lagrangian is None
+        else (lagrangian[kept], np.abs(lagrangian[kept]).max(axis=0, initial=1e-300))
+    )
+    return Reference(name, tolerance, states, values, scales, energy)
 
 
 def _others(value: Array) -> tuple[int, ...]:

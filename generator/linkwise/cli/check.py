@@ -26,8 +26,9 @@ def check(
     if as_json:
         print(json_text([_row(result) for result in results], indent=1))
     else:
+        width = max(len(result.name) for result in results)
         for result in results:
-            tell(f"{result.mark:<4}  {result.name:<58} {result.detail}")
+            tell(f"{result.mark:<4}  {result.name:<{width}}  {result.detail}")
     if not all(result.passed for result in results):
         raise typer.Exit(1)
 

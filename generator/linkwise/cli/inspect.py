@@ -8,7 +8,7 @@ import typer
 from linkwise import pipeline
 from linkwise.cli import Details, Json, counted
 from linkwise.cli.options import RobotName, reads_robot
-from linkwise.emit.assemble import rigid_tree
+from linkwise.emit.definition import rigid_tree
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, printable
 from linkwise.robot import Options, left_out

@@ -14,14 +14,14 @@ from linkwise import runtime
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.bodies import body_texts, parameter_rules
+from linkwise.emit.definition import energies, rigid_tree
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
 from linkwise.escape import python_docstring, python_literal
-from linkwise.package.manifest import FILE, BodyEntry, JointEntry, LinkEntry, Manifest, RigidTree
+from linkwise.package.manifest import FILE, JointEntry, LinkEntry, Manifest
 from linkwise.progress import Progress, silent
-from linkwise.robot.robot import Scalar, Vec3
-from linkwise.symbolic.system import EnergySystem, System
+from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 
 LONGEST_NAME = 60
@@ -170,39 +170,6 @@ def manifest(derivation: Derivation, shared: Kernel | None, files: Mapping[str, 
         decomposition_cost([shared]) if shared else None,
         {s.name: float(v) for s, v in system.parameters.items()},
         rigid_tree(system),
+        energies(system),
         {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(files.items())},
-    )
-
-
-def rigid_tree(system: System) -> RigidTree | None:
-    """Return where the bodies are, numbers only, to draw and to check; None for a user's own energies."""
-    if isinstance(system, EnergySystem):
-        return None
-    robot = system.robot
-    values = dict(system.parameters)
-
-    def number(scalar: Scalar) -> float:
-        return float(sp.sympify(scalar).xreplace(values))
-
-    def numbers(a: Vec3) -> tuple[float, float, float]:
-        return number(a[0]), number(a[1]), number(a[2])
-
-    return RigidTree(
-        numbers(robot.gravity),
-        tuple(
-            BodyEntry(
-                link.name,
-                link.parent,
-                link.joint.name,
-                link.joint.kind,
-                link.joint.coordinate,
-                link.joint.ratio,
-                link.joint.rotation,  # type: ignore[arg-type]
-                numbers(link.joint.translation),
-                number(link.mass),
-                numbers(link.com),
-                (numbers(link.inertia[0]), numbers(link.inertia[1]), numbers(link.inertia[2])),
-            )
-            for link in robot.links
-        ),
     )

@@ -1,6 +1,7 @@
-"""The joints, links and rigid bodies of a manifest, and what must hold among them."""
+"""The joints, links, rigid bodies and energies of a manifest, and what must hold among them."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,6 +11,12 @@ Row = tuple[float, float, float]
 
 ROUNDING = 1e-6
 """Largest error of an entry of a rotation times its transpose."""
+
+PLACE = re.compile(
+    r"(?:gravity|bodies\[(?P<body>\d+)\]\.(?:translation|com))\[[0-2]\]"
+    r"|bodies\[(?P<whole>\d+)\]\.(?:mass|inertia\[[0-2]\]\[[0-2]\])"
+)
+"""Numbers of a tree that may hang on parameters."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +59,24 @@ class BodyEntry:
 
 @dataclass(frozen=True)
 class RigidTree:
-    """The rigid bodies, parents before children, and gravity in m/s² in the base's axes."""
+    """The rigid bodies, parents before children, and gravity in m/s² in the base's axes.
+
+    formulas: by its place, such as bodies[2].com[0], each number that hangs on run-time parameters, as text
+    in their symbols; the numbers themselves are those of the parameters' own values
+    """
 
     gravity: Row
     bodies: tuple[BodyEntry, ...]
+    formulas: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class EnergyEntry:
+    """Energies in J that a user wrote for a link: text in q_k and qd_k, k from 1, and parameters' symbols."""
+
+    link: str
+    kinetic: str
+    potential: str
 
 
 def check_tree(tree: RigidTree, joints: Sequence[JointEntry], links: Sequence[LinkEntry]) -> None:
@@ -79,6 +100,10 @@ def check_tree(tree: RigidTree, joints: Sequence[JointEntry], links: Sequence[Li
         if set(link.path) != by_link[link.name]:
             raise ValueError(f"the path of link {link.name!r} is not that of the tree")
     _check_joints(tree, joints)
+    for place in tree.formulas:
+        found = PLACE.fullmatch(place)
+        if not found or int(found["body"] or found["whole"] or 0) >= len(tree.bodies):
+            raise ValueError(f"tree.formulas has {place[:80]!a}, which is not a place of the tree")
 
 
 def _check_joints(tree: RigidTree, joints: Sequence[JointEntry]) -> None:

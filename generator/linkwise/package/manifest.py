@@ -12,14 +12,22 @@ from typing import Any
 from linkwise.errors import LinkwiseError
 from linkwise.output import sweep
 from linkwise.package.decode import decoded, parsed, require
-from linkwise.package.entries import BodyEntry, JointEntry, LinkEntry, RigidTree, check_tree
+from linkwise.package.entries import (
+    BodyEntry,
+    EnergyEntry,
+    JointEntry,
+    LinkEntry,
+    RigidTree,
+    check_tree,
+)
 
-SCHEMA = 3
+SCHEMA = 4
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [
     "FILE",
     "BodyEntry",
+    "EnergyEntry",
     "JointEntry",
     "LinkEntry",
     "Manifest",
@@ -40,7 +48,7 @@ CONVENTIONS = {
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a package is of; `tree` is None for energies that a user wrote.
+    """What a package is of: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
 
     request: the options of `generate`; files: the SHA-256 of every other file, by its path in the package
     shared_operations: those of the kernel in which links share work; None without such a kernel
@@ -55,6 +63,7 @@ class Manifest:
     shared_operations: int | None
     parameters: Mapping[str, float]
     tree: RigidTree | None
+    energies: tuple[EnergyEntry, ...] | None
     files: Mapping[str, str]
 
     def __post_init__(self) -> None:
@@ -75,8 +84,12 @@ class Manifest:
                 raise ValueError(f"files has {path[:80]!a}, which is not a path of a file in the package")
             if not re.fullmatch("[0-9a-f]{64}", digest):
                 raise ValueError(f"files has for {path[:80]!a} something else than a SHA-256")
+        if (self.tree is None) == (self.energies is None):
+            raise ValueError("there must be either a tree or energies")
         if self.tree is not None:
             check_tree(self.tree, self.joints, self.links)
+        if self.energies is not None and [e.link for e in self.energies] != names["links"]:
+            raise ValueError("energies is not of the links, one for each, in their order")
 
     def text(self) -> str:
         """JSON, one entry of a list a line; `checksums` tell which entry was changed by hand."""
@@ -111,10 +124,11 @@ def altered_entries(directory: Path) -> list[str]:
     data = _read(directory / FILE)
     checksums = data.get("checksums")
     known = checksums if isinstance(checksums, dict) else {}
+    fixed = {"units": UNITS, "conventions": CONVENTIONS}
     return [
         f"the entry {key} of {FILE} was changed"
         for key in sorted({*known, *data} - {"files", "checksums"})
-        if known.get(key) != _checksum(data.get(key))
+        if known.get(key) != _checksum(data.get(key)) or data.get(key) != fixed.get(key, data.get(key))
     ]
 
 
@@ -160,4 +174,6 @@ def _lines(value: Any) -> str:
 def _items(value: Any) -> str:
     if isinstance(value, (list, tuple)) and value and isinstance(value[0], Mapping):
         return "[\n" + ",\n".join(f"  {json.dumps(item)}" for item in value) + "\n ]"
+    if isinstance(value, Mapping) and len(value) > 1:
+        return "{\n" + ",\n".join(f"   {json.dumps(k)}: {json.dumps(v)}" for k, v in value.items()) + "\n  }"
     return json.dumps(value)

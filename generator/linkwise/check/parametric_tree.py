@@ -1,0 +1,95 @@
+"""A manifest's rigid bodies for any values of the run-time parameters, by the formulas that it gives."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from linkwise.check.compare import Result
+from linkwise.check.text_reader import TextFormula, parameter_values
+from linkwise.package.entries import BodyEntry, RigidTree
+from linkwise.package.load import Array
+from linkwise.runtime.parameter_values import ParametricBody, faults
+
+MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+ROUNDING = 1e-12
+"""Of the largest number of a vector or an inertia, which formulas and numbers may differ by."""
+
+
+def tree_with(tree: RigidTree, values: Mapping[str, float]) -> RigidTree:
+    """The tree for other values of the parameters; raises Unreadable where a formula is none."""
+    given = parameter_values(values)
+    found = {place: float(TextFormula(text).value(given)) for place, text in tree.formulas.items()}
+    data = asdict(tree)
+
+    def at(place: str, value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(at(f"{place}[{i}]", item) for i, item in enumerate(value))
+        return found.get(place, value)
+
+    bodies = [
+        BodyEntry(**{name: at(f"bodies[{b}].{name}", value) for name, value in body.items()})
+        for b, body in enumerate(data["bodies"])
+    ]
+    return RigidTree(at("gravity", tree.gravity), tuple(bodies), tree.formulas)
+
+
+def check_bodies(
+    tree: RigidTree,
+    bodies: Sequence[ParametricBody],
+    values: Mapping[str, float],
+    unphysical: bool,
+    label: str,
+) -> Iterator[Result]:
+    """Hold the tree's numbers and the bodies that `load` looks at against the tree's formulas."""
+    varied = tree_with(tree, values)
+    if not label:
+        wrong = [
+            f"{name} of link {number.link!r}"
+            for number, formula in zip(tree.bodies, varied.bodies, strict=True)
+            for name in ("translation", "mass", "com", "inertia")
+            if not _alike(getattr(number, name), getattr(formula, name))
+        ]
+        wrong += [] if _alike(tree.gravity, varied.gravity) else ["gravity"]
+        yield _result("parameters: formulas of the bodies give their numbers", wrong)
+    known = {body.link: body for body in bodies}
+    wrong = []
+    for b, (own, body) in enumerate(zip(tree.bodies, varied.bodies, strict=True)):
+        names = _names(tree, b, list(values))
+        looked_at = bool(names) and not unphysical and not faults(_listed(own)).any()
+        rule = known.pop(body.link, None)
+        if looked_at != (rule is not None):
+            wrong.append(f"link {body.link!r} is {'not ' if looked_at else ''}among them")
+        elif rule is not None:
+            numbers = {name: np.float64(value) for name, value in values.items()}
+            found = np.array(rule.mass_and_inertia(numbers), dtype=float)
+            same = _alike(body.mass, found[0]) and _alike(_listed(body)[1:], found[1:])
+            if set(rule.parameters) != names or not same:
+                wrong.append(f"link {body.link!r} hangs otherwise on the parameters")
+    wrong += [f"link {link!r} is not in the tree" for link in known]
+    yield _result(f"parameters{label}: bodies that load looks at", wrong)
+
+
+def _names(tree: RigidTree, b: int, parameters: Sequence[str]) -> set[str]:
+    """Parameters that the mass and the inertia of a body hang on."""
+    place = re.compile(rf"bodies\[{b}\]\.(mass|inertia.*)")
+    formulas = [TextFormula(text) for at, text in tree.formulas.items() if place.fullmatch(at)]
+    used = {name for formula in formulas for name in formula.names()}
+    own = parameter_values({name: name for name in parameters})
+    return {own[text] for text in used}
+
+
+def _listed(body: BodyEntry) -> Array:
+    """Mass, and xx, yy, zz, xy, xz, yz of the inertia."""
+    return np.array([body.mass, *(body.inertia[i][k] for i, k in MOMENTS)])
+
+
+def _alike(one: Any, other: Any) -> bool:
+    a, b = np.array(one, dtype=float), np.array(other, dtype=float)
+    return bool(np.abs(a - b).max() <= ROUNDING * max(np.abs(a).max(), np.abs(b).max()))
+
+
+def _result(name: str, wrong: Sequence[str]) -> Result:
+    return Result(name, not wrong, None, "; ".join(wrong[:3]) if wrong else "as the tree's formulas say")

@@ -1,0 +1,93 @@
+"""What a manifest says that a robot is, rigid bodies or energies, by which its package can be checked."""
+
+from collections.abc import Callable, Iterator
+
+import sympy as sp
+from sympy.printing.str import StrPrinter
+
+from linkwise.emit.formula_symbols import motion_symbol, parameter_symbols
+from linkwise.package.manifest import BodyEntry, EnergyEntry, RigidTree
+from linkwise.robot.robot import Robot, Scalar, Vec3
+from linkwise.symbolic.system import EnergySystem, RigidSystem, System
+
+
+def rigid_tree(system: System) -> RigidTree | None:
+    """Return where the bodies are and what they carry; None for a user's own energies."""
+    if not isinstance(system, RigidSystem):
+        return None
+    robot, values = system.robot, dict(system.parameters)
+
+    def number(scalar: Scalar) -> float:
+        return float(sp.sympify(scalar).xreplace(values))
+
+    def numbers(a: Vec3) -> tuple[float, float, float]:
+        return number(a[0]), number(a[1]), number(a[2])
+
+    text = _texts(system)
+    return RigidTree(
+        numbers(robot.gravity),
+        tuple(
+            BodyEntry(
+                link.name,
+                link.parent,
+                link.joint.name,
+                link.joint.kind,
+                link.joint.coordinate,
+                link.joint.ratio,
+                link.joint.rotation,  # type: ignore[arg-type]
+                numbers(link.joint.translation),
+                number(link.mass),
+                numbers(link.com),
+                (numbers(link.inertia[0]), numbers(link.inertia[1]), numbers(link.inertia[2])),
+            )
+            for link in robot.links
+        ),
+        {
+            place: text(value)
+            for place, value in _places(robot)
+            if isinstance(value, sp.Expr) and value.free_symbols
+        },
+    )
+
+
+def energies(system: System) -> tuple[EnergyEntry, ...] | None:
+    """Return the energies that a user wrote; None for rigid bodies."""
+    if not isinstance(system, EnergySystem):
+        return None
+    text = _texts(system)
+    return tuple(EnergyEntry(link.name, text(link.kinetic), text(link.potential)) for link in system.links)
+
+
+def _places(robot: Robot) -> Iterator[tuple[str, Scalar]]:
+    """Every number of a tree that may hang on parameters, by its place."""
+    yield from _entries("gravity", robot.gravity)
+    for b, link in enumerate(robot.links):
+        yield f"bodies[{b}].mass", link.mass
+        yield from _entries(f"bodies[{b}].translation", link.joint.translation)
+        yield from _entries(f"bodies[{b}].com", link.com)
+        for i, row in enumerate(link.inertia):
+            yield from _entries(f"bodies[{b}].inertia[{i}]", row)
+
+
+def _entries(place: str, vector: Vec3) -> Iterator[tuple[str, Scalar]]:
+    return ((f"{place}[{i}]", value) for i, value in enumerate(vector))
+
+
+def _texts(system: System) -> Callable[[Scalar], str]:
+    """Formulas in the symbols of formulas.txt, every number with all its digits."""
+    parameters = parameter_symbols([symbol.name for symbol in system.parameters])
+    names = {own: sp.Symbol(shown.text) for own, shown in zip(system.parameters, parameters, strict=True)}
+    for k, c in enumerate(system.coordinates, 1):
+        names |= {c.q: sp.Symbol(motion_symbol("q", k).text), c.qd: sp.Symbol(motion_symbol("qd", k).text)}
+    printer = _Exact()
+    return lambda scalar: str(printer.doprint(sp.sympify(scalar).xreplace(names)))
+
+
+class _Exact(StrPrinter):  # type: ignore[misc]
+    """Numbers as Python reads them back to the last bit; constants such as zeta(3) are numbers too."""
+
+    def _print(self, expr: sp.Basic, **options: object) -> str:
+        if isinstance(expr, sp.Expr) and expr.is_number and not expr.is_Rational:
+            value = float(expr)
+            return f"({value!r})" if value < 0 else repr(value)
+        return str(super()._print(expr, **options))
