@@ -1,5 +1,6 @@
 """A template's variables are exactly the fields of the view it is rendered with."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -58,3 +59,9 @@ def test_template_uses_every_field_of_its_view_and_no_other(
 def test_missing_field_raises() -> None:
     with pytest.raises(jinja2.UndefinedError):
         render("package/init.py.j2", {"package": "arm"})
+
+
+def test_numbers_of_formulas_are_rounded_to_what_they_are_worth() -> None:
+    files = generate(read_system(str(DATA / "skew.toml"), Options(tip="b")), ["formulas"], "skew")
+    for name in ("formulas.txt", "formulas.tex"):
+        assert max(len(digits) for digits in re.findall(r"[0-9]+", files[name])) <= 15

@@ -23,7 +23,10 @@ from mutants import Mutant, Rules, mutants
 from urdf_text import chain, joint, link, mimic, robot
 
 DATA = Path(__file__).parents[1] / "data"
-FORMULAS = ("forms/link_*.py", "energies/link_*.py", "c/*.h", "c/*.c", "formulas.txt", "formulas.tex")
+FORMULAS = (
+    *("forms/link_*.py", "energies/link_*.py", "names.py"),
+    *("c/*.h", "c/*.c", "formulas.txt", "formulas.tex"),
+)
 SHARED = {"numbers.h", "sines.h", "rows.h", "stream.h"}
 BACKENDS = ("numpy", "autograd", "c", "formulas")
 SAMPLES = 20
@@ -42,6 +45,7 @@ ROBOTS = {
     "planar2_symbolic": ("planar2", {"parameters": "symbolic"}),
     "puma560": ("puma560", {}),
     "torso": ("torso", {}),
+    "skew_symbolic": (str(DATA / "skew.toml"), {"parameters": "symbolic"}),
     "every_joint": (chain, {}),
     "turntable": (str(DATA / "turntable.py"), {}),
     "cart_pendulum": (str(DATA / "cart_pendulum.py"), {"parameters": "symbolic"}),

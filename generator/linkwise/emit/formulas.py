@@ -14,6 +14,8 @@ from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 
 MOST_COORDINATES = 3
+DIGITS = 12
+"""Of the numbers shown."""
 ROUNDING = 1e-12
 """Share of a torque's largest coefficient below which one is rounding."""
 
@@ -65,7 +67,8 @@ def _shown(system: System, parameters: Iterable[FormulaSymbol], expr: sp.Expr) -
     terms = [term.as_coeff_Mul() for term in sp.Add.make_args(expanded)]
     least = ROUNDING * max((abs(number) for number, _ in terms), default=0)
     kept = sp.Add(*(number * rest for number, rest in terms if abs(number) > least))
-    return kept.xreplace({f: sp.Float(f, 12) for f in kept.atoms(sp.Float)})
+    long = (r for r in kept.atoms(sp.Rational) if max(abs(r.p), r.q) >= 10**DIGITS)
+    return kept.xreplace({f: sp.Float(f, DIGITS) for f in (*kept.atoms(sp.Float), *long)})
 
 
 def _latex_names(system: System, parameters: Iterable[FormulaSymbol]) -> dict[sp.Symbol, str]:
