@@ -303,6 +303,17 @@ def test_generate_never_replaces_what_was_added_to_a_package(
     assert own.read_text() == "mine"
 
 
+def test_a_refused_generate_brings_back_what_a_dead_writer_took_away(
+    linkwise: Run, planar2: Path, tmp_path: Path
+) -> None:
+    dead = tmp_path / "out/.linkwise-abcdefgh"
+    (dead / "old").mkdir(parents=True)
+    (dead / "lock").touch()
+    planar2.rename(dead / "old/planar2")
+    assert linkwise("generate", "planarx", "--out", "out").returncode == 2
+    assert os.listdir(tmp_path / "out") == ["planar2"]
+
+
 @pytest.mark.parametrize(
     ("target", "message"),
     [
