@@ -214,7 +214,7 @@ BAD_FILES = {
         "links = [LinkEnergy('a', x.qd**3, 0)]\n",
         "link 'a': its energies have degree 3 in the velocities",
     ),
-    "crash.py": ("1 / 0", "running the file failed: ZeroDivisionError"),
+    "crash.py": ("1 / 0", "running the file failed in line 1: ZeroDivisionError"),
     "nothing.py": ("", "the file must define 'coordinates'"),
     "picture.png": ("", "unknown kind of file '.png'"),
 }
