@@ -245,6 +245,14 @@ def test_results_that_overflow_are_named(tmp_path, lowpass, value):
         assert str(error.value).endswith(f"too large: 'joint2' comes to {value:.3g} in row 32")
 
 
+def test_a_coordinate_that_overflows_in_the_filter_is_named(tmp_path):
+    table = smooth(60, 3)
+    table[::2, 2] = 1.7e308
+    path = write_csv(tmp_path / "a.csv", table)
+    with pytest.raises(LinkwiseError, match=r"values are too large: 'joint2' overflows in the filter$"):
+        analyze(path, PLANAR3, processing=Processing(lowpass=Lowpass(5.0)))
+
+
 def test_slashes_in_names_are_escaped(tmp_path):
     robot = load_robot(PLANAR3)
     names = ("a", "a/b", "a%2Fb")

@@ -77,6 +77,18 @@ def test_columns_by_map_time_and_leave():
     assert (found.time, found.joints, found.ignored) == (3, (4, 0, 1), ("emg",))
 
 
+STATES = ("time", *(f"/jointset/j/{joint}/{kind}" for joint in JOINTS for kind in ("value", "speed")))
+
+
+def test_opensim_states_are_matched_by_the_coordinate():
+    found = select(STATES, JOINTS, Reading())
+    assert (found.joints, found.ignored) == ((1, 3, 5), STATES[2::2])
+    with pytest.raises(LinkwiseError, match="no joint for column '/forceset/soleus/activation'; leave"):
+        select((*STATES, "/forceset/soleus/activation"), JOINTS, Reading())
+    with pytest.raises(LinkwiseError, match=r"no column for joint 'joint1'; name it with --map"):
+        select((*STATES, "/jointset/other/joint1/value"), JOINTS, Reading())
+
+
 @pytest.mark.parametrize(
     ("row", "time", "message"),
     [

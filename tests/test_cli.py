@@ -214,7 +214,7 @@ BAD_FILES = {
         "links = [LinkEnergy('a', x.qd**3, 0)]\n",
         "link 'a': its energies have degree 3 in the velocities",
     ),
-    "crash.py": ("1 / 0", "running the file failed: ZeroDivisionError"),
+    "crash.py": ("1 / 0", "running the file failed in line 1: ZeroDivisionError"),
     "nothing.py": ("", "the file must define 'coordinates'"),
     "picture.png": ("", "unknown kind of file '.png'"),
 }
@@ -301,6 +301,17 @@ def test_generate_never_replaces_what_was_added_to_a_package(
     assert done.returncode == 2
     assert f"out/planar2 holds '{name}', which linkwise did not write; move it away" in done.stderr
     assert own.read_text() == "mine"
+
+
+def test_a_refused_generate_brings_back_what_a_dead_writer_took_away(
+    linkwise: Run, planar2: Path, tmp_path: Path
+) -> None:
+    dead = tmp_path / "out/.linkwise-abcdefgh"
+    (dead / "old").mkdir(parents=True)
+    (dead / "lock").touch()
+    planar2.rename(dead / "old/planar2")
+    assert linkwise("generate", "planarx", "--out", "out").returncode == 2
+    assert os.listdir(tmp_path / "out") == ["planar2"]
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,14 @@
 """A quick start: what `import linkwise` and `linkwise --help` load, and that every public name is there."""
 
 import inspect
+import os
 import pydoc
 import re
 import subprocess
 import sys
+import tomllib
 from importlib import import_module
+from pathlib import Path
 
 import linkwise
 import pytest
@@ -33,6 +36,21 @@ def test_what_stdout_cannot_encode_is_escaped() -> None:
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert "| \\u03c4_1,1 | link1 |" in done.stdout
+
+
+SCRIPT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]["scripts"]
+STARTS = {
+    "module": ("-m", "linkwise"),
+    "script": ("-c", "from {} import {} as main; main()".format(*SCRIPT["linkwise"].split(":"))),
+}
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_an_interrupt_while_libraries_are_imported_is_one_line(start: str, tmp_path: Path) -> None:
+    (tmp_path / "typer.py").write_text("raise KeyboardInterrupt")
+    command, environment = [sys.executable, *STARTS[start]], os.environ | {"PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "linkwise: interrupted\n")
 
 
 def test_import_loads_no_heavy_library() -> None:

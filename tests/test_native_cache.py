@@ -3,10 +3,12 @@
 import os
 import pty
 import pwd
+import signal
 import stat
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -317,6 +319,32 @@ def test_one_builds_while_the_others_wait(tiny: Sources) -> None:
     assert is_whole(path)
 
 
+def test_a_server_that_a_compiler_leaves_behind_is_not_waited_for(
+    tiny: Sources, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiler = tmp_path / "cc"
+    compiler.write_text(f'#!/bin/sh\nsleep 60 & echo $! >> {tmp_path}/started\nexec gcc "$@"')
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    start = time.monotonic()
+    assert is_whole(library(tiny, "double"))
+    assert time.monotonic() - start < 20.0
+    for number in (tmp_path / "started").read_text().split():
+        os.kill(int(number), signal.SIGKILL)
+
+
+def test_parts_count_as_they_are_done(tmp_path: Path) -> None:
+    heard = []
+
+    def tell(note: str) -> None:
+        heard.append(int(note.split(" of 3 parts, ")[0]))
+        (tmp_path / str(heard[-1])).touch()
+
+    waiting = "until [ -e {}/{} ]; do sleep 0.02; done"
+    native_process.run_all([["sh", "-c", waiting.format(tmp_path, count)] for count in (2, 0, 1)], tell)
+    assert list(dict.fromkeys(heard)) == [0, 1, 2]
+
+
 def test_a_compiler_that_is_given_up_is_ended(
     tiny: Sources, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -341,6 +369,7 @@ def test_a_terminal_is_told_of_the_build(package_of: Callable[[str], ModuleType]
     subprocess.run([sys.executable, "-c", code], env=environment, stderr=writer, check=True)
     said = os.read(reader, 1 << 16).decode()
     assert "\rcompiling planar3 (decomposition, double), once: 0 of 3 parts, 0 s" in said
+    assert "\rcompiling planar3 (decomposition, double), once: linking  " in said
     assert said.endswith(f"\r{'':79}\r")
     subprocess.run([sys.executable, "-c", code], env=environment, stderr=writer, check=True)
     os.write(writer, b"nothing more")

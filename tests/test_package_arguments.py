@@ -127,7 +127,10 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "long": (lambda: np.ones(3, np.longdouble), "qd has dtype (longdouble|float128|float96); give"),
     "half of torch": (lambda: torch.ones(3, dtype=torch.float16), "qd has dtype float16; give"),
     "words": (lambda: "abc", r"qd has dtype str\d+; give"),
-    "nothing": (lambda: None, "qd has dtype object; give"),
+    "nothing": (
+        lambda: None,
+        r"^qd is None; give an array, a tensor or a list of shape \(\.\.\., n\), n joints",
+    ),
     "a gap": (lambda: [1.0, None, 2.0], "qd has dtype object; give"),
     "ragged": (lambda: [[1.0, 2.0], [1.0]], "qd does not read as an array: .*inhomogeneous"),
     "masked": (lambda: np.ma.masked_array(np.ones(3), [0, 1, 0]), "qd is a masked array; fill its gaps"),

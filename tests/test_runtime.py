@@ -51,7 +51,7 @@ def test_given_parameters_replace_built_in_ones_by_name() -> None:
     assert FORK.values({"m": 2.0}) == {"m": 2.0}
     with pytest.raises(ValueError, match="no parameter 'k'; the parameters are m"):
         FORK.values({"k": 1.0})
-    with pytest.raises(ValueError, match="are none: generate with --parameters symbolic"):
+    with pytest.raises(ValueError, match="no parameter 'k': this package has no parameters; generate it"):
         replace(FORK, parameters={}).values({"k": 1.0})
 
 

@@ -71,9 +71,11 @@ def puck(kinetic: sp.Expr, potential: sp.Expr = sp.S.Zero) -> object:
     return energy_system("puck", [Coordinate("x", "m")], [LinkEnergy("disc", kinetic, potential)])
 
 
-def test_degree_three_in_the_velocities_is_refused() -> None:
-    with pytest.raises(LinkwiseError, match=r"link 'disc': its energies have degree 3 in the velocities"):
-        puck(Coordinate("x", "m").qd ** 3)
+@pytest.mark.parametrize("degree", [3, 10**9])
+def test_a_degree_beyond_two_in_the_velocities_is_refused(degree: int) -> None:
+    message = f"link 'disc': its energies have degree {degree} in the velocities"
+    with pytest.raises(LinkwiseError, match=message):
+        puck(Coordinate("x", "m").qd ** degree)
 
 
 def test_energy_that_is_not_a_polynomial_in_the_velocities_is_refused() -> None:
@@ -111,6 +113,7 @@ A, B = sp.symbols("a b")
         (X.q / (A - B), "link 'disc': its energies hold NaN or infinity"),
         (sp.sqrt(-A) * X.q, "link 'disc': its energies hold the imaginary unit"),
         (sp.I * X.q, "link 'disc': its energies hold the imaginary unit"),
+        (10**309 * X.q, "link 'disc': its energies hold a number beyond 1e308"),
         (None, "link 'disc': its potential energy is None; give a SymPy expression"),
         ("x", "link 'disc': its potential energy is 'x'; give a SymPy expression"),
         (True, "link 'disc': its potential energy is True; give a SymPy expression"),
@@ -127,14 +130,32 @@ def test_energy_that_is_no_real_number_is_refused(potential: object, message: st
 HEAD = "from linkwise import *\nimport sympy as sp\nx = Coordinate('x')\n"
 GOOD = HEAD + "coordinates = [x]\nlinks = [LinkEnergy('a', x.qd**2, 0)]\n"
 FILES = {
-    "exit": (GOOD + "import sys; sys.exit(0)", "running the file failed: SystemExit: 0"),
+    "exit": (GOOD + "import sys; sys.exit(0)", "running the file failed in line 6: SystemExit: 0"),
+    "raised": (
+        HEAD + "def f(a):\n    return a / 0\nf(1)",
+        "running the file failed in line 5: ZeroDivisionError: d",
+    ),
+    "raised beyond": (
+        HEAD + "\nsp.Symbol(3)",
+        "running the file failed in line 5: TypeError: name should be",
+    ),
+    "raised without a word": (HEAD + "assert 0", "running the file failed in line 4: AssertionError"),
+    "no Python": (HEAD + "x = = 1\n", "running the file failed in line 4: SyntaxError: invalid syntax"),
     "number": (GOOD + "coordinates = [Coordinate(3)]", "the coordinate name 3 is not a string"),
     "unit": (GOOD + "coordinates = [Coordinate('x', 'deg')]", "coordinate 'x' has the unit 'deg'; give rad"),
     "link": (GOOD + "links = [LinkEnergy(None, x.qd**2, 0)]", "the link name None is not a string"),
     "name": (GOOD + "name = 3", "the robot's name is 3; give a string"),
     "list": (GOOD + "parameters = [3]", "`parameters` must be a dictionary of SymPy symbols"),
     "text": (GOOD + "parameters = {'m': 1}", "`parameters` must be a dictionary of SymPy symbols"),
-    "word": (GOOD + "parameters = {sp.Symbol('m'): 'heavy'}", "parameter m has no value as a real number"),
+    "digits": (
+        GOOD + "parameters = {sp.Symbol('m'): '1'}",
+        "parameter m is '1'; give a number, without quotes",
+    ),
+    "unused": (
+        GOOD + "parameters = {sp.Symbol('m'): 1}",
+        "no link's energy has the parameter m; use it there",
+    ),
+    "word": (GOOD + "parameters = {sp.Symbol('m'): [1]}", "parameter m has no value as a real number"),
     "complex": (GOOD + "parameters = {sp.Symbol('m'): sp.I}", "parameter m has no value as a real number"),
     "huge": (GOOD + "parameters = {sp.Symbol('m'): 10**400}", "parameter m has no value as a real number"),
     "infinite": (GOOD + "parameters = {sp.Symbol('m'): sp.oo}", "parameter m has NaN or infinity"),

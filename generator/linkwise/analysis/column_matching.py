@@ -13,6 +13,8 @@ from linkwise.escape import listed
 
 MANY_TURNS = 4 * math.pi
 """An angle past two turns in radians is more likely one in degrees."""
+STATE = "/value"
+"""How OpenSim ends a coordinate's column among the states: /jointset/JOINT/COORDINATE/value."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class Selection:
 
 
 def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> Selection:
-    """Match columns to joints by `reading.mapping`, else by name.
+    """Match columns to joints by `reading.mapping`, else by name, also as OpenSim's states name them.
 
     Raises LinkwiseError for a joint without a column, a column used twice, and a column without a joint
     where that was not allowed.
@@ -44,14 +46,16 @@ def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> S
     missing = [joint for joint, column in source.items() if column not in at_column]
     used = {*source.values(), columns[time]}
     free = [column for column in columns if column not in used]
+    speeds = {f"{column.removesuffix(STATE)}/speed" for column in used if column.endswith(STATE)}
     if missing:
         raise LinkwiseError(
             f"no column for joint {listed(map(repr, missing))}; name it with --map COLUMN={missing[0]}"
             f" (columns not used: {listed(map(repr, free)) if free else 'none'})"
         )
-    if free and not reading.ignore_extra:
+    extra = [column for column in free if column not in speeds]
+    if extra and not reading.ignore_extra:
         raise LinkwiseError(
-            f"no joint for column {listed(map(repr, free))}; leave such columns out with --ignore-extra,"
+            f"no joint for column {listed(map(repr, extra))}; leave such columns out with --ignore-extra,"
             " or map them with --map COLUMN=JOINT"
         )
     found = tuple(at_column[column] for column in source.values())
@@ -117,7 +121,7 @@ def _time(columns: Sequence[str], reading: Reading) -> int:
 
 def _mapped(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> dict[str, str]:
     """Name of each joint's column, in the robot's order."""
-    source = {joint: joint for joint in joints}
+    source = {joint: _named(joint, columns) for joint in joints}
     for column, joint in reading.mapping:
         if joint not in source:
             raise LinkwiseError(
@@ -131,3 +135,9 @@ def _mapped(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> 
             )
         source[joint] = column
     return source
+
+
+def _named(joint: str, columns: Sequence[str]) -> str:
+    """The column of a joint's name; where there is none, the only state of that coordinate."""
+    states = [column for column in columns if column.startswith("/") and column.endswith(f"/{joint}{STATE}")]
+    return states[0] if joint not in columns and len(states) == 1 else joint

@@ -73,7 +73,8 @@ def _extension(edge: Array, padding: str) -> Array:
     """
     beyond: Array = edge[:0:-1]
     if padding == "odd":
-        beyond = 2 * edge[0] - beyond
+        with np.errstate(over="ignore"):
+            beyond = 2 * edge[0] - beyond
     elif padding == "even":
         beyond = beyond.copy()  # the filter works in place
     else:

@@ -18,8 +18,8 @@ class Reading:
 
     `units` is the angles' unit; None takes what the file says (`inDegrees`), else radians. Lengths
     are always metres. `time` names the column of the time, in s; None takes "time" or "t". `mapping`
-    holds (column, joint) pairs; other joints take the column of their name. `ignore_extra` leaves out
-    columns that no joint has.
+    holds (column, joint) pairs; other joints take the column of their name, or OpenSim's state of that
+    coordinate. `ignore_extra` leaves out columns that no joint has.
     """
 
     units: Units | None = None

@@ -125,8 +125,10 @@ def _largest(samples: Samples, decomposer: Decomposer, at: int) -> str:
     """Tell of the largest coordinate near a sample."""
     first = max(0, at - INNER)
     near = np.abs(samples.q[first : at + INNER])
-    near[~np.isfinite(near)] = 0.0  # a filter can make everything so
+    near[np.isnan(near)] = np.inf  # of a filter that overflowed
     row, joint = np.unravel_index(int(np.argmax(near)), near.shape)
+    if np.isinf(near[row, joint]):
+        return f": {decomposer.robot.joints[joint]!r} overflows in the filter"
     where = f"row {samples.first_row + first + row}" if samples.first_row is not None else "a sample nearby"
     return f": {decomposer.robot.joints[joint]!r} comes to {near[row, joint]:.3g} in {where}"
 

@@ -12,7 +12,7 @@ from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import checked_identifier
 from linkwise.emit.backend import BACKENDS, chosen_backends
 from linkwise.input_file import is_file
-from linkwise.output import require_writable
+from linkwise.output import require_writable, sweep
 from linkwise.package.write import check_target, write_package
 from linkwise.progress import progress
 from linkwise.robot import Options, effects
@@ -33,6 +33,7 @@ def generate(
     details: Details = False,
 ) -> None:
     """Write the package of a robot."""
+    sweep(out)  # also where this one is refused: an earlier one may have died while it took a package away
     backends = [chosen.name for chosen in chosen_backends(backend or BACKENDS)]
     path = Path(robot)
     request = {"robot": path.name if is_file(path) else robot, "backends": backends, **asdict(options)}

@@ -38,6 +38,8 @@ DESCRIPTIONS = f"{', '.join(BUILT_IN)}, or a {', '.join(READERS)} or .py file; .
 def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
     """Robot from a built-in name or a file; raises LinkwiseError naming the file and the remedy."""
     options = options or Options()
+    if not str(spec).strip():
+        raise LinkwiseError(f"the robot's name is empty; give {DESCRIPTIONS}")
     with within(str(spec)):
         if match := re.fullmatch(r"planar([1-9][0-9]*)", str(spec)):
             return build(planar(_joints(match[1])), options)

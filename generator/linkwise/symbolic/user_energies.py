@@ -4,13 +4,19 @@ import runpy
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from sys import float_info
+from traceback import walk_tb
 from typing import Any
 
 import sympy as sp
 
 from linkwise.errors import LinkwiseError, within
+from linkwise.escape import listed, short
 from linkwise.robot.robot import Coordinate, unusable
 from linkwise.symbolic.system import EnergySystem, LinkEnergy
+
+MOST_EXPANDED = 50
+"""Largest power of velocities that is multiplied out: a larger one may never be."""
 
 
 def energy_system(
@@ -34,6 +40,12 @@ def energy_system(
     for link in links:
         with within(f"link {link.name!r}"):
             checked.append(_checked(link, coordinates, values, symbolic))
+    energies = [sp.sympify(energy) for link in links for energy in (link.kinetic, link.potential)]
+    used = set().union(*(energy.free_symbols for energy in energies))
+    if unused := [symbol.name for symbol in values if symbol not in used]:
+        raise LinkwiseError(
+            f"no link's energy has the parameter {listed(unused)}; use it there or leave it out"
+        )
     return EnergySystem(name, coordinates, tuple(checked), values if symbolic else {})
 
 
@@ -44,7 +56,7 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
     except LinkwiseError:
         raise
     except (Exception, SystemExit) as error:  # the user's own code may raise anything
-        raise LinkwiseError(f"running the file failed: {type(error).__name__}: {error}") from error
+        raise LinkwiseError(f"running the file failed{_said(error, str(path))}") from error
     for required, kind in (("coordinates", Coordinate), ("links", LinkEnergy)):
         items = scope.get(required)
         if not isinstance(items, (list, tuple)) or not all(isinstance(item, kind) for item in items):
@@ -56,6 +68,16 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
         scope.get("parameters"),
         symbolic,
     )
+
+
+def _said(error: BaseException, path: str) -> str:
+    """The last line of the user's file that an error passed through, and what the error is."""
+    said = str(error)
+    lines = [at for frame, at in walk_tb(error.__traceback__) if frame.f_code.co_filename == path]
+    if isinstance(error, SyntaxError) and error.filename == path:
+        lines, said = [error.lineno] if error.lineno else [], error.msg
+    place = f" in line {lines[-1]}" if lines else ""
+    return f"{place}: {type(error).__name__}{': ' if said else ''}{said}"
 
 
 def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[LinkEnergy, ...]) -> None:
@@ -96,6 +118,8 @@ def _values(
     for symbol, value in parameters.items():
         if symbol in {s for c in coordinates for s in (c.q, c.qd)}:
             raise LinkwiseError(f"{symbol} is both a coordinate and a parameter; rename one")
+        if isinstance(value, (str, bytes, bool)):
+            raise LinkwiseError(f"parameter {symbol} is {short(repr(value))}; give a number, without quotes")
         try:
             values[symbol] = float(value)
         except (TypeError, ValueError, OverflowError):
@@ -157,11 +181,16 @@ def _check_real(*energies: sp.Expr) -> None:
             raise LinkwiseError("its energies hold NaN or infinity; look for a division by zero")
         if energy.has(sp.I):
             raise LinkwiseError("its energies hold the imaginary unit; energies are real")
+        if any(abs(number) > float_info.max for number in energy.atoms(sp.Number)):
+            raise LinkwiseError("its energies hold a number beyond 1e308; choose other units")
 
 
 def _check_degree(lagrangian: sp.Expr, velocities: list[sp.Symbol]) -> None:
+    powers = [power.exp for power in lagrangian.atoms(sp.Pow) if power.base.free_symbols & set(velocities)]
+    degree = max((exponent for exponent in powers if exponent.is_Integer), default=0)
     try:
-        degree = sp.Poly(lagrangian, *velocities, domain="EX").total_degree()
+        if degree <= MOST_EXPANDED:
+            degree = sp.Poly(lagrangian, *velocities, domain="EX").total_degree()
     except sp.PolynomialError:
         raise LinkwiseError(
             "its energies are not polynomials in the velocities; use terms up to degree 2"

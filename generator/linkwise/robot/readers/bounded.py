@@ -17,6 +17,8 @@ STRINGS_AND_COMMENTS = re.compile(
     r"|#[^\n]*",
     re.DOTALL,
 )
+ENDLESS = re.compile(r"[0-9_]{601,}")
+"""Digits of a number that Python may refuse to read as an integer; the largest number has 309."""
 NOT_OF_A_KEY = re.compile(r"[^\w.\- \t]+")
 
 
@@ -32,19 +34,22 @@ def content(path: Path, most: int) -> bytes:
     return data
 
 
-def check_toml_depth(text: str) -> None:
-    """Raise LinkwiseError for brackets or dotted keys deeper than any robot's file has them.
+def check_toml_bounds(text: str) -> None:
+    """Raise LinkwiseError for numbers longer, brackets or dotted keys deeper than any robot's file has them.
 
     Works on the text without its strings and comments: brackets are then those of tables and arrays, and
     dots with nothing but words between them belong to one key.
     """
-    structure = STRINGS_AND_COMMENTS.sub("s", text)
+    structure = STRINGS_AND_COMMENTS.sub(lambda found: "s" + "\n" * found[0].count("\n"), text)
+    if number := ENDLESS.search(structure):
+        line, digits = 1 + structure.count("\n", 0, number.start()), len(number[0].replace("_", ""))
+        raise LinkwiseError(f"line {line} has a number of {digits} digits; 1e308 is about the largest")
     depth = deepest = 0
     for bracket in re.findall(r"[\[\]{}]", structure):
         depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
         deepest = max(deepest, depth)
-    dots = max(part.count(".") for part in NOT_OF_A_KEY.split(structure))
-    for what, found in (("brackets", deepest), ("a dotted key", dots)):
+    parts = 1 + max(key.count(".") for key in NOT_OF_A_KEY.split(structure))
+    for what, found in (("brackets", deepest), ("a dotted key", parts)):
         if found > MAX_DEPTH:
             raise LinkwiseError(
                 f"malformed TOML: {what} {found} deep; no robot's file needs more than {MAX_DEPTH}"

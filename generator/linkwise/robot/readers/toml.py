@@ -9,7 +9,7 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
-from linkwise.robot.readers.bounded import MIB, check_toml_depth, content
+from linkwise.robot.readers.bounded import MIB, check_toml_bounds, content
 from linkwise.robot.readers.formula import parse_formula
 from linkwise.robot.robot import Mat3, Scalar, Vec3, unusable
 
@@ -64,11 +64,11 @@ def read_toml(path: Path) -> Description:
     """Read a robot; raises LinkwiseError naming the table, the key and the remedy."""
     try:
         text = content(path, MIB).decode("utf-8-sig").replace("\r\n", "\n")
-        check_toml_depth(text)
+        check_toml_bounds(text)
         data = tomllib.loads(text)
     except LinkwiseError:
         raise
-    except (ValueError, RecursionError) as error:  # ValueError: not TOML, not UTF-8, or too many digits
+    except (ValueError, RecursionError) as error:  # ValueError: not TOML, not UTF-8
         raise LinkwiseError(f"malformed TOML: {error}") from None
     if type(data.get("schema")) is not int or data["schema"] != 1:
         raise LinkwiseError(f"the schema is {data.get('schema')!r}; write schema = 1 at the top")
