@@ -151,10 +151,6 @@ FILES = {
         GOOD + "parameters = {sp.Symbol('m'): '1'}",
         "parameter m is '1'; give a number, without quotes",
     ),
-    "unused": (
-        GOOD + "parameters = {sp.Symbol('m'): 1}",
-        "no link's energy has the parameter m; use it there",
-    ),
     "word": (GOOD + "parameters = {sp.Symbol('m'): [1]}", "parameter m has no value as a real number"),
     "complex": (GOOD + "parameters = {sp.Symbol('m'): sp.I}", "parameter m has no value as a real number"),
     "huge": (GOOD + "parameters = {sp.Symbol('m'): 10**400}", "parameter m has no value as a real number"),
@@ -189,3 +185,10 @@ def test_parameters_of_a_python_file_stay_symbols_on_request() -> None:
         "r": 0.5,
         "g": 9.81,
     }
+
+
+def test_parameters_that_no_energy_has_are_left_out() -> None:
+    x, used, unused = Coordinate("x", "m"), sp.Symbol("used"), sp.Symbol("unused")
+    links = [LinkEnergy("disc", used * x.qd**2, 0)]
+    system = energy_system("puck", [x], links, {used: 1.0, unused: 2.0}, symbolic=True)
+    assert system.parameters == {used: 1.0}

@@ -69,7 +69,7 @@ def _build(compiler: Compiler, source: Path, parts: Sequence[str], target: Path,
         commands = [compiler.compiling(source, part, made) for part, made in zip(parts, objects, strict=True)]
         made = folder / "library.so"
         run_all(commands, tell)
-        run_all([compiler.linking(objects, str(made))], tell)
+        run_all([compiler.linking(objects, str(made))], lambda _: tell("linking"))
         if not made.is_file():
             raise RuntimeError(f"{compiler.command[0]} made no library; point CC to a C compiler")
         keep(made, target)

@@ -141,7 +141,10 @@ def _check_bodies(
 
 def _unknown(name: str, own: Mapping[str, float]) -> str:
     if not own:
-        return f"no parameter {_short(name)}; the parameters are none: generate with --parameters symbolic"
+        return (
+            f"no parameter {_short(name)}: this package has no parameters; generate it with "
+            "--parameters symbolic"
+        )
     if len(own) <= MOST_NAMES:
         return f"no parameter {_short(name)}; the parameters are {', '.join(map(_plain, own))}"
     near = difflib.get_close_matches(str(name), own, MOST_NAMES, 0.5) or list(own)[:MOST_NAMES]

@@ -29,6 +29,8 @@ def as_array(name: str, value: Any) -> NDArray[Any]:
     """Anything that reads as an array; raises TypeError or ValueError for what does not, or not wholly."""
     if has_tensors([value]):
         return _array_of_tensor(name, value)
+    if value is None:
+        raise TypeError(f"{name} is None; give an array, a tensor or a list of shape (..., n), n joints")
     if isinstance(value, np.ma.MaskedArray):
         raise TypeError(f"{name} is a masked array; fill its gaps first")
     if isinstance(value, list | tuple) and has_tensors(value):

@@ -4,10 +4,11 @@ import os
 import platform
 import shlex
 import shutil
-import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from .native_process import answer
 
 FLAGS = ("-std=c99", "-O2", "-ftree-vectorize", "-fno-tree-slp-vectorize", "-ffp-contract=fast")
 """Flags of gcc and clang. Multiplications and additions may fuse, which -std=c99 alone forbids gcc."""
@@ -38,20 +39,7 @@ class Compiler:
 
     def version(self) -> str:
         """What it says of itself; raises RuntimeError for what is not a program, or does not answer."""
-        command = [*self.command, "--version"]
-        try:
-            done = subprocess.run(
-                command, stdin=subprocess.DEVNULL, capture_output=True, timeout=ANSWERS, check=False
-            )
-        except OSError as error:
-            raise RuntimeError(
-                f"{self.command[0]} cannot be run: {error.strerror}; point CC to a C compiler"
-            ) from None
-        except subprocess.TimeoutExpired:
-            raise RuntimeError(
-                f"{' '.join(command)} gives no answer in {ANSWERS:.0f} s; point CC to a C compiler"
-            ) from None
-        return done.stdout.decode(errors="replace")
+        return answer([*self.command, "--version"], ANSWERS).decode(errors="replace")
 
     def compiling(self, source: Path, part: str, target: str) -> list[str]:
         """Command line that compiles one part of a robot's file."""

@@ -8,10 +8,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any
 
 PATIENCE = 3600.0
 """Seconds after which a compiler counts as hung; the largest robots take minutes."""
 WIDTH = 79
+
+STEP = 0.1
+"""Seconds between two looks at what runs."""
 
 Tell = Callable[[str], None]
 """Called with how far something is, in words."""
@@ -36,54 +41,96 @@ def told(what: str) -> Iterator[Tell]:
 
 
 def run_all(commands: Sequence[Sequence[str]], tell: Tell) -> None:
-    """Run commands side by side; raises RuntimeError, in one line, for one that fails or hangs."""
-    running: list[subprocess.Popen[bytes]] = []
-    complaints: dict[int, bytes] = {}
+    """Run commands side by side; raises RuntimeError, in one line, for one that fails or hangs.
+
+    `tell` hears how many have ended.
+    """
+    running: list[_Running] = []
     try:
         for command in commands:
-            running.append(_started(command))
-        _wait(running, complaints, commands[0][0], tell)
+            running.append(_started(command, "stderr"))
+        if not _ended(running, PATIENCE, tell):
+            name = commands[0][0]
+            raise RuntimeError(f"{name} is not done after {PATIENCE:.0f} s; point CC to another C compiler")
     finally:
-        for number, process in enumerate(running):
-            if number not in complaints:
-                with suppress(ProcessLookupError):
-                    os.killpg(process.pid, signal.SIGKILL)  # with whatever it has started
-                process.wait()
-                process.stderr.close()  # type: ignore[union-attr]
-    for number, (process, command) in enumerate(zip(running, commands, strict=True)):
-        if process.returncode:
-            reason = _reason(complaints[number], process.returncode)
+        for one in running:
+            one.close()
+    for one, command in zip(running, commands, strict=True):
+        if one.process.returncode:
+            reason = _reason(bytes(one.said), one.process.returncode)
             raise RuntimeError(f"{command[0]} failed: {reason}; the other back ends need no compiler")
 
 
-def _started(command: Sequence[str]) -> "subprocess.Popen[bytes]":
+def answer(command: Sequence[str], seconds: float) -> bytes:
+    """What a command says on stdout; raises RuntimeError if it cannot be run or isn't done by then."""
+    one = _started(command, "stdout")
     try:
-        return subprocess.Popen(
+        if not _ended([one], seconds, lambda _: None):
+            raise RuntimeError(
+                f"{' '.join(command)} gives no answer in {seconds:.0f} s; point CC to a C compiler"
+            )
+    finally:
+        one.close()
+    return bytes(one.said)
+
+
+@dataclass(frozen=True)
+class _Running:
+    """A program that is listened to until it ends itself, not until all that it has started do.
+
+    A compiler's wrapper may leave a server behind, which has the same stdout and stderr open for hours.
+    """
+
+    process: "subprocess.Popen[bytes]"
+    stream: Any
+    said: bytearray
+
+    def has_ended(self) -> bool:
+        """Whether it has; what it has said so far is in `said`."""
+        ended = self.process.poll() is not None  # first: what it said before its end is there to be read
+        self.said.extend(self.stream.read() or b"")
+        return ended
+
+    def close(self) -> None:
+        """End it, with whatever it has started, if it goes on."""
+        if self.process.poll() is None:
+            with suppress(ProcessLookupError):
+                os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.wait()
+        self.stream.close()
+
+
+def _started(command: Sequence[str], listened: str) -> _Running:
+    """Start a command and listen to its stdout or its stderr."""
+    try:
+        process = subprocess.Popen(
             command,
+            bufsize=0,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
+            stdout=subprocess.PIPE if listened == "stdout" else subprocess.DEVNULL,
+            stderr=subprocess.PIPE if listened == "stderr" else subprocess.DEVNULL,
             start_new_session=True,
         )
     except OSError as error:
         raise RuntimeError(
             f"{command[0]} cannot be run: {error.strerror}; point CC to a C compiler"
         ) from None
+    stream = getattr(process, listened)
+    os.set_blocking(stream.fileno(), False)
+    return _Running(process, stream, bytearray())
 
 
-def _wait(
-    running: "Sequence[subprocess.Popen[bytes]]", complaints: dict[int, bytes], name: str, tell: Tell
-) -> None:
-    """Fill `complaints` with what each says on stderr until it ends."""
+def _ended(running: Sequence[_Running], patience: float, tell: Tell) -> bool:
+    """Wait until all have ended; False if that takes longer than `patience`."""
     start = time.monotonic()
-    while left := [number for number in range(len(running)) if number not in complaints]:
+    while left := [one for one in running if not one.has_ended()]:
         seconds = time.monotonic() - start
-        if seconds > PATIENCE:
-            raise RuntimeError(f"{name} is not done after {PATIENCE:.0f} s; point CC to another C compiler")
-        tell(f"{len(complaints)} of {len(running)} parts, {seconds:.0f} s")
-        for number in left:
-            with suppress(subprocess.TimeoutExpired):
-                complaints[number] = running[number].communicate(timeout=min(1.0, PATIENCE) / len(left))[1]
+        if seconds > patience:
+            return False
+        tell(f"{len(running) - len(left)} of {len(running)} parts, {seconds:.0f} s")
+        with suppress(subprocess.TimeoutExpired):
+            left[0].process.wait(STEP)
+    return True
 
 
 def _reason(complaint: bytes, code: int) -> str:

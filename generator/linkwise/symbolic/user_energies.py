@@ -11,7 +11,7 @@ from typing import Any
 import sympy as sp
 
 from linkwise.errors import LinkwiseError, within
-from linkwise.escape import listed, short
+from linkwise.escape import short
 from linkwise.robot.robot import Coordinate, unusable
 from linkwise.symbolic.system import EnergySystem, LinkEnergy
 
@@ -28,8 +28,9 @@ def energy_system(
 ) -> EnergySystem:
     """System from link energies, checked: every symbol known, degree at most 2 in the velocities.
 
-    `parameters` gives each other symbol its value; they become numbers unless `symbolic`. Velocity terms of
-    the potential count as kinetic, terms of the kinetic energy without velocities as potential.
+    `parameters` gives each other symbol its value; they become numbers unless `symbolic`, and
+    those that no energy has are left out. Velocity terms of the potential count as kinetic, terms of the
+    kinetic energy without velocities as potential.
 
     Raises LinkwiseError naming the link.
     """
@@ -40,13 +41,9 @@ def energy_system(
     for link in links:
         with within(f"link {link.name!r}"):
             checked.append(_checked(link, coordinates, values, symbolic))
-    energies = [sp.sympify(energy) for link in links for energy in (link.kinetic, link.potential)]
-    used = set().union(*(energy.free_symbols for energy in energies))
-    if unused := [symbol.name for symbol in values if symbol not in used]:
-        raise LinkwiseError(
-            f"no link's energy has the parameter {listed(unused)}; use it there or leave it out"
-        )
-    return EnergySystem(name, coordinates, tuple(checked), values if symbolic else {})
+    used = set().union(*(link.kinetic.free_symbols | link.potential.free_symbols for link in checked))
+    kept = {symbol: value for symbol, value in values.items() if symbol in used}
+    return EnergySystem(name, coordinates, tuple(checked), kept if symbolic else {})
 
 
 def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
