@@ -68,8 +68,11 @@ def _build(compiler: Compiler, source: Path, parts: Sequence[str], target: Path,
         objects = [f"{folder}/{part}.o" for part in parts]
         commands = [compiler.compiling(source, part, made) for part, made in zip(parts, objects, strict=True)]
         made = folder / "library.so"
-        run_all(commands, tell)
-        run_all([compiler.linking(objects, str(made))], lambda _: tell("linking"))
+        try:
+            run_all(commands, tell)
+            run_all([compiler.linking(objects, str(made))], lambda _: tell("linking"))
+        except RuntimeError as error:
+            raise RuntimeError(f"{error}; the other back ends need no compiler") from None
         if not made.is_file():
             raise RuntimeError(f"{compiler.command[0]} made no library; point CC to a C compiler")
         keep(made, target)

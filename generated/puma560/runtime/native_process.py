@@ -58,7 +58,7 @@ def run_all(commands: Sequence[Sequence[str]], tell: Tell) -> None:
     for one, command in zip(running, commands, strict=True):
         if one.process.returncode:
             reason = _reason(bytes(one.said), one.process.returncode)
-            raise RuntimeError(f"{command[0]} failed: {reason}; the other back ends need no compiler")
+            raise RuntimeError(f"{command[0]} failed: {reason}")
 
 
 def answer(command: Sequence[str], seconds: float) -> bytes:

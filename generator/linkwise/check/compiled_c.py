@@ -2,7 +2,6 @@
 
 import ctypes
 import re
-import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError
 from linkwise.runtime.native_compiler import Compiler, find_compiler
+from linkwise.runtime.native_process import run_all
 
 Numbers = NDArray[Any]
 
@@ -132,25 +132,13 @@ def _compile(compiler: Compiler, sources: Sequence[Path], library: Path, large: 
     """Both number types side by side, then one library of them."""
     tuning = [flag for flag in compiler.flags if flag.startswith("-m")]
     objects = [library.with_name(f"{source.name}.o") for source in sources]
-    running = [
-        subprocess.Popen(
-            [*compiler.command, *FLAGS[:-1], *tuning, f"-DLARGE={large}", "-c", str(source), "-o", str(made)],
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+    commands = [
+        [*compiler.command, *FLAGS[:-1], *tuning, f"-DLARGE={large}", "-c", str(source), "-o", str(made)]
         for source, made in zip(sources, objects, strict=True)
     ]
-    errors = [process.communicate()[1] for process in running]
-    codes = [process.returncode for process in running]
-    if not any(codes):
-        linked = subprocess.run(
-            [*compiler.command, *FLAGS, *map(str, objects), "-lm", "-o", str(library)],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        errors, codes = [linked.stderr], [linked.returncode]
-    for text, code in zip(errors, codes, strict=True):
-        if code:
-            complaint = next((line for line in text.splitlines() if "error" in line), text.strip()[:200])
-            raise LinkwiseError(f"{compiler.command[0]} failed: {complaint}")
+    linking = [*compiler.command, *FLAGS, *map(str, objects), "-lm", "-o", str(library)]
+    try:
+        run_all(commands, lambda _: None)
+        run_all([linking], lambda _: None)
+    except RuntimeError as error:
+        raise LinkwiseError(str(error)) from None

@@ -1,5 +1,6 @@
 """Work that a fault of compiled code may end, done in a process of its own."""
 
+import faulthandler
 import os
 import pickle
 import signal
@@ -43,6 +44,7 @@ def in_own_process(work: Callable[[], T]) -> T:
 
 def _answer(work: Callable[[], T], writer: int) -> None:
     """Write what `work` gives or raises, and end this process without more ado."""
+    faulthandler.disable()  # the parent tells by what signal it ended, in a line
     try:
         try:
             answer = pickle.dumps((True, work()))
