@@ -147,7 +147,7 @@ class _Checks:
     def _reference(
         self, values: Mapping[str, float], loaded: Mapping[str, Model], functions: CFunctions | None
     ) -> tuple[Reference | None, int]:
-        """What numbers are held against, None if nothing can compute or at no state, and at how many it was tried."""
+        """What numbers are held against, None if nothing can compute or at no state; how many were tried."""
         manifest = self.package.manifest
         n = len(manifest.joints)
         if manifest.tree is not None:
