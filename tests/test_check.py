@@ -101,6 +101,35 @@ def test_names_that_no_formula_can_hold_are_read_back(parameters: Any, tmp_path:
     assert set(marks(tmp_path / "odd").values()) == {"ok"}
 
 
+WORDS = ("lambda", "None", "True", "in", "tanh", "sign", "Abs", "sqrt", "pi", "e", "q1", "q_1", "tau11")
+ALIKE = ("p_m_1", "m1", "m_1", "p_p_m_1")
+
+
+def test_parameters_may_be_called_like_words_and_functions_of_formulas(tmp_path: Path) -> None:
+    x = Coordinate("x", "m")
+    values = {sp.Symbol(name): 0.3 + 0.05 * k for k, name in enumerate((*WORDS, *ALIKE))}
+    terms = sum(symbol * sp.cos((k + 1) * x.q) for k, symbol in enumerate(values))
+    slope = sp.tanh(sp.Symbol("tanh") * x.q) * sp.Symbol("lambda")
+    links = [LinkEnergy("bead", x.qd**2 * sum(values), terms + slope)]
+    package = tmp_path / "words"
+    write_package(generate(energy_system("words", [x], links, values, True), ["numpy", "formulas"]), package)
+    assert set(marks(package).values()) == {"ok"}
+    latex = (package / "formulas.tex").read_text()
+    assert r"p_{\mathrm{lambda}} is parameter 'lambda'." in latex
+    assert r"p_{\mathrm{q1}} is parameter 'q1'." in latex
+    assert r"p_{\mathrm{tau11}} is parameter 'tau11'." in latex
+
+
+@pytest.mark.parametrize("name", ["tanh", "sign", "Abs", "sqrt"])
+def test_a_mass_may_be_called_like_functions_of_formulas(name: str, tmp_path: Path) -> None:
+    parameters = f"[parameters]\n{name} = 1.2\n[[link]]"
+    text = ODD.replace("mass = 1.2", f'mass = "{name}"').replace("[[link]]", parameters)
+    (tmp_path / "odd.toml").write_text(text)
+    system = read_system(str(tmp_path / "odd.toml"), Options("symbolic"))
+    write_package(generate(system, ["numpy", "formulas"], "odd"), tmp_path / "odd")
+    assert set(marks(tmp_path / "odd").values()) == {"ok"}
+
+
 def test_a_wrong_term_of_a_parameter_that_is_zero_fails(tmp_path: Path) -> None:
     (tmp_path / "odd.toml").write_text(ODD)
     system = read_system(str(tmp_path / "odd.toml"), Options("symbolic"))
