@@ -6,12 +6,10 @@ import sympy as sp
 from sympy.simplify.fu import TR8
 
 from linkwise.emit.derivation import Derivation
+from linkwise.emit.formula_page import formula_page
 from linkwise.emit.formula_symbols import MOTION, FormulaSymbol, motion_symbol, parameter_symbols
-from linkwise.emit.render import render
-from linkwise.escape import latex_symbol, python_literal
 from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.system import System
-from linkwise.version import VERSION
 
 MOST_COORDINATES = 3
 DIGITS = 12
@@ -27,25 +25,16 @@ def formula_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
         return
     names = [symbol.name for symbol in system.parameters]
     parameters = parameter_symbols(names)
-    rows = [(i, j, _shown(system, parameters, tau)) for i, j, tau in _rows(system)]
+    shown = [(i, j, _shown(system, parameters, tau)) for i, j, tau in _rows(system)]
     latex = _latex_names(system, parameters)
-    printers: tuple[tuple[str, str, Callable[[sp.Expr], str]], ...] = (
-        ("txt", "text", sp.sstr),
-        ("tex", "latex", lambda expr: str(sp.latex(expr, symbol_names=latex))),
-    )
-    for ending, kind, printer in printers:
-        view = {
-            "version": VERSION,
-            "rows": [(i + 1, j + 1, printer(expr)) for i, j, expr in rows],
-            "joints": [python_literal(c.name) for c in system.coordinates],
-            "links": [python_literal(link.name) for link in system.links],
-            "parameters": [
-                (getattr(symbol, kind), python_literal(name))
-                for name, symbol in zip(names, parameters, strict=True)
-                if symbol != FormulaSymbol(name, latex_symbol(name))
-            ],
-        }
-        yield f"formulas.{ending}", render(f"formulas/formulas.{ending}.j2", view)
+    printers: dict[str, Callable[[sp.Expr], str]] = {
+        "txt": sp.sstr,
+        "tex": lambda expr: str(sp.latex(expr, symbol_names=latex)),
+    }
+    for ending, printer in printers.items():
+        rows = [(i, j, printer(expr)) for i, j, expr in shown]
+        joints, links = ([part.name for part in parts] for parts in (system.coordinates, system.links))
+        yield f"formulas.{ending}", formula_page(ending, rows, joints, links, names)
 
 
 def _rows(system: System) -> Iterator[tuple[int, int, sp.Expr]]:
