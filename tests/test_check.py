@@ -229,6 +229,45 @@ WRONG = {
 }
 
 
+FRAME = {
+    "a continued formula": ("formulas.txt", "\ntau_2_2 =", "\n    + 5*q_2\ntau_2_2 =", 13),
+    "a joint exchanged": ("formulas.txt", "q_1 is joint 'joint1'", "q_1 is joint 'joint2'", 4),
+    "qd and qdd exchanged": ("formulas.txt", "qd_1 and qdd_1", "qdd_1 and qd_1", 4),
+    "a wrong link": ("formulas.txt", "Link 2 is 'link2'", "Link 2 is 'link1'", 7),
+    "something behind": ("formulas.txt", "/800000\n", "/800000\n*0", 10),
+    "a line's other end": ("formulas.txt", "in N m (N)", "in N m\r(N)", 1),
+    "a further display": ("formulas.tex", "\n\\[ \\tau_{12}", "\n\\[ + 5 q_{2} \\]\n\\[ \\tau_{12}", 8),
+    "a joint exchanged in latex": ("formulas.tex", "q_1 is joint 'joint1'", "q_1 is joint 'joint2'", 3),
+    "a line too few": ("formulas.tex", "% Link 2 is 'link2'.\n", "", 6),
+}
+
+
+@pytest.mark.parametrize("case", FRAME)
+def test_every_line_beside_the_formulas_is_read(case: str, every_text: Path, tmp_path: Path) -> None:
+    file, old, new, line = FRAME[case]
+    package = shutil.copytree(every_text, tmp_path / "planar2")
+    change_file(package, file, old, new)
+    wrong = [(result.name, result.detail) for result in check_package(package, 3) if not result.passed]
+    assert wrong == [(f"{file}: lines", f"line {line} is not what linkwise writes there")]
+
+
+def test_lines_of_another_versions_formulas_are_not_compared(
+    every_text: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("linkwise.check.formula_texts.VERSION", "0.0.1")
+    found = {result.name: result for result in check_package(every_text, 3)}
+    for name in ("formulas.txt: lines", "formulas.tex: lines"):
+        assert found[name].mark == "skip"
+        assert "which is not at hand to compare with" in found[name].detail
+
+
+def test_formulas_of_ten_links_are_told_apart(tmp_path: Path) -> None:
+    x, y = Coordinate("x", "m"), Coordinate("y", "m")
+    links = [LinkEnergy(f"{k}", k * (x.qd**2 + y.qd**2), 0) for k in range(1, 12)]
+    write_package(generate(energy_system("ten", [x, y], links), ["formulas"]), tmp_path / "ten")
+    assert "FAIL" not in marks(tmp_path / "ten").values()
+
+
 @pytest.mark.parametrize("case", WRONG)
 def test_one_wrong_formula_in_any_file_fails(case: str, every_text: Path, tmp_path: Path) -> None:
     file, old, new, failing = WRONG[case]
@@ -378,7 +417,9 @@ def test_formulas_alone_are_held_against_the_energies(tmp_path: Path) -> None:
         ("manifest", "ok"),
         ("runtime", "ok"),
         ("back ends", "skip"),
+        ("formulas.txt: lines", "ok"),
         ("formulas.txt: tau_ij against energies differentiated", "ok"),
+        ("formulas.tex: lines", "ok"),
         ("formulas.tex: tau_ij against energies differentiated", "ok"),
     ]
 
