@@ -101,6 +101,23 @@ def test_names_that_no_formula_can_hold_are_read_back(parameters: Any, tmp_path:
     assert set(marks(tmp_path / "odd").values()) == {"ok"}
 
 
+CONSTANTS = {
+    "of their own name": sp.GoldenRatio * sp.erf(1) + sp.EulerGamma * sp.zeta(3) + sp.Catalan**2,
+    "of functions": sp.sin(1) + sp.pi**2 + sp.E**2 + sp.sqrt(2) + sp.Rational(1, 3) ** sp.Rational(1, 3),
+    "of many digits": sp.Rational(10**400, 10**399 + 1) + sp.Integer(10**20) / 10**19,
+}
+
+
+@pytest.mark.parametrize("case", CONSTANTS)
+@pytest.mark.parametrize("symbolic", [False, True])
+def test_constants_of_energies_are_read_back(case: str, symbolic: bool, tmp_path: Path) -> None:
+    x, k = Coordinate("x", "m"), sp.Symbol("k")
+    links = [LinkEnergy("a", k * x.qd**2, CONSTANTS[case] * sp.sin(x.q) + k * x.q * CONSTANTS[case])]
+    system = energy_system("constant", [x], links, {k: 2.0}, symbolic)
+    write_package(generate(system, ["numpy", "formulas"]), tmp_path / "constant")
+    assert set(marks(tmp_path / "constant").values()) == {"ok"}
+
+
 WORDS = ("lambda", "None", "True", "in", "tanh", "sign", "Abs", "sqrt", "pi", "e", "q1", "q_1", "tau11")
 ALIKE = ("p_m_1", "m1", "m_1", "p_p_m_1")
 

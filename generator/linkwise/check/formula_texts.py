@@ -27,7 +27,7 @@ PATTERNS = {
     "tex": re.compile(r"^\\\[ \\tau_\{(\d)(\d+)\} = (.*) \\\]$", re.MULTILINE),
 }
 DIGITS = 1e-12
-"""Numbers in these texts are rounded to twelve digits, and terms smaller than this are left out."""
+"""Numbers in these texts are rounded to twelve digits; what cancelling leaves below them is left out."""
 
 
 def check_formulas(

@@ -8,14 +8,18 @@ from sympy.simplify.fu import TR8
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.formula_page import formula_page
 from linkwise.emit.formula_symbols import MOTION, FormulaSymbol, motion_symbol, parameter_symbols
+from linkwise.emit.residue import without_residue
+from linkwise.expression.from_sympy import SYMPY_FUNCTIONS
 from linkwise.symbolic.chain_rule import partial_torques
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import RigidSystem, System
 
 MOST_COORDINATES = 3
 DIGITS = 12
 """Of the numbers shown."""
-ROUNDING = 1e-12
-"""Share of a torque's largest coefficient below which one is rounding."""
+EXACT = 17
+"""Digits that hold every float."""
+READABLE = (sp.Rational, sp.Float, type(sp.pi), type(sp.E), sp.Add, sp.Mul, sp.Pow, *SYMPY_FUNCTIONS)
+"""What a number may be made of for readers of Python and of LaTeX to know it."""
 
 
 def formula_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
@@ -44,20 +48,31 @@ def _rows(system: System) -> Iterator[tuple[int, int, sp.Expr]]:
 
 
 def _shown(system: System, parameters: Iterable[FormulaSymbol], expr: sp.Expr) -> sp.Expr:
-    """The expression expanded, products of sines and cosines as ones of angle sums, numbers short.
-
-    What then cancels, such as sin² + cos² − 1, leaves rounding behind, which is dropped.
-    """
-    shown = (sp.Symbol(symbol.text) for symbol in parameters)
+    """The expression expanded, products of sines and cosines as ones of angle sums, numbers short."""
+    shown = [sp.Symbol(symbol.text) for symbol in parameters]
     names = dict(zip(system.parameters, shown, strict=True))
+    sizes = zip(shown, system.parameters.values(), strict=True)
+    values = {symbol: sp.Float(value or 1.0) for symbol, value in sizes}
+    bounded = set()
     for k, c in enumerate(system.coordinates, 1):
-        names |= {c.q: sp.Symbol(f"q_{k}"), c.qd: sp.Symbol(f"qd_{k}"), c.qdd: sp.Symbol(f"qdd_{k}")}
-    expanded = sp.expand(TR8(sp.expand(expr.xreplace(names))))
-    terms = [term.as_coeff_Mul() for term in sp.Add.make_args(expanded)]
-    least = ROUNDING * max((abs(number) for number, _ in terms), default=0)
-    kept = sp.Add(*(number * rest for number, rest in terms if abs(number) > least))
+        q, qd, qdd = (sp.Symbol(f"{kind}_{k}") for kind in MOTION)
+        names |= {c.q: q, c.qd: qd, c.qdd: qdd}
+        # A sliding body's place is added to lengths; a user's coordinate may be of any size.
+        bounded |= {q, qd, qdd} if isinstance(system, RigidSystem) else {qd, qdd}
+    expanded = sp.expand(TR8(sp.expand(_readable(expr).xreplace(names))))
+    kept = sp.Add(*without_residue(sp.Add.make_args(expanded), bounded, values))
     long = (r for r in kept.atoms(sp.Rational) if max(abs(r.p), r.q) >= 10**DIGITS)
     return kept.xreplace({f: sp.Float(f, DIGITS) for f in (*kept.atoms(sp.Float), *long)})
+
+
+def _readable(expr: sp.Expr) -> sp.Expr:
+    """The expression with numbers for constants that have no notation of their own, such as zeta(3)."""
+    constants = {
+        part: sp.N(part, EXACT)
+        for part in sp.preorder_traversal(expr)
+        if isinstance(part, sp.Expr) and not isinstance(part, READABLE) and part.is_number
+    }
+    return expr.xreplace(constants)
 
 
 def _latex_names(system: System, parameters: Iterable[FormulaSymbol]) -> dict[sp.Symbol, str]:
