@@ -130,6 +130,52 @@ def test_names_that_no_formula_can_hold_are_read_back(parameters: Any, tmp_path:
     assert set(marks(tmp_path / "odd").values()) == {"ok"}
 
 
+CONSTANTS = {
+    "of their own name": sp.GoldenRatio * sp.erf(1) + sp.EulerGamma * sp.zeta(3) + sp.Catalan**2,
+    "of functions": sp.sin(1) + sp.pi**2 + sp.E**2 + sp.sqrt(2) + sp.Rational(1, 3) ** sp.Rational(1, 3),
+    "of many digits": sp.Rational(10**400, 10**399 + 1) + sp.Integer(10**20) / 10**19,
+}
+
+
+@pytest.mark.parametrize("case", CONSTANTS)
+@pytest.mark.parametrize("symbolic", [False, True])
+def test_constants_of_energies_are_read_back(case: str, symbolic: bool, tmp_path: Path) -> None:
+    x, k = Coordinate("x", "m"), sp.Symbol("k")
+    links = [LinkEnergy("a", k * x.qd**2, CONSTANTS[case] * sp.sin(x.q) + k * x.q * CONSTANTS[case])]
+    system = energy_system("constant", [x], links, {k: 2.0}, symbolic)
+    write_package(generate(system, ["numpy", "formulas"]), tmp_path / "constant")
+    assert set(marks(tmp_path / "constant").values()) == {"ok"}
+
+
+WORDS = ("lambda", "None", "True", "in", "tanh", "sign", "Abs", "sqrt", "pi", "e", "q1", "q_1", "tau11")
+ALIKE = ("p_m_1", "m1", "m_1", "p_p_m_1")
+
+
+def test_parameters_may_be_called_like_words_and_functions_of_formulas(tmp_path: Path) -> None:
+    x = Coordinate("x", "m")
+    values = {sp.Symbol(name): 0.3 + 0.05 * k for k, name in enumerate((*WORDS, *ALIKE))}
+    terms = sum(symbol * sp.cos((k + 1) * x.q) for k, symbol in enumerate(values))
+    slope = sp.tanh(sp.Symbol("tanh") * x.q) * sp.Symbol("lambda")
+    links = [LinkEnergy("bead", x.qd**2 * sum(values), terms + slope)]
+    package = tmp_path / "words"
+    write_package(generate(energy_system("words", [x], links, values, True), ["numpy", "formulas"]), package)
+    assert set(marks(package).values()) == {"ok"}
+    latex = (package / "formulas.tex").read_text()
+    assert r"p_{\mathrm{lambda}} is parameter 'lambda'." in latex
+    assert r"p_{\mathrm{q1}} is parameter 'q1'." in latex
+    assert r"p_{\mathrm{tau11}} is parameter 'tau11'." in latex
+
+
+@pytest.mark.parametrize("name", ["tanh", "sign", "Abs", "sqrt"])
+def test_a_mass_may_be_called_like_functions_of_formulas(name: str, tmp_path: Path) -> None:
+    parameters = f"[parameters]\n{name} = 1.2\n[[link]]"
+    text = ODD.replace("mass = 1.2", f'mass = "{name}"').replace("[[link]]", parameters)
+    (tmp_path / "odd.toml").write_text(text)
+    system = read_system(str(tmp_path / "odd.toml"), Options("symbolic"))
+    write_package(generate(system, ["numpy", "formulas"], "odd"), tmp_path / "odd")
+    assert set(marks(tmp_path / "odd").values()) == {"ok"}
+
+
 def test_a_wrong_term_of_a_parameter_that_is_zero_fails(tmp_path: Path) -> None:
     (tmp_path / "odd.toml").write_text(ODD)
     system = read_system(str(tmp_path / "odd.toml"), Options("symbolic"))
@@ -227,6 +273,45 @@ WRONG = {
     ),
     "index": ("c/planar2_index.h", "{2, 2, 2}", "{2, 2, 1}", "c: numbers and indices"),
 }
+
+
+FRAME = {
+    "a continued formula": ("formulas.txt", "\ntau_2_2 =", "\n    + 5*q_2\ntau_2_2 =", 13),
+    "a joint exchanged": ("formulas.txt", "q_1 is joint 'joint1'", "q_1 is joint 'joint2'", 4),
+    "qd and qdd exchanged": ("formulas.txt", "qd_1 and qdd_1", "qdd_1 and qd_1", 4),
+    "a wrong link": ("formulas.txt", "Link 2 is 'link2'", "Link 2 is 'link1'", 7),
+    "something behind": ("formulas.txt", "/800000\n", "/800000\n*0", 10),
+    "a line's other end": ("formulas.txt", "in N m (N)", "in N m\r(N)", 1),
+    "a further display": ("formulas.tex", "\n\\[ \\tau_{12}", "\n\\[ + 5 q_{2} \\]\n\\[ \\tau_{12}", 8),
+    "a joint exchanged in latex": ("formulas.tex", "q_1 is joint 'joint1'", "q_1 is joint 'joint2'", 3),
+    "a line too few": ("formulas.tex", "% Link 2 is 'link2'.\n", "", 6),
+}
+
+
+@pytest.mark.parametrize("case", FRAME)
+def test_every_line_beside_the_formulas_is_read(case: str, every_text: Path, tmp_path: Path) -> None:
+    file, old, new, line = FRAME[case]
+    package = shutil.copytree(every_text, tmp_path / "planar2")
+    change_file(package, file, old, new)
+    wrong = [(result.name, result.detail) for result in check_package(package, 3) if not result.passed]
+    assert wrong == [(f"{file}: lines", f"line {line} is not what linkwise writes there")]
+
+
+def test_lines_of_another_versions_formulas_are_not_compared(
+    every_text: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("linkwise.check.formula_texts.VERSION", "0.0.1")
+    found = {result.name: result for result in check_package(every_text, 3)}
+    for name in ("formulas.txt: lines", "formulas.tex: lines"):
+        assert found[name].mark == "skip"
+        assert "which is not at hand to compare with" in found[name].detail
+
+
+def test_formulas_of_ten_links_are_told_apart(tmp_path: Path) -> None:
+    x, y = Coordinate("x", "m"), Coordinate("y", "m")
+    links = [LinkEnergy(f"{k}", k * (x.qd**2 + y.qd**2), 0) for k in range(1, 12)]
+    write_package(generate(energy_system("ten", [x, y], links), ["formulas"]), tmp_path / "ten")
+    assert "FAIL" not in marks(tmp_path / "ten").values()
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -393,7 +478,9 @@ def test_formulas_alone_are_held_against_the_energies(tmp_path: Path) -> None:
         ("manifest", "ok"),
         ("runtime", "ok"),
         ("back ends", "skip"),
+        ("formulas.txt: lines", "ok"),
         ("formulas.txt: tau_ij against energies differentiated", "ok"),
+        ("formulas.tex: lines", "ok"),
         ("formulas.tex: tau_ij against energies differentiated", "ok"),
     ]
 

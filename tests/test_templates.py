@@ -2,16 +2,20 @@
 
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import jinja2
 import pytest
+import sympy as sp
+import urdf_text
 from conftest import DATA
-from linkwise import Options, generate, read_system
-from linkwise.emit import assemble, autograd, closed_forms, formulas
+from linkwise import Coordinate, LinkEnergy, Options, energy_system, generate, read_system
+from linkwise.emit import assemble, autograd, closed_forms, formula_page
 from linkwise.emit import render as rendering
 from linkwise.emit.c import sources
 from linkwise.emit.render import render, variables
+from urdf_text import joint
 
 ROBOTS = (
     ("planar2", Options()),
@@ -31,7 +35,7 @@ def views() -> dict[str, list[set[str]]]:
         return render(template, view)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (rendering, autograd, sources, closed_forms, formulas, assemble):
+        for module in (rendering, autograd, sources, closed_forms, formula_page, assemble):
             patch.setattr(module, "render", recording)
         for robot, options in ROBOTS:
             generate(read_system(robot, options))
@@ -65,3 +69,45 @@ def test_numbers_of_formulas_are_rounded_to_what_they_are_worth() -> None:
     files = generate(read_system(str(DATA / "skew.toml"), Options(tip="b")), ["formulas"], "skew")
     for name in ("formulas.txt", "formulas.tex"):
         assert max(len(digits) for digits in re.findall(r"[0-9]+", files[name])) <= 15
+
+
+RX = Coordinate("x", "m")
+K, C = sp.symbols("k c")
+KEPT = {
+    "a power of e": (1e-13 * sp.exp(15 * RX.q) + K * RX.q, "exp(15*q_1)"),
+    "a reciprocal": (1e-14 / (RX.q - 4) + K * RX.q, "1.0e-14/(q_1**2"),
+    "a power of a place": (1e-15 * RX.q**9 + K * RX.q, "q_1**8"),
+    "beside a power of e": (1e13 * sp.exp(-30 * RX.q) + sp.cos(RX.q), "sin(q_1)"),
+    "a small parameter": (C * RX.q**2 + K * RX.q, "q_1"),
+    "beside a small parameter": (1e-13 * K * sp.cos(RX.q) + C * sp.sin(RX.q), "sin(q_1)"),
+}
+
+
+@pytest.mark.parametrize("case", KEPT)
+@pytest.mark.parametrize("symbolic", [False, True])
+def test_terms_of_any_size_stay_in_formulas_however_small_their_numbers(case: str, symbolic: bool) -> None:
+    energy, term = KEPT[case]
+    link = LinkEnergy("a", RX.qd**2, energy)
+    system = energy_system("spring", [RX], [link], {K: 40.0, C: 1e-14}, symbolic)
+    assert term in generate(system, ["formulas"])["formulas.txt"].partition("tau_1_1 =")[2]
+
+
+@pytest.mark.parametrize("robot", ["skew", "turned", "energies"])
+def test_what_cancelling_leaves_is_not_shown(
+    robot: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if robot == "skew":
+        system = read_system(DATA / "skew.toml")
+    elif robot == "turned":
+        upright, slide = joint("j", "a", "b", axis="0 0 1"), joint("k", "b", "c", type="prismatic")
+        (tmp_path / "turned.urdf").write_text(urdf_text.chain(upright, slide))
+        system = read_system(tmp_path / "turned.urdf", Options("symbolic"))
+    else:
+        y = Coordinate("y")
+        place = [0.7 * RX.q * f(y.q) + 0.1 * RX.q * f(y.q + 0.3) for f in (sp.sin, sp.cos)]
+        rates = [sp.diff(p, RX.q) * RX.qd + sp.diff(p, y.q) * y.qd for p in place]
+        system = energy_system("slide", [RX, y], [LinkEnergy("a", 1.3 * sum(v**2 for v in rates) / 2, 0)])
+    small = re.compile("e-1[4-9]|e-[2-9]")
+    assert not small.search(generate(system, ["formulas"])["formulas.txt"])
+    monkeypatch.setattr("linkwise.emit.residue.ROUNDING", 0.0)
+    assert small.search(generate(system, ["formulas"])["formulas.txt"])

@@ -9,7 +9,16 @@ import pytest
 import sympy as sp
 from answers import packed, random_states, relative_error
 from conftest import DATA, needs_compiler
-from linkwise import Coordinate, LinkEnergy, LinkwiseError, energy_system, generate, read_system
+from linkwise import (
+    Coordinate,
+    LinkEnergy,
+    LinkwiseError,
+    energy_system,
+    generate,
+    read_system,
+    write_package,
+)
+from linkwise.package.load import import_package
 
 CART, TURNTABLE = str(DATA / "cart_pendulum.py"), str(DATA / "turntable.py")
 BACKENDS = ("numpy", "torch", "autograd", *(pytest.param(b, marks=needs_compiler) for b in ("c", "native")))
@@ -165,6 +174,46 @@ def test_defect_of_a_python_file_is_named(case: str, tmp_path: Path) -> None:
     with pytest.raises(LinkwiseError) as caught:
         read_system(tmp_path / "bad.py")
     assert str(caught.value).startswith(f"{tmp_path / 'bad.py'}: {message}")
+
+
+@pytest.mark.parametrize(
+    ("exponent", "parameters"), [(2.0, {}), (A, {A: 2}), (-A, {A: 2.0}), (2 * A + 0.5, {A: 1.25})], ids=str
+)
+@pytest.mark.parametrize("backend", ["numpy", "autograd"])
+def test_a_whole_power_that_is_written_with_a_point_is_one_for_negative_positions_too(
+    exponent: object, parameters: dict[sp.Symbol, float], backend: str, tmp_path: Path
+) -> None:
+    link = LinkEnergy("disc", X.qd**2.0 / 2, X.q**exponent)
+    write_package(generate(energy_system("puck", [X], [link], parameters), [backend]), tmp_path / "puck")
+    states = np.array([[[-1.7], [0.4]], [[0.3], [-0.2]], [[2.0], [1.0]]])
+    if backend == "autograd":
+        states = pytest.importorskip("torch").from_numpy(states)
+    found = np.asarray(import_package(tmp_path / "puck").load(backend).partial_torque(*states))
+    n = float(sp.sympify(exponent).subs(parameters))
+    expected = [2.0 + n * (-1.7) ** (n - 1), 1.0 + n * 0.4 ** (n - 1)]
+    assert found.ravel().tolist() == pytest.approx(expected, rel=1e-14)
+
+
+def test_a_half_power_that_is_written_with_a_point_is_a_root() -> None:
+    text = generate(puck(X.qd**2, (X.q**2 + 1) ** 1.5), ["numpy"])["forms/link_1.py"]  # type: ignore[arg-type]
+    assert "log" not in text
+
+
+@pytest.mark.parametrize("potential", [X.q**A, sp.cos(X.q) * (X.q - B) ** (2 * A), A**B * X.q], ids=str)
+def test_a_parameter_as_exponent_is_refused_where_the_base_may_be_negative(potential: sp.Expr) -> None:
+    links, values = [LinkEnergy("disc", X.qd**2, potential)], {A: 2.0, B: 2.0}
+    message = (
+        r"^link 'disc': .* has parameters in its exponent, .* numbers for the parameters, .*positive=True"
+    )
+    with pytest.raises(LinkwiseError, match=message):
+        energy_system("puck", [X], links, values, symbolic=True)
+    generate(energy_system("puck", [X], links, values), ["numpy"])
+
+
+@pytest.mark.parametrize("potential", [(X.q**2 + 1) ** A, sp.exp(X.q) ** A, 2**X.q, B**X.q], ids=str)
+def test_an_exponent_is_taken_where_the_power_is_that_of_a_logarithm(potential: sp.Expr) -> None:
+    links, values = [LinkEnergy("disc", X.qd**2, potential)], {A: 2.0, B: 2.0}
+    assert generate(energy_system("puck", [X], links, values, symbolic=True), ["numpy"])
 
 
 def test_unsupported_function_is_refused_by_name() -> None:

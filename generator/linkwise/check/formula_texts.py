@@ -1,7 +1,8 @@
 """formulas.txt and formulas.tex, read back as formulas and held against the reference."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,22 @@ from linkwise.check.latex_reader import LatexReader, Unreadable
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.reference import Reference
 from linkwise.check.text_reader import NUMPY, TextFormula, parameter_values
+from linkwise.emit.formula_page import Row, formula_page
 from linkwise.emit.formula_symbols import MOTION, motion_symbol, parameter_symbols
 from linkwise.package.load import Array, Package
 from linkwise.package.manifest import Manifest
+from linkwise.version import VERSION
 
+Formula = Callable[[Mapping[str, Any]], Any]
+"""Value for given values of the symbols; raises Unreadable."""
+
+# Coordinates have one digit, since more than a few have no formulas.
+PATTERNS = {
+    "txt": re.compile(r"^tau_(\d+)_(\d+) = (.*)$", re.MULTILINE),
+    "tex": re.compile(r"^\\\[ \\tau_\{(\d)(\d+)\} = (.*) \\\]$", re.MULTILINE),
+}
 DIGITS = 1e-12
-"""Numbers in these texts are rounded to twelve digits, and terms smaller than this are left out."""
+"""Numbers in these texts are rounded to twelve digits; what cancelling leaves below them is left out."""
 
 
 def check_formulas(
@@ -26,42 +37,61 @@ def check_formulas(
     label: str,
     reference: Reference | None,
 ) -> Iterator[Result]:
-    """One result for each text there is; a formula that cannot be read as one fails."""
-    manifest, directory = package.manifest, package.directory
-    texts: tuple[tuple[str, Callable[[str], Any], str], ...] = (
-        ("formulas.txt", _text_row, r"^tau_(\d+)_(\d+) = (.*)$"),
-        ("formulas.tex", _latex_row(manifest), r"^\\\[ \\tau_\{(\d+)(?:, ?)?(\d+)\} = (.*) \\\]$"),
-    )
-    for file, read, pattern in texts:
+    """What there is to say of each text; every line of it counts, whatever stands between the formulas."""
+    manifest = package.manifest
+    readers = {"txt": _text_row, "tex": _latex_row(manifest)}
+    for ending, pattern in PATTERNS.items():
+        file = f"formulas.{ending}"
         if file not in manifest.files:
             continue
+        text = (package.directory / file).read_bytes().decode()
+        found = [(int(i) - 1, int(j) - 1, formula) for i, j, formula in pattern.findall(text)]
+        if [(i, j) for i, j, _ in found] != [(i, j) for i, j in rows.tau.tolist()]:
+            told = "it lists other torques than the paths say"
+            yield Result(f"{file}{label}: every tau_ij", False, None, told)
+            continue
+        if not label:
+            yield _lines(manifest, ending, text, found)
         if reference is None:
             yield Skipped(f"{file}{label}: not checked", "there is nothing to hold it against")
             continue
-        text = (directory / file).read_text(encoding="utf-8")
-        found = re.findall(pattern, text, re.MULTILINE)
-        given = [(int(i) - 1, int(j) - 1) for i, j, _ in found]
-        if given != [(i, j) for i, j in rows.tau.tolist()]:
-            yield Result(
-                f"{file}{label}: every tau_ij", False, None, "it lists other torques than the paths say"
-            )
-            continue
-        names = _names(parameters, reference)
-        try:
-            tau = np.stack([_filled(read(formula)(names), reference) for *_, formula in found], -1)
-        except Unreadable as unread:
-            yield Result(f"{file}{label}: can be read", False, None, f"it holds {unread}")
-            continue
-        at = (slice(None), *rows.tau.T)
-        picked, scale = reference.values["tau"][at], reference.scales["tau"][at]
-        # Rounding of numbers with DIGITS in place of that of float64.
-        entries = [Entries("entry ", tau, picked, scale)]
-        yield compare(
-            f"{file}{label}: tau_ij against {reference.name}",
-            entries,
-            reference.tolerance,
-            epsilon=DIGITS / 100,
-        )
+        formulas = [readers[ending](formula) for *_, formula in found]
+        yield _numbers(f"{file}{label}", formulas, rows, parameters, reference)
+
+
+def _lines(manifest: Manifest, ending: str, text: str, found: Sequence[Row]) -> Result:
+    """Hold the text against the page that linkwise makes of the same formulas."""
+    name, version = f"formulas.{ending}: lines", manifest.generator.get("linkwise")
+    if version != VERSION:
+        return Skipped(name, f"those of linkwise {version}, which is not at hand to compare with")
+    joints, links = ([part.name for part in parts] for parts in (manifest.joints, manifest.links))
+    page = formula_page(ending, found, joints, links, list(manifest.parameters)).split("\n")
+    lines = zip_longest(text.split("\n"), page)
+    wrong = next((number for number, (line, own) in enumerate(lines, 1) if line != own), None)
+    told = (
+        f"line {wrong} is not what linkwise writes there" if wrong else "beside the formulas are linkwise's"
+    )
+    return Result(name, not wrong, None, told)
+
+
+def _numbers(
+    name: str,
+    formulas: Sequence[Formula],
+    rows: IndexRows,
+    parameters: Mapping[str, float],
+    reference: Reference,
+) -> Result:
+    """Hold the formulas' values against the reference; one that cannot be read as a formula fails."""
+    names = _names(parameters, reference)
+    try:
+        tau = np.stack([_filled(formula(names), reference) for formula in formulas], -1)
+    except Unreadable as unread:
+        return Result(f"{name}: can be read", False, None, f"it holds {unread}")
+    at = (slice(None), *rows.tau.T)
+    entries = [Entries("entry ", tau, reference.values["tau"][at], reference.scales["tau"][at])]
+    # Rounding of numbers with DIGITS in place of that of float64.
+    told = f"{name}: tau_ij against {reference.name}"
+    return compare(told, entries, reference.tolerance, epsilon=DIGITS / 10)
 
 
 def _names(parameters: Mapping[str, float], reference: Reference) -> dict[str, Any]:
@@ -78,12 +108,12 @@ def _filled(value: Any, reference: Reference) -> Array:
     return np.broadcast_to(np.asarray(value, dtype=float), len(reference.states.q))
 
 
-def _text_row(formula: str) -> Callable[[Mapping[str, Any]], Any]:
-    return TextFormula(formula).value
+def _text_row(formula: str) -> Formula:
+    return lambda names: TextFormula(formula).value(names)
 
 
-def _latex_row(manifest: Manifest) -> Callable[[str], Callable[[Mapping[str, Any]], Any]]:
-    def read(formula: str) -> Callable[[Mapping[str, Any]], Any]:
+def _latex_row(manifest: Manifest) -> Callable[[str], Formula]:
+    def read(formula: str) -> Formula:
         return lambda names: LatexReader(formula, _latex_symbols(manifest, names), NUMPY).value()
 
     return read

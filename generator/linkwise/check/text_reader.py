@@ -24,6 +24,9 @@ NAMES = (
 NUMPY: Functions = {name: getattr(np, NUMPY_NAMES.get(name, name)) for name in NAMES}
 """The functions of formulas, for arrays of NumPy."""
 
+HELD = re.compile('[ -"$-~]*')
+"""Characters of formulas. Python would leave out what stands behind #, and take letters for others alike."""
+
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -39,6 +42,8 @@ class TextFormula:
     """One formula; raises Unreadable for what is none."""
 
     def __init__(self, text: str) -> None:
+        if not HELD.fullmatch(text):
+            raise Unreadable(repr(text[:40]))
         try:
             # Term by term, since Python's parser gives up a sum of some thousands.
             self._terms = [(sign, ast.parse(term, mode="eval").body) for sign, term in _terms(text)]
@@ -51,10 +56,11 @@ class TextFormula:
         return sum(sign * _value(term, known, functions) for sign, term in self._terms)
 
     def names(self) -> set[str]:
-        """Names that its value hangs on."""
-        nodes = (node for _, term in self._terms for node in ast.walk(term))
-        found = {node.id for node in nodes if isinstance(node, ast.Name)}
-        return found - CONSTANTS.keys() - set(NAMES)
+        """Names that its value hangs on; parameters may be called like functions."""
+        nodes = [node for _, term in self._terms for node in ast.walk(term)]
+        called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
+        found = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in called}
+        return found - CONSTANTS.keys()
 
 
 def _terms(text: str) -> Iterator[tuple[float, str]]:
@@ -100,8 +106,11 @@ def _value(node: ast.AST, names: Mapping[str, Any], functions: Functions) -> Any
 
 def _operand(node: ast.AST, names: Mapping[str, Any], functions: Functions) -> Any:
     match node:
-        case ast.Constant(value=int() | float() as number):
-            return float(number)
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+            try:
+                return float(number)
+            except OverflowError as error:
+                raise _unreadable(node) from error
         case ast.Name(id=name) if name in names:
             return names[name]
         case ast.UnaryOp(op=op, operand=operand) if type(op) in OPERATORS:

@@ -10,6 +10,9 @@ from linkwise.package.manifest import BodyEntry, EnergyEntry, RigidTree
 from linkwise.robot.robot import Robot, Scalar, Vec3
 from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
+LARGEST = 2**53
+"""Whole numbers beyond are no longer all floats; those of fractions need not even be near one."""
+
 
 def rigid_tree(system: System) -> RigidTree | None:
     """Return where the bodies are and what they carry; None for a user's own energies."""
@@ -80,7 +83,13 @@ def _texts(system: System) -> Callable[[Scalar], str]:
     for k, c in enumerate(system.coordinates, 1):
         names |= {c.q: sp.Symbol(motion_symbol("q", k).text), c.qd: sp.Symbol(motion_symbol("qd", k).text)}
     printer = _Exact()
-    return lambda scalar: str(printer.doprint(sp.sympify(scalar).xreplace(names)))
+
+    def text(scalar: Scalar) -> str:
+        expr = sp.sympify(scalar).xreplace(names)
+        long = (r for r in expr.atoms(sp.Rational) if max(abs(r.p), r.q) > LARGEST)
+        return str(printer.doprint(expr.xreplace({r: sp.Float(r, 17) for r in long})))
+
+    return text
 
 
 class _Exact(StrPrinter):  # type: ignore[misc]

@@ -3,13 +3,20 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from keyword import kwlist
 
 from linkwise.escape import identifiers, latex_symbol
 
-USABLE = re.compile(r"(?!(q|qd|qdd|tau)_|(sin|cos|tan|sqrt|exp|log|pi|E|e|I)$)[A-Za-z][0-9A-Za-z_]*")
-"""Names of parameters that a formula can hold as they are, and that stand for nothing else in it."""
+WORDS = "|".join(("sin", "cos", "tan", "sqrt", "exp", "log", "pi", "E", "e", "I", *kwlist))
+USABLE = re.compile(rf"(?!(q|qd|qdd|tau)_|({WORDS})$)[A-Za-z][0-9A-Za-z_]*")
+"""Names of parameters that a formula can hold as they are, and that stand for nothing else in it.
+
+Words of Python's, such as lambda, are none: formulas.txt is in its notation.
+"""
 MOTION = {"q": "q", "qd": r"\dot{q}", "qdd": r"\ddot{q}"}
 """LaTeX of q_k, q̇_k and q̈_k without their index."""
+OWN = re.compile(r"(q|\\tau)_\{\d+\}")
+"""LaTeX that a parameter's name could be made into, and that a coordinate or a torque has."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +39,9 @@ def parameter_symbols(names: Sequence[str]) -> list[FormulaSymbol]:
     symbols: list[FormulaSymbol] = []
     taken: set[str] = set()
     for name in names:
-        text = name if name in usable else next(made)
-        latex = latex_symbol(text)
-        latex = latex_symbol(f"p_{text}") if latex in taken else latex
+        text = told = name if name in usable else next(made)
+        while (latex := latex_symbol(told)) in taken or OWN.fullmatch(latex):
+            told = f"p_{told}"
         taken.add(latex)
         symbols.append(FormulaSymbol(text, latex))
     return symbols

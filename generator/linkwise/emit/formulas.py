@@ -6,18 +6,20 @@ import sympy as sp
 from sympy.simplify.fu import TR8
 
 from linkwise.emit.derivation import Derivation
+from linkwise.emit.formula_page import formula_page
 from linkwise.emit.formula_symbols import MOTION, FormulaSymbol, motion_symbol, parameter_symbols
-from linkwise.emit.render import render
-from linkwise.escape import latex_symbol, python_literal
+from linkwise.emit.residue import without_residue
+from linkwise.expression.from_sympy import SYMPY_FUNCTIONS
 from linkwise.symbolic.chain_rule import partial_torques
-from linkwise.symbolic.system import System
-from linkwise.version import VERSION
+from linkwise.symbolic.system import RigidSystem, System
 
 MOST_COORDINATES = 3
 DIGITS = 12
 """Of the numbers shown."""
-ROUNDING = 1e-12
-"""Share of a torque's largest coefficient below which one is rounding."""
+EXACT = 17
+"""Digits that hold every float."""
+READABLE = (sp.Rational, sp.Float, type(sp.pi), type(sp.E), sp.Add, sp.Mul, sp.Pow, *SYMPY_FUNCTIONS)
+"""What a number may be made of for readers of Python and of LaTeX to know it."""
 
 
 def formula_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
@@ -27,25 +29,16 @@ def formula_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
         return
     names = [symbol.name for symbol in system.parameters]
     parameters = parameter_symbols(names)
-    rows = [(i, j, _shown(system, parameters, tau)) for i, j, tau in _rows(system)]
+    shown = [(i, j, _shown(system, parameters, tau)) for i, j, tau in _rows(system)]
     latex = _latex_names(system, parameters)
-    printers: tuple[tuple[str, str, Callable[[sp.Expr], str]], ...] = (
-        ("txt", "text", sp.sstr),
-        ("tex", "latex", lambda expr: str(sp.latex(expr, symbol_names=latex))),
-    )
-    for ending, kind, printer in printers:
-        view = {
-            "version": VERSION,
-            "rows": [(i + 1, j + 1, printer(expr)) for i, j, expr in rows],
-            "joints": [python_literal(c.name) for c in system.coordinates],
-            "links": [python_literal(link.name) for link in system.links],
-            "parameters": [
-                (getattr(symbol, kind), python_literal(name))
-                for name, symbol in zip(names, parameters, strict=True)
-                if symbol != FormulaSymbol(name, latex_symbol(name))
-            ],
-        }
-        yield f"formulas.{ending}", render(f"formulas/formulas.{ending}.j2", view)
+    printers: dict[str, Callable[[sp.Expr], str]] = {
+        "txt": sp.sstr,
+        "tex": lambda expr: str(sp.latex(expr, symbol_names=latex)),
+    }
+    for ending, printer in printers.items():
+        rows = [(i, j, printer(expr)) for i, j, expr in shown]
+        joints, links = ([part.name for part in parts] for parts in (system.coordinates, system.links))
+        yield f"formulas.{ending}", formula_page(ending, rows, joints, links, names)
 
 
 def _rows(system: System) -> Iterator[tuple[int, int, sp.Expr]]:
@@ -55,20 +48,31 @@ def _rows(system: System) -> Iterator[tuple[int, int, sp.Expr]]:
 
 
 def _shown(system: System, parameters: Iterable[FormulaSymbol], expr: sp.Expr) -> sp.Expr:
-    """The expression expanded, products of sines and cosines as ones of angle sums, numbers short.
-
-    What then cancels, such as sin² + cos² − 1, leaves rounding behind, which is dropped.
-    """
-    shown = (sp.Symbol(symbol.text) for symbol in parameters)
+    """The expression expanded, products of sines and cosines as ones of angle sums, numbers short."""
+    shown = [sp.Symbol(symbol.text) for symbol in parameters]
     names = dict(zip(system.parameters, shown, strict=True))
+    sizes = zip(shown, system.parameters.values(), strict=True)
+    values = {symbol: sp.Float(value or 1.0) for symbol, value in sizes}
+    bounded = set()
     for k, c in enumerate(system.coordinates, 1):
-        names |= {c.q: sp.Symbol(f"q_{k}"), c.qd: sp.Symbol(f"qd_{k}"), c.qdd: sp.Symbol(f"qdd_{k}")}
-    expanded = sp.expand(TR8(sp.expand(expr.xreplace(names))))
-    terms = [term.as_coeff_Mul() for term in sp.Add.make_args(expanded)]
-    least = ROUNDING * max((abs(number) for number, _ in terms), default=0)
-    kept = sp.Add(*(number * rest for number, rest in terms if abs(number) > least))
+        q, qd, qdd = (sp.Symbol(f"{kind}_{k}") for kind in MOTION)
+        names |= {c.q: q, c.qd: qd, c.qdd: qdd}
+        # A sliding body's place is added to lengths; a user's coordinate may be of any size.
+        bounded |= {q, qd, qdd} if isinstance(system, RigidSystem) else {qd, qdd}
+    expanded = sp.expand(TR8(sp.expand(_readable(expr).xreplace(names))))
+    kept = sp.Add(*without_residue(sp.Add.make_args(expanded), bounded, values))
     long = (r for r in kept.atoms(sp.Rational) if max(abs(r.p), r.q) >= 10**DIGITS)
     return kept.xreplace({f: sp.Float(f, DIGITS) for f in (*kept.atoms(sp.Float), *long)})
+
+
+def _readable(expr: sp.Expr) -> sp.Expr:
+    """The expression with numbers for constants that have no notation of their own, such as zeta(3)."""
+    constants = {
+        part: sp.N(part, EXACT)
+        for part in sp.preorder_traversal(expr)
+        if isinstance(part, sp.Expr) and not isinstance(part, READABLE) and part.is_number
+    }
+    return expr.xreplace(constants)
 
 
 def _latex_names(system: System, parameters: Iterable[FormulaSymbol]) -> dict[sp.Symbol, str]:

@@ -132,7 +132,8 @@ def _checked(
     values: dict[sp.Symbol, float],
     symbolic: bool,
 ) -> LinkEnergy:
-    kinetic, potential = _expression("kinetic", link.kinetic), _expression("potential", link.potential)
+    kinetic = _whole(_expression("kinetic", link.kinetic))
+    potential = _whole(_expression("potential", link.potential))
     velocities = [c.qd for c in coordinates]
     known = {c.q for c in coordinates} | set(velocities) | set(values)
     for symbol in sorted((kinetic.free_symbols | potential.free_symbols) - known, key=str):
@@ -146,9 +147,11 @@ def _checked(
             "add it there"
         )
     numbers = {symbol: sp.Float(value, 17) for symbol, value in values.items()}
-    plain = kinetic.xreplace(numbers), potential.xreplace(numbers)
+    plain = _whole(kinetic.xreplace(numbers)), _whole(potential.xreplace(numbers))
     _check_real(kinetic, potential, *plain)
-    if not symbolic:
+    if symbolic:
+        _check_exponents(kinetic.atoms(sp.Pow) | potential.atoms(sp.Pow), set(values))
+    else:
         kinetic, potential = plain
     _check_degree(kinetic - potential, velocities)
     if not (kinetic - potential).free_symbols & (known - set(values)):
@@ -170,6 +173,31 @@ def _expression(what: str, energy: object) -> sp.Expr:
     if not isinstance(expression, sp.Expr):
         raise LinkwiseError(f"its {what} energy is {energy!r}; give a SymPy expression, 0 for none")
     return expression
+
+
+def _whole(energy: sp.Expr) -> sp.Expr:
+    """The energy with exponents such as 2.0 or 1.5 as the fractions that they are.
+
+    Others are powers of the base's logarithm, which negative numbers do not have.
+    """
+
+    def with_a_point(part: sp.Basic) -> bool:
+        return part.is_Pow and part.exp.is_Float and float(2 * part.exp).is_integer()
+
+    return energy.replace(with_a_point, lambda power: power.base ** sp.Rational(power.exp))
+
+
+def _check_exponents(powers: Iterable[sp.Pow], parameters: set[sp.Symbol]) -> None:
+    """Raise LinkwiseError for a parameter as exponent of what may be negative: it need not be whole."""
+    for power in sorted(powers, key=str):
+        symbols = power.exp.free_symbols
+        if symbols and symbols <= parameters and not power.base.is_nonnegative:
+            raise LinkwiseError(
+                f"{short(str(power))} has parameters in its exponent, which at run time is taken by the "
+                f"logarithm of {short(str(power.base))}; generate with numbers for the parameters, write a "
+                "number there, or make the base one that SymPy knows to be positive, as by "
+                "sp.symbols(..., positive=True)"
+            )
 
 
 def _check_real(*energies: sp.Expr) -> None:
