@@ -5,6 +5,7 @@ import importlib.util
 import json
 import os
 import py_compile
+import re
 import shutil
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from conftest import DATA
+from conftest import DATA, needs_compiler
 from linkwise import (
     Coordinate,
     LinkEnergy,
@@ -215,6 +216,46 @@ def test_c_that_does_not_compile_fails_with_the_compilers_words(every_text: Path
     assert not result.passed
     assert "failed: " in result.detail
     assert "error: " in result.detail
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("void planar2_torque(", "void planar2_torque (", "planar2_torque is declared otherwise"),
+        ("const double *q, const double *qd,", "const double *qd, const double *q,", "is declared otherwise"),
+        (
+            "double *tau);",
+            "double *tau); void planar2_power(void);",
+            "planar2_power is declared, and there is",
+        ),
+        ("void planar2_link_2f(", "void link_2f(", "planar2_link_2f is not declared"),
+    ],
+)
+def test_a_header_that_declares_other_functions_fails(
+    old: str, new: str, fault: str, every_text: Path, tmp_path: Path
+) -> None:
+    package = shutil.copytree(every_text, tmp_path / "planar2")
+    change_file(package, "c/planar2.h", old, new)
+    found = {result.name: result for result in check_package(package, 3)}
+    headers = found["c: numbers, indices and functions of the headers"]
+    assert not headers.passed
+    assert fault in headers.detail
+
+
+@needs_compiler
+def test_a_c_function_is_called_whether_or_not_its_header_declares_it(
+    every_text: Path, tmp_path: Path
+) -> None:
+    package = shutil.copytree(every_text, tmp_path / "planar2")
+    text = (package / "c/planar2.h").read_text()
+    for prototype in re.findall(r"void planar2_link_2f?\([^;]*;", text):
+        change_file(package, "c/planar2.h", prototype, "")
+    results = {result.name: result.passed for result in check_package(package, 3)}
+    assert results["c: planar2_link_2"]
+    change_file(package, "c/planar2.c", "void API(link_2)(", "static void API(link_2)(")
+    (wrong,) = (r for r in check_package(package, 3) if r.name == "c: planar2_link_2")
+    assert (wrong.passed, wrong.detail) == (False, "there is no such function")
 
 
 @pytest.mark.parametrize(
