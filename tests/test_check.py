@@ -267,10 +267,16 @@ def test_a_c_function_is_called_whether_or_not_its_header_declares_it(
         ('ImportError("gone", name=__package__ + ".forms")', "FAIL"),
         ('RuntimeError("needs a C compiler: apt install gcc")', "skip"),
         ('RuntimeError("cannot make the cache /x: No space left; set LINKWISE_CACHE to another")', "skip"),
-        ('ImportError("No module named torch", name="torch")', "skip"),
+        ('ImportError("No module named torch", name="torch.func")', "skip"),
+        ('ImportError("No module named torchh", name="torchh")', "FAIL"),
+        ('ImportError("cannot import Anyy", name="typing")', "FAIL"),
+        ("SystemExit(0)", "FAIL"),
     ],
 )
-def test_only_what_is_missing_here_is_left_out(error: str, mark: str, package: Path) -> None:
+def test_only_what_is_missing_here_is_left_out(
+    error: str, mark: str, package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("linkwise.check.checks.find_spec", lambda name: None)
     change_file(package, "__init__.py", "    if backend not in", f"    raise {error}\n    if backend not in")
     found = marks(package)
     assert (found.pop("hashes"), found.pop("manifest"), found.pop("runtime")) == ("ok", "ok", "ok")
@@ -284,6 +290,30 @@ def test_a_package_that_cannot_be_imported_or_asked_fails(package: Path) -> None
     change_file(package, "runtime/dynamics.py", "def broken(:\n", "")
     change_file(package, "runtime/dynamics.py", "def partial_torque", "def full_torque")
     assert marks(package)["answers"] == "FAIL"
+
+
+def test_a_library_that_is_here_is_not_called_missing(package: Path) -> None:
+    pytest.importorskip("torch")
+    change_file(package, "forms/link_1.py", "from collections", "from torch import Tensorr\nfrom collections")
+    assert marks(package)["numpy: loads"] == "FAIL"
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "failing"),
+    [
+        ("names.py", "ROBOT = ", "import"),
+        ("forms/link_1.py", "def decomposition(", "numpy: loads"),
+        ("forms/link_1.py", "    return ", "answers"),
+    ],
+)
+def test_a_package_that_ends_the_process_fails(file: str, old: str, failing: str, package: Path) -> None:
+    indent = old[: len(old) - len(old.lstrip())]
+    change_file(package, file, old, f"{indent}raise SystemExit(0)\n{old}", 1)
+    found = {result.name: result.detail for result in check_package(package, 3) if not result.passed}
+    assert found[failing] == "LinkwiseError: its code would end this process by SystemExit(0)"
+    if failing == "import":
+        with pytest.raises(LinkwiseError, match=r"cannot be imported .*SystemExit\(0\)"):
+            open_package(package)
 
 
 def test_closed_forms_are_held_against_the_energies_that_a_user_wrote(tmp_path: Path) -> None:
