@@ -29,6 +29,7 @@ from linkwise import (
     write_package,
 )
 from linkwise.package.load import open_package
+from linkwise.version import VERSION
 
 
 @pytest.fixture(scope="session")
@@ -197,7 +198,7 @@ WRONG = {
         "scatter(8, 3, G, tau",
         "c: planar2_torque",
     ),
-    "index": ("c/planar2_index.h", "{2, 2, 2}", "{2, 2, 1}", "c: numbers and indices"),
+    "index": ("c/planar2_index.h", "{2, 2, 2}", "{2, 2, 1}", "c: numbers, indices"),
 }
 
 
@@ -277,7 +278,7 @@ def test_only_what_is_missing_here_is_left_out(
     error: str, mark: str, package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("linkwise.check.checks.find_spec", lambda name: None)
-    change_file(package, "__init__.py", "    if backend not in", f"    raise {error}\n    if backend not in")
+    change_file(package, "forms/__init__.py", "from .", f"raise {error}\nfrom .", 1)
     found = marks(package)
     assert (found.pop("hashes"), found.pop("manifest"), found.pop("runtime")) == ("ok", "ok", "ok")
     assert found.pop("back ends") == "FAIL"
@@ -362,6 +363,16 @@ def of_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
+@pytest.fixture(scope="session")
+def loaded_with_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same on three back ends."""
+    directory = tmp_path_factory.mktemp("loaded") / "odd"
+    (directory.parent / "odd.toml").write_text(ODD)
+    system = read_system(str(directory.parent / "odd.toml"), Options("symbolic"))
+    write_package(generate(system, ["numpy", "torch", "autograd"]), directory)
+    return directory
+
+
 @pytest.mark.parametrize(
     ("file", "old", "new", "failing"),
     [
@@ -394,6 +405,54 @@ def test_a_runtime_file_that_is_not_linkwises_own_fails(package: Path) -> None:
     assert [(result.name, result.detail.split(" is ")[0]) for result in wrong] == [
         ("runtime", "runtime/arguments.py")
     ]
+
+
+def test_a_listed_file_of_the_runtime_that_linkwise_does_not_have_fails(package: Path) -> None:
+    (package / "runtime/deep").mkdir()
+    (package / "runtime/deep/helper.py").touch()
+    digest = hashlib.sha256(b"").hexdigest()
+    change_manifest(package, lambda data: data["files"].update({"runtime/deep/helper.py": digest}))
+    (wrong,) = (result for result in check_package(package, 3) if not result.passed)
+    assert (wrong.name, wrong.detail.split(" is ")[0]) == ("runtime", "runtime/deep/helper.py")
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("__init__.py", '"autograd": _autograd', '"autograd": _torch'),
+        ("__init__.py", '    "numpy",\n    "torch",\n', '    "torch",\n    "numpy",\n'),
+        ("__init__.py", "joint_names = ROBOT.joint_names", "joint_names = ROBOT.link_names"),
+        ("__init__.py", "asked, check_finite)", "asked, False)"),
+        ("__init__.py", "asked = backend,", "asked = 'torch',"),
+        ("__init__.py", "(parameters, allow_unphysical)", "(parameters, True)"),
+        ("__init__.py", "m_LINK is a mass", 'm_LINK is"""\n    allow_unphysical = True\n    """'),
+        (
+            "names.py",
+            "from .runtime.structure import",
+            "from .runtime.arguments import *; from .runtime.structure import",
+        ),
+        ("names.py", "            lambda p: (", "            lambda p: 1 and ("),
+    ],
+)
+def test_a_package_that_is_loaded_otherwise_fails(
+    file: str, old: str, new: str, loaded_with_parameters: Path, tmp_path: Path
+) -> None:
+    package = shutil.copytree(loaded_with_parameters, tmp_path / "odd")
+    change_file(package, file, old, new, 1)
+    wrong = {result.name: result.detail for result in check_package(package, 3) if not result.passed}
+    assert f"{file} is not what linkwise {VERSION} makes of the manifest" in wrong["runtime"]
+
+
+def test_of_another_version_it_is_said_what_was_not_checked(package: Path) -> None:
+    change_file(package, "__init__.py", f"linkwise {VERSION}", "linkwise 0.0.9")
+    change_manifest(package, lambda data: data["generator"].update(linkwise="0.0.9"))
+    data = json.loads((package / "manifest.json").read_text())
+    text = json.dumps(data["generator"], sort_keys=True)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    change_manifest(package, lambda data: data["checksums"].update(generator=digest))
+    (runtime,) = (result for result in check_package(package, 3) if result.name == "runtime")
+    assert runtime.mark == "skip"
+    assert runtime.detail.startswith("runtime/, __init__.py and names.py were not checked")
 
 
 def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import jinja2
 import pytest
 from conftest import DATA
 from linkwise import Options, generate, read_system
-from linkwise.emit import assemble, autograd, closed_forms, formulas
+from linkwise.emit import autograd, closed_forms, formulas, shared_texts
 from linkwise.emit import render as rendering
 from linkwise.emit.c import sources
 from linkwise.emit.render import render, variables
@@ -31,7 +31,7 @@ def views() -> dict[str, list[set[str]]]:
         return render(template, view)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (rendering, autograd, sources, closed_forms, formulas, assemble):
+        for module in (rendering, autograd, sources, closed_forms, formulas, shared_texts):
             patch.setattr(module, "render", recording)
         for robot, options in ROBOTS:
             generate(read_system(robot, options))

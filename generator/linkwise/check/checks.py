@@ -41,13 +41,14 @@ def check_package(directory: Path, samples: int = 100) -> list[Result]:
     if not results[0].passed:
         return results
     try:
-        package = load_package(directory, manifest)
-        results.append(check_manifest(package))
+        with staying():
+            package = load_package(directory, manifest)
+            results.append(check_manifest(package))
+            if not results[-1].passed:
+                return results
+            results.append(check_runtime(package))
     except Exception as error:
         return [*results, Result("import", False, None, _line(error))]
-    if not results[-1].passed:
-        return results
-    results.append(check_runtime(directory, manifest))
     loaded, missing = _load(package)
     results += missing
     checks = _Checks(package, loaded, random_states(len(manifest.joints), samples))
