@@ -7,8 +7,7 @@ from pathlib import Path
 
 from linkwise.check.compare import Result, Skipped
 from linkwise.emit.backend import BACKENDS
-from linkwise.emit.bodies import BodyText
-from linkwise.emit.shared_texts import init_text, names_text
+from linkwise.emit.shared_texts import BodyText, init_text, names_text
 from linkwise.package.agreement import disagreements, miscounted
 from linkwise.package.bytecode import caches, is_compiled_from_source
 from linkwise.package.contents import added, changed

@@ -3,21 +3,24 @@
 They are made of what a manifest has too, so that `linkwise check` makes them again and compares.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.render import render
 from linkwise.escape import python_docstring, python_literal
 from linkwise.version import VERSION
 
-if TYPE_CHECKING:
-    from linkwise.emit.bodies import BodyText
-
 LINE = 100
+
+
+@dataclass(frozen=True)
+class BodyText:
+    """A link, the parameters that its mass and inertia hang on, and these two as Python expressions."""
+
+    link: str
+    parameters: str
+    values: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,7 @@ class Maker:
     made: str
 
     @classmethod
-    def of(cls, backend: BackendFiles, loading: Loading) -> Maker:
+    def of(cls, backend: BackendFiles, loading: Loading) -> "Maker":
         """Its class comes from runtime/, and is the first word of the expression."""
         made = loading.made.partition("(")[0]
         imported = f"from .runtime.{loading.module} import {made}"
