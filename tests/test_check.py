@@ -93,6 +93,35 @@ axis = [0, 1, 0]
 """
 
 
+def test_bodies_of_negative_mass_pass_where_they_were_allowed(tmp_path: Path) -> None:
+    (tmp_path / "odd.toml").write_text(ODD.replace("mass = 1.2", "mass = -1.2"))
+    system = read_system(str(tmp_path / "odd.toml"), Options(allow_unphysical=True))
+    write_package(generate(system, ["numpy"], "odd", {"allow_unphysical": True}), tmp_path / "odd")
+    assert set(marks(tmp_path / "odd").values()) <= {"ok", "skip"}
+
+
+PAIR = """schema = 1
+name = "pair"
+link = [
+  { name = "arm", mass = 20, com = [0.3, 0.1, 0.2], inertia = { xx = 1, yy = 1.2, zz = 0.9 } },
+  { name = "tip", mass = 1e-6, com = [1e-6, 0, 0], inertia = { xx = 1e-14, yy = 1.2e-14, zz = 1e-14 } },
+]
+joint = [
+  { name = "shoulder", parent = "base", child = "arm", axis = [0, 1, 1] },
+  { name = "wrist", parent = "arm", child = "tip", xyz = [0.5, 0, 0], axis = [1, 0, 0] },
+]
+"""
+
+
+def test_a_parameter_that_is_zero_is_held_beside_a_tiny_link_too(tmp_path: Path) -> None:
+    (tmp_path / "pair.toml").write_text(PAIR)
+    system = read_system(str(tmp_path / "pair.toml"), Options("symbolic"))
+    write_package(generate(system, ["numpy"], "pair"), tmp_path / "pair")
+    assert set(marks(tmp_path / "pair").values()) == {"ok"}
+    change_file(tmp_path / "pair", "forms/link_1.py", "= p['I_arm_yz']", "= -p['I_arm_yz']")
+    assert marks(tmp_path / "pair")["numpy, other parameters: M^j against Newton-Euler recursion"] == "FAIL"
+
+
 @pytest.mark.parametrize("parameters", ["symbolic", "nonzero"])
 def test_names_that_no_formula_can_hold_are_read_back(parameters: Any, tmp_path: Path) -> None:
     (tmp_path / "odd.toml").write_text(ODD)
@@ -345,7 +374,10 @@ def test_without_torch_a_users_energies_are_held_against_their_own_torques_which
     package = tmp_path / "turntable"
     write_package(generate(read_system(str(DATA / "turntable.py")), ["numpy"]), package)
     found = marks(package)
-    assert (found["energies"], found["numpy: c1 against differences of numpy's torques"]) == ("skip", "ok")
+    assert (
+        found["energies: not held against their text"],
+        found["numpy: c1 against differences of numpy's torques"],
+    ) == ("skip", "ok")
     change_file(package, "forms/link_1.py", "0.5 * (t6 + 1.36)", "0.5 * (t6 + 1.36001)")
     assert marks(package)["numpy: c1 against differences of numpy's torques"] == "FAIL"
 
@@ -457,11 +489,23 @@ def test_of_another_version_it_is_said_what_was_not_checked(package: Path) -> No
 
 def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp_path: Path) -> None:
     x = Coordinate("x", "m")
-    for name, potential in (("near", sp.sqrt(x.q)), ("nowhere", sp.sqrt(x.q - 4))):
+    for name, potential in (
+        ("near", sp.sqrt(x.q)),
+        ("far", sp.log(x.q - 4)),
+        ("nowhere", sp.sqrt(-1 - x.q**2)),
+    ):
         system = energy_system(name, [x], [LinkEnergy("bead", x.qd**2, potential)])
         write_package(generate(system, ["numpy"]), tmp_path / name)
-    assert set(marks(tmp_path / "near").values()) == {"ok"}
-    assert marks(tmp_path / "nowhere")["numbers"] == "skip"
+    for name in ("near", "far"):
+        found = {result.name: result for result in check_package(tmp_path / name, 10)}
+        assert {result.mark for result in found.values()} == {"ok"}
+        assert found["energies: are defined"].detail.startswith(
+            "numbers at 14 of " if name == "far" else "numbers at "
+        )
+    wrong = {
+        result.name: result.detail for result in check_package(tmp_path / "nowhere") if not result.passed
+    }
+    assert wrong == {"energies: are defined": "numbers at 0 of 4108 random states: too few to prove anything"}
 
 
 @pytest.mark.parametrize("spec", ["planar2", str(DATA / "cart_pendulum.py")])

@@ -10,23 +10,22 @@ import numpy as np
 import pytest
 from conftest import DATA, needs_compiler
 from linkwise import Options, read_system
+from linkwise.check.body_reference import body_reference
 from linkwise.check.compare import ROUNDINGS, Entries, compare
+from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.latex_reader import LatexReader, Unreadable
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.parametric_tree import check_bodies, tree_with
-from linkwise.check.reference import (
-    Reference,
-    lagrangian_reference,
-    random_states,
-    recursion_reference,
-    torque_reference,
-)
+from linkwise.check.reference import Reference
+from linkwise.check.states import random_states, states_where
+from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.text_reader import NAMES, NUMPY, TextFormula, torch_functions
+from linkwise.check.torque_reference import states_of_torques, torque_reference
 from linkwise.emit.definition import rigid_tree
 from linkwise.expression.graph import FUNCTIONS
-from linkwise.package.manifest import Manifest
+from linkwise.package.manifest import EnergyEntry, Manifest
 
 LEG, TURNTABLE = str(DATA / "leg.toml"), str(DATA / "turntable.py")
 EPSILON = 2.0**-52
@@ -51,19 +50,19 @@ def test_magnitudes_bound_the_torques_and_energies_that_they_are_of(
     rng = np.random.default_rng(0)
     for scales in ((1.0, 0.0, 0.0), (1.0, 2.0, 0.0), (1.0, 0.0, 3.0), (9.0, 5.0, 4.0)):
         motion = [s * rng.uniform(-1.0, 1.0, (200, 6)) for s in scales]
-        most = [np.abs(m).max(axis=0) for m in motion]
+        sizes = [np.abs(m) for m in motion]
         for gravity in (True, False):
-            tau = np.abs(recursion.partial_torque(*motion, gravity=gravity)).max(axis=0)
-            bound = magnitudes.partial_torque(*most, gravity=gravity)
+            tau = np.abs(recursion.partial_torque(*motion, gravity=gravity))
+            bound = magnitudes.partial_torque(*sizes, gravity=gravity)
             assert (tau <= bound).all()
             assert bound.max() <= 1e4 * tau.max()
         kinetic, potential = recursion.energies(*motion[:2])
-        assert ((kinetic + np.abs(potential)).max(axis=0) <= magnitudes.lagrangian(*most[:2])).all()
+        assert (kinetic + np.abs(potential) <= magnitudes.lagrangian(*sizes[:2])).all()
 
 
 def test_magnitudes_grow_with_the_square_of_the_velocities(leg: tuple[NewtonEuler, Magnitudes]) -> None:
     _, magnitudes = leg
-    q, qd = np.random.default_rng(1).uniform(0.5, 1.0, (2, 6))
+    q, qd = np.random.default_rng(1).uniform(0.5, 1.0, (2, 3, 6))
     once, twice = (magnitudes.partial_torque(q, s * qd, 0 * q, gravity=False) for s in (1.0, 2.0))
     np.testing.assert_allclose(twice, 4 * once)
     rest, once, twice = (magnitudes.lagrangian(q, s * qd) for s in (0.0, 1.0, 2.0))
@@ -90,8 +89,8 @@ def test_three_references_of_one_robot_agree(
     directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
 ) -> None:
     states, package = random_states(3, 5), package_of("planar3")
-    by_bodies = recursion_reference(*sources(directory_of("planar3")), states)
-    same(by_bodies, lagrangian_reference(package.load("autograd").backend.modules, states), 1e-9)
+    by_bodies = body_reference(*sources(directory_of("planar3")), states)
+    same(by_bodies, energy_reference(package.load("autograd").backend.modules, [], states), 1e-9)
     same(by_bodies, torque_reference("it", package.load("numpy").partial_torque, states), 1e-7)
 
 
@@ -99,7 +98,7 @@ def test_terms_linear_in_the_velocities_are_found_by_either_way(
     package_of: Callable[[str], ModuleType],
 ) -> None:
     states = random_states(2, 5)
-    by_energy = lagrangian_reference(package_of(TURNTABLE).load("autograd").backend.modules, states)
+    by_energy = energy_reference(package_of(TURNTABLE).load("autograd").backend.modules, [], states)
     by_torque = torque_reference("it", package_of(TURNTABLE).load("numpy").partial_torque, states)
     same(by_energy, by_torque, 1e-9)
     np.testing.assert_allclose(by_energy.values["h1"][:, 0, 0, 1], -2 * 0.4 * 1.7)
@@ -118,6 +117,50 @@ def test_states_that_energies_are_not_defined_for_are_left_out() -> None:
     np.testing.assert_allclose(reference.values["c0"][:, 0, 0, 0], 1 / reference.states.q[:, 0], rtol=1e-8)
     assert (reference.states.q > 0).all()
     assert len(reference.values["c0"]) == len(reference.states.q)
+
+
+def test_states_are_looked_for_where_energies_are_defined() -> None:
+    def torque(q: Any, qd: Any, qdd: Any) -> Any:
+        with np.errstate(invalid="ignore"):
+            return (np.sqrt(q - 4) + np.arcsin(q[:, ::-1] / 0.01) * qd)[:, :, None]
+
+    found = states_of_torques(torque, 2, 30)
+    assert found.tried > 34
+    assert not len(found.states.q)  # both coordinates are wanted in either range
+    above = states_where(lambda states: (states.q > [4.0, -0.01]).all(axis=1), 2, 30)
+    assert len(above.states.q) == 34
+    assert above.tried > 34
+    everywhere = states_where(lambda states: np.ones(len(states.q), bool), 2, 30)
+    assert (len(everywhere.states.q), everywhere.tried) == (34, 34)
+
+
+def energies_of(kinetic: str, potential: str) -> tuple[list[Any], list[Any]]:
+    entry = EnergyEntry("bead", kinetic, potential)
+    return [TextLagrangian(entry, {"k": 3.0})], [
+        [TextLagrangian(entry, {"k": 3.0}, noise)] for noise in (1, 2)
+    ]
+
+
+def test_noise_tells_what_cancels() -> None:
+    pytest.importorskip("torch")
+    exact, noisy = energies_of("0.5*qd_1**2", "k*((1000.0 + q_1)**2 - 1000.0**2)/2")
+    states = random_states(1, 20)
+    reference = energy_reference(exact, noisy, states)
+    np.testing.assert_allclose(reference.values["g"][:, 0, 0], 3 * (1000 + states.q[:, 0]), rtol=1e-14)
+    assert reference.lagrangian is not None
+    value, scale = reference.lagrangian
+    assert (scale[np.abs(states.q[:, 0]) > 0] > 1e5).all()
+    assert np.abs(value).max() < 1e5
+
+
+def test_energies_that_are_huge_somewhere_are_held_elsewhere_too() -> None:
+    pytest.importorskip("torch")
+    exact, noisy = energies_of("0.5*qd_1**2", "exp(20*(q_1 - 1)) + 4*q_1**2")
+    wrong, _ = energies_of("0.5*qd_1**2", "exp(20*(q_1 - 1)) + 4.00001*q_1**2")
+    found = states_of_energies(exact, 1, 50)
+    reference, other = (energy_reference(one, noisy, found.states) for one in (exact, wrong))
+    entry = Entries("g", other.values["g"], reference.values["g"], reference.scales["g"])
+    assert not compare("g", [entry]).passed
 
 
 def test_random_states_are_apart_from_zero_in_every_quadrant_and_some_at_rest() -> None:
@@ -144,16 +187,16 @@ def entries(error: float, place: int, small: float, scale: float = 1.0) -> Entri
     return Entries("c1", value, expected, np.array([100.0, scale]))
 
 
-def test_an_entry_is_measured_by_its_own_largest_value() -> None:
-    assert compare("c1", [entries(0.9e-9 * 100.0, 0, 1e-3)]).passed
-    assert not compare("c1", [entries(1.1e-9 * 100.0, 0, 1e-3)]).passed
-    assert compare("c1", [entries(0.9e-12, 1, 1e-3)]).passed
-    wrong = compare("c1", [entries(0.0, 0, 1.0), entries(1.1e-12, 1, 1e-3)])
+def test_a_value_is_measured_by_its_own_size() -> None:
+    assert compare("c1", [entries(0.9e-9 * 50.0, 0, 1e-3)]).passed
+    assert not compare("c1", [entries(1.1e-9 * 50.0, 0, 1e-3)]).passed
+    assert compare("c1", [entries(0.9e-9 * 5e-4, 1, 1e-3)]).passed
+    wrong = compare("c1", [entries(0.0, 0, 1.0), entries(1.1e-9 * 5e-4, 1, 1e-3)])
     assert not wrong.passed
     assert wrong.detail == "largest relative error 1.1e-09 at c1(2)"
 
 
-def test_an_entry_that_is_zero_but_for_rounding_is_measured_by_what_it_is_summed_from() -> None:
+def test_a_value_that_is_zero_but_for_rounding_is_measured_by_what_it_is_summed_from() -> None:
     rounding = ROUNDINGS * EPSILON
     assert compare("c1", [entries(0.9 * rounding, 1, 0.0)]).passed
     assert not compare("c1", [entries(1.1 * rounding, 1, 0.0)]).passed

@@ -200,5 +200,7 @@ def _blocks(motion: Array, width: int) -> Array:
 
 
 def _packed(what: str, value: Any, rows: Rows, reference: Reference, at: Rows) -> Entries:
-    picked = reference.values[what][at][(slice(None), *rows.T)]
-    return Entries(what, value, picked, reference.scales[what][tuple(rows.T)])
+    picked, scale = (
+        source[what][at][(slice(None), *rows.T)] for source in (reference.values, reference.scales)
+    )
+    return Entries(what, value, picked, scale)

@@ -1,6 +1,6 @@
 """The checks of `linkwise check`."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -8,26 +8,23 @@ from pathlib import Path
 import numpy as np
 
 from linkwise.check.as_generated import check_files, check_manifest, check_runtime
+from linkwise.check.body_reference import body_reference
 from linkwise.check.c_functions import CFunctions, compile_c
 from linkwise.check.compare import Result, Skipped
 from linkwise.check.compiled_c import CompiledPackage
+from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.model_calls import Named, against_reference
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.own_process import Ended, in_own_process
 from linkwise.check.packed_layout import IndexRows
-from linkwise.check.parametric_tree import check_bodies, tree_with
-from linkwise.check.reference import (
-    Reference,
-    States,
-    lagrangian_reference,
-    random_states,
-    recursion_reference,
-    torque_reference,
-)
+from linkwise.check.parametric_tree import changed_values, check_bodies, tree_with
+from linkwise.check.reference import Reference
+from linkwise.check.states import random_states
 from linkwise.check.text_lagrangian import TextLagrangian
-from linkwise.package.load import Model, Package, load_package, staying
+from linkwise.check.torque_reference import states_of_torques, torque_reference
+from linkwise.package.load import Array, Model, Package, load_package, staying
 from linkwise.package.manifest import Manifest
 
 OPTIONAL = ("torch",)
@@ -51,7 +48,7 @@ def check_package(directory: Path, samples: int = 100) -> list[Result]:
         return [*results, Result("import", False, None, _line(error))]
     loaded, missing = _load(package)
     results += missing
-    checks = _Checks(package, loaded, random_states(len(manifest.joints), samples))
+    checks = _Checks(package, loaded, samples)
     try:
         with staying(), np.errstate(all="ignore"):  # energies of a user's own need not be defined everywhere
             results += checks.run()
@@ -87,13 +84,17 @@ def _lacks(error: Exception) -> bool:
     return isinstance(error, RuntimeError) and here and " failed: " not in str(error)
 
 
+LEAST = 10
+"""States below which nothing is proved."""
+
+
 @dataclass(frozen=True)
 class _Checks:
     """The checks of one package's numbers: its formulas, its C, and the back ends that load here."""
 
     package: Package
     loaded: Mapping[str, Model]
-    states: States
+    samples: int
 
     def run(self) -> Iterator[Result]:
         """Everything for the parameters as generated, and, where there are some, for others too."""
@@ -123,15 +124,10 @@ class _Checks:
                 manifest.tree, self.package.module.ROBOT.bodies, values, unphysical, label
             )
         functions = CFunctions(manifest, compiled, rows, values) if compiled else None
-        reference = self._bodies(values) or self._energies(values)
-        if reference is None:
-            reference = self._own_reference(loaded, functions)
-            yield Skipped(
-                f"energies{label}",
-                "a user's own, and no torch here to differentiate them: its own torques are what counts",
-            )
-        if reference is not None and not len(reference.states.q):
-            yield Skipped(f"numbers{label}", "the energies are defined at none of the random states")
+        reference, tried = self._reference(values, loaded, functions)
+        if manifest.energies is not None:
+            yield from _told(f"energies{label}", reference, tried, self.samples)
+        if reference is None and tried:
             return
         yield from check_formulas(self.package, rows, values, label, reference)
         if reference is None:
@@ -149,31 +145,59 @@ class _Checks:
 
     def _other_parameters(self, rows: IndexRows, compiled: CompiledPackage | None) -> Iterator[Result]:
         """Every parameter changed a little: equal ones tell no longer one from another, and none is zero."""
-        changed = _changed(self.package.manifest.parameters)
+        changed = changed_values(self.package.manifest.parameters, self.package.manifest.tree)
         loaded = {name: self.package.load(name, changed) for name in self.loaded}
         yield from self._numbers(", other parameters", changed, loaded, rows, compiled)
 
-    def _bodies(self, values: Mapping[str, float]) -> Reference | None:
+    def _reference(
+        self, values: Mapping[str, float], loaded: Mapping[str, Model], functions: CFunctions | None
+    ) -> tuple[Reference | None, int]:
+        """What numbers are held against, None if nothing can compute or at no state; how many were tried."""
         manifest = self.package.manifest
-        if manifest.tree is None:
-            return None
-        tree = tree_with(manifest.tree, values)
-        return recursion_reference(NewtonEuler(manifest, tree), Magnitudes(manifest, tree), self.states)
+        n = len(manifest.joints)
+        if manifest.tree is not None:
+            tree, states = tree_with(manifest.tree, values), random_states(n, self.samples)
+            recursion, magnitudes = NewtonEuler(manifest, tree), Magnitudes(manifest, tree)
+            return body_reference(recursion, magnitudes, states), len(states.q)
+        if manifest.energies is not None and find_spec("torch"):
+            noises = (None, 1, 2, 3)
+            exact, *noisy = (
+                [TextLagrangian(energy, values, noise) for energy in manifest.energies] for noise in noises
+            )
+            found = states_of_energies(exact, n, self.samples)
+            defined = len(found.states.q) > 0
+            return energy_reference(exact, noisy, found.states) if defined else None, found.tried
+        return self._own_reference(loaded, functions)
 
-    def _energies(self, values: Mapping[str, float]) -> Reference | None:
-        """The energies that a user wrote, from the manifest's text; None without torch."""
-        energies = self.package.manifest.energies
-        if energies is None or find_spec("torch") is None:
-            return None
-        return lagrangian_reference([TextLagrangian(entry, values) for entry in energies], self.states)
-
-    def _own_reference(self, loaded: Mapping[str, Model], functions: CFunctions | None) -> Reference | None:
+    def _own_reference(
+        self, loaded: Mapping[str, Model], functions: CFunctions | None
+    ) -> tuple[Reference | None, int]:
         """The torques of one of the package's back ends, else those of its C."""
+        n = len(self.package.manifest.joints)
+
+        def of(name: str, torque: Callable[[Array, Array, Array], Array]) -> tuple[Reference | None, int]:
+            found = states_of_torques(torque, n, self.samples)
+            reference = torque_reference(name, torque, found.states) if len(found.states.q) else None
+            return reference, found.tried
+
         for name, model in loaded.items():
-            return torque_reference(name, model.partial_torque, self.states)
+            return of(name, model.partial_torque)
         if functions is None:
-            return None
-        return in_own_process(lambda: torque_reference("c", functions.torque, self.states))
+            return None, 0
+        return in_own_process(lambda: of("c", functions.torque))
+
+
+def _told(name: str, reference: Reference | None, tried: int, samples: int) -> Iterator[Result]:
+    """What is to be known of energies that a user wrote: what they are held against, and where."""
+    if not find_spec("torch"):
+        own = "a user's own, and no torch here to differentiate them: its own torques are what counts"
+        yield Skipped(f"{name}: not held against their text", own)
+    kept = len(reference.states.q) if reference else 0
+    detail = f"numbers at {kept} of {tried} random states"
+    if tried and kept < min(LEAST, samples / 2):
+        yield Result(f"{name}: are defined", False, None, f"{detail}: too few to prove anything")
+    elif kept < tried:
+        yield Result(f"{name}: are defined", True, None, detail)
 
 
 def _c_results(functions: CFunctions, name: str, reference: Reference) -> list[Result]:
@@ -182,24 +206,6 @@ def _c_results(functions: CFunctions, name: str, reference: Reference) -> list[R
         return in_own_process(lambda: list(functions.check(name, reference)))
     except Ended as ended:
         return [Result(f"{name}: runs to its end", False, None, str(ended))]
-
-
-def _changed(values: Mapping[str, float]) -> dict[str, float]:
-    """Each value changed by up to 3 % of its own; a zero, by 1 to 3 % of the smallest of its kind.
-
-    Of a kind are names that begin alike: masses m_…, centres of mass c_…, inertias I_….
-    """
-    generator = np.random.default_rng(2)
-    smallest: dict[str, float] = {}
-    for name, value in values.items():
-        if value:
-            kind = name.partition("_")[0]
-            smallest[kind] = min(abs(value), smallest.get(kind, np.inf))
-    return {
-        name: value * generator.uniform(0.97, 1.03)
-        or smallest.get(name.partition("_")[0], 1.0) * generator.uniform(0.01, 0.03)
-        for name, value in values.items()
-    }
 
 
 def _line(error: Exception) -> str:

@@ -1,4 +1,4 @@
-"""Entries against a reference: each by its own largest value, or by the rounding of what it sums."""
+"""Entries against a reference: each value by its own size, or by the rounding of what it is summed from."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ import numpy as np
 from linkwise.check.reference import TOLERANCE, Reference
 from linkwise.package.load import Array
 
-ROUNDINGS = 100.0
-"""Roundings that an entry may gather, each as large as that of the largest number it is summed from."""
+ROUNDINGS = 10.0
+"""Roundings that a value may gather, each as large as that of the numbers that it is summed from."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Skipped(Result):
 
 @dataclass(frozen=True)
 class Entries:
-    """Values beside those expected, samples first; scale: how large the numbers are that an entry sums."""
+    """Values beside those expected, samples first; scale: size of the numbers that each is the sum of."""
 
     what: str
     value: Array
@@ -55,8 +55,8 @@ def compare(
 ) -> Result:
     """Hold groups of entries against what is expected of them, and report the worst.
 
-    An entry's error is relative to its own largest value over the samples; where that is next to nothing, an
-    error as large as what rounding leaves of its operands, ROUNDINGS · epsilon · scale, passes just so.
+    A value's error is relative to the value itself; where that is next to nothing, an error as large as what
+    rounding leaves of its operands, ROUNDINGS · epsilon · scale, passes just so.
     """
     worst, place = 0.0, ""
     for entries in groups:
@@ -68,11 +68,11 @@ def compare(
         if not value.size:
             continue
         least = ROUNDINGS * epsilon / tolerance * entries.scale
-        own = np.maximum(np.abs(expected).max(axis=0), np.maximum(least, 1e-300))
-        errors = np.abs(value.astype(float) - expected).max(axis=0) / own
+        own = np.maximum(np.abs(expected), np.maximum(least, 1e-300))
+        errors = np.abs(value.astype(float) - expected) / own
         errors = np.where(np.isnan(errors), np.inf, errors)
         if errors.max() > worst:
-            worst, at = float(errors.max()), np.unravel_index(errors.argmax(), errors.shape)
+            worst, (_, *at) = float(errors.max()), np.unravel_index(errors.argmax(), errors.shape)
             place = f"{entries.what}({', '.join(str(index + 1) for index in at)})"
     detail = f"largest relative error {worst:.1e}"
     return Result(name, worst <= tolerance, worst, detail if worst <= tolerance else f"{detail} at {place}")
@@ -80,4 +80,4 @@ def compare(
 
 def dense(what: str, value: Array, reference: Reference, rows: Any = slice(None)) -> Entries:
     """A dense quantity of some of the reference's samples."""
-    return Entries(what, value, reference.values[what][rows], reference.scales[what])
+    return Entries(what, value, reference.values[what][rows], reference.scales[what][rows])

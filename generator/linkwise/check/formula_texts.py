@@ -52,8 +52,8 @@ def check_formulas(
         except Unreadable as unread:
             yield Result(f"{file}{label}: can be read", False, None, f"it holds {unread}")
             continue
-        picked = reference.values["tau"][(slice(None), *rows.tau.T)]
-        scale = reference.scales["tau"][tuple(rows.tau.T)]
+        at = (slice(None), *rows.tau.T)
+        picked, scale = reference.values["tau"][at], reference.scales["tau"][at]
         # Rounding of numbers with DIGITS in place of that of float64.
         entries = [Entries("entry ", tau, picked, scale)]
         yield compare(

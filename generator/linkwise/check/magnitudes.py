@@ -20,15 +20,15 @@ class _Sizes:
     v and a are those of the point at the base's origin, moving with the frame.
     """
 
-    reach: float = 0.0
-    omega: float = 0.0
-    v: float = 0.0
-    alpha: float = 0.0
-    a: float = 0.0
+    reach: Array
+    omega: Array
+    v: Array
+    alpha: Array
+    a: Array
 
 
 class Magnitudes:
-    """Upper bounds for one motion of a manifest's rigid bodies; each of q, qd, qdd holds (n,) magnitudes."""
+    """Upper bounds for a manifest's rigid bodies; q, qd, qdd are magnitudes of shape (samples, n)."""
 
     def __init__(self, manifest: Manifest, tree: RigidTree) -> None:
         self.bodies = tree.bodies
@@ -38,50 +38,57 @@ class Magnitudes:
         self.links = [index[link.name] for link in manifest.links]
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
-        """Bounds of |τ_ij|, shape (n, N)."""
+        """Bounds of |τ_ij|, shape (samples, n, N)."""
         frames = self._frames(q, qd, qdd, self.gravity if gravity else 0.0)
-        tau = np.zeros((self.n, len(self.links)))
+        tau = np.zeros((len(q), self.n, len(self.links)))
         for j, at in enumerate(self.links):
             body, frame, reach = self.bodies[at], frames[at], self._com(frames, at)
             turning = frame.alpha + frame.omega**2
-            force = body.mass * (frame.a + frame.omega * frame.v + turning * reach)
-            moment = reach * force + float(np.linalg.norm(body.inertia)) * turning
+            force = abs(body.mass) * (frame.a + frame.omega * frame.v + turning * reach)
+            # v × p is 0, but who differentiates ½ m v² sums it all the same.
+            moment = reach * force + abs(body.mass) * (frame.v + frame.omega * reach) ** 2
+            moment = moment + float(np.linalg.norm(body.inertia)) * turning
             back: int | None = at
             while back is not None:
                 upper = self.bodies[back]
                 about = moment + frames[back].reach * force
-                tau[upper.coordinate, j] += abs(upper.ratio) * (about if upper.kind == "revolute" else force)
+                tau[:, upper.coordinate, j] += abs(upper.ratio) * (
+                    about if upper.kind == "revolute" else force
+                )
                 back = upper.parent
         return tau
 
     def lagrangian(self, q: Array, qd: Array) -> Array:
-        """Bounds of kinetic + |potential| energy of each link, shape (N,)."""
+        """Bounds of kinetic + |potential| energy of each link, shape (samples, N)."""
         frames = self._frames(q, qd, 0.0 * qd, 0.0)
         sizes = []
         for at in self.links:
             body, frame, reach = self.bodies[at], frames[at], self._com(frames, at)
             speed = frame.v + frame.omega * reach
             spin = float(np.linalg.norm(body.inertia)) * frame.omega**2
-            sizes.append(0.5 * (body.mass * speed**2 + spin) + body.mass * self.gravity * reach)
-        return np.array(sizes)
+            mass = abs(body.mass)
+            sizes.append(0.5 * (mass * speed**2 + spin) + mass * self.gravity * reach)
+        return np.stack(sizes, -1)
 
-    def _com(self, frames: list[_Sizes], at: int) -> float:
+    def _com(self, frames: list[_Sizes], at: int) -> Array:
         return frames[at].reach + _length(self.bodies[at].com)
 
     def _frames(self, q: Array, qd: Array, qdd: Array, gravity: float) -> list[_Sizes]:
         frames: list[_Sizes] = []
+        zero = np.zeros(len(q))
+        ground = _Sizes(zero, zero, zero, zero, zero + gravity)
         for body in self.bodies:
-            up = _Sizes(a=gravity) if body.parent is None else frames[body.parent]
-            turn, rate, change = (abs(body.ratio * float(x[body.coordinate])) for x in (q, qd, qdd))
+            up = ground if body.parent is None else frames[body.parent]
+            turn, rate, change = (abs(body.ratio) * x[:, body.coordinate] for x in (q, qd, qdd))
             frames.append(_carried(body, up, turn, rate, change))
         return frames
 
 
-def _carried(body: BodyEntry, up: _Sizes, turn: float, rate: float, change: float) -> _Sizes:
+def _carried(body: BodyEntry, up: _Sizes, turn: Array, rate: Array, change: Array) -> _Sizes:
     """A frame on `up`: V + S q̇ and A + S q̈ + V × S q̇, with S = (z, s), |s| the distance of a hinge's axis."""
     sliding = body.kind == "prismatic"
     reach = up.reach + _length(body.translation) + (turn if sliding else 0.0)
-    z, s = (0.0, 1.0) if sliding else (1.0, reach)
+    z, s = (0.0, np.ones_like(turn)) if sliding else (1.0, reach)
     return _Sizes(
         reach,
         up.omega + rate * z,

@@ -7,7 +7,8 @@ import numpy as np
 
 from linkwise.check.compare import Entries, Result, Skipped, compare, dense
 from linkwise.check.packed_layout import IndexRows, Rows, spread
-from linkwise.check.reference import Reference, States
+from linkwise.check.reference import Reference
+from linkwise.check.states import States
 from linkwise.extras import extra
 from linkwise.package.load import Array, Model
 from linkwise.package.manifest import Manifest
@@ -74,12 +75,13 @@ def _calls(checked: Named) -> Iterator[Entries]:
     coefficients = model.coefficients(q, qd)
     for what, value in zip(("c2", "c1", "g"), coefficients, strict=True):
         yield dense(what, value, reference)
-    most = [np.abs(x).max(axis=0) for x in (q, qd, qdd)]
+    most = [np.abs(x) for x in (q, qd, qdd)]
     slopes = {"closing": values["c1"], "gradient": 2 * values["c1"] - values["h1"]}
     for convention, c1 in slopes.items():
         parts = model.propagation(q, qd, qdd, convention=convention)
-        yield Entries("c2 qdd", parts[0], values["c2"] * _over(qdd), scales["c2"] * most[2])
-        yield Entries(f"c1 qd ({convention})", parts[1], c1 * _over(qd), 2 * scales["c1"] * most[1])
+        yield Entries("c2 qdd", parts[0], values["c2"] * _over(qdd), scales["c2"] * _over(most[2]))
+        scale = 2 * scales["c1"] * _over(most[1])
+        yield Entries(f"c1 qd ({convention})", parts[1], c1 * _over(qd), scale)
         yield dense("g", parts[2], reference)
         if convention == "closing":
             closed = parts[0].sum(-1) + parts[1].sum(-1) + parts[2]
@@ -88,7 +90,7 @@ def _calls(checked: Named) -> Iterator[Entries]:
     for weights in (mask, mask * [[0.0], [1.0], [1.0]]):
         orders = list(zip(("c0", "c1", "c2"), weights, (q, qd, qdd), most, strict=True))
         expected = np.sum([(values[c] @ _column(w * x))[..., 0] for c, w, x, _ in orders], axis=0)
-        scale = np.sum([scales[c] @ (w * m) for c, w, _, m in orders], axis=0)
+        scale = np.sum([(scales[c] @ _column(w * m))[..., 0] for c, w, _, m in orders], axis=0)
         yield Entries("masked", model.masked(q, qd, qdd, weights), expected, scale)
 
 
@@ -118,17 +120,18 @@ def _few(checked: Named, states: States, at: Rows) -> Iterator[Entries]:
 
 def _flat(what: str, value: Array, reference: Reference, at: Rows) -> Entries:
     """Entries whose batch of shape `at` became one axis."""
-    inner = reference.scales[what].shape
+    inner = reference.values[what].shape[1:]
     if value.shape != (*at.shape, *inner):
-        return Entries(what, value, np.empty((*at.shape, *inner)), reference.scales[what])
+        shape = np.empty((*at.shape, *inner))
+        return Entries(what, value, shape, shape)
     return dense(what, value.reshape(-1, *inner), reference, at.reshape(-1))
 
 
 def _single(checked: Named) -> Iterator[Entries]:
     """The same in float32, in a large batch and in one that fills no block."""
     _, model, rows, reference = checked
-    count = len(reference.states.q)
-    for at in (slice(None), slice(0, min(7, count)), slice(0, 1)):
+    fitting = np.flatnonzero(reference.fits_single())
+    for at in (fitting, fitting[:7], fitting[:1]):
         motion: list[Any] = [x[at].astype(np.float32) for x in reference.states.motion]
         packed = rows.fields(model.packed(*motion))
         for what, value in packed.items():
@@ -166,7 +169,7 @@ def _structure(checked: Named, manifest: Manifest) -> Iterator[Result]:
     tau = model.partial_torque(q, qd, qdd)
     if reference.power is not None:
         power = np.einsum("sij,si->sj", tau, qd)
-        scale = np.abs(qd).max(axis=0) @ reference.scales["tau"]
+        scale = np.einsum("sij,si->sj", reference.scales["tau"], np.abs(qd))
         entries = Entries("power", power, reference.power, scale)
         yield compare(f"{name}: power is what each link's energy gains", [entries], reference.tolerance)
     mass = model.coefficients(q, qd).acceleration.sum(2)

@@ -52,7 +52,7 @@ def spread(packed: Array, rows: Rows, reference: Reference, what: str) -> Array:
     packed = np.asarray(packed)
     if packed.shape[-1] != len(rows):
         return packed
-    full = np.zeros((*packed.shape[:-1], *reference.scales[what].shape), packed.dtype)
+    full = np.zeros((*packed.shape[:-1], *reference.values[what].shape[1:]), packed.dtype)
     full[(..., *rows.T)] = packed
     if what == "c2":
         full[(..., *rows.T[::-1])] = packed

@@ -9,7 +9,7 @@ import numpy as np
 
 from linkwise.check.compare import Result
 from linkwise.check.text_reader import TextFormula, parameter_values
-from linkwise.package.entries import BodyEntry, RigidTree
+from linkwise.package.entries import PLACE, BodyEntry, RigidTree
 from linkwise.package.load import Array
 from linkwise.runtime.parameter_values import ParametricBody, faults
 
@@ -34,6 +34,36 @@ def tree_with(tree: RigidTree, values: Mapping[str, float]) -> RigidTree:
         for b, body in enumerate(data["bodies"])
     ]
     return RigidTree(at("gravity", tree.gravity), tuple(bodies), tree.formulas)
+
+
+def changed_values(values: Mapping[str, float], tree: RigidTree | None) -> dict[str, float]:
+    """Each value changed by up to 3 % of its own; a zero, by 1 to 3 % of the numbers that it stands among.
+
+    These are the lengths or the moments of the bodies that it is of; 1 where there are none.
+    """
+    generator = np.random.default_rng(2)
+    sizes = _neighbours(values, tree) if tree else {}
+    return {
+        name: value * generator.uniform(0.97, 1.03)
+        or (sizes.get(name) or 1.0) * generator.uniform(0.01, 0.03)
+        for name, value in values.items()
+    }
+
+
+def _neighbours(values: Mapping[str, float], tree: RigidTree) -> dict[str, float]:
+    """By parameter, the largest number among those that it stands among in the tree."""
+    own = parameter_values({name: name for name in values})
+    sizes: dict[str, float] = {}
+    for place, text in tree.formulas.items():
+        body = PLACE.fullmatch(place)
+        numbers: Any = tree.gravity
+        if body and (b := body["body"] or body["whole"]):
+            entry = tree.bodies[int(b)]
+            lengths = (*entry.translation, *entry.com)
+            numbers = entry.inertia if "inertia" in place else entry.mass if "mass" in place else lengths
+        for name in TextFormula(text).names():
+            sizes[own[name]] = max(sizes.get(own[name], 0.0), float(np.abs(numbers).max()))
+    return sizes
 
 
 def check_bodies(
