@@ -5,6 +5,7 @@ import importlib.util
 import json
 import os
 import py_compile
+import re
 import shutil
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from conftest import DATA
+from conftest import DATA, needs_compiler
 from linkwise import (
     Coordinate,
     LinkEnergy,
@@ -28,6 +29,7 @@ from linkwise import (
     write_package,
 )
 from linkwise.package.load import open_package
+from linkwise.version import VERSION
 
 
 @pytest.fixture(scope="session")
@@ -271,7 +273,7 @@ WRONG = {
         "scatter(8, 3, G, tau",
         "c: planar2_torque",
     ),
-    "index": ("c/planar2_index.h", "{2, 2, 2}", "{2, 2, 1}", "c: numbers and indices"),
+    "index": ("c/planar2_index.h", "{2, 2, 2}", "{2, 2, 1}", "c: numbers, indices"),
 }
 
 
@@ -331,6 +333,46 @@ def test_c_that_does_not_compile_fails_with_the_compilers_words(every_text: Path
     assert "error: " in result.detail
 
 
+@needs_compiler
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("void planar2_torque(", "void planar2_torque (", "planar2_torque is declared otherwise"),
+        ("const double *q, const double *qd,", "const double *qd, const double *q,", "is declared otherwise"),
+        (
+            "double *tau);",
+            "double *tau); void planar2_power(void);",
+            "planar2_power is declared, and there is",
+        ),
+        ("void planar2_link_2f(", "void link_2f(", "planar2_link_2f is not declared"),
+    ],
+)
+def test_a_header_that_declares_other_functions_fails(
+    old: str, new: str, fault: str, every_text: Path, tmp_path: Path
+) -> None:
+    package = shutil.copytree(every_text, tmp_path / "planar2")
+    change_file(package, "c/planar2.h", old, new)
+    found = {result.name: result for result in check_package(package, 3)}
+    headers = found["c: numbers, indices and functions of the headers"]
+    assert not headers.passed
+    assert fault in headers.detail
+
+
+@needs_compiler
+def test_a_c_function_is_called_whether_or_not_its_header_declares_it(
+    every_text: Path, tmp_path: Path
+) -> None:
+    package = shutil.copytree(every_text, tmp_path / "planar2")
+    text = (package / "c/planar2.h").read_text()
+    for prototype in re.findall(r"void planar2_link_2f?\([^;]*;", text):
+        change_file(package, "c/planar2.h", prototype, "")
+    results = {result.name: result.passed for result in check_package(package, 3)}
+    assert results["c: planar2_link_2"]
+    change_file(package, "c/planar2.c", "void API(link_2)(", "static void API(link_2)(")
+    (wrong,) = (r for r in check_package(package, 3) if r.name == "c: planar2_link_2")
+    assert (wrong.passed, wrong.detail) == (False, "there is no such function")
+
+
 @pytest.mark.parametrize(
     ("error", "mark"),
     [
@@ -340,11 +382,17 @@ def test_c_that_does_not_compile_fails_with_the_compilers_words(every_text: Path
         ('ImportError("gone", name=__package__ + ".forms")', "FAIL"),
         ('RuntimeError("needs a C compiler: apt install gcc")', "skip"),
         ('RuntimeError("cannot make the cache /x: No space left; set LINKWISE_CACHE to another")', "skip"),
-        ('ImportError("No module named torch", name="torch")', "skip"),
+        ('ImportError("No module named torch", name="torch.func")', "skip"),
+        ('ImportError("No module named torchh", name="torchh")', "FAIL"),
+        ('ImportError("cannot import Anyy", name="typing")', "FAIL"),
+        ("SystemExit(0)", "FAIL"),
     ],
 )
-def test_only_what_is_missing_here_is_left_out(error: str, mark: str, package: Path) -> None:
-    change_file(package, "__init__.py", "    if backend not in", f"    raise {error}\n    if backend not in")
+def test_only_what_is_missing_here_is_left_out(
+    error: str, mark: str, package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("linkwise.check.checks.find_spec", lambda name: None)
+    change_file(package, "forms/__init__.py", "from .", f"raise {error}\nfrom .", 1)
     found = marks(package)
     assert (found.pop("hashes"), found.pop("manifest"), found.pop("runtime")) == ("ok", "ok", "ok")
     assert found.pop("back ends") == "FAIL"
@@ -357,6 +405,30 @@ def test_a_package_that_cannot_be_imported_or_asked_fails(package: Path) -> None
     change_file(package, "runtime/dynamics.py", "def broken(:\n", "")
     change_file(package, "runtime/dynamics.py", "def partial_torque", "def full_torque")
     assert marks(package)["answers"] == "FAIL"
+
+
+def test_a_library_that_is_here_is_not_called_missing(package: Path) -> None:
+    pytest.importorskip("torch")
+    change_file(package, "forms/link_1.py", "from collections", "from torch import Tensorr\nfrom collections")
+    assert marks(package)["numpy: loads"] == "FAIL"
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "failing"),
+    [
+        ("names.py", "ROBOT = ", "import"),
+        ("forms/link_1.py", "def decomposition(", "numpy: loads"),
+        ("forms/link_1.py", "    return ", "answers"),
+    ],
+)
+def test_a_package_that_ends_the_process_fails(file: str, old: str, failing: str, package: Path) -> None:
+    indent = old[: len(old) - len(old.lstrip())]
+    change_file(package, file, old, f"{indent}raise SystemExit(0)\n{old}", 1)
+    found = {result.name: result.detail for result in check_package(package, 3) if not result.passed}
+    assert found[failing] == "LinkwiseError: its code would end this process by SystemExit(0)"
+    if failing == "import":
+        with pytest.raises(LinkwiseError, match=r"cannot be imported .*SystemExit\(0\)"):
+            open_package(package)
 
 
 def test_closed_forms_are_held_against_the_energies_that_a_user_wrote(tmp_path: Path) -> None:
@@ -408,6 +480,16 @@ def of_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
+@pytest.fixture(scope="session")
+def loaded_with_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same on three back ends."""
+    directory = tmp_path_factory.mktemp("loaded") / "odd"
+    (directory.parent / "odd.toml").write_text(ODD)
+    system = read_system(str(directory.parent / "odd.toml"), Options("symbolic"))
+    write_package(generate(system, ["numpy", "torch", "autograd"]), directory)
+    return directory
+
+
 @pytest.mark.parametrize(
     ("file", "old", "new", "failing"),
     [
@@ -440,6 +522,54 @@ def test_a_runtime_file_that_is_not_linkwises_own_fails(package: Path) -> None:
     assert [(result.name, result.detail.split(" is ")[0]) for result in wrong] == [
         ("runtime", "runtime/arguments.py")
     ]
+
+
+def test_a_listed_file_of_the_runtime_that_linkwise_does_not_have_fails(package: Path) -> None:
+    (package / "runtime/deep").mkdir()
+    (package / "runtime/deep/helper.py").touch()
+    digest = hashlib.sha256(b"").hexdigest()
+    change_manifest(package, lambda data: data["files"].update({"runtime/deep/helper.py": digest}))
+    (wrong,) = (result for result in check_package(package, 3) if not result.passed)
+    assert (wrong.name, wrong.detail.split(" is ")[0]) == ("runtime", "runtime/deep/helper.py")
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("__init__.py", '"autograd": _autograd', '"autograd": _torch'),
+        ("__init__.py", '    "numpy",\n    "torch",\n', '    "torch",\n    "numpy",\n'),
+        ("__init__.py", "joint_names = ROBOT.joint_names", "joint_names = ROBOT.link_names"),
+        ("__init__.py", "asked, check_finite)", "asked, False)"),
+        ("__init__.py", "asked = backend,", "asked = 'torch',"),
+        ("__init__.py", "(parameters, allow_unphysical)", "(parameters, True)"),
+        ("__init__.py", "m_LINK is a mass", 'm_LINK is"""\n    allow_unphysical = True\n    """'),
+        (
+            "names.py",
+            "from .runtime.structure import",
+            "from .runtime.arguments import *; from .runtime.structure import",
+        ),
+        ("names.py", "            lambda p: (", "            lambda p: 1 and ("),
+    ],
+)
+def test_a_package_that_is_loaded_otherwise_fails(
+    file: str, old: str, new: str, loaded_with_parameters: Path, tmp_path: Path
+) -> None:
+    package = shutil.copytree(loaded_with_parameters, tmp_path / "odd")
+    change_file(package, file, old, new, 1)
+    wrong = {result.name: result.detail for result in check_package(package, 3) if not result.passed}
+    assert f"{file} is not what linkwise {VERSION} makes of the manifest" in wrong["runtime"]
+
+
+def test_of_another_version_it_is_said_what_was_not_checked(package: Path) -> None:
+    change_file(package, "__init__.py", f"linkwise {VERSION}", "linkwise 0.0.9")
+    change_manifest(package, lambda data: data["generator"].update(linkwise="0.0.9"))
+    data = json.loads((package / "manifest.json").read_text())
+    text = json.dumps(data["generator"], sort_keys=True)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    change_manifest(package, lambda data: data["checksums"].update(generator=digest))
+    (runtime,) = (result for result in check_package(package, 3) if result.name == "runtime")
+    assert runtime.mark == "skip"
+    assert runtime.detail.startswith("runtime/, __init__.py and names.py were not checked")
 
 
 def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp_path: Path) -> None:

@@ -311,15 +311,15 @@ def test_every_function_of_energies_can_be_read_back() -> None:
 
 @needs_compiler
 def test_writing_beside_an_array_is_noticed_on_either_side(tmp_path: Path) -> None:
-    from linkwise.check.compiled_c import CompiledPackage
+    from linkwise.check.compiled_c import CompiledPackage, Prototype
 
-    (tmp_path / "x.h").write_text("void x_at(size_t count, const double *q, double *c2);\n")
+    at = Prototype("at", "double", "count", ("q",), ("c2",))
+    (tmp_path / "x.h").write_text(at.declaration("x"))
     (tmp_path / "x.c").write_text(
         "void x_at(unsigned long n, const double *q, double *c2) { c2[(int)q[0]] = n; }\n"
     )
     (tmp_path / "xf.c").write_text("")
     compiled = CompiledPackage("x", tmp_path, 1)
-    (at,) = compiled.prototypes
     for place, shift in ((0, 0), (2, 1), (-1, 0), (3, 1), (40, 0), (-40, 0)):
         found = compiled.call(at, 7, {"q": np.array([float(place)])}, {"c2": 3}, shift)
         assert (found is not None) == (0 <= place < 3)

@@ -1,9 +1,13 @@
 """Whether a package is as generated: its files, what Python compiled of them, and its manifest."""
 
+import re
+from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 
 from linkwise.check.compare import Result, Skipped
+from linkwise.emit.backend import BACKENDS
+from linkwise.emit.shared_texts import BodyText, init_text, names_text
 from linkwise.package.agreement import disagreements, miscounted
 from linkwise.package.bytecode import caches, is_compiled_from_source
 from linkwise.package.contents import added, changed
@@ -13,6 +17,12 @@ from linkwise.version import VERSION
 
 TOLD = 3
 """Faults that one line tells."""
+MARK = "\0"
+BODY = re.compile(
+    r"^ {8}ParametricBody\(\n {12}(.*),\n {12}(.*),\n {12}lambda p: \(\n((?: {16}.*,\n)*) {12}\),\n",
+    re.MULTILINE,
+)
+"""Link, parameters and values of a body in names.py."""
 
 
 def check_files(directory: Path, manifest: Manifest) -> list[Result]:
@@ -46,16 +56,21 @@ def check_manifest(package: Package) -> Result:
     return _result("manifest", wrong, "agrees with the package")
 
 
-def check_runtime(directory: Path, manifest: Manifest) -> Result:
-    """Hold the files that every package has alike against linkwise's own, where this version wrote it."""
+def check_runtime(package: Package) -> Result:
+    """Hold the files that linkwise has or makes alike for every package, where this version wrote it."""
+    directory, manifest = package.directory, package.manifest
     version = manifest.generator.get("linkwise")
     if version != VERSION:
-        return Skipped("runtime", f"that of linkwise {version}, which is not at hand to compare with")
+        unchecked = "runtime/, __init__.py and names.py were not checked"
+        return Skipped("runtime", f"{unchecked}: of linkwise {version}, which is not at hand to compare with")
     own = {path: _own(path) for path in manifest.files}
     wrong = [
         f"{path} is not that of linkwise {VERSION}"
         for path, text in own.items()
-        if text is not None and text != (directory / path).read_bytes()
+        if text != (directory / path).read_bytes() and (text is not None or path.startswith("runtime/"))
+    ]
+    wrong += [
+        f"{path} is not what linkwise {VERSION} makes of the manifest" for path in _made_otherwise(package)
     ]
     return _result(
         "runtime", wrong, f"{sum(text is not None for text in own.values())} files are linkwise's own"
@@ -69,6 +84,31 @@ def _own(path: str) -> bytes | None:
     if folder in places and (file := places[folder].joinpath(name)).is_file():
         return file.read_bytes()
     return None
+
+
+def _made_otherwise(package: Package) -> Iterator[str]:
+    """Which of __init__.py and names.py differ from the texts that the manifest's entries give.
+
+    The manifest does not have the docstring's lines on what parameters mean, which may be any; nor the
+    expressions of bodies and the links with terms linear in the velocities, which are held by what they give.
+    """
+    directory, manifest, robot = package.directory, package.manifest, package.module.ROBOT
+    chosen = [backend for name, backend in BACKENDS.items() if name in package.backends]
+    init = init_text(manifest.name, chosen, manifest.parameters, [MARK])
+    head, mark, tail = init.partition(f"    {MARK}\n")
+    found = (directory / "__init__.py").read_bytes().decode()
+    about = found[len(head) : len(found) - len(tail)]
+    if head + about + tail != found or '"""' in about or (about and not mark):
+        yield "__init__.py"
+    found = (directory / "names.py").read_bytes().decode()
+    bodies = [
+        BodyText(link, names, tuple(line.strip().removesuffix(",") for line in values.splitlines()))
+        for link, names, values in BODY.findall(found)
+    ]
+    joints = [(joint.name, joint.unit) for joint in manifest.joints]
+    links = {link.name: link.path for link in manifest.links}
+    if names_text(manifest.name, joints, links, robot.linear, manifest.parameters, bodies) != found:
+        yield "names.py"
 
 
 def _result(name: str, wrong: list[str], right: str) -> Result:

@@ -1,4 +1,4 @@
-"""Every function that a package's C header declares, in double and float, against the reference."""
+"""Every function that a package's C must have, in double and float, against the reference."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from linkwise.check.compare import Entries, Result, Skipped, compare
-from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype
+from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype, declared
 from linkwise.check.model_calls import FLOAT32
 from linkwise.check.packed_layout import IndexRows, Rows
 from linkwise.check.reference import Reference
@@ -18,6 +18,9 @@ from linkwise.package.manifest import Manifest
 
 ROWS, BLOCKS = (0, 1, 7, 8, 9, 17, 107), (1, 2, 8)
 """Numbers of samples, and of blocks: none, one, some that fill no block, some that do, many."""
+
+OUTPUTS = ("c2", "c1", "g", "tau", "h1")
+"""Arrays of a decomposition, in the order of the arguments."""
 
 MANY = 192
 """Bytes for each result of a sample that still count as few: 24 samples in double, 48 in float."""
@@ -32,10 +35,11 @@ class CFunctions:
         self.manifest, self.rows, self.compiled = manifest, rows, compiled
         self.n = len(manifest.joints)
         self.parameters = np.array([parameters[name] for name in manifest.parameters])
+        self.functions = prototypes(manifest, rows)
 
     def torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Dense τ_ij (samples, n, N) of the function for torques alone, in double."""
-        function = next(f for f in self.compiled.prototypes if f.name == "torque")
+        function = next(f for f in self.functions if f.name == "torque")
         given = {"q": q, "qd": qd, "qdd": qdd, "p": self.parameters}
         found = self.compiled.call(function, len(q), given, {"tau": len(q) * len(self.rows.tau)}, 0)
         dense = np.full((len(q), self.n, len(self.manifest.links)), np.nan if found is None else 0.0)
@@ -45,8 +49,12 @@ class CFunctions:
 
     def check(self, label: str, reference: Reference) -> Iterator[Result]:
         """One result a function; `label` stands before its name."""
-        for function in self.compiled.prototypes:
-            name = f"{label}: {self.manifest.name}_{function.name}"
+        for function in self.functions:
+            symbol = f"{self.manifest.name}_{function.name}"
+            name = f"{label}: {symbol}"
+            if not hasattr(self.compiled.library, symbol):
+                yield Result(name, False, None, "there is no such function")
+                continue
             single = FLOAT32 if function.real == "float" else {"tolerance": reference.tolerance}
             try:
                 yield compare(name, list(self._calls(function, reference)), **single)
@@ -106,8 +114,31 @@ class _OutOfBounds(Exception):
     """A function wrote beyond its arrays."""
 
 
+def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
+    """The functions that a package's header must declare, by the manifest's links and parameters."""
+    inputs = ("q", "qd", "qdd", *(["p"] if manifest.parameters else []))
+    every = tuple(what for what in OUTPUTS if len(rows.of(what)))
+    functions = [
+        ("decomposition", "count", every),
+        ("decomposition_blocks", "blocks", every),
+        ("torque", "count", ("tau",)),
+        ("position_gradient", "count", ("c0",)),
+    ]
+    for j in range(len(manifest.links)):
+        own = tuple(what for what in every if j in rows.of(what)[:, 1])
+        functions.append((f"link_{j + 1}", "", own))
+    return [
+        Prototype(name + suffix, real, counted, inputs, outputs)
+        for real, suffix in (("double", ""), ("float", "f"))
+        for name, counted, outputs in functions
+    ]
+
+
 def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[CompiledPackage | None, Result]:
-    """Compile a package's C, and hold the numbers and indices of its headers against the manifest's paths."""
+    """Compile a package's C, and hold what its headers say against the manifest's paths.
+
+    That is every number, every index, and every function with its arguments, by name.
+    """
     results = sum(len(rows.of(what)) for what in ("c2", "c1", "g", "tau", "h1"))
     try:
         compiled = CompiledPackage(manifest.name, directory / "c", MANY * results)
@@ -115,9 +146,13 @@ def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[Com
         return None, Skipped("c: not checked", " ".join(str(error).split()))
     except (LinkwiseError, OSError) as error:
         return None, Result("c: compiles", False, None, " ".join(str(error).split()))
-    wrong = _wrong_number(manifest, compiled, rows) or _wrong_table(manifest, directory, rows)
+    wrong = (
+        _wrong_number(manifest, compiled, rows)
+        or _wrong_table(manifest, directory, rows)
+        or _wrong_function(manifest, compiled, rows)
+    )
     detail = wrong or "as the manifest's paths say"
-    return compiled, Result("c: numbers and indices of the headers", not wrong, None, detail)
+    return compiled, Result("c: numbers, indices and functions of the headers", not wrong, None, detail)
 
 
 def _wrong_number(manifest: Manifest, compiled: CompiledPackage, rows: IndexRows) -> str:
@@ -141,6 +176,22 @@ def _wrong_table(manifest: Manifest, directory: Path, rows: IndexRows) -> str:
         if listed != rows.of(what).tolist():
             return f"the indices of {what} are wrong"
     return ""
+
+
+def _wrong_function(manifest: Manifest, compiled: CompiledPackage, rows: IndexRows) -> str:
+    name = manifest.name
+    expected = {f"{name}_{f.name}": f.declaration(name) for f in prototypes(manifest, rows)}
+    found = declared(name, compiled.header)
+    wrong = [
+        *(f"{function} is not declared" for function in expected.keys() - found.keys()),
+        *(f"{function} is declared, and there is no such function" for function in found.keys() - expected),
+        *(
+            f"{function} is declared otherwise"
+            for function, text in expected.items()
+            if found.get(function, text) != text
+        ),
+    ]
+    return "; ".join(sorted(wrong)[:3])
 
 
 def _blocks(motion: Array, width: int) -> Array:

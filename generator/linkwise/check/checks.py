@@ -24,8 +24,11 @@ from linkwise.check.reference import Reference
 from linkwise.check.states import random_states
 from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.torque_reference import states_of_torques, torque_reference
-from linkwise.package.load import Array, Model, Package, load_package
+from linkwise.package.load import Array, Model, Package, load_package, staying
 from linkwise.package.manifest import Manifest
+
+OPTIONAL = ("torch",)
+"""Libraries that a package's back ends may need beside NumPy."""
 
 
 def check_package(directory: Path, samples: int = 100) -> list[Result]:
@@ -35,18 +38,19 @@ def check_package(directory: Path, samples: int = 100) -> list[Result]:
     if not results[0].passed:
         return results
     try:
-        package = load_package(directory, manifest)
-        results.append(check_manifest(package))
+        with staying():
+            package = load_package(directory, manifest)
+            results.append(check_manifest(package))
+            if not results[-1].passed:
+                return results
+            results.append(check_runtime(package))
     except Exception as error:
         return [*results, Result("import", False, None, _line(error))]
-    if not results[-1].passed:
-        return results
-    results.append(check_runtime(directory, manifest))
     loaded, missing = _load(package)
     results += missing
     checks = _Checks(package, loaded, samples)
     try:
-        with np.errstate(all="ignore"):  # energies of a user's own need not be defined everywhere
+        with staying(), np.errstate(all="ignore"):  # energies of a user's own need not be defined everywhere
             results += checks.run()
     except Exception as error:
         results.append(Result("answers", False, None, _line(error)))
@@ -62,7 +66,7 @@ def _load(package: Package) -> tuple[dict[str, Model], list[Result]]:
         try:
             loaded[name] = package.load(name)
         except Exception as error:
-            if _lacks(error, package.module.__name__):
+            if _lacks(error):
                 missing.append(Skipped(f"{name}: not checked", " ".join(str(error).split())))
             else:
                 missing.append(Result(f"{name}: loads", False, None, _line(error)))
@@ -71,10 +75,11 @@ def _load(package: Package) -> tuple[dict[str, Model], list[Result]]:
     return loaded, missing
 
 
-def _lacks(error: Exception, package: str) -> bool:
+def _lacks(error: Exception) -> bool:
     """Whether a library, the compiler or a place to compile is missing here: not the package's fault."""
     if isinstance(error, ImportError):
-        return not (error.name or "").startswith(package)
+        library = (error.name or "").partition(".")[0]
+        return library in OPTIONAL and find_spec(library) is None
     here = any(word in str(error) for word in ("install", "LINKWISE_CACHE"))
     return isinstance(error, RuntimeError) and here and " failed: " not in str(error)
 

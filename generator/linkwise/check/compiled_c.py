@@ -1,4 +1,4 @@
-"""A package's C, compiled here and called through the functions that its header declares."""
+"""A package's C, compiled here and called through the functions that there must be."""
 
 import ctypes
 import re
@@ -28,13 +28,23 @@ LINE = 64
 
 @dataclass(frozen=True)
 class Prototype:
-    """A function of the header: its name without the package's, its number type, and its arrays in order."""
+    """A function of the header: its name without the package's, its number type, and its arrays in order.
+
+    counted: name of the argument that says how many samples or blocks; empty for one sample
+    """
 
     name: str
     real: str
-    counted: bool
+    counted: str
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+
+    def declaration(self, package: str) -> str:
+        """Its prototype, on one line."""
+        counts = [f"size_t {self.counted}"] if self.counted else []
+        inputs = [f"const {self.real} *{array}" for array in self.inputs]
+        outputs = [f"{self.real} *{array}" for array in self.outputs]
+        return f"void {package}_{self.name}({', '.join([*counts, *inputs, *outputs])});"
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -58,7 +68,6 @@ class CompiledPackage:
         self.header = (directory / f"{name}.h").read_text(encoding="utf-8")
         self.name = name
         self.constants = _constants(name, self.header)
-        self.prototypes = _prototypes(name, self.header)
         with tempfile.TemporaryDirectory() as folder:
             library = Path(folder) / "checked.so"
             sources = [directory / f"{name}.c", directory / f"{name}f.c"]
@@ -111,21 +120,11 @@ def _constants(name: str, header: str) -> dict[str, int]:
     return {key: int(value) for key, value in found}
 
 
-def _prototypes(name: str, header: str) -> tuple[Prototype, ...]:
-    found = []
-    for function, arguments in re.findall(rf"\bvoid {re.escape(name)}_(\w+)\(([^)]*)\);", header):
-        arrays = re.findall(r"(const )?(double|float) \*(\w+)", arguments)
-        kinds = {kind for _, kind, _ in arrays}
-        found.append(
-            Prototype(
-                function,
-                "float" if "float" in kinds else "double",
-                "size_t" in arguments,
-                tuple(array for const, _, array in arrays if const),
-                tuple(array for const, _, array in arrays if not const),
-            )
-        )
-    return tuple(found)
+def declared(name: str, header: str) -> dict[str, str]:
+    """What a header says of each of the package's functions, on one line, by the name in C."""
+    code = " ".join(re.sub(r"/\*.*?\*/", " ", header, flags=re.DOTALL).split())
+    found = re.finditer(rf"[^;{{}}]*\b({re.escape(name)}_\w+) *\([^;]*;", code)
+    return {statement[1]: statement[0].strip() for statement in found}
 
 
 def _compile(compiler: Compiler, sources: Sequence[Path], library: Path, large: int) -> None:

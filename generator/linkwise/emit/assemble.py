@@ -5,27 +5,23 @@ import keyword
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from importlib import resources
 
 import sympy as sp
 
 from linkwise import runtime
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
-from linkwise.emit.backend import BackendFiles, Loading
+from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
 from linkwise.emit.definition import energies, rigid_tree
 from linkwise.emit.derivation import Derivation
-from linkwise.emit.render import render
+from linkwise.emit.shared_texts import init_text, names_text
 from linkwise.errors import LinkwiseError
-from linkwise.escape import python_docstring, python_literal
 from linkwise.package.manifest import FILE, JointEntry, LinkEntry, Manifest
 from linkwise.progress import Progress, silent
-from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 
 LONGEST_NAME = 60
-LINE = 100
 SHARED_RUNTIME = (
     "__init__.py",
     "arguments.py",
@@ -92,66 +88,19 @@ def _fault_of_name(name: str) -> str:
 
 def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iterator[tuple[str, str]]:
     """Files that serve every back end, and the runtime files of those `chosen`, which `load` is to know."""
-    loadable = {backend: backend.loading for backend in chosen if backend.loading}
-    fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
-    system, shared = derivation.system, {"version": VERSION}
-    bodies = body_texts(system)
-    names = {
-        **shared,
-        "name": repr(derivation.package),
-        "joints": [python_literal(c.name) for c in system.coordinates],
-        "units": [repr(c.unit) for c in system.coordinates],
-        "links": [python_literal(link.name) for link in system.links],
-        "paths": [repr(system.path(j)) for j in range(len(system.links))],
-        "linear": repr(tuple(sorted(derivation.linear))),
-        "parameters": [(python_literal(s.name), repr(float(v))) for s, v in system.parameters.items()],
-        "bodies": bodies,
-        "calls_numpy": any("np." in value for body in bodies for value in body.values),
-    }
-    init = {
-        **shared,
-        "package": derivation.package,
-        "default": next((backend.name for backend in loadable), ""),
-        "makers": [Maker.of(backend, loading) for backend, loading in loadable.items()],
-        "fastest_first": [backend.name for backend, _ in fastest_first],
-        "parameters": _parameter_lines(system),
-        "about_parameters": parameter_rules(system, bodies),
-    }
-    yield "__init__.py", render("package/init.py.j2", init)
-    yield "names.py", render("package/names.py.j2", names)
+    system, bodies = derivation.system, body_texts(derivation.system)
+    parameters = {s.name: float(v) for s, v in system.parameters.items()}
+    loadable = [backend for backend in chosen if backend.loading]
+    about = parameter_rules(system, bodies)
+    yield "__init__.py", init_text(derivation.package, loadable, parameters, about)
+    joints = [(c.name, c.unit) for c in system.coordinates]
+    links = {name: system.path(j) for j, name in enumerate(system.link_names)}
+    linear = derivation.linear
+    yield "names.py", names_text(derivation.package, joints, links, linear, parameters, bodies)
     yield "py.typed", ""
     copied = {name for backend in loadable for name in backend.runtime}
     for name in sorted(copied.union(SHARED_RUNTIME)):
         yield f"runtime/{name}", resources.files(runtime).joinpath(name).read_text(encoding="utf-8")
-
-
-@dataclass(frozen=True)
-class Maker:
-    """A function of the package's __init__.py that makes one back end."""
-
-    name: str
-    doc: str
-    imports: tuple[str, ...]
-    made: str
-
-    @classmethod
-    def of(cls, backend: BackendFiles, loading: Loading) -> "Maker":
-        """Its class comes from runtime/, and is the first word of the expression."""
-        made = loading.made.partition("(")[0]
-        imported = f"from .runtime.{loading.module} import {made}"
-        return cls(backend.name, backend.doc, (*loading.imports, imported), loading.made)
-
-
-def _parameter_lines(system: System) -> list[str]:
-    """Names of the parameters as lines of a docstring, which none of their characters can end."""
-    lines: list[str] = []
-    for symbol in system.parameters:
-        name = python_docstring(symbol.name)
-        if lines and len(lines[-1]) + len(name) < LINE:
-            lines[-1] += f" {name},"
-        else:
-            lines.append(f"{name},")
-    return [*lines[:-1], *(last.removesuffix(",") for last in lines[-1:])]
 
 
 def manifest(derivation: Derivation, shared: Kernel | None, files: Mapping[str, str]) -> Manifest:

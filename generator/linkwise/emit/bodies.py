@@ -1,13 +1,13 @@
 """What a package knows of its parameters: what they mean, and which values no body can have."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from textwrap import wrap
 
 import numpy as np
 import sympy as sp
 
 from linkwise.emit.printer import PythonPrinter, Text
+from linkwise.emit.shared_texts import BodyText
 from linkwise.escape import python_docstring, python_literal
 from linkwise.expression.from_sympy import Lowering
 from linkwise.expression.graph import Graph, Node, operands, reachable
@@ -32,15 +32,6 @@ EXEMPT = "Free of that, as they break it in the file already: {}."
 WIDTH = 108
 
 ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-
-
-@dataclass(frozen=True)
-class BodyText:
-    """A link, the parameters that its mass and inertia hang on, and these two as Python expressions."""
-
-    link: str
-    parameters: str
-    values: tuple[str, ...]
 
 
 def body_texts(system: System) -> tuple[BodyText, ...]:

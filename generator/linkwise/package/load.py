@@ -1,6 +1,7 @@
 """A generated package, imported from its folder, and its back ends with NumPy arrays in and out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -82,9 +83,24 @@ class Package:
 
     def load(self, backend: str, parameters: Mapping[str, float] | None = None) -> Model:
         """Model on a back end, for any parameters; passes on what the package raises."""
-        dynamics = self.module.load(backend, parameters, allow_unphysical=True)
+        with staying():
+            dynamics = self.module.load(backend, parameters, allow_unphysical=True)
         model: Model = TensorModel(dynamics) if dynamics.backend.takes_tensors else dynamics
         return model
+
+
+@contextmanager
+def staying() -> Iterator[None]:
+    """Raise LinkwiseError where a package's code would end this process, as by SystemExit.
+
+    Ctrl-C and errors pass through.
+    """
+    try:
+        yield
+    except (Exception, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        raise LinkwiseError(f"its code would end this process by {error!r}") from error
 
 
 def open_package(directory: Path) -> Package:
@@ -109,7 +125,8 @@ def open_package(directory: Path) -> Package:
 
 def load_package(directory: Path, manifest: Manifest) -> Package:
     """Import the package of a manifest; passes on whatever the package raises."""
-    return Package(directory, manifest, import_listed(directory, manifest.files))
+    with staying():
+        return Package(directory, manifest, import_listed(directory, manifest.files))
 
 
 def import_package(directory: Path) -> ModuleType:

@@ -1,0 +1,95 @@
+"""Texts that do not depend on how links move: a package's __init__.py and names.py.
+
+They are made of what a manifest has too, so that `linkwise check` makes them again and compares.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from linkwise.emit.backend import BackendFiles, Loading
+from linkwise.emit.render import render
+from linkwise.escape import python_docstring, python_literal
+from linkwise.version import VERSION
+
+LINE = 100
+
+
+@dataclass(frozen=True)
+class BodyText:
+    """A link, the parameters that its mass and inertia hang on, and these two as Python expressions."""
+
+    link: str
+    parameters: str
+    values: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Maker:
+    """A function of the package's __init__.py that makes one back end."""
+
+    name: str
+    doc: str
+    imports: tuple[str, ...]
+    made: str
+
+    @classmethod
+    def of(cls, backend: BackendFiles, loading: Loading) -> "Maker":
+        """Its class comes from runtime/, and is the first word of the expression."""
+        made = loading.made.partition("(")[0]
+        imported = f"from .runtime.{loading.module} import {made}"
+        return cls(backend.name, backend.doc, (*loading.imports, imported), loading.made)
+
+
+def init_text(
+    package: str, chosen: Iterable[BackendFiles], parameters: Iterable[str], about: Sequence[str]
+) -> str:
+    """__init__.py, whose `load` makes the back ends of those `chosen`; about: lines on the parameters."""
+    loadable = {backend: backend.loading for backend in chosen if backend.loading}
+    fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
+    view = {
+        "version": VERSION,
+        "package": package,
+        "default": next((backend.name for backend in loadable), ""),
+        "makers": [Maker.of(backend, loading) for backend, loading in loadable.items()],
+        "fastest_first": [backend.name for backend, _ in fastest_first],
+        "parameters": _parameter_lines(parameters),
+        "about_parameters": about,
+    }
+    return render("package/init.py.j2", view)
+
+
+def names_text(
+    package: str,
+    joints: Iterable[tuple[str, str]],
+    links: Mapping[str, Sequence[int]],
+    linear: Iterable[int],
+    parameters: Mapping[str, float],
+    bodies: Sequence[BodyText],
+) -> str:
+    """names.py: names and units of the joints, names and paths of the links, and what hangs on parameters."""
+    joints = list(joints)
+    view = {
+        "version": VERSION,
+        "name": repr(package),
+        "joints": [python_literal(name) for name, _ in joints],
+        "units": [repr(unit) for _, unit in joints],
+        "links": [python_literal(name) for name in links],
+        "paths": [repr(tuple(path)) for path in links.values()],
+        "linear": repr(tuple(sorted(linear))),
+        "parameters": [(python_literal(name), repr(value)) for name, value in parameters.items()],
+        "bodies": bodies,
+        "calls_numpy": any("np." in value for body in bodies for value in body.values),
+    }
+    return render("package/names.py.j2", view)
+
+
+def _parameter_lines(parameters: Iterable[str]) -> list[str]:
+    """Names of the parameters as lines of a docstring, which none of their characters can end."""
+    lines: list[str] = []
+    for parameter in parameters:
+        name = python_docstring(parameter)
+        if lines and len(lines[-1]) + len(name) < LINE:
+            lines[-1] += f" {name},"
+        else:
+            lines.append(f"{name},")
+    return [*lines[:-1], *(last.removesuffix(",") for last in lines[-1:])]
