@@ -115,14 +115,37 @@ def test_a_shared_value_without_a_name_is_called_by_its_place(directory_of: Call
 
 
 def test_what_a_robot_has_no_use_for_is_not_in_its_functions(directory_of: Callable[[str], Path]) -> None:
-    def code(robot: str) -> str:
+    def text(robot: str) -> str:
         directory = directory_of(robot)
-        text = (directory / "c" / f"{name_of(directory)}.h").read_text(encoding="utf-8")
-        return re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+        return (directory / "c" / f"{name_of(directory)}.h").read_text(encoding="utf-8")
 
+    def code(robot: str) -> str:
+        return re.sub(r"/\*.*?\*/", "", text(robot), flags=re.S)
+
+    assert "h1" not in text("planar3")
+    assert "quadratic in qd, and h1" in text(TURNTABLE)
     assert not re.search(r"\b(h1|\w+_H1|p|\w+_PARAMETERS)\b", code("planar3"))
     assert re.search(r"\*p\b", code("planar3 symbolic"))
     assert re.search(r"\*h1\b", code(TURNTABLE))
+
+
+@pytest.mark.parametrize("robot", ["torso", LEG, TURNTABLE], ids=["tree", "leg", "energies"])
+def test_the_header_says_where_each_links_entries_begin_and_which_joints_move_it(
+    robot: str, directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    directory = directory_of(robot)
+    text = (directory / "c" / f"{name_of(directory)}.h").read_text(encoding="utf-8")
+    rows = re.findall(r"^   (\d+) {3,}(\d[\d to]*?) {3,}(\d[\d ]*?) {3,}'", text, re.M)
+    links, layout = Manifest.read(directory).links, package_of(robot).load("numpy").layout
+    assert len(rows) == len(links)
+    for row, link in zip(rows, links, strict=True):
+        first, to, last = row[1].partition(" to ")
+        joints = range(int(first), int(last) + 1) if to else map(int, row[1].split())
+        assert [joint - 1 for joint in joints] == list(link.path)
+        arrays = (layout.acceleration, layout.velocity, layout.gravity, layout.velocity_linear)
+        for start, entries in zip(map(int, row[2].split()), arrays, strict=False):
+            own = [place for place, entry in enumerate(entries) if entry[1] == int(row[0]) - 1]
+            assert start == own[0]
 
 
 @pytest.mark.parametrize("robot", ["planar3", "puma560", LEG, TURNTABLE, SHARING])

@@ -7,15 +7,18 @@ from dataclasses import dataclass
 from fnmatch import fnmatch
 
 CHECK = "tests/test_check.py"
+ONE_COMPILER = "not clang and not g++"
+"""What a second compiler says of a mutant, the first has said."""
 
 
 @dataclass(frozen=True)
 class Room:
-    """Files by pattern, below the project's root; tests as pytest names them."""
+    """Files by pattern, below the project's root; tests as pytest names them, `only` as its -k chooses."""
 
     files: tuple[str, ...]
     tests: tuple[str, ...]
     leave: tuple[str, ...] = ()
+    only: str = ""
 
     def holds(self, path: str) -> bool:
         """Whether a file is one of this room's."""
@@ -24,6 +27,11 @@ class Room:
 
 def _house(room: str) -> tuple[str, ...]:
     return (f"generator/linkwise/{room}/*.py", f"generator/linkwise/{room}.py")
+
+
+def _cli(*tests: str) -> tuple[str, ...]:
+    """Of the commands' tests, each of which begins a new Python, those of a room."""
+    return tuple(f"tests/test_cli.py::test_{test}" for test in tests)
 
 
 ROOMS: dict[str, Room] = {
@@ -61,6 +69,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_emitted_c.py",
             "tests/test_user_energies.py",
         ),
+        only=ONE_COMPILER,
     ),
     "templates": Room(
         tuple(f"templates/{kind}/*.j2" for kind in ("c", "closed_forms", "energies", "formulas", "package")),
@@ -71,11 +80,27 @@ ROOMS: dict[str, Room] = {
             "tests/test_package_calls.py",
             "tests/test_emitted_c.py",
         ),
+        only=ONE_COMPILER,
     ),
     "check": Room(_house("check"), ("tests/test_check_sources.py", CHECK)),
     "package": Room(
         _house("package"),
-        ("tests/test_manifest.py", CHECK, "tests/test_package_import.py", "tests/test_cli.py"),
+        (
+            "tests/test_manifest.py",
+            CHECK,
+            "tests/test_package_import.py",
+            *_cli(
+                "manifest_tells_how_to_make_the_package_again",
+                "generate_replaces_an_earlier_package_whole",
+                "generate_leaves_a_foreign_directory_alone",
+                "generate_leaves_the_package_of_another_robot_alone",
+                "generate_never_replaces_what_is_not_a_package",
+                "generate_never_replaces_what_was_added_to_a_package",
+                "what_blocks_the_target_is_named",
+                "check_catches_a_tampered_file",
+                "check_of_a_folder_without_a_package_says_so",
+            ),
+        ),
     ),
     "runtime": Room(
         _house("runtime"),
@@ -98,13 +123,24 @@ ROOMS: dict[str, Room] = {
             "tests/test_runtime.py",
         ),
     ),
-    "c headers": Room(("generator/linkwise/runtime/c/*.h",), (CHECK, "tests/test_emitted_c.py")),
+    "c headers": Room(
+        ("generator/linkwise/runtime/c/*.h",), (CHECK, "tests/test_emitted_c.py"), only=ONE_COMPILER
+    ),
     "output": Room(
         (
             *_house("output"),
             *(f"generator/linkwise/{name}.py" for name in ("escape", "errors", "input_file")),
         ),
-        ("tests/test_escape.py", "tests/test_output.py", "tests/test_cli_endings.py", "tests/test_cli.py"),
+        (
+            "tests/test_escape.py",
+            "tests/test_output.py",
+            "tests/test_cli_endings.py",
+            *_cli(
+                "generate_replaces_an_earlier_package_whole",
+                "what_blocks_the_target_is_named",
+                "bad_file_is_one_line_that_names_the_remedy",
+            ),
+        ),
     ),
     "report": Room(
         (*_house("report"), "templates/report/*.j2"),
@@ -139,7 +175,14 @@ ROOMS: dict[str, Room] = {
             "tests/test_robots_mjcf_options.py",
             "tests/test_parameters.py",
             "tests/numeric/test_parameters_of_file.py",
-            "tests/test_cli.py",
+            *_cli(
+                "inspect_prints_a_table",
+                "inspect_names_what_was_merged_locked_and_ignored",
+                "inspect_lists_what_each_joint_leaves_out_on_request",
+                "inspect_shows_a_robot_that_generate_refuses_for_a_body_that_cannot_be",
+                "generate_warns_of_what_the_torques_leave_out",
+                "generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be",
+            ),
         ),
     ),
 }

@@ -89,8 +89,9 @@ class Tree:
         inner = path.removeprefix("generator/linkwise/")
         return self.folder / "linkwise" / inner
 
-    def tested(self, mutant: Mutant | None, tests: Sequence[str]) -> tuple[str, str]:
+    def tested(self, mutant: Mutant | None, room: Room) -> tuple[str, str]:
         """Verdict of the tests on a mutant, and the test that gave it."""
+        tests = [*room.tests, *(("-k", room.only) if room.only else ())]
         if mutant is None:
             return self._run(tests)
         file = self.place(mutant.path)
@@ -185,7 +186,7 @@ def outcomes(work: Sequence[tuple[str, Mutant | None]], jobs: int, folder: Path)
         name, mutant = item
         tree = trees.get()
         try:
-            return Outcome(name, mutant, *tree.tested(mutant, ROOMS[name].tests))
+            return Outcome(name, mutant, *tree.tested(mutant, ROOMS[name]))
         finally:
             trees.put(tree)
 
