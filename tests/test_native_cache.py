@@ -13,7 +13,7 @@ from types import ModuleType
 
 import pytest
 from conftest import needs_compiler
-from linkwise.runtime import native_compiler, native_process
+from linkwise.runtime import native_build, native_compiler, native_process
 from linkwise.runtime.native_build import Sources, library
 from linkwise.runtime.native_cache import cache_directory, is_whole, locked
 from linkwise.runtime.native_library import function
@@ -121,6 +121,23 @@ def test_a_whole_library_needs_nothing_written(tiny: Sources) -> None:
     path.with_suffix(".lock").unlink()
     assert library(tiny, "double") == path
     assert not path.with_suffix(".lock").exists()
+
+
+def test_another_source_compiler_or_processor_has_a_library_of_its_own(
+    tiny: Sources, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """-march=native must not meet another machine where homes are shared."""
+    made = [library(tiny, "double")]
+    tiny.file("double").write_text(TINY.replace("1.0", "2.0"))
+    made.append(library(tiny, "double"))
+    monkeypatch.setenv("CC", "cc -O1")
+    made.append(library(tiny, "double"))
+    with monkeypatch.context() as newer:
+        newer.setattr(native_compiler.Compiler, "version", lambda _: "cc 99")
+        made.append(library(tiny, "double"))
+    monkeypatch.setattr(native_build, "processor", lambda: "of another machine")
+    made.append(library(tiny, "double"))
+    assert len(set(made)) == 5
 
 
 @pytest.mark.parametrize("plant", [Path.symlink_to, lambda lock, _: os.mkfifo(lock)], ids=["link", "pipe"])
