@@ -6,7 +6,7 @@ import platform
 import re
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -323,6 +323,91 @@ def test_stores_past_the_cache_end_with_a_fence(
     for a, size in zip(outputs, sizes, strict=True):
         samples = a.reshape(-1, size, width).swapaxes(1, 2) if blocks else a.reshape(-1, size)
         assert (samples == samples[:1]).all()
+
+
+GUARDED = """
+#include "planar3.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+enum { N = 3, C2 = 10, C1 = 14, G = 6 };
+static const int SIZES[] = { C2, C1, G, G, G, C1 };
+static real *room(size_t count)
+{
+    void *made;
+    if (posix_memalign(&made, 64, count * sizeof(real)))
+        exit(2);
+    return made;
+}
+static void compute(size_t count, real *const *motion, real **out)
+{
+    for (int a = 0; a < 6; ++a)
+        out[a] = room(count * SIZES[a]);
+    API(planar3_decomposition)(count, motion[0], motion[1], motion[2], out[0], out[1], out[2], out[3]);
+    API(planar3_torque)(count, motion[0], motion[1], motion[2], out[4]);
+    API(planar3_position_gradient)(count, motion[0], motion[1], motion[2], out[5]);
+}
+int main(void)
+{
+    for (size_t count = 1; count < 40; ++count) {
+        real *motion[3], *one[3], *all[6], *alone[6];
+        for (int k = 0; k < 3; ++k) {
+            motion[k] = room(count * N);
+            one[k] = room(N);
+            for (size_t e = 0; e < count * N; ++e)
+                motion[k][e] = (real)(3.0 * cos(1.0 + k + 7.0 * e));
+        }
+        compute(count, motion, all);
+        for (size_t s = 0; s < count; ++s) {
+            for (int k = 0; k < 3; ++k)
+                for (int e = 0; e < N; ++e)
+                    one[k][e] = motion[k][s * N + e];
+            compute(1, one, alone);
+            for (int a = 0; a < 6; ++a)
+                for (int e = 0; e < SIZES[a]; ++e)
+                    if (!(fabs((double)(all[a][s * SIZES[a] + e] - alone[a][e])) < NEAR)) {
+                        fprintf(stderr, "array %d, sample %d of %d, entry %d", a, (int)s, (int)count, e);
+                        return 1;
+                    }
+            for (int a = 0; a < 6; ++a)
+                free(alone[a]);
+        }
+        for (int a = 0; a < 6; ++a)
+            free(all[a]);
+        for (int k = 0; k < 3; ++k)
+            free(motion[k]), free(one[k]);
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(("-DLARGE=(size_t)4096", "-D__AVX512F__"), id="past the cache"),
+        pytest.param(("-U__GNUC__", "-D__GNUC__=11"), id="without vectors"),
+    ],
+)
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_no_call_leaves_its_arrays_and_many_samples_are_one_by_one(
+    real: str, kind: Sequence[str], directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """Under gcc's address sanitizer, for every count up to some blocks."""
+    folder = directory_of("planar3") / "c"
+    suffix, api, near = ("", "name", "1e-13") if real == "double" else ("f", "name##f", "1e-4")
+    (tmp_path / "immintrin.h").write_text(COUNTING, encoding="utf-8")
+    (tmp_path / "main.c").write_text(GUARDED, encoding="utf-8")
+    defined = (f"-Dreal={real}", f"-DAPI(name)={api}", f"-DNEAR={near}")
+    guard = ("gcc", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-D_GNU_SOURCE")
+    makes = [
+        [*guard, "-std=c99", *kind, f"-I{tmp_path}", "-c", str(folder / f"planar3{suffix}.c"), "-o", "arm.o"],
+        [*guard, "-std=c99", *defined, f"-I{folder}", "main.c", "arm.o", "-lm", "-o", "main"],
+        ["./main"],
+    ]
+    for command in makes:
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
 
 
 def test_it_takes_run_time_parameters(

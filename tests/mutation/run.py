@@ -3,7 +3,7 @@
     python tests/mutation/run.py --out out/mutate [--each 25] [--only dynamics emit] [--jobs 2] [--seed 0]
 
 Each mutant runs in a process forked from one that has the heavy libraries, in a copy of the tree. A mutant is
-killed when a test of its room fails, or takes more processor time than LIMIT. What survives is to be killed
+killed when a test of its room fails, takes more processor time than LIMIT, or hangs. What survives is to be killed
 by a test, or listed in equivalents.json with the reason why it changes nothing that is promised.
 """
 
@@ -16,6 +16,7 @@ import py_compile
 import random
 import resource
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -34,6 +35,8 @@ ROOT = Path(__file__).parents[2]
 EQUIVALENTS = Path(__file__).with_name("equivalents.json")
 LIMIT = 120
 """Seconds of processor time for the tests of one mutant."""
+PATIENCE = 600
+"""Seconds after which a mutant that waits for something counts as killed, too."""
 
 HEAVY = (
     *(
@@ -108,7 +111,7 @@ class Tree:
         if child == 0:
             _child(self.folder, tests, log)
         _, status = os.waitpid(child, 0)
-        if os.WIFSIGNALED(status) and os.WTERMSIG(status) == 24:
+        if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGALRM):
             return "too slow", ""
         code = os.waitstatus_to_exitcode(status)
         lines = log.read_text(errors="replace").splitlines()
@@ -126,6 +129,7 @@ def _child(folder: Path, tests: Sequence[str], log: Path) -> None:
     os.dup2(out, 1)
     os.dup2(out, 2)
     resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT + 5))
+    signal.alarm(PATIENCE)
     os.chdir(folder)
     os.environ |= {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", "LINKWISE_TEST_CACHE": _CACHE}
     sys.dont_write_bytecode = True
