@@ -289,6 +289,10 @@ def link_to(path: Path) -> None:
 
 FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
     "module": (lambda p: (p / "forms/more.py").touch(), "forms/more.py was added"),
+    "modules, in the order of their paths": (
+        lambda p: [(p / name).touch() for name in ("z.py", "forms/more.py", "a.py")],
+        "a.py was added; forms/more.py was added; z.py was added",
+    ),
     "library": (lambda p: (p / "names.so").touch(), "names.so was added"),
     "bytecode of no cache": (lambda p: (p / "forms/link_1.pyc").touch(), "forms/link_1.pyc was added"),
     "name of no cache": (lambda p: plant(p, "names.pyc"), "__pycache__/names.pyc was added"),

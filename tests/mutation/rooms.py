@@ -128,7 +128,7 @@ ROOMS: dict[str, Room] = {
         only=UNTYPED,
     ),
     "c headers": Room(
-        ("generator/linkwise/runtime/c/*.h",), (CHECK, "tests/test_emitted_c.py"), only=ONE_COMPILER
+        ("generator/linkwise/runtime/c/*.h",), ("tests/test_emitted_c.py", CHECK), only=ONE_COMPILER
     ),
     "output": Room(
         (

@@ -1,10 +1,10 @@
 """Mutation testing of generator, runtime and templates: what may be wrong without a test noticing?
 
-    python tests/mutation/run.py --out out/mutate [--each 25] [--only dynamics emit] [--jobs 2] [--seed 0]
+    python tests/mutation/run.py --out out/mutate [--each 22] [--only dynamics emit] [--jobs 2] [--seed 0]
 
 Each mutant runs in a process forked from one that has the heavy libraries, in a copy of the tree. A mutant is
-killed when a test of its room fails, takes more processor time than LIMIT, or hangs. What survives is to be killed
-by a test, or listed in equivalents.json with the reason why it changes nothing that is promised.
+killed when a test of its room fails, takes more processor time than LIMIT, or hangs. What survives is to be
+killed by a test, or listed in equivalents.json with the reason why it changes nothing that is promised.
 """
 
 import argparse
@@ -37,6 +37,8 @@ LIMIT = 120
 """Seconds of processor time for the tests of one mutant."""
 PATIENCE = 600
 """Seconds after which a mutant that waits for something counts as killed, too."""
+OF_A_FILE = 50
+"""Mutants of one file at most."""
 
 HEAVY = (
     *(
@@ -172,7 +174,7 @@ def room_mutants(room: Room, each: int, seed: int) -> list[Mutant]:
                 text = path.read_text(encoding="utf-8")
                 group = list(mutants(name, text))
                 chosen.shuffle(group)
-                groups.append([mutant for mutant in group[: each * 2] if mutant.parses(text)])
+                groups.append([mutant for mutant in group[:OF_A_FILE] if mutant.parses(text)])
     total = sum(map(len, groups))
     # Long files get more: each line has the same chance.
     drawn = [(k / len(group), g, group[k]) for g, group in enumerate(groups) for k in range(len(group))]
@@ -207,7 +209,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, default=Path("out/mutate"))
-    parser.add_argument("--each", type=int, default=25, help="mutants of each room")
+    parser.add_argument("--each", type=int, default=22, help="mutants of each room")
     parser.add_argument("--only", nargs="*", default=list(ROOMS), choices=list(ROOMS), metavar="ROOM")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
