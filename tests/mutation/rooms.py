@@ -91,17 +91,6 @@ ROOMS: dict[str, Room] = {
             "tests/test_manifest.py",
             CHECK,
             "tests/test_package_import.py",
-            *_cli(
-                "manifest_tells_how_to_make_the_package_again",
-                "generate_replaces_an_earlier_package_whole",
-                "generate_leaves_a_foreign_directory_alone",
-                "generate_leaves_the_package_of_another_robot_alone",
-                "generate_never_replaces_what_is_not_a_package",
-                "generate_never_replaces_what_was_added_to_a_package",
-                "what_blocks_the_target_is_named",
-                "check_catches_a_tampered_file",
-                "check_of_a_folder_without_a_package_says_so",
-            ),
         ),
     ),
     "runtime": Room(
@@ -139,11 +128,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_escape.py",
             "tests/test_output.py",
             "tests/test_cli_endings.py",
-            *_cli(
-                "generate_replaces_an_earlier_package_whole",
-                "what_blocks_the_target_is_named",
-                "bad_file_is_one_line_that_names_the_remedy",
-            ),
+            *_cli("what_blocks_the_target_is_named"),
         ),
     ),
     "report": Room(
