@@ -301,3 +301,9 @@ def test_a_folder_with_the_manifest_of_another_program_is_not_replaced(data: Any
     (tmp_path / "manifest.json").write_text(json.dumps(data))
     with pytest.raises(LinkwiseError, match="exists and is not a generated package"):
         check_target(tmp_path, "planar2")
+
+
+def test_a_new_back_end_may_put_its_files_several_folders_down(tmp_path: Path) -> None:
+    files = {"manifest.json": json.dumps({"robot": "arm"}), "rust/src/lib.rs": "// τ\n"}
+    write_package(files, tmp_path / "arm")
+    assert (tmp_path / "arm/rust/src/lib.rs").read_text(encoding="utf-8") == "// τ\n"
