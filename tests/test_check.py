@@ -244,6 +244,15 @@ def test_a_package_that_cannot_be_imported_or_asked_fails(package: Path) -> None
     assert marks(package)["answers"] == "FAIL"
 
 
+def test_a_package_that_cannot_be_imported_says_why_and_leaves_no_trace(package: Path) -> None:
+    finders = list(sys.meta_path)
+    change_file(package, "names.py", "ROBOT =", "1 / 0\nROBOT =", 1)
+    for _ in range(2):
+        with pytest.raises(LinkwiseError, match=r"cannot be imported \(ZeroDivisionError: division by"):
+            open_package(package)
+    assert sys.meta_path == finders
+
+
 def test_closed_forms_of_a_users_energies_are_held_against_their_own_torques(tmp_path: Path) -> None:
     package = tmp_path / "turntable"
     write_package(generate(read_system(str(DATA / "turntable.py")), ["numpy"]), package)
