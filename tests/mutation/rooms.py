@@ -140,6 +140,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_report_commands.py",
         ),
         leave=("*/plots.py", "*/seconds.py", "*/seconds_page.py"),
+        only="not same_bytes and not users_mistake and not unwritable",  # whole commands are slow
     ),
     "analysis": Room(
         _house("analysis"),
