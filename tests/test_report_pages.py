@@ -26,6 +26,7 @@ from linkwise.report import (
     seconds_markdown,
     seconds_page,
     study,
+    terms_files,
     terms_markdown,
     terms_page,
     terms_report,
@@ -63,6 +64,21 @@ def test_each_template_uses_every_field_of_its_view_and_no_other(monkeypatch: py
 def test_a_joint_that_is_in_no_term_has_no_column() -> None:
     report = terms_report(planar(4), TermQuery(joint=0, link=1), 100, False, silent)
     assert "| torque | gravity | acc 1 | acc 2 | vel 1 | vel 2 |\n" in terms_markdown(report)
+
+
+def test_the_data_of_the_terms_hold_what_the_page_shows() -> None:
+    report = terms_report(planar(2), TermQuery(), 100, False, silent)
+    files, page = terms_files(report), terms_markdown(report)
+    assert files["terms.csv"].decode().splitlines() == [
+        "joint,link,terms,kept,reduction,gravity,acceleration_1,acceleration_2,velocity_1,velocity_2",
+        "1,1,3,2,0.333333,1,2,0,0,0",
+        "1,2,11,4,0.636364,2,4,3,1,2",
+        "1,all,14,6,0.571429,3,6,3,1,2",
+    ]
+    for costs in json.loads(files["terms.json"])["operations"]:
+        whole, kept = (tuple(costs[of]["1"].values()) for of in ("torque", "kept"))
+        assert "| τ_1,{} as a whole | {} | {} |".format(costs["link"], *whole) in page
+        assert "| τ_1,{}, the part kept alone | {} | {} |".format(costs["link"], *kept) in page
 
 
 def test_measured_seconds_are_held_against_the_terms() -> None:

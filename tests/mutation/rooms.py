@@ -134,9 +134,9 @@ ROOMS: dict[str, Room] = {
     "report": Room(
         (*_house("report"), "templates/report/*.j2"),
         (
+            "tests/test_report_pages.py",
             "tests/test_report_terms.py",
             "tests/test_report_reduction.py",
-            "tests/test_report_pages.py",
             "tests/test_report_commands.py",
         ),
         leave=("*/plots.py", "*/seconds.py", "*/seconds_page.py"),
