@@ -1,5 +1,7 @@
 """Two derivations of one thing: the rigid-link rule, and Euler–Lagrange on the energy of the same link."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -17,6 +19,7 @@ from linkwise.dynamics.principal_axes import principal_axes
 from linkwise.dynamics.screws import CommonAxes, Orientation
 from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Graph
+from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import RigidSystem, System
 
@@ -50,6 +53,22 @@ def states_of_three(samples: int) -> list[dict[str, float]]:
         }
         for rows in zip(*random_states(3, samples), strict=True)
     ]
+
+
+@pytest.mark.parametrize(("gravity", "weight"), [("[1, 0, 0]", sp.sin), ("[0, -1, 0]", sp.cos)])
+def test_the_energy_of_a_pendulum_is_that_of_the_textbook(
+    gravity: str, weight: sp.Function, tmp_path: Path
+) -> None:
+    """tau = (I + m r^2) qdd + m g r times the sine of the angle from the way that a stone falls."""
+    (tmp_path / "pendulum.toml").write_text(
+        f"schema = 1\ngravity = {gravity}\n"
+        '[[link]]\nname = "bob"\nmass = 2\ncom = [0.5, 0, 0]\ninertia = { xx = 0.25, yy = 0.25, zz = 0.25 }\n'
+        '[[joint]]\nname = "pivot"\nparent = "base"\nchild = "bob"\ntype = "revolute"\naxis = [0, 0, 1]\n'
+    )
+    system = read_system(tmp_path / "pendulum.toml")
+    (joint,) = system.coordinates
+    (torque,) = partial_torques(system, 0).values()
+    assert sp.expand(torque - (0.75 * joint.qdd + weight(joint.q))).evalf(12, chop=True) == 0
 
 
 @pytest.mark.parametrize("block", BLOCKS)

@@ -67,8 +67,28 @@ def test_emitted_c_has_the_linear_part_too(
     assert np.abs(given["linear"]).max() > 1.0
 
 
+X = Coordinate("x", "m")
+A, B = sp.symbols("a b")
+
+
 def puck(kinetic: sp.Expr, potential: sp.Expr = sp.S.Zero) -> object:
     return energy_system("puck", [Coordinate("x", "m")], [LinkEnergy("disc", kinetic, potential)])
+
+
+@pytest.mark.parametrize(
+    ("kinetic", "potential", "sorted_out"),
+    [
+        (X.qd**2 / 2 + 3 * X.q**2, sp.S.Zero, (X.qd**2 / 2, -3 * X.q**2)),
+        (X.qd**2 / 2, -5 * X.q * X.qd, (X.qd**2 / 2 + 5 * X.q * X.qd, sp.S.Zero)),
+        (X.qd**2 / 2, 3 * X.q**2, (X.qd**2 / 2, 3 * X.q**2)),
+    ],
+    ids=["kinetic at rest", "potential in motion", "neither"],
+)
+def test_kinetic_is_what_moves_and_potential_what_does_not(
+    kinetic: sp.Expr, potential: sp.Expr, sorted_out: tuple[sp.Expr, sp.Expr]
+) -> None:
+    (disc,) = energy_system("puck", [X], [LinkEnergy("disc", kinetic, potential)]).links
+    assert (sp.expand(disc.kinetic), sp.expand(disc.potential)) == sorted_out
 
 
 def test_degree_three_in_the_velocities_is_refused() -> None:
@@ -99,10 +119,6 @@ def test_two_parameters_of_one_name_are_refused(symbolic: bool) -> None:
         energy_system("puck", [x], links, {m: 1.0}, symbolic)
 
 
-X = Coordinate("x", "m")
-A, B = sp.symbols("a b")
-
-
 @pytest.mark.parametrize(
     ("potential", "message"),
     [
@@ -129,6 +145,12 @@ GOOD = HEAD + "coordinates = [x]\nlinks = [LinkEnergy('a', x.qd**2, 0)]\n"
 FILES = {
     "exit": (GOOD + "import sys; sys.exit(0)", "running the file failed: SystemExit: 0"),
     "number": (GOOD + "coordinates = [Coordinate(3)]", "the coordinate name 3 is not a string"),
+    "twice": (GOOD + "coordinates = [x, x]", "the coordinate name 'x' is used twice; give each its own"),
+    "blank": (
+        GOOD + "coordinates = [Coordinate(' ')]",
+        "the coordinate name ' ' is empty; give each its own",
+    ),
+    "own words": (GOOD + "raise LinkwiseError('in my own words')", "in my own words"),
     "unit": (GOOD + "coordinates = [Coordinate('x', 'deg')]", "coordinate 'x' has the unit 'deg'; give rad"),
     "link": (GOOD + "links = [LinkEnergy(None, x.qd**2, 0)]", "the link name None is not a string"),
     "name": (GOOD + "name = 3", "the robot's name is 3; give a string"),

@@ -56,6 +56,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_user_energies.py",
             "tests/numeric/test_against_sympy.py",
             "tests/test_report_terms.py",
+            f"{CHECK}::test_c_that_does_not_compile_fails_with_the_compilers_words",  # formulas
         ),
     ),
     "emit": Room(
