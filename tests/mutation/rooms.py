@@ -152,6 +152,8 @@ ROOMS: dict[str, Room] = {
             "tests/test_analysis_run.py",
             "tests/test_analysis_logs.py",
             "tests/test_analysis_files.py",
+            "tests/test_analysis_pictures.py",
+            "tests/test_analysis_page.py",
         ),
     ),
     "robot": Room(
