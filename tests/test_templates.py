@@ -5,8 +5,9 @@ from typing import Any
 
 import jinja2
 import pytest
+import sympy as sp
 from conftest import DATA
-from linkwise import Options, generate, read_system
+from linkwise import Coordinate, LinkEnergy, Options, energy_system, generate, read_system
 from linkwise.emit import assemble, autograd, closed_forms, formulas
 from linkwise.emit import render as rendering
 from linkwise.emit.c import sources
@@ -58,3 +59,18 @@ def test_template_uses_every_field_of_its_view_and_no_other(
 def test_missing_field_raises() -> None:
     with pytest.raises(jinja2.UndefinedError):
         render("package/init.py.j2", {"package": "arm"})
+
+
+@pytest.mark.parametrize(
+    ("file", "symbol"), [("formulas.txt", "p_m_load"), ("formulas.tex", r"p_{\mathrm{m\_load}}")]
+)
+def test_formulas_say_what_their_symbols_are(file: str, symbol: str) -> None:
+    rail, load = Coordinate("rail x", "m"), sp.Symbol("m load")
+    links = [LinkEnergy("box", load * rail.qd**2 / 2, sp.S.Zero)]
+    cart = energy_system("cart", [rail], links, {load: 2.0}, symbolic=True)
+    head = [line.removeprefix("% ") for line in generate(cart, ["formulas"])[file].splitlines()]
+    assert [line for line in head if " is " in line] == [
+        "q_1 is joint 'rail x'; qd_1 and qdd_1 are its velocity and acceleration.",
+        "Link 1 is 'box'.",
+        f"{symbol} is parameter 'm load'.",
+    ]
