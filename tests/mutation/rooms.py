@@ -81,6 +81,7 @@ ROOMS: dict[str, Room] = {
             CHECK,
             "tests/test_package_import.py",
             "tests/test_package_calls.py",
+            "tests/test_parameters.py",
             "tests/test_emitted_c.py",
         ),
         only=ONE_COMPILER,
