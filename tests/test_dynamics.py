@@ -172,8 +172,12 @@ def test_joints_that_follow_one_coordinate_have_labels_of_their_own() -> None:
 
 @pytest.mark.parametrize(
     ("robot", "options", "most"),
-    [("planar3", Options(), 200), (PANDA, Options(lock=LOCKED_FINGERS), 4700)],
-    ids=["planar3", "panda"],
+    [
+        ("planar3", Options(), 160),
+        (DATA / "skew.toml", Options(), 540),
+        (PANDA, Options(lock=LOCKED_FINGERS), 4700),
+    ],
+    ids=["planar3", "skew", "panda"],
 )
 def test_full_decomposition_stays_cheap(robot: str, options: Options, most: int) -> None:
     kernels = derive(read_system(robot, options))
