@@ -9,8 +9,8 @@ from fnmatch import fnmatch
 CHECK = "tests/test_check.py"
 UNTYPED = "not typed_strictly"
 """mypy, which takes longer than all other tests, tells no wrong number."""
-ONE_COMPILER = f"not clang and not g++ and {UNTYPED}"
-"""What a second compiler says of a mutant, the first has said."""
+UNWARNED = f"not compile and {UNTYPED}"
+"""Nor what four compilers warn of, on eight robots: C that is wrong is compiled and run by the others."""
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,8 @@ ROOMS: dict[str, Room] = {
             "tests/test_parameters.py",
             "tests/test_escape.py",
             "tests/test_emitted_c.py",
-            "tests/test_user_energies.py",
         ),
-        only=ONE_COMPILER,
+        only=UNWARNED,
     ),
     "templates": Room(
         tuple(f"templates/{kind}/*.j2" for kind in ("c", "closed_forms", "energies", "formulas", "package")),
@@ -84,7 +83,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_parameters.py",
             "tests/test_emitted_c.py",
         ),
-        only=ONE_COMPILER,
+        only=UNWARNED,
     ),
     "check": Room(_house("check"), ("tests/test_check_sources.py", CHECK)),
     "package": Room(
@@ -119,7 +118,7 @@ ROOMS: dict[str, Room] = {
         only=UNTYPED,
     ),
     "c headers": Room(
-        ("generator/linkwise/runtime/c/*.h",), ("tests/test_emitted_c.py", CHECK), only=ONE_COMPILER
+        ("generator/linkwise/runtime/c/*.h",), ("tests/test_emitted_c.py", CHECK), only=UNWARNED
     ),
     "output": Room(
         (

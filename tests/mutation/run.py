@@ -1,6 +1,6 @@
 """Mutation testing of generator, runtime and templates: what may be wrong without a test noticing?
 
-    python tests/mutation/run.py --out out/mutate [--each 22] [--only dynamics emit] [--jobs 2] [--seed 0]
+    python tests/mutation/run.py --out out/mutate [--each 25] [--only dynamics emit] [--jobs 2] [--seed 0]
 
 Each mutant runs in a process forked from one that has the heavy libraries, in a copy of the tree. A mutant is
 killed when a test of its room fails, takes more processor time than LIMIT, or hangs. What survives is to be
@@ -209,7 +209,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, default=Path("out/mutate"))
-    parser.add_argument("--each", type=int, default=22, help="mutants of each room")
+    parser.add_argument("--each", type=int, default=25, help="mutants of each room")
     parser.add_argument("--only", nargs="*", default=list(ROOMS), choices=list(ROOMS), metavar="ROOM")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
