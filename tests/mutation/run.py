@@ -132,6 +132,8 @@ def _child(folder: Path, tests: Sequence[str], log: Path) -> None:
     os.dup2(out, 2)
     resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT + 5))
     signal.alarm(PATIENCE)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)  # ignored in the background: programs under test inherit that
     os.chdir(folder)
     os.environ |= {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", "LINKWISE_TEST_CACHE": _CACHE}
     sys.dont_write_bytecode = True
