@@ -12,7 +12,7 @@ from linkwise import Options, read_system
 from linkwise.dynamics.coefficients import LinkForms
 from linkwise.dynamics.derive import derive, link_kernel
 from linkwise.dynamics.euler_lagrange import euler_lagrange
-from linkwise.dynamics.frame_search import FrameSearch
+from linkwise.dynamics.frame_search import FrameSearch, _spread
 from linkwise.dynamics.kernel import lowering
 from linkwise.dynamics.link_motion import Origin
 from linkwise.dynamics.principal_axes import principal_axes
@@ -151,6 +151,15 @@ def test_principal_axes_that_are_the_links_own_or_unknown_are_not_tried() -> Non
         inertia = np.diag([1.0, 2.0, 3.0])
         inertia[place] = inertia[place[::-1]] = 0.1
         assert principal_axes(tuple(map(tuple, inertia.tolist()))) is not None
+
+
+@pytest.mark.parametrize(("count", "most"), [(3, 4), (5, 4), (10, 4), (30, 3), (31, 7)])
+def test_frames_are_looked_for_near_the_base_and_as_far_as_the_last_joint(count: int, most: int) -> None:
+    found = _spread(range(count), most)
+    assert len(found) == min(count, most)
+    assert found[: most // 2] == list(range(min(count, most // 2)))
+    assert found[-1] == count - 1
+    assert found == sorted(set(found))
 
 
 def test_deriving_says_how_far_it_is() -> None:

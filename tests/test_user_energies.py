@@ -124,6 +124,7 @@ def test_two_parameters_of_one_name_are_refused(symbolic: bool) -> None:
     [
         (sp.nan, "link 'disc': its energies hold NaN or infinity"),
         (sp.oo * X.q, "link 'disc': its energies hold NaN or infinity"),
+        (-sp.oo, "link 'disc': its energies hold NaN or infinity"),
         (X.q / (A - B), "link 'disc': its energies hold NaN or infinity"),
         (sp.sqrt(-A) * X.q, "link 'disc': its energies hold the imaginary unit"),
         (sp.I * X.q, "link 'disc': its energies hold the imaginary unit"),
@@ -154,6 +155,8 @@ FILES = {
     "unit": (GOOD + "coordinates = [Coordinate('x', 'deg')]", "coordinate 'x' has the unit 'deg'; give rad"),
     "link": (GOOD + "links = [LinkEnergy(None, x.qd**2, 0)]", "the link name None is not a string"),
     "name": (GOOD + "name = 3", "the robot's name is 3; give a string"),
+    "no links": (HEAD + "coordinates = [x]", "the file must define 'links', a list of linkwise.LinkEnergy"),
+    "one of two": (GOOD + "links += [3]", "the file must define 'links', a list of linkwise.LinkEnergy"),
     "list": (GOOD + "parameters = [3]", "`parameters` must be a dictionary of SymPy symbols"),
     "text": (GOOD + "parameters = {'m': 1}", "`parameters` must be a dictionary of SymPy symbols"),
     "word": (GOOD + "parameters = {sp.Symbol('m'): 'heavy'}", "parameter m has no value as a real number"),
