@@ -123,6 +123,7 @@ def test_what_a_robot_has_no_use_for_is_not_in_its_functions(directory_of: Calla
         return re.sub(r"/\*.*?\*/", "", text(robot), flags=re.S)
 
     assert "h1" not in text("planar3")
+    assert "Each function reads q, qd, qdd (JOINTS). */" in text("planar3")
     assert "quadratic in qd, and h1" in text(TURNTABLE)
     assert not re.search(r"\b(h1|\w+_H1|p|\w+_PARAMETERS)\b", code("planar3"))
     assert re.search(r"\*p\b", code("planar3 symbolic"))
