@@ -195,6 +195,16 @@ def test_long_rows_come_in_small_blocks(tmp_path, monkeypatch):
     np.testing.assert_array_equal(np.concatenate(blocks), smooth(50, 3))
 
 
+@pytest.mark.parametrize(("name", "before"), [("a.csv", ""), ("a.mot", ""), ("a.mot", "nRows=1\n")])
+def test_a_line_without_an_end_is_named_by_its_row(tmp_path, monkeypatch, name, before):
+    monkeypatch.setattr(text, "LONGEST", 100)
+    path = tmp_path / name
+    path.write_text(before + "x" * 101, encoding="utf-8")
+    row = 1 + before.count("\n")
+    with pytest.raises(LinkwiseError, match=rf"{name}: row {row} has more than 100 characters; is it"):
+        open_log(path)
+
+
 def test_a_damaged_page_of_parquet_is_named(tmp_path):
     path = tmp_path / "a.parquet"
     pq.write_table(pa.table({"time": np.random.default_rng(1).random(9000)}), path, use_dictionary=False)

@@ -31,6 +31,11 @@ def test_numbers_are_the_tables_to_the_last_bit(analysis):
     origins = np.frombuffer(base64.b64decode(data["bodies"]["origins"]), "<f8")
     assert origins.shape == (80 * 3 * 3,)
     assert data["bodies"]["up"] == [0, 9.80665, 0]
+    assert [data["bodies"][key] for key in ("parents", "links", "coordinates")] == [
+        [-1, 0, 1],
+        [0, 1, 2],
+        [0, 1, 2],
+    ]
 
 
 def test_names_cannot_end_their_element(analysis):

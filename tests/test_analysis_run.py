@@ -4,6 +4,7 @@ from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from linkwise.analysis import Lowpass, Processing, Reading, analyze, stream
@@ -88,6 +89,28 @@ def test_blocks_do_not_show(tmp_path, monkeypatch, derivative):
     parts = analyze(path, PLANAR3, processing=processing)
     np.testing.assert_allclose(parts.values, whole.values, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(parts.totals.mean, whole.totals.mean, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_progress_counts_up_to_the_end_of_each_stage(tmp_path, monkeypatch, kind):
+    monkeypatch.setattr(stream, "BLOCK_BYTES", 1)
+    path, table = tmp_path / f"a.{kind}", smooth(70_000, 3)
+    if kind == "csv":
+        write_csv(path, table)
+    else:
+        pq.write_table(pa.table(dict(zip(["time", *JOINTS], table.T, strict=True))), path)
+    seen = {"reading": [], "analysing": []}
+
+    def told(stage, done, whole):
+        seen[stage].append((done, whole))
+
+    analyze(path, PLANAR3, processing=Processing(edges="trim"), progress=told)
+    for steps in seen.values():
+        done = [step for step, _ in steps]
+        assert len(done) > 1
+        assert done[0] > 0
+        assert done == sorted(set(done))
+        assert {whole for _, whole in steps} == {done[-1]}
 
 
 def test_gradient_convention_doubles_the_velocity_terms(tmp_path):

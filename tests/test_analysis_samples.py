@@ -145,6 +145,16 @@ def test_a_rate_beyond_reason_is_refused(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["a.csv"]
 
 
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("inf"), float("nan")])
+def test_what_is_no_rate_is_refused(rate):
+    with pytest.raises(LinkwiseError, match=r"--resample .*: give a rate in Hz above 0"):
+        Reading(resample=rate)
+
+
+def test_a_rate_below_one_is_one():
+    assert Reading(resample=0.25).resample == 0.25
+
+
 def test_resampling_reports_progress():
     seen = []
     blocks = [*resampled(smooth(50, 1), 200.0, rows=40, progress=lambda *step: seen.append(step))]

@@ -324,6 +324,16 @@ def test_one_wrong_formula_in_any_file_fails(case: str, every_text: Path, tmp_pa
     assert [name for name, mark in marks(package).items() if mark == "FAIL" and name.startswith(failing)]
 
 
+@needs_compiler
+def test_what_runs_c_that_is_wrong_is_not_called(tmp_path: Path) -> None:
+    package = tmp_path / "planar2"
+    write_package(generate(read_system("planar2"), ["native"]), package)
+    file, old, new, _ = WRONG["one link alone"]
+    change_file(package, file, old, new)
+    found = marks(package)
+    assert (found["c: planar2_link_2"], found["native: not called"]) == ("FAIL", "skip")
+
+
 def test_c_that_does_not_compile_fails_with_the_compilers_words(every_text: Path, tmp_path: Path) -> None:
     package = shutil.copytree(every_text, tmp_path / "planar2")
     change_file(package, "c/planar2.c", "struct block x;", "struct brick x;")
@@ -429,6 +439,15 @@ def test_a_package_that_ends_the_process_fails(file: str, old: str, failing: str
     if failing == "import":
         with pytest.raises(LinkwiseError, match=r"cannot be imported .*SystemExit\(0\)"):
             open_package(package)
+
+
+def test_a_package_that_cannot_be_imported_says_why_and_leaves_no_trace(package: Path) -> None:
+    finders = list(sys.meta_path)
+    change_file(package, "names.py", "ROBOT =", "1 / 0\nROBOT =", 1)
+    for _ in range(2):
+        with pytest.raises(LinkwiseError, match=r"cannot be imported \(ZeroDivisionError: division by"):
+            open_package(package)
+    assert sys.meta_path == finders
 
 
 def test_closed_forms_are_held_against_the_energies_that_a_user_wrote(tmp_path: Path) -> None:
@@ -622,6 +641,10 @@ def link_to(path: Path) -> None:
 
 FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
     "module": (lambda p: (p / "forms/more.py").touch(), "forms/more.py was added"),
+    "modules, in the order of their paths": (
+        lambda p: [(p / name).touch() for name in ("z.py", "forms/more.py", "a.py")],
+        "a.py was added; forms/more.py was added; z.py was added",
+    ),
     "library": (lambda p: (p / "names.so").touch(), "names.so was added"),
     "bytecode of no cache": (lambda p: (p / "forms/link_1.pyc").touch(), "forms/link_1.pyc was added"),
     "name of no cache": (lambda p: plant(p, "names.pyc"), "__pycache__/names.pyc was added"),
@@ -703,8 +726,11 @@ def test_a_planted_cache_fails_and_is_never_run(mode: py_compile.PycInvalidation
 
 
 def test_a_damaged_cache_fails_and_that_of_another_python_is_told(package: Path) -> None:
-    plant(package, "names.cpython-27.pyc")
-    assert marks(package).pop("__pycache__") == "skip"
+    for version in ("27", "38", "33", "39"):
+        plant(package, f"names.cpython-{version}.pyc")
+    told = next(result for result in check_package(package, 3) if result.name == "__pycache__")
+    assert told.mark == "skip"
+    assert re.findall(r"cpython-[0-9]+", told.detail) == [f"cpython-{v}" for v in ("27", "33", "38", "39")]
     plant(package, Path(importlib.util.cache_from_source("names.py")).name)
     assert "is not names.py compiled" in check_package(package)[0].detail
 

@@ -1,5 +1,7 @@
 """Two derivations of one thing: the rigid-link rule, and Euler–Lagrange on the energy of the same link."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -10,13 +12,14 @@ from linkwise import Options, read_system
 from linkwise.dynamics.coefficients import LinkForms
 from linkwise.dynamics.derive import derive, link_kernel
 from linkwise.dynamics.euler_lagrange import euler_lagrange
-from linkwise.dynamics.frame_search import FrameSearch
+from linkwise.dynamics.frame_search import FrameSearch, _spread
 from linkwise.dynamics.kernel import lowering
 from linkwise.dynamics.link_motion import Origin
 from linkwise.dynamics.principal_axes import principal_axes
 from linkwise.dynamics.screws import CommonAxes, Orientation
 from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Graph
+from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import RigidSystem, System
 
@@ -50,6 +53,22 @@ def states_of_three(samples: int) -> list[dict[str, float]]:
         }
         for rows in zip(*random_states(3, samples), strict=True)
     ]
+
+
+@pytest.mark.parametrize(("gravity", "weight"), [("[1, 0, 0]", sp.sin), ("[0, -1, 0]", sp.cos)])
+def test_the_energy_of_a_pendulum_is_that_of_the_textbook(
+    gravity: str, weight: sp.Function, tmp_path: Path
+) -> None:
+    """tau = (I + m r^2) qdd + m g r times the sine of the angle from the way that a stone falls."""
+    (tmp_path / "pendulum.toml").write_text(
+        f"schema = 1\ngravity = {gravity}\n"
+        '[[link]]\nname = "bob"\nmass = 2\ncom = [0.5, 0, 0]\ninertia = { xx = 0.25, yy = 0.25, zz = 0.25 }\n'
+        '[[joint]]\nname = "pivot"\nparent = "base"\nchild = "bob"\ntype = "revolute"\naxis = [0, 0, 1]\n'
+    )
+    system = read_system(tmp_path / "pendulum.toml")
+    (joint,) = system.coordinates
+    (torque,) = partial_torques(system, 0).values()
+    assert sp.expand(torque - (0.75 * joint.qdd + weight(joint.q))).evalf(12, chop=True) == 0
 
 
 @pytest.mark.parametrize("block", BLOCKS)
@@ -134,6 +153,15 @@ def test_principal_axes_that_are_the_links_own_or_unknown_are_not_tried() -> Non
         assert principal_axes(tuple(map(tuple, inertia.tolist()))) is not None
 
 
+@pytest.mark.parametrize(("count", "most"), [(3, 4), (5, 4), (10, 4), (30, 3), (31, 7)])
+def test_frames_are_looked_for_near_the_base_and_as_far_as_the_last_joint(count: int, most: int) -> None:
+    found = _spread(range(count), most)
+    assert len(found) == min(count, most)
+    assert found[: most // 2] == list(range(min(count, most // 2)))
+    assert found[-1] == count - 1
+    assert found == sorted(set(found))
+
+
 def test_deriving_says_how_far_it_is() -> None:
     said: list[tuple[str, int, int]] = []
     derive(read_system("planar2"), lambda *progress: said.append(progress))
@@ -153,8 +181,12 @@ def test_joints_that_follow_one_coordinate_have_labels_of_their_own() -> None:
 
 @pytest.mark.parametrize(
     ("robot", "options", "most"),
-    [("planar3", Options(), 200), (PANDA, Options(lock=LOCKED_FINGERS), 4700)],
-    ids=["planar3", "panda"],
+    [
+        ("planar3", Options(), 160),
+        (DATA / "skew.toml", Options(), 540),
+        (PANDA, Options(lock=LOCKED_FINGERS), 4700),
+    ],
+    ids=["planar3", "skew", "panda"],
 )
 def test_full_decomposition_stays_cheap(robot: str, options: Options, most: int) -> None:
     kernels = derive(read_system(robot, options))

@@ -6,7 +6,7 @@ import platform
 import re
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -115,14 +115,38 @@ def test_a_shared_value_without_a_name_is_called_by_its_place(directory_of: Call
 
 
 def test_what_a_robot_has_no_use_for_is_not_in_its_functions(directory_of: Callable[[str], Path]) -> None:
-    def code(robot: str) -> str:
+    def text(robot: str) -> str:
         directory = directory_of(robot)
-        text = (directory / "c" / f"{name_of(directory)}.h").read_text(encoding="utf-8")
-        return re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+        return (directory / "c" / f"{name_of(directory)}.h").read_text(encoding="utf-8")
 
+    def code(robot: str) -> str:
+        return re.sub(r"/\*.*?\*/", "", text(robot), flags=re.S)
+
+    assert "h1" not in text("planar3")
+    assert "Each function reads q, qd, qdd (JOINTS). */" in text("planar3")
+    assert "quadratic in qd, and h1" in text(TURNTABLE)
     assert not re.search(r"\b(h1|\w+_H1|p|\w+_PARAMETERS)\b", code("planar3"))
     assert re.search(r"\*p\b", code("planar3 symbolic"))
     assert re.search(r"\*h1\b", code(TURNTABLE))
+
+
+@pytest.mark.parametrize("robot", ["torso", LEG, TURNTABLE], ids=["tree", "leg", "energies"])
+def test_the_header_says_where_each_links_entries_begin_and_which_joints_move_it(
+    robot: str, directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    directory = directory_of(robot)
+    text = (directory / "c" / f"{name_of(directory)}.h").read_text(encoding="utf-8")
+    rows = re.findall(r"^   (\d+) {3,}(\d[\d to]*?) {3,}(\d[\d ]*?) {3,}'", text, re.M)
+    links, layout = Manifest.read(directory).links, package_of(robot).load("numpy").layout
+    assert len(rows) == len(links)
+    for row, link in zip(rows, links, strict=True):
+        first, to, last = row[1].partition(" to ")
+        joints = range(int(first), int(last) + 1) if to else map(int, row[1].split())
+        assert [joint - 1 for joint in joints] == list(link.path)
+        arrays = (layout.acceleration, layout.velocity, layout.gravity, layout.velocity_linear)
+        for start, entries in zip(map(int, row[2].split()), arrays, strict=False):
+            own = [place for place, entry in enumerate(entries) if entry[1] == int(row[0]) - 1]
+            assert start == own[0]
 
 
 @pytest.mark.parametrize("robot", ["planar3", "puma560", LEG, TURNTABLE, SHARING])
@@ -300,6 +324,90 @@ def test_stores_past_the_cache_end_with_a_fence(
     for a, size in zip(outputs, sizes, strict=True):
         samples = a.reshape(-1, size, width).swapaxes(1, 2) if blocks else a.reshape(-1, size)
         assert (samples == samples[:1]).all()
+
+
+GUARDED = """
+#include "planar5.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+enum { N = PLANAR5_JOINTS, C2 = PLANAR5_C2, C1 = PLANAR5_C1, G = PLANAR5_G };
+static const int SIZES[] = { C2, C1, G, G, G, C1 };
+static real *room(size_t count)
+{
+    void *made;
+    if (posix_memalign(&made, 64, count * sizeof(real)))
+        exit(2);
+    return made;
+}
+static void compute(size_t count, real *const *motion, real **out)
+{
+    for (int a = 0; a < 6; ++a)
+        out[a] = room(count * SIZES[a]);
+    API(planar5_decomposition)(count, motion[0], motion[1], motion[2], out[0], out[1], out[2], out[3]);
+    API(planar5_torque)(count, motion[0], motion[1], motion[2], out[4]);
+    API(planar5_position_gradient)(count, motion[0], motion[1], motion[2], out[5]);
+}
+int main(void)
+{
+    for (size_t count = 1; count < 40; ++count) {
+        real *motion[3], *one[3], *all[6], *alone[6];
+        for (int k = 0; k < 3; ++k) {
+            motion[k] = room(count * N);
+            one[k] = room(N);
+            for (size_t e = 0; e < count * N; ++e)
+                motion[k][e] = (real)(3.0 * cos(1.0 + k + 7.0 * e));
+        }
+        compute(count, motion, all);
+        for (size_t s = 0; s < count; ++s) {
+            for (int k = 0; k < 3; ++k)
+                for (int e = 0; e < N; ++e)
+                    one[k][e] = motion[k][s * N + e];
+            compute(1, one, alone);
+            for (int a = 0; a < 6; ++a)
+                for (int e = 0; e < SIZES[a]; ++e)
+                    if (!(fabs((double)(all[a][s * SIZES[a] + e] - alone[a][e])) < NEAR)) {
+                        fprintf(stderr, "array %d, sample %d of %d, entry %d", a, (int)s, (int)count, e);
+                        return 1;
+                    }
+            for (int a = 0; a < 6; ++a)
+                free(alone[a]);
+        }
+        for (int a = 0; a < 6; ++a)
+            free(all[a]);
+        for (int k = 0; k < 3; ++k)
+            free(motion[k]), free(one[k]);
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("real", "kind"),
+    [
+        pytest.param("double", ("-DLARGE=(size_t)16384", "-D__AVX512F__"), id="past the cache"),
+        pytest.param("float", ("-U__GNUC__", "-D__GNUC__=11"), id="without vectors"),
+    ],
+)
+def test_no_call_leaves_its_arrays_and_many_samples_are_one_by_one(
+    real: str, kind: Sequence[str], directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """Under gcc's address sanitizer. Arrays have 35, 55 and 15 entries: tiles of 8 do not fill them."""
+    folder = directory_of("planar5") / "c"
+    suffix, api, near = ("", "name", "1e-12") if real == "double" else ("f", "name##f", "1e-3")
+    (tmp_path / "immintrin.h").write_text(COUNTING, encoding="utf-8")
+    (tmp_path / "main.c").write_text(GUARDED, encoding="utf-8")
+    defined = (f"-Dreal={real}", f"-DAPI(name)={api}", f"-DNEAR={near}")
+    guard = ("gcc", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-D_GNU_SOURCE")
+    makes = [
+        [*guard, "-std=c99", *kind, f"-I{tmp_path}", "-c", str(folder / f"planar5{suffix}.c"), "-o", "arm.o"],
+        [*guard, "-std=c99", *defined, f"-I{folder}", "main.c", "arm.o", "-lm", "-o", "main"],
+        ["./main"],
+    ]
+    for command in makes:
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
 
 
 def test_it_takes_run_time_parameters(

@@ -10,6 +10,7 @@ from linkwise.expression.count import count_operations, in_words
 from linkwise.expression.differentiate import derivative, substitute
 from linkwise.expression.from_sympy import Lowering
 from linkwise.expression.graph import FUNCTIONS, Graph, Node
+from linkwise.expression.vector import named
 
 SMOOTH_AT_HALF = sorted(FUNCTIONS)
 
@@ -197,3 +198,11 @@ def test_substitution_folds_what_becomes_constant() -> None:
     output = g.add(g.mul(x, g.call("cos", y)), g.mul(y, y))
     assert substitute(g, output, {x: g.zero}) == g.mul(y, y)
     assert g.value(substitute(g, output, {x: g.one, y: g.const(2.0)})) == math.cos(2.0) + 4.0
+
+
+def test_a_vector_names_its_parts_by_their_axes() -> None:
+    g = Graph()
+    one, two = g.symbol("q1"), g.symbol("q2")
+    parts = g.add(one, two), g.sub(one, two), g.mul(one, two)
+    assert named(g, "v3", parts) == parts
+    assert [g.names[part] for part in parts] == ["v3_x", "v3_y", "v3_z"]

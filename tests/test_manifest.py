@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from linkwise import LinkwiseError, check_package, generate, read_system, write_package
 from linkwise.package.manifest import LARGEST, Manifest
+from linkwise.package.write import check_target
 
 
 @pytest.fixture(scope="session")
@@ -64,7 +65,7 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda data: bodies(data)[1].update(rotation=[[1]]),
         "tree.bodies[1].rotation is not a list of 3",
     ),
-    "coordinate": (lambda data: bodies(data)[1].update(coordinate=5), "body 1 of the tree hangs on no joint"),
+    "coordinate": (lambda data: bodies(data)[1].update(coordinate=2), "body 1 of the tree hangs on no joint"),
     "kind": (lambda data: bodies(data)[1].update(kind=[]), "tree.bodies[1].kind is not 'revolute' or"),
     "parent": (
         lambda data: bodies(data)[1].update(parent=1),
@@ -302,3 +303,26 @@ def test_what_is_not_a_hash_is_refused(package: Path) -> None:
     change_manifest(package, lambda data: data["files"].update({"names.py": "0"}))
     with pytest.raises(LinkwiseError, match=r"files has for 'names.py' something else than a SHA-256"):
         Manifest.read(package)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"files": {}},
+        {"files": {}, "generator": {"vite": "5"}},
+        {"files": {}, "generator": "linkwise"},
+        {"files": ["a"], "generator": {"linkwise": "1"}},
+        {"generator": {"linkwise": "1"}},
+    ],
+    ids=str,
+)
+def test_a_folder_with_the_manifest_of_another_program_is_not_replaced(data: Any, tmp_path: Path) -> None:
+    (tmp_path / "manifest.json").write_text(json.dumps(data))
+    with pytest.raises(LinkwiseError, match="exists and is not a generated package"):
+        check_target(tmp_path, "planar2")
+
+
+def test_a_new_back_end_may_put_its_files_several_folders_down(tmp_path: Path) -> None:
+    files = {"manifest.json": json.dumps({"robot": "arm"}), "rust/src/lib.rs": "// τ\n"}
+    write_package(files, tmp_path / "arm")
+    assert (tmp_path / "arm/rust/src/lib.rs").read_text(encoding="utf-8") == "// τ\n"

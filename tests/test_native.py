@@ -45,6 +45,18 @@ def test_a_parameter_that_is_learned_counts_with_its_present_value(planar3_symbo
     np.testing.assert_allclose(arrays, reference.inverse_dynamics(*motion).detach().numpy())
 
 
+def test_second_derivatives_are_those_of_torch(planar3: ModuleType) -> None:
+    motion = torch.linspace(-1.0, 1.0, 9, dtype=torch.float64).reshape(3, 3).requires_grad_()
+
+    def curvature(backend: str) -> torch.Tensor:
+        torque = planar3.load(backend).inverse_dynamics(*motion)
+        (slope,) = torch.autograd.grad(torque.square().sum(), motion, create_graph=True)
+        (second,) = torch.autograd.grad(slope.square().sum(), motion)
+        return second
+
+    torch.testing.assert_close(curvature("native"), curvature("torch"))
+
+
 def test_a_process_forked_after_a_large_batch_works(planar3: ModuleType, motion: np.ndarray) -> None:
     robot = planar3.load("native")
     robot.backend.threads = 2
@@ -59,6 +71,14 @@ def test_a_process_forked_after_a_large_batch_works(planar3: ModuleType, motion:
     process.start()
     assert queue.get(timeout=30) == pytest.approx(expected.sum())
     process.join()
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_results_begin_on_a_cache_line(planar3: ModuleType, motion: np.ndarray, dtype: str) -> None:
+    """Stores past the cache are of whole lines."""
+    robot = planar3.load("native")
+    held = [robot.packed_torque(*motion[:, :count].astype(dtype)) for count in range(3000, 3032)]
+    assert {torque.ctypes.data % 64 for torque in held} == {0}
 
 
 @pytest.mark.parametrize("backend", ["numpy", "torch", "native"])

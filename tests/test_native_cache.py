@@ -15,7 +15,7 @@ from types import ModuleType
 
 import pytest
 from conftest import needs_compiler
-from linkwise.runtime import native_compiler, native_process
+from linkwise.runtime import native_build, native_compiler, native_process
 from linkwise.runtime.native_build import Sources, library
 from linkwise.runtime.native_cache import cache_directory, is_whole, locked
 from linkwise.runtime.native_library import function
@@ -123,6 +123,23 @@ def test_a_whole_library_needs_nothing_written(tiny: Sources) -> None:
     path.with_suffix(".lock").unlink()
     assert library(tiny, "double") == path
     assert not path.with_suffix(".lock").exists()
+
+
+def test_another_source_compiler_or_processor_has_a_library_of_its_own(
+    tiny: Sources, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """-march=native must not meet another machine where homes are shared."""
+    made = [library(tiny, "double")]
+    tiny.file("double").write_text(TINY.replace("1.0", "2.0"))
+    made.append(library(tiny, "double"))
+    monkeypatch.setenv("CC", "cc -O1")
+    made.append(library(tiny, "double"))
+    with monkeypatch.context() as newer:
+        newer.setattr(native_compiler.Compiler, "version", lambda _: "cc 99")
+        made.append(library(tiny, "double"))
+    monkeypatch.setattr(native_build, "processor", lambda: "of another machine")
+    made.append(library(tiny, "double"))
+    assert len(set(made)) == 5
 
 
 @pytest.mark.parametrize("plant", [Path.symlink_to, lambda lock, _: os.mkfifo(lock)], ids=["link", "pipe"])
@@ -367,10 +384,13 @@ def test_a_terminal_is_told_of_the_build(package_of: Callable[[str], ModuleType]
     reader, writer = pty.openpty()
     environment = os.environ | {"LINKWISE_CACHE": str(tmp_path)}
     subprocess.run([sys.executable, "-c", code], env=environment, stderr=writer, check=True)
-    said = os.read(reader, 1 << 16).decode()
+    os.write(writer, b"end")  # so that there is something to read, whatever was said
+    said = ""
+    while not said.endswith("end"):
+        said += os.read(reader, 1 << 16).decode()
     assert "\rcompiling planar3 (decomposition, double), once: 0 of 3 parts, 0 s" in said
     assert "\rcompiling planar3 (decomposition, double), once: linking  " in said
-    assert said.endswith(f"\r{'':79}\r")
+    assert said.endswith(f"\r{'':79}\rend")
     subprocess.run([sys.executable, "-c", code], env=environment, stderr=writer, check=True)
     os.write(writer, b"nothing more")
     assert os.read(reader, 1 << 16) == b"nothing more"

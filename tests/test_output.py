@@ -99,6 +99,31 @@ def test_an_error_at_any_call_is_told_and_what_was_there_stays(way: str, tmp_pat
     assert sum(end.status == 2 for end in ends) >= 20
 
 
+def test_a_writer_who_comes_between_two_renames_keeps_the_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target, work = tmp_path / "target", tmp_path / "work"
+    for folder, text in ((target, "old"), (work / "new", "new")):
+        folder.mkdir(parents=True)
+        (folder / "a").write_text(text)
+    rename = Path.rename
+
+    def interrupted(here: Path, there: Path) -> None:
+        rename(here, there)
+        if here == target:
+            target.mkdir()
+            (target / "a").write_text("of another")
+
+    monkeypatch.setattr(exchange, "_swapped", lambda *_: False)
+    monkeypatch.setattr(Path, "rename", interrupted)
+    with pytest.raises(OSError, match="not empty"):
+        exchange.exchange(work / "new", target)
+    assert (target / "a").read_text() == "of another"
+    assert (work / "new/a").read_text() == "new"
+    assert not (work / "old/target").exists(), "a sweep would bring it back"
+    assert [file.read_text() for file in (work / "rest").rglob("a")] == ["old"]
+
+
 def test_of_two_writers_at_once_one_wins_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for swap in (exchange._swap, lambda: None):
         monkeypatch.setattr(exchange, "_swap", swap)

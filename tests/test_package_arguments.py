@@ -80,6 +80,7 @@ def test_whatever_reads_as_numbers_is_taken(
         (("float32", "list", "int64"), "float32"),
         (("list", "int32", "float32"), "float32"),
         (("float32", "float64", "list"), "float64"),
+        (("float32", "float64", "float64"), "float64"),
         (("int8", "float64", "float32"), "float64"),
         (("int64", "list", "uint8"), "float64"),
     ],

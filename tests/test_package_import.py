@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from linkwise import check_package, generate, read_system, write_package
@@ -45,6 +46,14 @@ def test_numpy_back_end_needs_numpy_only(directory_of: Callable[[str], Path], tm
     script += "assert 'torch' not in sys.modules and 'sympy' not in sys.modules"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_package_says_which_back_end_is_the_fastest_for_many_samples(
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    package = package_of("planar3")
+    assert package.FASTEST_FIRST == ("native", "numpy", "torch", "autograd")
+    assert set(package.FASTEST_FIRST) == set(package.BACKENDS)
 
 
 @pytest.mark.parametrize("backend", ["numpy", "torch", "autograd"])

@@ -303,8 +303,10 @@ def test_a_package_judges_bodies_as_reading_does() -> None:
     assert (parameter_values.TRIANGLE, parameter_values.SPECK) == (mass.TRIANGLE, mass.SPECK)
     draw = np.random.default_rng(5)
     verdicts = []
-    for _ in range(300):
-        m, xx, yy, zz, xy, xz, yz = values = draw.uniform(-0.15, 1.0, 7) * [1, 1, 1, 1, 0.2, 0.2, 0.2]
+    anything = draw.uniform(-0.15, 1.0, (300, 7)) * [1, 1, 1, 1, 0.2, 0.2, 0.2]
+    rods = [np.array([1.0, 0.0, 1e-3, high, 0.0, 0.0, 0.0]) for high in (1e-3, 1.1e-3)]
+    for values in (*anything, *rods):
+        m, xx, yy, zz, xy, xz, yz = values
         body = Body("a", m, (0.0, 0.0, 0.0), ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
         try:
             mass.check_bodies([body], False)

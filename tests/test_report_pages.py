@@ -26,6 +26,7 @@ from linkwise.report import (
     seconds_markdown,
     seconds_page,
     study,
+    terms_files,
     terms_markdown,
     terms_page,
     terms_report,
@@ -63,6 +64,21 @@ def test_each_template_uses_every_field_of_its_view_and_no_other(monkeypatch: py
 def test_a_joint_that_is_in_no_term_has_no_column() -> None:
     report = terms_report(planar(4), TermQuery(joint=0, link=1), 100, False, silent)
     assert "| torque | gravity | acc 1 | acc 2 | vel 1 | vel 2 |\n" in terms_markdown(report)
+
+
+def test_the_data_of_the_terms_hold_what_the_page_shows() -> None:
+    report = terms_report(planar(2), TermQuery(), 100, False, silent)
+    files, page = terms_files(report), terms_markdown(report)
+    assert files["terms.csv"].decode().splitlines() == [
+        "joint,link,terms,kept,reduction,gravity,acceleration_1,acceleration_2,velocity_1,velocity_2",
+        "1,1,3,2,0.333333,1,2,0,0,0",
+        "1,2,11,4,0.636364,2,4,3,1,2",
+        "1,all,14,6,0.571429,3,6,3,1,2",
+    ]
+    for costs in json.loads(files["terms.json"])["operations"]:
+        whole, kept = (tuple(costs[of]["1"].values()) for of in ("torque", "kept"))
+        assert "| τ_1,{} as a whole | {} | {} |".format(costs["link"], *whole) in page
+        assert "| τ_1,{}, the part kept alone | {} | {} |".format(costs["link"], *kept) in page
 
 
 def test_measured_seconds_are_held_against_the_terms() -> None:
@@ -123,19 +139,57 @@ def test_json_that_is_no_measurement_is_told(text: str, tmp_path: Path) -> None:
         read_seconds(tmp_path / "measured.json")
 
 
+def tables(page: str) -> list[list[list[str]]]:
+    """Tables of a Markdown page as a reader sees them: rows of cells, the head among them."""
+    found: list[list[list[str]]] = []
+    for token, cell in pairwise(MarkdownIt("commonmark").enable("table").parse(page)):
+        if token.type == "table_open":
+            found.append([])
+        elif token.type == "tr_open":
+            found[-1].append([])
+        elif token.type in ("td_open", "th_open"):
+            found[-1][-1].append("".join(child.content for child in cell.children or []))
+    return found
+
+
+def test_every_table_of_a_page_is_read_as_one() -> None:
+    """Terms counted by hand: m r² q̈ + I q̈ + m r g cos q of link 1, eleven of link 2."""
+    result = study("arm", planar(2), 1, 2, 2, 100, silent)
+    timings = [Timing(2, method, 1.0, 2.0, 3.0) for method in ("closed form", "autograd")]
+    report = terms_report(planar(2), TermQuery(), 100, False, silent)
+    summary, motions, operations = tables(terms_markdown(report))
+    assert summary == [
+        ["torque", "link", "terms", "kept", "reduction"],
+        ["τ_1,1", "link1", "3", "2", "33.3 %"],
+        ["τ_1,2", "link2", "11", "4", "63.6 %"],
+        ["τ_1", "all counted", "14", "6", "57.1 %"],
+    ]
+    assert motions == [
+        ["torque", "gravity", "acc 1", "acc 2", "vel 1", "vel 2"],
+        ["τ_1,1", "1", "2", "0", "0", "0"],
+        ["τ_1,2", "2", "4", "3", "1", "2"],
+        ["τ_1", "3", "6", "3", "1", "2"],
+    ]
+    assert [len(row) for row in operations] == [3] * 9
+    terms, costs = tables(reduction_markdown(result))
+    assert [row[:4] for row in terms[1:]] == [["1", "3", "2", "0.3333"], ["2", "14", "6", "0.5714"]]
+    assert [len(row) for row in (*terms, *costs)] == [7] * 3 + [8] * 3
+    (seconds,) = tables(seconds_markdown(result, seconds_json("arm", timings)))
+    assert seconds == [
+        ["DoF", "method", "extract", "whole", "everything", "reduction 1 − extract/whole"],
+        ["2", "closed form", "1.000", "2.000", "3.000", "0.500"],
+        ["2", "autograd", "1.000", "2.000", "3.000", "0.500"],
+    ]
+    assert all(cell for table in (operations, terms, costs, seconds) for row in table for cell in row)
+
+
 @pytest.mark.parametrize("name", ["a|b`c`\\|d", "_a_ *b* <img src=x>", "$x^$ \x1b[31m\n# b |---|"])
 def test_tables_keep_their_cells_whatever_the_names(name: str, tmp_path: Path) -> None:
     robot = replace(read_robot("planar1", Options(parameters="symbolic")), name=name)
     robot = replace(robot, links=tuple(replace(link, name=name) for link in robot.links))
     page = terms_markdown(terms_report(rigid_system(robot), TermQuery(), 1000, False, silent))
+    assert [row[1] for row in tables(page)[0]] == ["link", printable(name), "all counted"]
     parsed = MarkdownIt("commonmark").enable("table").parse(page)
-    rows = [[]]
-    for token, cell in pairwise(parsed):
-        if token.type == "tr_open":
-            rows.append([])
-        elif token.type == "td_open":
-            rows[-1].append("".join(child.content for child in cell.children))
-    assert [row[1] for row in rows if len(row) == 5] == [printable(name), "all counted"]
     assert parsed[0].tag == "h1"
     heading = "".join(child.content for child in parsed[1].children)
     assert heading == f"Terms in the partial torques of {printable(name)}"

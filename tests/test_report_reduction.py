@@ -144,6 +144,7 @@ def test_the_study_says_where_the_claim_holds() -> None:
     assert "Stronger: 5 DoF.** 5.2 redundant" in said
     assert "Holds: 10 DoF.** 15.9 redundant" in said
     assert "falls like 10/n^2" in said
+    assert "it ends at A = 0.95, which y passes at 12 DoF." in said
     assert "Weaker: emitted code" in said
 
 

@@ -12,6 +12,14 @@ HUGE = "1" * 400
 POINT = '<inertial><mass value="2"/><origin xyz="0 0 0.5"/></inertial>'
 AB = joint("ab", "a", "b")
 BC = joint("bc", "b", "c")
+
+
+def moments(xx: float, yy: float, zz: float) -> str:
+    """Link b of 1 kg with these principal moments."""
+    inertia = f'<inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/>'
+    return f'<link name="b"><inertial><mass value="1"/>{inertia}</inertial></link>'
+
+
 BAD = {
     "empty": (robot(), "<robot> is empty: the file has no <link>"),
     "still": (robot(link("a")), "no joint moves; give one a moving type, or let the base move with --base"),
@@ -29,6 +37,14 @@ BAD = {
     "infinite turn": (chain(joint("ab", "a", "b", rpy="0 inf 0")), "'ab' has NaN or infinity in its origin"),
     "nan mass": (robot(link("a"), link("b", "nan"), AB), "link 'b' has NaN or infinity in its mass"),
     "negative": (robot(link("a"), link("b", "-1"), AB), "link 'b' has negative mass -1 kg"),
+    "triangle": (
+        robot(link("a"), moments(0.2, 0.3, 0.6), AB),
+        "link 'b' has an inertia that breaks the triangle inequality (0.6 > 0.2 + 0.3 kg·m²) by 20 %",
+    ),
+    "one moment": (
+        robot(link("a"), moments(0, 0, 0.6), AB),
+        "breaks the triangle inequality (0.6 > 0 + 0 kg·m²); correct it",
+    ),
     "long digits": (robot(link("a"), link("b", HUGE), AB), "link 'b' has NaN or infinity in its mass"),
     "longer digits": (
         chain(joint("ab", "a", "b", xyz=f"0 {'1' * 5000} 0")),
@@ -190,7 +206,10 @@ BAD_TOML = {
     "schema 1.0": (toml(head="schema = 1.0"), "the schema is 1.0; write schema = 1 at the top"),
     "number for link": ("schema = 1\nlink = [3]", "entry 1 of link must be a table"),
     "number for joint": ("schema = 1\njoint = [{}, 3]", "entry 2 of joint must be a table"),
-    "deep": ("schema = 1\nlink = " + "[" * 5000, "malformed TOML: brackets 5000 deep; no robot's file needs"),
+    "deep": (
+        "schema = 1\n[[link]]\nmass = " + "[" * 5000,
+        "malformed TOML: brackets 5000 deep; no robot's file needs",
+    ),
     "deep tables": (
         "schema = 1\nlink = " + "{a=" * 300,
         "malformed TOML: brackets 300 deep; no robot's file",

@@ -1,6 +1,8 @@
 """The built-in robots: each can be read by its name, and shows what it is there to show."""
 
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -18,6 +20,25 @@ def test_built_in_robot_is_read_by_its_name(name: str) -> None:
 def test_description_of_what_can_be_read_names_every_robot_and_format() -> None:
     for word in (*BUILT_IN, ".toml", ".urdf", ".xml", "MJCF", ".mjcf", ".py"):
         assert word in DESCRIPTIONS
+
+
+def test_planar_arms_have_the_torques_of_the_textbook(package_of: Callable[[str], ModuleType]) -> None:
+    """Spong, Hutchinson and Vidyasagar, section 7.4: two links, gravity along -y, angles from x."""
+    length, centre, mass, inertia, gravity = 0.25, 0.125, 0.6, 5e-3, 9.80665
+    q, qd, qdd = np.random.default_rng(2).uniform(-2.0, 2.0, (3, 50, 2))
+    turned, (a1, a2), (v1, v2) = np.cos(q[:, 1]), qdd.T, qd.T
+    own = inertia + mass * centre**2
+    m12 = own + mass * length * centre * turned
+    m11 = 2 * own + mass * (length**2 + 2 * length * centre * turned)
+    h = mass * length * centre * np.sin(q[:, 1])
+    weight = mass * gravity * centre * np.cos(q.sum(1))
+    first = mass * gravity * (centre + length) * np.cos(q[:, 0])
+    exact = [
+        m11 * a1 + m12 * a2 - h * (2 * v1 * v2 + v2**2) + first + weight,
+        m12 * a1 + own * a2 + h * v1**2 + weight,
+    ]
+    answer = package_of("planar2").load("numpy").inverse_dynamics(q, qd, qdd)
+    np.testing.assert_allclose(answer, np.stack(exact, -1), rtol=0, atol=1e-14)
 
 
 def test_torso_is_a_small_tree_whose_links_share_work() -> None:

@@ -197,7 +197,8 @@ def test_extensions_of_simulators_that_load_joints_are_told(tmp_path: Path) -> N
             joint("bc", "b", "c", inner='<rotor_inertia value="0.01"/>'),
             '<gazebo reference="b"><turnGravityOff>true</turnGravityOff></gazebo>',
             '<gazebo reference="ab"><springStiffness>3</springStiffness><dampingFactor>0</dampingFactor>',
-            '</gazebo><transmission><joint name="bc"/><actuator><motorInertia>0.2</motorInertia></actuator>',
+            '</gazebo><gazebo reference="bc"><springStiffness/></gazebo>',
+            '<transmission><joint name="bc"/><actuator><motorInertia>0.2</motorInertia></actuator>',
             "</transmission>",
         )
     )

@@ -111,3 +111,18 @@ def test_what_cancelling_leaves_is_not_shown(
     assert not small.search(generate(system, ["formulas"])["formulas.txt"])
     monkeypatch.setattr("linkwise.emit.residue.ROUNDING", 0.0)
     assert small.search(generate(system, ["formulas"])["formulas.txt"])
+
+
+@pytest.mark.parametrize(
+    ("file", "symbol"), [("formulas.txt", "p_m_load"), ("formulas.tex", r"p_{\mathrm{m\_load}}")]
+)
+def test_formulas_say_what_their_symbols_are(file: str, symbol: str) -> None:
+    rail, load = Coordinate("rail x", "m"), sp.Symbol("m load")
+    links = [LinkEnergy("box", load * rail.qd**2 / 2, sp.S.Zero)]
+    cart = energy_system("cart", [rail], links, {load: 2.0}, symbolic=True)
+    head = [line.removeprefix("% ") for line in generate(cart, ["formulas"])[file].splitlines()]
+    assert [line for line in head if " is " in line] == [
+        "q_1 is joint 'rail x'; qd_1 and qdd_1 are its velocity and acceleration.",
+        "Link 1 is 'box'.",
+        f"{symbol} is parameter 'm load'.",
+    ]

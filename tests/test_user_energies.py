@@ -76,8 +76,28 @@ def test_emitted_c_has_the_linear_part_too(
     assert np.abs(given["linear"]).max() > 1.0
 
 
+X = Coordinate("x", "m")
+A, B = sp.symbols("a b")
+
+
 def puck(kinetic: sp.Expr, potential: sp.Expr = sp.S.Zero) -> object:
     return energy_system("puck", [Coordinate("x", "m")], [LinkEnergy("disc", kinetic, potential)])
+
+
+@pytest.mark.parametrize(
+    ("kinetic", "potential", "sorted_out"),
+    [
+        (X.qd**2 / 2 + 3 * X.q**2, sp.S.Zero, (X.qd**2 / 2, -3 * X.q**2)),
+        (X.qd**2 / 2, -5 * X.q * X.qd, (X.qd**2 / 2 + 5 * X.q * X.qd, sp.S.Zero)),
+        (X.qd**2 / 2, 3 * X.q**2, (X.qd**2 / 2, 3 * X.q**2)),
+    ],
+    ids=["kinetic at rest", "potential in motion", "neither"],
+)
+def test_kinetic_is_what_moves_and_potential_what_does_not(
+    kinetic: sp.Expr, potential: sp.Expr, sorted_out: tuple[sp.Expr, sp.Expr]
+) -> None:
+    (disc,) = energy_system("puck", [X], [LinkEnergy("disc", kinetic, potential)]).links
+    assert (sp.expand(disc.kinetic), sp.expand(disc.potential)) == sorted_out
 
 
 @pytest.mark.parametrize("degree", [3, 10**9])
@@ -110,15 +130,12 @@ def test_two_parameters_of_one_name_are_refused(symbolic: bool) -> None:
         energy_system("puck", [x], links, {m: 1.0}, symbolic)
 
 
-X = Coordinate("x", "m")
-A, B = sp.symbols("a b")
-
-
 @pytest.mark.parametrize(
     ("potential", "message"),
     [
         (sp.nan, "link 'disc': its energies hold NaN or infinity"),
         (sp.oo * X.q, "link 'disc': its energies hold NaN or infinity"),
+        (-sp.oo, "link 'disc': its energies hold NaN or infinity"),
         (X.q / (A - B), "link 'disc': its energies hold NaN or infinity"),
         (sp.sqrt(-A) * X.q, "link 'disc': its energies hold the imaginary unit"),
         (sp.I * X.q, "link 'disc': its energies hold the imaginary unit"),
@@ -151,9 +168,17 @@ FILES = {
     "raised without a word": (HEAD + "assert 0", "running the file failed in line 4: AssertionError"),
     "no Python": (HEAD + "x = = 1\n", "running the file failed in line 4: SyntaxError: invalid syntax"),
     "number": (GOOD + "coordinates = [Coordinate(3)]", "the coordinate name 3 is not a string"),
+    "twice": (GOOD + "coordinates = [x, x]", "the coordinate name 'x' is used twice; give each its own"),
+    "blank": (
+        GOOD + "coordinates = [Coordinate(' ')]",
+        "the coordinate name ' ' is empty; give each its own",
+    ),
+    "own words": (GOOD + "raise LinkwiseError('in my own words')", "in my own words"),
     "unit": (GOOD + "coordinates = [Coordinate('x', 'deg')]", "coordinate 'x' has the unit 'deg'; give rad"),
     "link": (GOOD + "links = [LinkEnergy(None, x.qd**2, 0)]", "the link name None is not a string"),
     "name": (GOOD + "name = 3", "the robot's name is 3; give a string"),
+    "no links": (HEAD + "coordinates = [x]", "the file must define 'links', a list of linkwise.LinkEnergy"),
+    "one of two": (GOOD + "links += [3]", "the file must define 'links', a list of linkwise.LinkEnergy"),
     "list": (GOOD + "parameters = [3]", "`parameters` must be a dictionary of SymPy symbols"),
     "text": (GOOD + "parameters = {'m': 1}", "`parameters` must be a dictionary of SymPy symbols"),
     "digits": (

@@ -54,7 +54,7 @@ class Mutant:
     text: str
     """The line it is on, stripped."""
     place: int
-    """Which of the same changes on the line this is."""
+    """Which of the same changes on this line, and on lines like it, this is."""
 
     @property
     def key(self) -> str:
@@ -90,7 +90,7 @@ class Rules:
 
 def mutants(path: str, text: str, rules: Rules = Rules()) -> Iterator[Mutant]:
     """All mutants of a text, in order; its kind is that of the path's ending."""
-    seen: dict[tuple[int, str, str], int] = {}
+    seen: dict[tuple[str, str, str], int] = {}
     hidden = _hidden(path, text)
     starts = [0, *(m.end() for m in re.finditer("\n", text))]
     line = 0
@@ -103,7 +103,7 @@ def mutants(path: str, text: str, rules: Rules = Rules()) -> Iterator[Mutant]:
         shown = text[starts[line] : end if end >= 0 else len(text)].strip()
         if shown.startswith("@dataclass") or text[max(start - 7, 0) : start] == "strict=":
             continue  # promises that no result depends on
-        place = seen[line, old, new] = seen.get((line, old, new), 0) + 1
+        place = seen[shown, old, new] = seen.get((shown, old, new), 0) + 1
         yield Mutant(path, start, old, new, line + 1, shown, place)
 
 

@@ -7,15 +7,20 @@ from dataclasses import dataclass
 from fnmatch import fnmatch
 
 CHECK = "tests/test_check.py"
+UNTYPED = "not typed_strictly"
+"""mypy, which takes longer than all other tests, tells no wrong number."""
+ONE_COMPILER = f"(not compile or gcc) and not its_parts and {UNTYPED}"
+"""What three more compilers warn of, gcc has."""
 
 
 @dataclass(frozen=True)
 class Room:
-    """Files by pattern, below the project's root; tests as pytest names them."""
+    """Files by pattern, below the project's root; tests as pytest names them, `only` as its -k chooses."""
 
     files: tuple[str, ...]
     tests: tuple[str, ...]
     leave: tuple[str, ...] = ()
+    only: str = ""
 
     def holds(self, path: str) -> bool:
         """Whether a file is one of this room's."""
@@ -24,6 +29,11 @@ class Room:
 
 def _house(room: str) -> tuple[str, ...]:
     return (f"generator/linkwise/{room}/*.py", f"generator/linkwise/{room}.py")
+
+
+def _cli(*tests: str) -> tuple[str, ...]:
+    """Of the commands' tests, each of which begins a new Python, those of a room."""
+    return tuple(f"tests/test_cli.py::test_{test}" for test in tests)
 
 
 ROOMS: dict[str, Room] = {
@@ -46,6 +56,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_user_energies.py",
             "tests/numeric/test_against_sympy.py",
             "tests/test_report_terms.py",
+            f"{CHECK}::test_c_that_does_not_compile_fails_with_the_compilers_words",  # formulas
         ),
     ),
     "emit": Room(
@@ -53,14 +64,14 @@ ROOMS: dict[str, Room] = {
         (
             "tests/test_templates.py",
             CHECK,
+            "tests/test_parameters.py",
             "tests/test_runtime.py",
             "tests/test_package_import.py",
             "tests/test_names.py",
-            "tests/test_parameters.py",
             "tests/test_escape.py",
             "tests/test_emitted_c.py",
-            "tests/test_user_energies.py",
         ),
+        only=ONE_COMPILER,
     ),
     "templates": Room(
         tuple(f"templates/{kind}/*.j2" for kind in ("c", "closed_forms", "energies", "formulas", "package")),
@@ -69,13 +80,19 @@ ROOMS: dict[str, Room] = {
             CHECK,
             "tests/test_package_import.py",
             "tests/test_package_calls.py",
+            "tests/test_parameters.py",
             "tests/test_emitted_c.py",
         ),
+        only=ONE_COMPILER,
     ),
     "check": Room(_house("check"), ("tests/test_check_sources.py", CHECK)),
     "package": Room(
         _house("package"),
-        ("tests/test_manifest.py", CHECK, "tests/test_package_import.py", "tests/test_cli.py"),
+        (
+            "tests/test_manifest.py",
+            CHECK,
+            "tests/test_package_import.py",
+        ),
     ),
     "runtime": Room(
         _house("runtime"),
@@ -88,6 +105,7 @@ ROOMS: dict[str, Room] = {
             CHECK,
         ),
         leave=("*/native_*.py",),
+        only=UNTYPED,
     ),
     "native": Room(
         ("generator/linkwise/runtime/native_*.py",),
@@ -97,24 +115,33 @@ ROOMS: dict[str, Room] = {
             "tests/test_package_calls.py",
             "tests/test_runtime.py",
         ),
+        only=UNTYPED,
     ),
-    "c headers": Room(("generator/linkwise/runtime/c/*.h",), (CHECK, "tests/test_emitted_c.py")),
+    "c headers": Room(
+        ("generator/linkwise/runtime/c/*.h",), ("tests/test_emitted_c.py", CHECK), only=ONE_COMPILER
+    ),
     "output": Room(
         (
             *_house("output"),
             *(f"generator/linkwise/{name}.py" for name in ("escape", "errors", "input_file")),
         ),
-        ("tests/test_escape.py", "tests/test_output.py", "tests/test_cli_endings.py", "tests/test_cli.py"),
+        (
+            "tests/test_escape.py",
+            "tests/test_output.py",
+            "tests/test_cli_endings.py",
+            *_cli("what_blocks_the_target_is_named"),
+        ),
     ),
     "report": Room(
         (*_house("report"), "templates/report/*.j2"),
         (
+            "tests/test_report_pages.py",
             "tests/test_report_terms.py",
             "tests/test_report_reduction.py",
-            "tests/test_report_pages.py",
             "tests/test_report_commands.py",
         ),
         leave=("*/plots.py", "*/seconds.py", "*/seconds_page.py"),
+        only="not same_bytes and not users_mistake and not unwritable",  # whole commands are slow
     ),
     "analysis": Room(
         _house("analysis"),
@@ -125,6 +152,8 @@ ROOMS: dict[str, Room] = {
             "tests/test_analysis_run.py",
             "tests/test_analysis_logs.py",
             "tests/test_analysis_files.py",
+            "tests/test_analysis_pictures.py",
+            "tests/test_analysis_page.py",
         ),
     ),
     "robot": Room(
@@ -139,7 +168,14 @@ ROOMS: dict[str, Room] = {
             "tests/test_robots_mjcf_options.py",
             "tests/test_parameters.py",
             "tests/numeric/test_parameters_of_file.py",
-            "tests/test_cli.py",
+            *_cli(
+                "inspect_prints_a_table",
+                "inspect_names_what_was_merged_locked_and_ignored",
+                "inspect_lists_what_each_joint_leaves_out_on_request",
+                "inspect_shows_a_robot_that_generate_refuses_for_a_body_that_cannot_be",
+                "generate_warns_of_what_the_torques_leave_out",
+                "generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be",
+            ),
         ),
     ),
 }

@@ -3,8 +3,8 @@
     python tests/mutation/run.py --out out/mutate [--each 25] [--only dynamics emit] [--jobs 2] [--seed 0]
 
 Each mutant runs in a process forked from one that has the heavy libraries, in a copy of the tree. A mutant is
-killed when a test of its room fails, or takes more processor time than LIMIT. What survives is to be killed
-by a test, or listed in equivalents.json with the reason why it changes nothing that is promised.
+killed when a test of its room fails, takes more processor time than LIMIT, or hangs. What survives is to be
+killed by a test, or listed in equivalents.json with the reason why it changes nothing that is promised.
 """
 
 import argparse
@@ -16,6 +16,7 @@ import py_compile
 import random
 import resource
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -34,6 +35,10 @@ ROOT = Path(__file__).parents[2]
 EQUIVALENTS = Path(__file__).with_name("equivalents.json")
 LIMIT = 120
 """Seconds of processor time for the tests of one mutant."""
+PATIENCE = 600
+"""Seconds after which a mutant that waits for something counts as killed, too."""
+OF_A_FILE = 50
+"""Mutants of one file at most."""
 
 HEAVY = (
     *(
@@ -89,8 +94,9 @@ class Tree:
         inner = path.removeprefix("generator/linkwise/")
         return self.folder / "linkwise" / inner
 
-    def tested(self, mutant: Mutant | None, tests: Sequence[str]) -> tuple[str, str]:
+    def tested(self, mutant: Mutant | None, room: Room) -> tuple[str, str]:
         """Verdict of the tests on a mutant, and the test that gave it."""
+        tests = [*room.tests, *(("-k", room.only) if room.only else ())]
         if mutant is None:
             return self._run(tests)
         file = self.place(mutant.path)
@@ -107,7 +113,7 @@ class Tree:
         if child == 0:
             _child(self.folder, tests, log)
         _, status = os.waitpid(child, 0)
-        if os.WIFSIGNALED(status) and os.WTERMSIG(status) == 24:
+        if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGALRM):
             return "too slow", ""
         code = os.waitstatus_to_exitcode(status)
         lines = log.read_text(errors="replace").splitlines()
@@ -125,6 +131,9 @@ def _child(folder: Path, tests: Sequence[str], log: Path) -> None:
     os.dup2(out, 1)
     os.dup2(out, 2)
     resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT + 5))
+    signal.alarm(PATIENCE)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)  # ignored in the background: programs under test inherit that
     os.chdir(folder)
     os.environ |= {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", "LINKWISE_TEST_CACHE": _CACHE}
     sys.dont_write_bytecode = True
@@ -167,7 +176,7 @@ def room_mutants(room: Room, each: int, seed: int) -> list[Mutant]:
                 text = path.read_text(encoding="utf-8")
                 group = list(mutants(name, text))
                 chosen.shuffle(group)
-                groups.append([mutant for mutant in group[: each * 2] if mutant.parses(text)])
+                groups.append([mutant for mutant in group[:OF_A_FILE] if mutant.parses(text)])
     total = sum(map(len, groups))
     # Long files get more: each line has the same chance.
     drawn = [(k / len(group), g, group[k]) for g, group in enumerate(groups) for k in range(len(group))]
@@ -185,7 +194,7 @@ def outcomes(work: Sequence[tuple[str, Mutant | None]], jobs: int, folder: Path)
         name, mutant = item
         tree = trees.get()
         try:
-            return Outcome(name, mutant, *tree.tested(mutant, ROOMS[name].tests))
+            return Outcome(name, mutant, *tree.tested(mutant, ROOMS[name]))
         finally:
             trees.put(tree)
 

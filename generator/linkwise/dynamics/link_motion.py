@@ -79,7 +79,7 @@ def link_motion(turn: Orientation, link: RigidLink, chain: Sequence[int], origin
         twists, rates = path.motion_of_points(axes, places)
     else:
         twists = path.twists_from_the_link(axes) if origin.frame is None else path.twists_from_the_base(axes)
-        rates = [motion_cross(g, twist, axis)[1] for twist, axis in zip(twists, axes, strict=False)]
+        rates = [motion_cross(g, twist, axis) for twist, axis in zip(twists, axes, strict=False)]
     screws, a = path.screws(axes, rates, twists, gravity)
     return LinkMotion(
         g.one if scaled else mass, com, gravity, twists[-1], (turn.alpha[end], a), tuple(screws), scaled
@@ -180,8 +180,8 @@ class _Path:
         for f, axis, rate, twist in zip(self.chain, axes, rates, twists, strict=False):
             parent, joint = turn.tree[f]
             sd = turn.zd[f], vec.named(g, f"sd{turn.labels[f]}", rate)
-            push = motion_cross(g, (turn.alpha[parent], a), axis)[1]
-            sdd = turn.zdd[f], vec.add(g, push, motion_cross(g, twist, sd)[1])
+            push = motion_cross(g, (turn.alpha[parent], a), axis)
+            sdd = turn.zdd[f], vec.add(g, push, motion_cross(g, twist, sd))
             screws.append(Screw(joint.coordinate, turn.labels[f], axis, sd, sdd))
             qdd = turn.x.qdd[joint.coordinate]
             a = vec.add(g, a, vec.scale(g, turn.rate(f), sd[1]), vec.scale(g, qdd, axis[1]))

@@ -13,9 +13,9 @@ from linkwise.robot.robot import Joint, Rotation, Scalar
 Spatial = tuple[Vector, Vector]
 
 
-def motion_cross(g: Graph, a: Spatial, b: Spatial) -> Spatial:
-    """(ω, v) × (z, s) = (ω × z, ω × s + v × z)."""
-    return vec.cross(g, a[0], b[0]), vec.add(g, vec.cross(g, a[0], b[1]), vec.cross(g, a[1], b[0]))
+def motion_cross(g: Graph, a: Spatial, b: Spatial) -> Vector:
+    """Linear part of (ω, v) × (z, s) = (ω × z, ω × s + v × z)."""
+    return vec.add(g, vec.cross(g, a[0], b[1]), vec.cross(g, a[1], b[0]))
 
 
 def force_cross(g: Graph, a: Spatial, f: Spatial) -> Spatial:

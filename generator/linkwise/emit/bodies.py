@@ -51,9 +51,9 @@ def parameter_rules(system: System, checked: Sequence[BodyText]) -> list[str]:
         return []
     if not isinstance(system, RigidSystem):
         return [FREE]
-    links = {link.name for link in system.robot.links if _parameters(link)}
+    links = [link.name for link in system.robot.links if _parameters(link)]
     kept = {body.link for body in checked}
-    exempt = sorted(name for name in links if python_literal(name) not in kept)
+    exempt = [name for name in links if python_literal(name) not in kept]
     made = any(note.kind == "promoted" for note in system.notes)
     rules = [NAMES] if made else []
     if system.robot.allow_unphysical:
