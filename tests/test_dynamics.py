@@ -15,7 +15,6 @@ from linkwise.dynamics.euler_lagrange import euler_lagrange
 from linkwise.dynamics.frame_search import FrameSearch, _spread
 from linkwise.dynamics.kernel import lowering
 from linkwise.dynamics.link_motion import Origin
-from linkwise.dynamics.principal_axes import principal_axes
 from linkwise.dynamics.screws import CommonAxes, Orientation
 from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Graph
@@ -23,7 +22,6 @@ from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import RigidSystem, System
 
-TURNED = principal_axes(((0.01, 0.001, 0.002), (0.001, 0.02, -0.001), (0.002, -0.001, 0.015)))
 BLOCKS = ("acceleration", "velocity", "gravity", "torque", "position_gradient")
 
 
@@ -103,16 +101,6 @@ FRAMES = [
         Origin(),
         ("of the frame before joint 2", "the link's centre of mass, moving"),
     ),
-    (
-        CommonAxes(2, turned=TURNED),
-        Origin(2),
-        ("the link's principal axes", "where joint 3 is at the instant"),
-    ),
-    (
-        CommonAxes(2, turned=TURNED),
-        Origin(by_points=True),
-        ("the link's principal axes", "the link's centre"),
-    ),
 ]
 
 
@@ -130,27 +118,6 @@ def test_every_common_frame_gives_the_same_numbers_and_says_which_it_is(
     for block in BLOCKS:
         by_rule = numbers(kernel.graph, kernel.forms[0], block, states)
         assert relative_error(by_rule, numbers(graph, forms, block, states)) <= 1e-12, block
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_principal_axes_diagonalise_the_inertia(seed: int) -> None:
-    half = np.random.default_rng(seed).standard_normal((3, 3))
-    inertia = half @ half.T + np.diag([0.0, 1e-3 * seed, 5.0])
-    axes = np.array(principal_axes(tuple(map(tuple, inertia.tolist()))))
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-14)
-    assert np.linalg.det(axes) == pytest.approx(1.0)
-    turned = axes @ inertia @ axes.T
-    np.testing.assert_allclose(turned, np.diag(np.diag(turned)), atol=1e-13)
-
-
-def test_principal_axes_that_are_the_links_own_or_unknown_are_not_tried() -> None:
-    assert principal_axes(((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0))) is None
-    i = sp.Symbol("i")
-    assert principal_axes(((1.0, i, 0.0), (i, 2.0, 0.0), (0.0, 0.0, 3.0))) is None
-    for place in ((0, 1), (0, 2), (1, 2)):
-        inertia = np.diag([1.0, 2.0, 3.0])
-        inertia[place] = inertia[place[::-1]] = 0.1
-        assert principal_axes(tuple(map(tuple, inertia.tolist()))) is not None
 
 
 @pytest.mark.parametrize(("count", "most"), [(3, 4), (5, 4), (10, 4), (30, 3), (31, 7)])

@@ -5,7 +5,6 @@ from operator import itemgetter
 
 from linkwise.dynamics.kernel import Kernel, lowering, parameter_nodes
 from linkwise.dynamics.link_motion import Origin
-from linkwise.dynamics.principal_axes import principal_axes
 from linkwise.dynamics.rigid_link import rigid_forms
 from linkwise.dynamics.screws import CommonAxes, Orientation
 from linkwise.expression.count import count_operations
@@ -58,12 +57,12 @@ class FrameSearch:
                 yield self.attempt(best, Origin(frame))
 
     def central(self, most_axes: int) -> Iterator[Attempt]:
-        """Origins in the one link's centre of mass, with principal axes too; the best one also by points."""
-        chain, link = self.chains[0], self.links[0]
-        axes = list(_axes(chain, most_axes))
-        if principal := principal_axes(link.inertia):
-            axes.append(CommonAxes(chain[-1], turned=principal))
-        tried = [self.attempt(candidate, Origin()) for candidate in axes]
+        """Origins in the one link's centre of mass; the best one also by points.
+
+        Its principal axes cost more than those of its joints: they make three products zero, and all turns
+        before them full.
+        """
+        tried = [self.attempt(axes, Origin()) for axes in _axes(self.chains[0], most_axes)]
         yield from tried
         yield self.attempt(min(tried, key=itemgetter(0))[1], Origin(by_points=True))
 
@@ -86,8 +85,6 @@ def _spread(items: Sequence[int], most: int) -> list[int]:
 
 
 def _axes_in_words(turn: Orientation, axes: CommonAxes) -> str:
-    if axes.turned:
-        return "the link's principal axes"
     if axes.frame < 0:
         return "the base's"
     joint = turn.labels[axes.frame]

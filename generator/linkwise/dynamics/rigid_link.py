@@ -144,7 +144,7 @@ def _weight(g: Graph, moments: _Moments, motion: LinkMotion) -> Spatial:
 
 
 def _without_rounding(g: Graph, m: Matrix) -> Matrix:
-    """Drop numbers that are nothing but rounding: in principal axes the products of inertia are zero."""
+    """Drop numbers that are nothing but rounding, as turns by right angles leave of products of inertia."""
     values = [abs(v) for row in m for e in row if (v := g.value(e)) is not None]
     least = ROUNDING * max(values, default=0.0)
 

@@ -43,7 +43,6 @@ class CommonAxes:
 
     frame: int
     before: bool = False
-    turned: Rotation | None = None
 
 
 class Orientation:
@@ -97,8 +96,7 @@ class Orientation:
     def _orient(self, axes: CommonAxes) -> dict[int, Matrix]:
         """Orientation of every frame, walking the tree away from the common one both ways."""
         g, at = self.g, axes.frame
-        start = self._constant(axes.turned) if axes.turned else vec.identity(g)
-        rotations = {at: self._turns[at] if axes.before else start}
+        rotations = {at: self._turns[at] if axes.before else vec.identity(g)}
         unturned = vec.identity(g) if axes.before else None
         while at >= 0:
             parent = self.tree[at][0]
