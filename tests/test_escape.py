@@ -297,3 +297,8 @@ def test_templates_have_the_rules_as_filters() -> None:
     text = render("report/measured.md.j2", view)
     assert "# Measured time of a\\|b\n" in text
     assert "&lt;m&gt;" in text
+
+
+def test_a_text_is_cut_only_where_it_is_longer_than_it_may_be() -> None:
+    assert to.short("a" * 24) == "a" * 24
+    assert to.short(f"{'a' * 12}{'b' * 13}") == f"{'a' * 12}…{'b' * 11}"

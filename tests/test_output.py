@@ -142,7 +142,7 @@ def test_of_two_writers_at_once_one_wins_whole(tmp_path: Path, monkeypatch: pyte
 def test_a_living_writers_workplace_and_what_linkwise_did_not_make_stay(tmp_path: Path) -> None:
     for name in ("mine", ".linkwise-abcdefgh/thesis", ".linkwise-notes"):
         (tmp_path / name).mkdir(parents=True)
-    for name in (".linkwise-abcdefgh/lock", ".linkwise-file1234", ".linkwise-notes/lock"):
+    for name in (".linkwise-abcdefgh/lock", ".linkwise-file1234", ".linkwise-notes/lock", "mine/lock"):
         (tmp_path / name).touch()
     (tmp_path / ".linkwise-link5678").symlink_to(tmp_path / "mine")
     before = sorted(tmp_path.rglob("*"))
