@@ -18,7 +18,7 @@ from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.parametric_tree import check_bodies, tree_with
-from linkwise.check.reference import Reference, link_sizes
+from linkwise.check.reference import STIFF, Reference, link_sizes
 from linkwise.check.states import States, random_states, states_where
 from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.text_reader import NAMES, NUMPY, TextFormula, torch_functions
@@ -145,8 +145,8 @@ def test_a_coefficient_counts_as_what_it_makes_of_the_largest_rates() -> None:
     states = States(np.zeros((2, 1)), np.array([[0.5], [2.0]]), np.array([[4.0], [0.1]]))
     values = {"tau": np.array([[[1.0]], [[8.0]]]), "c2": np.array([[[[0.5]]], [[[0.5]]]])}
     sizes = link_sizes(values, states)
-    np.testing.assert_array_equal(sizes["tau"].ravel(), [2.0, 8.0])  # of 0.5 · 4 and of 8
-    np.testing.assert_array_equal(sizes["c2"].ravel(), [0.5, 2.0])
+    np.testing.assert_array_equal(sizes["tau"].ravel(), [STIFF * 2.0, STIFF * 8.0])  # of 0.5 · 4 and of 8
+    np.testing.assert_array_equal(sizes["c2"].ravel(), [STIFF * 0.5, STIFF * 2.0])
 
 
 def test_noise_tells_what_cancels() -> None:

@@ -206,3 +206,11 @@ def test_a_vector_names_its_parts_by_their_axes() -> None:
     parts = g.add(one, two), g.sub(one, two), g.mul(one, two)
     assert named(g, "v3", parts) == parts
     assert [g.names[part] for part in parts] == ["v3_x", "v3_y", "v3_z"]
+
+
+@pytest.mark.parametrize("x", [-20.0, -3.0, 0.0, 15.0])
+def test_the_slope_of_tanh_keeps_its_digits_where_tanh_is_near_one(x: float) -> None:
+    g = Graph()
+    at = g.symbol("x")
+    (slope,) = evaluate(g, [derivative(g, g.call("tanh", at), at)], {"x": x})
+    assert slope == pytest.approx(4.0 / (math.exp(x) + math.exp(-x)) ** 2, rel=1e-14)

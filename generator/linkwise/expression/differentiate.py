@@ -53,7 +53,8 @@ def _call_tangent(g: Graph, function: str, node: Node, a: Node, da: Node) -> Nod
         case "cosh":
             return g.mul(g.call("sinh", a), da)
         case "tanh":
-            return g.mul(g.sub(g.one, g.mul(node, node)), da)
+            cosh = g.call("cosh", a)  # 1 − tanh² would leave nothing but rounding where tanh is near 1
+            return g.div(da, g.mul(cosh, cosh))
         case "exp":
             return g.mul(node, da)
         case "log":
