@@ -10,6 +10,7 @@ import pytest
 from answers import random_states
 from compiled import compile_library
 from linkwise import Options, check_package, generate, read_system, write_package
+from linkwise.emit.assemble import checked_identifier
 from linkwise.package.load import import_package
 
 HOSTILE = (
@@ -126,3 +127,7 @@ def test_robots_name_becomes_a_module_name(name: str, module: str) -> None:
 
     assert identifier(name) == module
     assert module.isidentifier()
+
+
+def test_a_package_may_have_a_name_of_sixty_letters() -> None:
+    assert checked_identifier("a" * 60, "robot") == "a" * 60

@@ -126,3 +126,9 @@ def test_formulas_say_what_their_symbols_are(file: str, symbol: str) -> None:
         "Link 1 is 'box'.",
         f"{symbol} is parameter 'm load'.",
     ]
+
+
+@pytest.mark.parametrize(("robot", "told"), [("planar2", True), (str(DATA / "cart_pendulum.py"), False)])
+def test_twists_are_explained_where_energies_have_them(robot: str, told: bool) -> None:
+    text = generate(read_system(robot), ["autograd"])["energies/link_1.py"]
+    assert ("`twist`" in text) == told
