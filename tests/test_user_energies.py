@@ -266,3 +266,10 @@ def test_parameters_that_no_energy_has_are_left_out() -> None:
     links = [LinkEnergy("disc", used * x.qd**2, 0)]
     system = energy_system("puck", [x], links, {used: 1.0, unused: 2.0}, symbolic=True)
     assert system.parameters == {used: 1.0}
+
+
+@pytest.mark.parametrize(("file", "told"), [("turntable.py", True), ("cart_pendulum.py", False)])
+def test_the_header_explains_linear_terms_where_there_are_some(file: str, told: bool) -> None:
+    system = read_system(str(DATA / file))
+    table = generate(system, ["c"])[f"c/{system.name}.h"].partition("An array holds")[0]
+    assert ("what energies linear in qd add to c1" in table) == told
