@@ -612,7 +612,7 @@ def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp
     assert wrong == {"energies: are defined": "numbers at 0 of 4108 random states: too few to prove anything"}
 
 
-@pytest.mark.parametrize("spec", ["planar2", str(DATA / "cart_pendulum.py")])
+@pytest.mark.parametrize("spec", ["planar2", "planar8", str(DATA / "cart_pendulum.py")])
 def test_c_alone_is_compiled_and_held_against_what_there_is(spec: str, tmp_path: Path) -> None:
     write_package(generate(read_system(spec), ["c"], "robot_c"), tmp_path / "robot_c")
     results = check_package(tmp_path / "robot_c", 10)
