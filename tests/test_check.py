@@ -620,6 +620,24 @@ def test_c_alone_is_compiled_and_held_against_what_there_is(spec: str, tmp_path:
     assert {"c: robot_c_decomposition_blocksf", "c: robot_c_link_1"} <= {result.name for result in results}
 
 
+def test_off_the_path_not_even_rounding_passes(tmp_path: Path) -> None:
+    package = tmp_path / "cart"
+    write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["numpy"]), package)
+    assert marks(package)["numpy: tau_ij = 0 off the path"] == "ok"
+    zeros = "self._backend.zeros(values, 1)"
+    change_file(package, "runtime/dense.py", zeros, f"{zeros} + 1e-18")
+    assert marks(package)["numpy: tau_ij = 0 off the path"] == "FAIL"
+
+
+def test_numbers_too_large_for_single_precision_are_told(tmp_path: Path) -> None:
+    x = Coordinate("x", "m")
+    system = energy_system("heavy", [x], [LinkEnergy("star", 1e20 * x.qd**2, 0)])
+    write_package(generate(system, ["numpy"]), tmp_path / "heavy")
+    found = marks(tmp_path / "heavy")
+    assert found.pop("numpy: single precision") == "skip"
+    assert set(found.values()) == {"ok"}
+
+
 def test_formulas_alone_are_held_against_the_energies(tmp_path: Path) -> None:
     write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["formulas"]), tmp_path / "cart")
     assert [(r.name, r.mark) for r in check_package(tmp_path / "cart")] == [

@@ -180,7 +180,8 @@ class _Checks:
             reference = torque_reference(name, torque, found.states) if len(found.states.q) else None
             return reference, found.tried
 
-        for name, model in loaded.items():
+        if loaded:
+            name, model = next(iter(loaded.items()))
             return of(name, model.partial_torque)
         if functions is None:
             return None, 0

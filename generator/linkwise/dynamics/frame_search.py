@@ -59,8 +59,8 @@ class FrameSearch:
     def central(self, most_axes: int) -> Iterator[Attempt]:
         """Origins in the one link's centre of mass; the best one also by points.
 
-        Its principal axes cost more than those of its joints: they make three products zero, and all turns
-        before them full.
+        Its principal axes are not among them: they make three products zero and the turns before them full,
+        and were the cheapest for none of the robots that they were tried on.
         """
         tried = [self.attempt(axes, Origin()) for axes in _axes(self.chains[0], most_axes)]
         yield from tried
