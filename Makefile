@@ -27,8 +27,9 @@ generate: $(READY)
 	$(BIN)/linkwise generate puma560 --out generated
 	$(BIN)/linkwise generate torso --out generated
 
+# Two files of tests at a time.
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 # What could be wrong without a test, or without `linkwise check`, noticing: an hour. ONLY="dynamics emit" takes rooms.
 mutate: $(READY)
