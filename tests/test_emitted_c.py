@@ -307,7 +307,12 @@ def aligned(count: int, dtype: type, behind: int) -> np.ndarray:
 @pytest.mark.parametrize("blocks", [False, True], ids=["rows", "blocks"])
 @pytest.mark.parametrize(("dtype", "processor"), [(np.float64, "AVX512F"), (np.float32, "AVX")])
 def test_stores_past_the_cache_are_whole_lines_and_end_with_a_fence(
-    dtype: type, processor: str, blocks: bool, behind: int, directory_of: Callable[[str], Path], tmp_path: Path
+    dtype: type,
+    processor: str,
+    blocks: bool,
+    behind: int,
+    directory_of: Callable[[str], Path],
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "immintrin.h").write_text(COUNTING, encoding="utf-8")
     compiler = ("gcc", "-std=c99", f"-D__{processor}__", f"-I{tmp_path}")
