@@ -275,36 +275,47 @@ COUNTING = """
 /* In place of the compiler's own: counts stores past the cache, and those that no fence has ordered yet. */
 #include <string.h>
 typedef struct { char bytes[64]; } __m512i;
+typedef struct { char bytes[32]; } __m256i;
 __attribute__((weak)) long streamed = 0, unfenced = 0;
-static inline __m512i _mm512_load_si512(const void *from)
-{
-    __m512i value;
-    memcpy(&value, from, 64);
-    return value;
-}
-static inline void _mm512_stream_si512(void *to, __m512i value)
-{
-    memcpy(to, &value, 64);
-    ++streamed, ++unfenced;
-}
+#define STORING(bits, load, store) \\
+    static inline __m##bits##i load(const void *from) \\
+    { \\
+        __m##bits##i value; \\
+        memcpy(&value, from, sizeof value); \\
+        return value; \\
+    } \\
+    static inline void store(void *to, __m##bits##i value) \\
+    { \\
+        memcpy(to, &value, sizeof value); \\
+        streamed += (long)sizeof value; \\
+        unfenced += 1; \\
+    }
+STORING(512, _mm512_loadu_si512, _mm512_stream_si512)
+STORING(256, _mm256_loadu_si256, _mm256_stream_si256)
 static inline void _mm_sfence(void) { unfenced = 0; }
 """
 
 
-def aligned(count: int, dtype: type) -> np.ndarray:
-    """Memory on a cache line."""
-    room = np.zeros(count * np.dtype(dtype).itemsize + 64, np.uint8)
-    start = -room.ctypes.data % 64
+def aligned(count: int, dtype: type, behind: int) -> np.ndarray:
+    """Memory that begins some bytes behind the begin of a cache line."""
+    room = np.zeros(count * np.dtype(dtype).itemsize + 128, np.uint8)
+    start = -room.ctypes.data % 64 + behind
     return room[start : start + count * np.dtype(dtype).itemsize].view(dtype)
 
 
+@pytest.mark.parametrize("behind", [0, 16], ids=["on a line", "off a line"])
 @pytest.mark.parametrize("blocks", [False, True], ids=["rows", "blocks"])
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_stores_past_the_cache_end_with_a_fence(
-    dtype: type, blocks: bool, directory_of: Callable[[str], Path], tmp_path: Path
+@pytest.mark.parametrize(("dtype", "processor"), [(np.float64, "AVX512F"), (np.float32, "AVX")])
+def test_stores_past_the_cache_are_whole_lines_and_end_with_a_fence(
+    dtype: type,
+    processor: str,
+    blocks: bool,
+    behind: int,
+    directory_of: Callable[[str], Path],
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "immintrin.h").write_text(COUNTING, encoding="utf-8")
-    compiler = ("gcc", "-std=c99", "-D__AVX512F__", f"-I{tmp_path}")
+    compiler = ("gcc", "-std=c99", f"-D__{processor}__", f"-I{tmp_path}")
     compile_library(directory_of("planar3"), tmp_path / "library.so", compiler)
     library = ctypes.CDLL(str(tmp_path / "library.so"))
     suffix, width = ("f", 16) if dtype is np.float32 else ("", 8)
@@ -312,14 +323,16 @@ def test_stores_past_the_cache_end_with_a_fence(
     compute.restype = None
     sizes = (10, 14, 6, 6)
     count = (64 << 20) // (sum(sizes) * np.dtype(dtype).itemsize) // width * width + 5 * width
-    outputs = [aligned(count * size, dtype) for size in sizes]
+    outputs = [aligned(count * size, dtype, behind) for size in sizes]
     motion = np.tile(np.full(3, 0.5, dtype), count)
     pointers = [ctypes.c_void_p(a.ctypes.data) for a in (motion, motion, motion, *outputs)]
     streamed, unfenced = (ctypes.c_long.in_dll(library, name) for name in ("streamed", "unfenced"))
     compute(ctypes.c_size_t(width), *pointers)
     assert streamed.value == 0
     compute(ctypes.c_size_t(count // width if blocks else count), *pointers)
-    assert streamed.value == sum(a.nbytes for a in outputs) // 64
+    # Off a line, the line where one block of results ends and the next one begins is written as usual.
+    shared = len(sizes) * count // width if behind else 0
+    assert streamed.value == sum(a.nbytes for a in outputs) - 64 * shared
     assert unfenced.value == 0
     for a, size in zip(outputs, sizes, strict=True):
         samples = a.reshape(-1, size, width).swapaxes(1, 2) if blocks else a.reshape(-1, size)

@@ -166,6 +166,80 @@ def test_a_pendulum_is_that_of_the_textbook(backend: str, batch: tuple[int, ...]
     np.testing.assert_allclose(stiffness, 0.5 * 9.81 * np.cos(q), rtol=1e-12)
 
 
+@pytest.mark.parametrize("call", ["packed", "packed_torque", "position_gradient"])
+def test_lagrangians_are_differentiated_a_part_of_a_large_batch_at_a_time(
+    call: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from linkwise.runtime import autograd_backend
+
+    robot = pendulum("autograd")
+    robot.backend.parameters["m"] = torch.rand(2, 1, dtype=torch.float64, requires_grad=True)
+    motion = torch.rand(3, 2, 5, 1, dtype=torch.float64)
+    whole = getattr(robot, call)(*motion)
+    monkeypatch.setattr(autograd_backend, "AT_A_TIME", 3)
+    for one, other in zip(whole, getattr(robot, call)(*motion), strict=True):
+        torch.testing.assert_close(one, other, rtol=1e-15, atol=0.0)
+        assert other.requires_grad == bool(other.numel()) or call == "packed"
+
+
+def test_what_a_link_hands_on_is_worked_out_once_for_all_that_it_carries() -> None:
+    from linkwise.runtime.lanes import carried
+    from linkwise.runtime.partial_lagrangian import PartialLagrangian
+    from linkwise.runtime.sweeps import decomposition
+
+    calls = []
+
+    @carried
+    def speed(q: Any, qd: Any) -> Any:
+        calls.append(tuple(qd[0].shape))
+        return (torch.cos(q[0]) * qd[0],)
+
+    @carried
+    def onward(q: Any, qd: Any) -> Any:
+        return (speed(q, qd)[0] + qd[1],)
+
+    class First(PartialLagrangian):
+        path = (0,)
+
+        def kinetic(self, q: Any, qd: Any) -> Any:
+            return 0.5 * speed(q, qd)[0] ** 2
+
+        def potential(self, q: Any) -> Any:
+            return 0.0
+
+    class Second(First):
+        path = (0, 1)
+        parent = First
+
+        def kinetic(self, q: Any, qd: Any) -> Any:
+            return 0.5 * onward(q, qd)[0] ** 2
+
+    class Third(Second):
+        parent = First
+
+    q, qd = torch.tensor([0.3, 0.1]), torch.tensor([2.0, 0.5])
+    c2, c1, *_ = decomposition([kind({}) for kind in (First, Second, Third)], q, qd, qd)
+    assert calls == [(5,)]
+    x, slope = np.cos(0.3), -np.sin(0.3) * 2.0
+    np.testing.assert_allclose(c2, [x * x, x * x, x, 1, x * x, x, 1], rtol=1e-6)
+    both = [x * slope, 0, slope, 0]
+    np.testing.assert_allclose(c1, [x * slope, *both, *both], rtol=1e-6)
+
+
+def test_an_energy_off_its_path_is_refused() -> None:
+    from linkwise.runtime.partial_lagrangian import PartialLagrangian
+    from linkwise.runtime.sweeps import torque
+
+    class Stray(PartialLagrangian):
+        path = (1,)
+
+        def kinetic(self, q: Any, qd: Any) -> Any:
+            return qd[0] ** 2
+
+    with pytest.raises(ValueError, match=r"asks for coordinate 0, which is not on its path \(1,\)"):
+        torque([Stray({})], *torch.zeros(3, 2))
+
+
 def test_a_parameter_may_be_an_array_of_one_value_a_sample() -> None:
     masses = np.array([0.5, 1.0, 2.0])
     robot = Dynamics(ROD, NumpyBackend(ROD, [Pendulum()], {"m": masses}), pendulum, ("numpy",))

@@ -99,8 +99,12 @@ BACKENDS: dict[str, BackendFiles] = {
             emits=(_energies,),
             runtime=(
                 "autograd_backend.py",
+                "lane_entries.py",
+                "lanes.py",
                 "partial_lagrangian.py",
                 "recording.py",
+                "rigid_body.py",
+                "sweeps.py",
                 "torch_backend.py",
             ),
             loading=Loading(
