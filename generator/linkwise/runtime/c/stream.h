@@ -1,6 +1,6 @@
 /* Results that no cache holds go past it: memory is then written without being read first. The same in every package
    of linkwise. It needs rows.h. */
-#if defined(__AVX512F__)
+#if defined(__AVX512F__) || defined(__AVX__)
 #include <immintrin.h>
 #endif
 #include <string.h>
@@ -20,6 +20,12 @@ static void stream(size_t count, const real *from, real *to)
             _mm512_stream_si512((__m512i *)(to + at), _mm512_load_si512((const __m512i *)(from + at)));
         return;
     }
+#elif defined(__AVX__)
+    if ((size_t)to % 64 == 0 && count % BLOCK == 0) {
+        for (size_t at = 0; at < count; at += BLOCK / 2)
+            _mm256_stream_si256((__m256i *)(to + at), _mm256_load_si256((const __m256i *)(from + at)));
+        return;
+    }
 #endif
     memcpy(to, from, count * sizeof(real));
 }
@@ -35,7 +41,7 @@ static inline void stream_rows(size_t entries, const real *block, real *rows, re
    another thread of it, say. Stores past the cache are not ordered with others otherwise. */
 static inline void stream_end(void)
 {
-#if defined(__AVX512F__)
+#if defined(__AVX512F__) || defined(__AVX__)
     _mm_sfence();
 #endif
 }
