@@ -115,6 +115,7 @@ BACKENDS: dict[str, BackendFiles] = {
             "the C code, compiled by this system's compiler",
             emits=(),
             runtime=(
+                "native_answers.py",
                 "native_backend.py",
                 "native_build.py",
                 "native_cache.py",

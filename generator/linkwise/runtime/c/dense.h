@@ -48,7 +48,7 @@ APART const real *SIZED(place)(int first, int last, int half, const real *RESTRI
 }
 
 /* From c1 of links to its slopes, 2 c1 - h1. */
-APART void SIZED(to_slopes)(int first, int last, real *RESTRICT c1, const real *RESTRICT h1)
+static inline void SIZED(to_slopes)(int first, int last, real *RESTRICT c1, const real *RESTRICT h1)
 {
     for (int j = first; j < last; ++j) {
         const int length = path_start[j + 1] - path_start[j];
