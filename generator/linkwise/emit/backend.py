@@ -122,6 +122,8 @@ BACKENDS: dict[str, BackendFiles] = {
                 "native_calls.py",
                 "native_compiler.py",
                 "native_library.py",
+                "native_module.c",
+                "native_module.py",
                 "native_process.py",
                 "native_torch.py",
                 "numpy_backend.py",

@@ -1,7 +1,7 @@
-"""The calls of `Dynamics` behind its face: the motion is checked, the answer computed, and put where `out` says."""
+"""The calls of `Dynamics` behind its face: motion is checked, answers are computed and put where `out` says."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -42,15 +42,14 @@ def answer_shapes(structure: Structure) -> dict[str, Shapes]:
 
 
 class Answers:
-    """The calls of a back end that has packed values to compose answers from; arguments as `Dynamics` says."""
-
-    direct: ClassVar[Mapping[type, Any]] = {}
-    """What answers motions of a type in place of this, without looking twice."""
+    """The calls of a back end whose packed values answers are composed of; arguments as `Dynamics` says."""
 
     def __init__(
         self, structure: Structure, backend: Backend[Any], check_finite: bool, composed: Any = None
     ) -> None:
         """`composed` computes; the closed forms' packed values, composed, unless given."""
+        self.direct: Mapping[type, Any] = {}
+        """What answers motions of a type in place of this, without looking twice."""
         self._structure, self._backend, self._check_finite = structure, backend, check_finite
         self._composed = composed or Composed(structure, backend)
         self._shapes = answer_shapes(structure)

@@ -1,5 +1,6 @@
 """Calls of the compiled C: arrays in, arrays out, large batches on several threads."""
 
+import ctypes
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -63,7 +64,7 @@ class NativeCalls:
         self.shapes = answer_shapes(structure)
         self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
         self._widths = {call: sum(sizes) for call, sizes in self.sizes.items()}
-        self._learned = has_tensors(parameters.values())
+        self.learned = has_tensors(parameters.values())
         self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
         self._functions: dict[tuple[str, np.dtype[Any]], Any] = {}
         self._function("packed", np.dtype("f8"))
@@ -86,7 +87,7 @@ class NativeCalls:
         compute = self._functions.get((call, kind)) or self._function(call, kind)
         p = []
         if self.parameters:
-            p = [self._numbers(kind) if self._learned else self._constants[kind]]
+            p = [self._numbers(kind) if self.learned else self._constants[kind]]
         parts = min(self.threads, count * self._widths[call] * kind.itemsize // PER_THREAD)
         if parts <= 1:
             compute(count, *map(place, read), *map(place, p), *map(place, written))
@@ -99,6 +100,14 @@ class NativeCalls:
         ]
         self._share(compute, count, arrays, parts)
         return into
+
+    def constants(self, kind: "np.dtype[Any]") -> NumberArray:
+        """Values of parameters that stay as they are, in the order of the structure."""
+        return self._constants[kind]
+
+    def address(self, call: str, kind: "np.dtype[Any]") -> int:
+        """Where the C function of a call that has been made stands in memory."""
+        return ctypes.cast(self._functions[call, kind], ctypes.c_void_p).value or 0
 
     def _function(self, call: str, kind: "np.dtype[Any]") -> Any:
         """C function of a call for a dtype, compiled if it is not there yet."""

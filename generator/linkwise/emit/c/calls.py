@@ -47,7 +47,7 @@ class Moves:
 class LinkCalls:
     """How one link's kernels are called for one sample, and for the position gradient of a block.
 
-    `links` is this one as the functions of dense.h take it: first and last, counted from 0, the last left out.
+    `links` is this one as functions of dense.h take it: first, counted from 0, and the one after the last.
     """
 
     number: int
