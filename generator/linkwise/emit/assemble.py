@@ -24,10 +24,13 @@ from linkwise.version import VERSION
 LONGEST_NAME = 60
 SHARED_RUNTIME = (
     "__init__.py",
+    "answers.py",
     "arguments.py",
+    "composed.py",
     "dense.py",
     "dynamics.py",
     "interface.py",
+    "outputs.py",
     "parameter_values.py",
     "quantities.py",
     "structure.py",

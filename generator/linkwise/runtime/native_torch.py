@@ -13,7 +13,15 @@ from torch import Tensor
 from .interface import ClosedForms
 from .native_build import Sources
 from .native_calls import NativeCalls
+from .native_library import NumberArray
 from .torch_backend import TorchBackend
+
+OPERATED = {
+    "decomposition": "packed",
+    "torque": "packed_torque",
+    "position_gradient": "packed_position_gradient",
+}
+"""What torch is given as operators, from which all answers are composed, and what `NativeCalls` calls it."""
 
 OPERATORS: dict[tuple[Sources, str], Any] = {}
 """Operators made so far; torch wants each to be made once."""
@@ -27,7 +35,8 @@ class TorchSide(TorchBackend):
     def __init__(self, calls: NativeCalls, links: Sequence[ClosedForms]) -> None:
         super().__init__(calls.structure, links, calls.parameters)
         self.calls = calls
-        self.operators = {call: operator(calls, links, call) for call in calls.sizes}
+        self._given = [value for value in calls.parameters.values() if torch.is_tensor(value)]
+        self.operators = {call: operator(calls, links, call) for call in OPERATED}
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
@@ -55,20 +64,35 @@ class TorchSide(TorchBackend):
         return self._run("position_gradient", q, qd, qdd)[0]
 
     def _run(self, call: str, q: Tensor, qd: Tensor, qdd: Tensor) -> tuple[Tensor, ...]:
+        if not self.needs_operators((q, qd, qdd)):
+            return compute(self.calls, OPERATED[call], (q, qd, qdd))
         names = self.structure.parameters
         values = [self.parameters[name].to(q).reshape(()) for name in names]
         p = torch.stack(values) if values else q.new_empty(0)
-        recorded = torch.is_grad_enabled() and any(t.requires_grad for t in (q, qd, qdd, p))
-        if recorded or torch.compiler.is_compiling():
-            results = self.operators[call](q, qd, qdd, p)
-            return results if isinstance(results, tuple) else (results,)
-        return compute(self.calls, call, q, qd, qdd)
+        results = self.operators[call](q, qd, qdd, p)
+        return results if isinstance(results, tuple) else (results,)
+
+    def needs_operators(self, motion: Sequence[Tensor]) -> bool:
+        """Whether torch has to know what is computed: a gradient is recorded, or a program compiled."""
+        if torch.compiler.is_compiling():
+            return True
+        return torch.is_grad_enabled() and any(t.requires_grad for t in (*motion, *self._given))
 
 
-def compute(calls: NativeCalls, call: str, *motion: Tensor) -> tuple[Tensor, ...]:
+def compute(
+    calls: NativeCalls, call: str, motion: Sequence[Tensor], into: Sequence[Tensor] | None = None
+) -> tuple[Tensor, ...]:
     """Results of the C code as tensors that share its memory."""
-    arrays = (t.detach().resolve_neg().numpy() for t in motion)
-    return tuple(torch.from_numpy(result) for result in calls.run(call, *arrays))
+    arrays = [as_numbers(t) for t in motion]
+    if into is not None:
+        calls.run(call, arrays, [as_numbers(t) for t in into])
+        return tuple(into)
+    return tuple(torch.from_numpy(result) for result in calls.run(call, arrays))
+
+
+def as_numbers(t: Tensor) -> NumberArray:
+    """The array that a CPU tensor's numbers are; it shares its memory, unless they are to be negated."""
+    return (t.detach() if t.requires_grad else t).resolve_neg().numpy()
 
 
 def operator(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
@@ -81,14 +105,14 @@ def operator(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any
 
 def _define(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
     """Operator (q, qd, qdd, p) -> results; p holds the parameters in the structure's order."""
-    structure, sources, sizes = calls.structure, calls.sources, calls.sizes[call]
+    structure, sources, sizes = calls.structure, calls.sources, calls.sizes[OPERATED[call]]
 
     def values(p: Tensor) -> dict[str, Tensor]:
         return dict(zip(structure.parameters, p.unbind(), strict=True))
 
     def forward(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
         present = NativeCalls(structure, sources.directory, values(p.detach()))
-        return _bare(compute(present, call, q, qd, qdd))
+        return _bare(compute(present, OPERATED[call], (q, qd, qdd)))
 
     def fake(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
         return _bare(tuple(q.new_empty((*q.shape[:-1], size)) for size in sizes))

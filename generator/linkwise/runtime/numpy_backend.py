@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .answers import Answers
 from .arguments import as_array, check_axes, no_common_shape, precision
 from .interface import ClosedForms, Entries
 from .parameter_values import fits
@@ -47,6 +48,10 @@ class NumpyBackend:
             return np.broadcast_arrays(*arrays.values())
         except ValueError:
             raise no_common_shape(arrays, n) from None
+
+    def answers(self, check_finite: bool) -> Answers:
+        """The calls of `Dynamics`."""
+        return Answers(self.structure, self, check_finite)
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""

@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from .answers import Answers
 from .arguments import as_array, check_axes, no_common_shape, precision
 from .interface import ClosedForms
 from .parameter_values import fits
@@ -43,6 +44,10 @@ class TorchBackend:
             return torch.broadcast_tensors(*named.values())  # type: ignore[no-any-return, no-untyped-call]
         except RuntimeError:
             raise no_common_shape(named, n) from None
+
+    def answers(self, check_finite: bool) -> Answers:
+        """The calls of `Dynamics`."""
+        return Answers(self.structure, self, check_finite)
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""

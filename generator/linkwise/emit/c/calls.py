@@ -45,7 +45,10 @@ class Moves:
 
 @dataclass(frozen=True)
 class LinkCalls:
-    """How one link's kernels are called for one sample, and for the position gradient of a block."""
+    """How one link's kernels are called for one sample, and for the position gradient of a block.
+
+    `links` is this one as functions of dense.h take it: first, counted from 0, and the one after the last.
+    """
 
     number: int
     outputs: str
@@ -54,6 +57,8 @@ class LinkCalls:
     torque: str
     position_gradient: str
     gradients_to_rows: str
+    links: str
+    to_dense: str
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,7 @@ class GroupCalls:
     places: tuple[str, ...]
     torque: tuple[str, ...]
     torques_to_rows: str
+    links: str
 
 
 def motions(inputs: Sequence[str]) -> Motions:
@@ -97,6 +103,8 @@ def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
         call(kernels.torque, "one", "m.", {"tau": "tau"}, link.start),
         call(kernels.position_gradient, "block", "m.", {"c0": "c0_block"}),
         _moves("c0", link).scatter,
+        _counted_from_0(link),
+        f"to_dense_one({link.first - 1}, &m, &r, to)",
     )
 
 
@@ -121,6 +129,7 @@ def group_calls(links: Sequence[Span], kernels: Sequence[LinkKernels], arrays: S
         tuple(_moves(array, group).place for array in arrays),
         tuple(call(k.torque, "block", "m.", {"tau": "tau_block"}, start) for k, start in mine),
         _moves("tau", group).scatter,
+        _counted_from_0(group),
     )
 
 
@@ -157,6 +166,10 @@ def _moves(array: str, links: Span) -> Moves:
         f"stream({count} * BLOCK, {array}_block, {place})",
         place,
     )
+
+
+def _counted_from_0(links: Span) -> str:
+    return f"{links.first - 1}, {links.last}"
 
 
 def _braces(values: Sequence[str]) -> str:

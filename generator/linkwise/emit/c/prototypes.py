@@ -14,9 +14,13 @@ NUMBERS = {"c2": "C2", "c1": "C1", "g": "G", "tau": "G", "h1": "H1", "c0": "C1"}
 
 @dataclass(frozen=True)
 class Shapes:
-    """Shapes of what functions read and of what they write: in rows of samples, in blocks, for one sample."""
+    """Shapes of what functions read and of what they write: in rows of samples, in blocks, for one sample.
+
+    Coefficients are those of a motion without qdd, here called at rest.
+    """
 
     motion: str
+    motion_at_rest: str
     results: str
     motion_blocks: str
     results_blocks: str
@@ -40,6 +44,7 @@ class Functions:
     type: str
     suffix: str
     inputs: str
+    inputs_at_rest: str
     outputs: str
     shapes: Shapes
     links: tuple[LinkFunction, ...]
@@ -58,9 +63,11 @@ def functions(inputs: Sequence[str], robot: Span, links: Sequence[Span]) -> Iter
             kind,
             suffix,
             pointers(f"const {kind}", inputs),
+            pointers(f"const {kind}", (array for array in inputs if array != "qdd")),
             pointers(kind, robot.size.arrays),
             Shapes(
                 _motion("p" in inputs, "count, JOINTS"),
+                _motion("p" in inputs, "count, JOINTS", "q, qd"),
                 _shapes((array, f"count, {NUMBERS[array]}") for array in robot.size.arrays),
                 _motion("p" in inputs, f"blocks, JOINTS, {block}"),
                 _shapes((array, f"blocks, {NUMBERS[array]}, {block}") for array in robot.size.arrays),
@@ -82,8 +89,8 @@ def cost(kernels: Iterable[KernelFunction]) -> int:
     return sum(kernel.arithmetic for kernel in kernels)
 
 
-def _motion(parameters: bool, shape: str) -> str:
-    return _shapes([("q, qd, qdd", shape), *([("p", "PARAMETERS")] if parameters else [])])
+def _motion(parameters: bool, shape: str, arrays: str = "q, qd, qdd") -> str:
+    return _shapes([(arrays, shape), *([("p", "PARAMETERS")] if parameters else [])])
 
 
 def _shapes(shapes: Iterable[tuple[str, str]]) -> str:

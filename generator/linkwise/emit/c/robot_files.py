@@ -1,6 +1,7 @@
 """What a robot's own C file and its header are rendered from."""
 
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import Any
 
 from linkwise.dynamics.kernel import parameter_names
@@ -19,6 +20,9 @@ def robot_view(
     """Fields of NAME.c but for its name."""
     robot = whole(links)
     arrays = robot.size.arrays
+    n = len(system.coordinates)
+    paths = [system.path(link.first - 1) for link in links]
+    one = _most([link.size for link in links])
     parts = tuple(groups(links))
     waiting = _most([whole(part).size for part in parts])
     names = list(parameter_names(system).values())
@@ -26,7 +30,10 @@ def robot_view(
     shared = [("shared", together.values)] if together else []
     calls = [link_calls(link, k) for link, k in zip(links, kernels, strict=True)]
     return {
-        "n": len(system.coordinates),
+        "n": n,
+        "paths": [", ".join(map(str, path)) for path in paths if path],
+        "path_starts": ", ".join(map(str, accumulate(map(len, paths), initial=0))),
+        "linear": ", ".join("1" if link.size.h1 else "0" for link in links),
         "totals": _totals(robot.size),
         "total": robot.size.total,
         "parameters": [(name, place) for place, name in enumerate(names)],
@@ -37,13 +44,18 @@ def robot_view(
         "pointers": ", ".join(f"*{array}" for array in arrays),
         "passed": ", ".join((*motion, *arrays)),
         "passed_motion": ", ".join(motion),
+        "inputs_at_rest": pointers("const real", (array for array in motion if array != "qdd")),
+        "passed_at_rest": ", ".join("qd" if array == "qdd" else array for array in motion),
         "links": calls,
         "groups": [group_calls(part, kernels, arrays) for part in parts],
         "idle_torque": idle(link.torque for link in calls),
         "idle_gradient": idle(link.position_gradient for link in calls),
         "room": [*shared, *((f"{array}_block", waiting.of(array)) for array in arrays)],
+        "room_of_one": [(array, one.of(array)) for array in arrays],
+        "results_of_one": ", ".join(arrays),
         "waiting": ", ".join(f"{array}_block" for array in arrays),
         "streams": len(parts) == 1,
+        "slopes": "r->h1" if robot.size.h1 else "NULL",
         "largest": max(waiting.of(array) for array in arrays),
         "waiting_torques": waiting.g,
         "largest_gradient": max(link.size.c1 for link in links),

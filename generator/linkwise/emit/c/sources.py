@@ -26,7 +26,7 @@ from linkwise.escape import c_comment
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 
-FIXED = ("numbers.h", "sines.h", "rows.h", "stream.h")
+FIXED = ("numbers.h", "sines.h", "rows.h", "dense.h", "stream.h", "dense_rows.h")
 """Files that are the same in every package."""
 
 

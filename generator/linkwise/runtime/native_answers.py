@@ -1,0 +1,65 @@
+"""Answers that C writes, zeros included, for arrays and for tensors of which no gradient is recorded."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .answers import KINDS, Answers
+from .arguments import has_tensors
+from .native_calls import PER_THREAD
+from .native_module import compiled_calls
+
+if TYPE_CHECKING:
+    from .native_backend import NativeBackend
+
+DTYPES = (np.dtype("f8"), np.dtype("f4"))
+"""In the order of the compiled module."""
+
+
+class NativeAnswers(Answers):
+    """The calls of the native back end, as the compiled module passes them on, or without it."""
+
+    def __init__(self, backend: "NativeBackend", check_finite: bool) -> None:
+        super().__init__(backend.structure, backend, check_finite)
+        self._native, self._calls = backend, backend.calls
+        made = compiled_calls()
+        # What is learned may change from call to call, and what is looked at is looked at here.
+        self._compiled = None if made is None or check_finite or self._calls.learned else self._made(made)
+        self.direct = {np.ndarray: self._compiled} if self._compiled else {}
+        self._known: set[tuple[str, np.dtype[Any]]] = set()
+
+    def _made(self, made: Any) -> Any:
+        """The compiled module's side of this robot."""
+        constants = [self._calls.constants(kind) for kind in DTYPES]
+        answers = {call: (KINDS.get(call), shapes) for call, shapes in self._shapes.items()}
+        return made(self, self._structure.n, 2 * PER_THREAD - 1, *constants, answers)
+
+    def _computed(self, call: str, motion: Sequence[Any]) -> Any:
+        if not has_tensors(motion):
+            return self._run(call, motion)
+        from .native_torch import compute  # it needs torch, which arrays do without
+
+        if self._native.on_torch().needs_operators(motion):
+            return super()._computed(call, motion)
+        return compute(self._calls, call, motion)
+
+    def _compute_into(self, call: str, motion: Sequence[Any], into: Sequence[Any]) -> None:
+        if not has_tensors(motion):
+            self._run(call, motion, into)
+            return
+        from .native_torch import compute
+
+        if self._native.on_torch().needs_operators(motion):
+            super()._compute_into(call, motion, into)
+        else:
+            compute(self._calls, call, motion, into)
+
+    def _run(self, call: str, motion: Sequence[Any], into: Sequence[Any] | None = None) -> Any:
+        """Call C, and tell the compiled module of a function that it has not known so far."""
+        results = self._calls.run(call, motion, into)
+        kind = motion[0].dtype
+        if self._compiled and (call, kind) not in self._known and motion[0].size:
+            self._known.add((call, kind))
+            self._compiled.learn(call, DTYPES.index(kind), self._calls.address(call, kind))
+        return results
