@@ -1,4 +1,4 @@
-"""The calls of `Dynamics` behind its face: motion is checked, answers are computed and put where `out` says."""
+"""The calls of `Dynamics` behind its face: motion is checked, answers computed and put where `out` says."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -48,11 +48,14 @@ class Answers:
         self, structure: Structure, backend: Backend[Any], check_finite: bool, composed: Any = None
     ) -> None:
         """`composed` computes; the closed forms' packed values, composed, unless given."""
-        self.direct: Mapping[type, Any] = {}
-        """What answers motions of a type in place of this, without looking twice."""
         self._structure, self._backend, self._check_finite = structure, backend, check_finite
         self._composed = composed or Composed(structure, backend)
         self._shapes = answer_shapes(structure)
+
+    @property
+    def of_arrays(self) -> Any:
+        """What answers in place of this where q is an array: what is quicker then, if there is anything."""
+        return self
 
     def packed(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.packed`."""

@@ -26,8 +26,12 @@ class NativeAnswers(Answers):
         made = compiled_calls()
         # What is learned may change from call to call, and what is looked at is looked at here.
         self._compiled = None if made is None or check_finite or self._calls.learned else self._made(made)
-        self.direct = {np.ndarray: self._compiled} if self._compiled else {}
         self._known: set[tuple[str, np.dtype[Any]]] = set()
+
+    @property
+    def of_arrays(self) -> Any:
+        """The compiled module, where there is one."""
+        return self._compiled or self
 
     def _made(self, made: Any) -> Any:
         """The compiled module's side of this robot."""
