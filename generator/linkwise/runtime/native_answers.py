@@ -40,13 +40,13 @@ class NativeAnswers(Answers):
         return made(self, self._structure.n, 2 * PER_THREAD - 1, *constants, answers)
 
     def _computed(self, call: str, motion: Sequence[Any]) -> Any:
-        if not has_tensors(motion):
+        if type(motion[0]) is np.ndarray or not has_tensors(motion):
             return self._run(call, motion)
         from .native_torch import compute  # it needs torch, which arrays do without
 
         if self._native.on_torch().needs_operators(motion):
             return super()._computed(call, motion)
-        return compute(self._calls, call, motion)
+        return compute(self._quickest, call, motion)
 
     def _compute_into(self, call: str, motion: Sequence[Any], into: Sequence[Any]) -> None:
         if not has_tensors(motion):
@@ -57,7 +57,17 @@ class NativeAnswers(Answers):
         if self._native.on_torch().needs_operators(motion):
             super()._compute_into(call, motion, into)
         else:
-            compute(self._calls, call, motion, into)
+            compute(self._quickest, call, motion, into)
+
+    def _quickest(self, call: str, motion: Sequence[Any], into: Sequence[Any] | None) -> Any:
+        """Results for arrays from the compiled module, where there is one."""
+        if not self._compiled:
+            return self._run(call, motion, into)
+        convention = {"propagation": ("closing",), "gradient_propagation": ("gradient",)}.get(call, ())
+        several = call in KINDS
+        out = into if into is None else tuple(into) if several else into[0]
+        answer = getattr(self._compiled, "propagation" if convention else call)(*motion, *convention, out)
+        return answer if several else (answer,)
 
     def _run(self, call: str, motion: Sequence[Any], into: Sequence[Any] | None = None) -> Any:
         """Call C, and tell the compiled module of a function that it has not known so far."""
