@@ -31,8 +31,8 @@ class Dynamics:
     its device; torques in N m, or N where joint i is prismatic.
 
     out: where the answer is written, and what is then returned: an array or tensor of its shape and dtype,
-    contiguous, writable and apart from the motion; several of them, in order, where there are several
-    results. What cannot hold the answer is refused by name, and so is any where a gradient is recorded.
+    writable, apart from the motion and, for native, contiguous; several of them, in order, where there are
+    several results. What cannot hold the answer is refused by name, as is any where a gradient is recorded.
 
     Every call raises ValueError for a wrong shape, and TypeError for what cannot be taken without a doubt;
     the message names the argument.

@@ -1,7 +1,7 @@
 """Answers that C writes, zeros included, for arrays and for tensors of which no gradient is recorded."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,8 @@ DTYPES = (np.dtype("f8"), np.dtype("f4"))
 
 class NativeAnswers(Answers):
     """The calls of the native back end, as the compiled module passes them on, or without it."""
+
+    contiguous: ClassVar = True
 
     def __init__(self, backend: "NativeBackend", check_finite: bool) -> None:
         super().__init__(backend.structure, backend, check_finite)
