@@ -1,7 +1,9 @@
 """Every function that a package's C must have, in double and float, against the reference."""
 
+import math
 import re
 from collections.abc import Iterator, Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,7 @@ from linkwise.check.compare import Entries, Result, Skipped, compare
 from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype, declared
 from linkwise.check.model_calls import FLOAT32
 from linkwise.check.packed_layout import IndexRows, Rows
-from linkwise.check.reference import Reference
+from linkwise.check.reference import Reference, dense_quantities
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
@@ -21,6 +23,16 @@ ROWS, BLOCKS = (0, 1, 7, 8, 9, 17, 107), (1, 2, 8)
 
 OUTPUTS = ("c2", "c1", "g", "tau", "h1")
 """Arrays of a decomposition, in the order of the arguments."""
+
+DENSE = {
+    "partial_torque": (("tau",), ("torque",)),
+    "inverse_dynamics": (("sums",), ("torque",)),
+    "coefficients": (("c2", "c1", "g"), ("acceleration", "velocity", "gravity")),
+    "propagation": (("c2 qdd", "c1 qd", "g"), ("acceleration", "velocity", "gravity")),
+    "gradient_propagation": (("c2 qdd", "slopes qd", "g"), ("acceleration", "velocity", "gravity")),
+    "dense_position_gradient": (("c0",), ("gradient",)),
+}
+"""Functions whose results have their zeros: what these are, and what the header calls them."""
 
 MANY = 192
 """Bytes for each result of a sample that still count as few: 24 samples in double, 48 in float."""
@@ -67,6 +79,9 @@ class CFunctions:
         if link:
             yield from self._link(function, reference, int(link[1]) - 1)
             return
+        if function.short in DENSE:
+            yield from self._dense(function, reference)
+            return
         width = 1
         if function.short.endswith("_blocks"):
             width = self.compiled.constants["BLOCKF" if function.real == "float" else "BLOCK"]
@@ -87,6 +102,20 @@ class CFunctions:
         for what, size in sizes.items():
             flat = found[what].reshape(len(at) // width, size, width).swapaxes(1, 2).reshape(len(at), size)
             yield _packed(what, flat, self.rows.of(what), reference, at)
+
+    def _dense(self, function: Prototype, reference: Reference) -> Iterator[Entries]:
+        """Calls of a function whose results have their zeros."""
+        expected = dense_quantities(reference)
+        for count, shift in product(ROWS, (0, 1)):
+            at = np.arange(count) * 3 % max(len(reference.states.q), 1)
+            given = dict(zip(("q", "qd", "qdd"), reference.states.at(at).motion, strict=True))
+            what, names = DENSE[function.short]
+            shapes = [expected[quantity][0].shape[1:] for quantity in what]
+            sizes = {name: count * math.prod(shape) for name, shape in zip(names, shapes, strict=True)}
+            found = self._call(function, count, given, sizes, shift)
+            for quantity, name, shape in zip(what, names, shapes, strict=True):
+                values, scales = (source[at] for source in expected[quantity])
+                yield Entries(quantity, found[name].reshape(count, *shape), values, scales)
 
     def _link(self, function: Prototype, reference: Reference, link: int) -> Iterator[Entries]:
         own = {what: self.rows.of(what)[self.rows.of(what)[:, 1] == link] for what in function.outputs}
@@ -123,15 +152,21 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
         ("decomposition_blocks", "blocks", every),
         ("torque", "count", ("tau",)),
         ("position_gradient", "count", ("c0",)),
+        *((name, "count", outputs) for name, (_, outputs) in DENSE.items()),
     ]
     for j in range(len(manifest.links)):
         own = tuple(what for what in every if j in rows.of(what)[:, 1])
         functions.append((f"link_{j + 1}", "", own))
     return [
-        Prototype(name + suffix, real, counted, inputs, outputs)
+        Prototype(name + suffix, real, counted, _inputs(name, inputs), outputs)
         for real, suffix in (("double", ""), ("float", "f"))
         for name, counted, outputs in functions
     ]
+
+
+def _inputs(name: str, every: tuple[str, ...]) -> tuple[str, ...]:
+    """Arrays that a function reads: coefficients do not depend on qdd."""
+    return tuple(what for what in every if name != "coefficients" or what != "qdd")
 
 
 def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[CompiledPackage | None, Result]:

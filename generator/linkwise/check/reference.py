@@ -68,3 +68,20 @@ def link_sizes(values: Mapping[str, Array], states: States) -> dict[str, Array]:
         )
         for what, value in values.items()
     }
+
+
+def dense_quantities(reference: Reference) -> dict[str, tuple[Array, Array]]:
+    """What functions and calls with zeros answer, and how large the numbers are that each is summed from."""
+    values, scales = reference.values, reference.scales
+    rates = {"qd": reference.states.qd, "qdd": reference.states.qdd}
+    over = {name: rate[:, None, None, :] for name, rate in rates.items()}
+    found = {what: (values[what], scales[what]) for what in ("tau", "c2", "c1", "g", "c0")}
+    found["sums"] = values["tau"].sum(-1), scales["tau"].sum(-1)
+    slopes = 2 * values["c1"] - values["h1"], 2 * scales["c1"]
+    for what, motion, (value, scale) in (
+        ("c2", "qdd", found["c2"]),
+        ("c1", "qd", found["c1"]),
+        ("slopes", "qd", slopes),
+    ):
+        found[f"{what} {motion}"] = value * over[motion], scale * np.abs(over[motion])
+    return found

@@ -1,7 +1,7 @@
-"""The calls of `Dynamics` behind its face: motion is checked, answers are computed and put where `out` says."""
+"""The calls of `Dynamics` behind its face: motion is checked, answers computed and put where `out` says."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -44,15 +44,21 @@ def answer_shapes(structure: Structure) -> dict[str, Shapes]:
 class Answers:
     """The calls of a back end whose packed values answers are composed of; arguments as `Dynamics` says."""
 
+    contiguous: ClassVar = False
+    """Whether what `out` says must be contiguous."""
+
     def __init__(
         self, structure: Structure, backend: Backend[Any], check_finite: bool, composed: Any = None
     ) -> None:
         """`composed` computes; the closed forms' packed values, composed, unless given."""
-        self.direct: Mapping[type, Any] = {}
-        """What answers motions of a type in place of this, without looking twice."""
         self._structure, self._backend, self._check_finite = structure, backend, check_finite
         self._composed = composed or Composed(structure, backend)
         self._shapes = answer_shapes(structure)
+
+    @property
+    def of_arrays(self) -> Any:
+        """What answers in place of this where q is an array: what is quicker then, if there is anything."""
+        return self
 
     def packed(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.packed`."""
@@ -130,9 +136,8 @@ class Answers:
         if out is None:
             return None
         kind = KINDS.get(call)
-        return accepted(
-            out, kind._fields if kind else (), self._shapes[call], motion, self._backend.parameters.values()
-        )
+        fields, parameters = kind._fields if kind else (), self._backend.parameters.values()
+        return accepted(out, fields, self._shapes[call], motion, parameters, self.contiguous)
 
     def _computed(self, call: str, motion: Any) -> Any:
         """Results of a call in order."""

@@ -12,6 +12,7 @@ tensors are a view that is built on request.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, overload
 
+from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from .interface import Array, Backend
@@ -30,8 +31,8 @@ class Dynamics:
     its device; torques in N m, or N where joint i is prismatic.
 
     out: where the answer is written, and what is then returned: an array or tensor of its shape and dtype,
-    contiguous, writable and apart from the motion; several of them, in order, where there are several
-    results. What cannot hold the answer is refused by name, and so is any where a gradient is recorded.
+    writable, apart from the motion and, for native, contiguous; several of them, in order, where there are
+    several results. What cannot hold the answer is refused by name, as is any where a gradient is recorded.
 
     Every call raises ValueError for a wrong shape, and TypeError for what cannot be taken without a doubt;
     the message names the argument.
@@ -74,7 +75,7 @@ class Dynamics:
         self.backend, self.parameters = backend, backend.parameters
         self._load, self._asked = load, asked
         self._answers = backend.answers(check_finite)
-        self._by_kind = self._answers.direct
+        self._of_arrays = self._answers.of_arrays
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}
@@ -87,27 +88,32 @@ class Dynamics:
 
     def packed(self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None) -> Packed[Array]:
         """Full decomposition without the zeros: c2, c1 (closing), g, tau, h1, (..., count) each."""
-        answer: Packed[Array] = self._by_kind.get(type(q), self._answers).packed(q, qd, qdd, out)
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        answer: Packed[Array] = calls.packed(q, qd, qdd, out)
         return answer
 
     def packed_torque(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_ij on the paths only, (..., count); its indices are `layout.torque`."""
-        tau: Array = self._by_kind.get(type(q), self._answers).packed_torque(q, qd, qdd, out)
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        tau: Array = calls.packed_torque(q, qd, qdd, out)
         return tau
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_ij, the torque on joint i through link j, shape (..., n, N)."""
-        tau: Array = self._by_kind.get(type(q), self._answers).partial_torque(q, qd, qdd, out)
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        tau: Array = calls.partial_torque(q, qd, qdd, out)
         return tau
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_i = sum_j tau_ij, shape (..., n)."""
-        tau: Array = self._by_kind.get(type(q), self._answers).inverse_dynamics(q, qd, qdd, out)
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        tau: Array = calls.inverse_dynamics(q, qd, qdd, out)
         return tau
 
     def coefficients(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Coefficients[Array]:
         """c2, c1 (..., n, N, n) and g (..., n, N) of the closing convention."""
-        answer: Coefficients[Array] = self._by_kind.get(type(q), self._answers).coefficients(q, qd, out)
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        answer: Coefficients[Array] = calls.coefficients(q, qd, out)
         return answer
 
     @overload
@@ -142,14 +148,15 @@ class Dynamics:
         paper's Eq. 1 to the letter, whose velocity part sums to twice the velocity force. Any other word
         raises ValueError.
         """
-        answer: Propagation[Array] | GradientPropagation[Array] = self._by_kind.get(
-            type(q), self._answers
-        ).propagation(q, qd, qdd, convention, out)
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        answer: Propagation[Array] | GradientPropagation[Array]
+        answer = calls.propagation(q, qd, qdd, convention, out)
         return answer
 
     def position_gradient(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
-        c0: Array = self._by_kind.get(type(q), self._answers).position_gradient(q, qd, qdd, out)
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        c0: Array = calls.position_gradient(q, qd, qdd, out)
         return c0
 
     def masked(

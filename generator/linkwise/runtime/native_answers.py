@@ -1,7 +1,7 @@
 """Answers that C writes, zeros included, for arrays and for tensors of which no gradient is recorded."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -20,14 +20,20 @@ DTYPES = (np.dtype("f8"), np.dtype("f4"))
 class NativeAnswers(Answers):
     """The calls of the native back end, as the compiled module passes them on, or without it."""
 
+    contiguous: ClassVar = True
+
     def __init__(self, backend: "NativeBackend", check_finite: bool) -> None:
         super().__init__(backend.structure, backend, check_finite)
         self._native, self._calls = backend, backend.calls
         made = compiled_calls()
         # What is learned may change from call to call, and what is looked at is looked at here.
         self._compiled = None if made is None or check_finite or self._calls.learned else self._made(made)
-        self.direct = {np.ndarray: self._compiled} if self._compiled else {}
         self._known: set[tuple[str, np.dtype[Any]]] = set()
+
+    @property
+    def of_arrays(self) -> Any:
+        """The compiled module, where there is one."""
+        return self._compiled or self
 
     def _made(self, made: Any) -> Any:
         """The compiled module's side of this robot."""
@@ -36,13 +42,13 @@ class NativeAnswers(Answers):
         return made(self, self._structure.n, 2 * PER_THREAD - 1, *constants, answers)
 
     def _computed(self, call: str, motion: Sequence[Any]) -> Any:
-        if not has_tensors(motion):
+        if type(motion[0]) is np.ndarray or not has_tensors(motion):
             return self._run(call, motion)
         from .native_torch import compute  # it needs torch, which arrays do without
 
         if self._native.on_torch().needs_operators(motion):
             return super()._computed(call, motion)
-        return compute(self._calls, call, motion)
+        return compute(self._quickest, call, motion)
 
     def _compute_into(self, call: str, motion: Sequence[Any], into: Sequence[Any]) -> None:
         if not has_tensors(motion):
@@ -53,7 +59,17 @@ class NativeAnswers(Answers):
         if self._native.on_torch().needs_operators(motion):
             super()._compute_into(call, motion, into)
         else:
-            compute(self._calls, call, motion, into)
+            compute(self._quickest, call, motion, into)
+
+    def _quickest(self, call: str, motion: Sequence[Any], into: Sequence[Any] | None) -> Any:
+        """Results for arrays from the compiled module, where there is one."""
+        if not self._compiled:
+            return self._run(call, motion, into)
+        convention = {"propagation": ("closing",), "gradient_propagation": ("gradient",)}.get(call, ())
+        several = call in KINDS
+        out = into if into is None else tuple(into) if several else into[0]
+        answer = getattr(self._compiled, "propagation" if convention else call)(*motion, *convention, out)
+        return answer if several else (answer,)
 
     def _run(self, call: str, motion: Sequence[Any], into: Sequence[Any] | None = None) -> Any:
         """Call C, and tell the compiled module of a function that it has not known so far."""

@@ -52,7 +52,10 @@ class NativeBackend(NumpyBackend):
 
     def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
-        return self.on_torch().arrays(named, n) if has_tensors(named.values()) else super().arrays(named, n)
+        values = named.values()
+        if {np.ndarray}.issuperset(map(type, values)) or not has_tensors(values):
+            return super().arrays(named, n)
+        return self.on_torch().arrays(named, n)
 
     def answers(self, check_finite: bool) -> Answers:
         """The calls of `Dynamics`: C writes the answers, but for tensors of which gradients are recorded."""

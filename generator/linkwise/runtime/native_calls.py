@@ -63,6 +63,7 @@ class NativeCalls:
         self.threads = os.cpu_count() or 1
         self.shapes = answer_shapes(structure)
         self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
+        self._complete = {call: all(sizes) for call, sizes in self.sizes.items()}
         self._widths = {call: sum(sizes) for call, sizes in self.sizes.items()}
         self.learned = has_tensors(parameters.values())
         self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
@@ -81,21 +82,21 @@ class NativeCalls:
             into = [memory((*batch, *shape), kind) for shape in shapes]
         if not count:
             return into
-        sizes = self.sizes[call]
-        read = [a if a.flags.c_contiguous and a.flags.aligned else np.array(a, order="C") for a in motion]
-        written = [a for a, size in zip(into, sizes, strict=True) if size]  # a robot may have none of a kind
         compute = self._functions.get((call, kind)) or self._function(call, kind)
-        p = []
+        read = [a if a.flags.carray else plain(a) for a in motion]
         if self.parameters:
-            p = [self._numbers(kind) if self.learned else self._constants[kind]]
+            read.append(self._numbers(kind) if self.learned else self._constants[kind])
+        sizes = self.sizes[call]
+        # A robot may have none of a kind; its functions then take no array for it.
+        written = into if self._complete[call] else [a for a, size in zip(into, sizes, strict=True) if size]
         parts = min(self.threads, count * self._widths[call] * kind.itemsize // PER_THREAD)
         if parts <= 1:
-            compute(count, *map(place, read), *map(place, p), *map(place, written))
+            compute(count, *[place(a) for a in read], *[place(a) for a in written])
             return into
         width = kind.itemsize
         arrays = [
-            *((address(a), q.shape[-1] * width) for a in read),
-            *((address(a), 0) for a in p),
+            *((address(a), q.shape[-1] * width) for a in read[: len(motion)]),
+            *((address(a), 0) for a in read[len(motion) :]),
             *((address(a), size * width) for a, size in zip(written, filter(None, sizes), strict=True)),
         ]
         self._share(compute, count, arrays, parts)
@@ -141,6 +142,11 @@ class NativeCalls:
                     "the numpy and torch back ends take one per sample"
                 )
         return np.array([_number(self.parameters[name]) for name in self.structure.parameters], dtype=kind)
+
+
+def plain(a: NumberArray) -> NumberArray:
+    """An array, or a copy of it that lies in memory as C reads it."""
+    return a if a.flags.c_contiguous and a.flags.aligned else np.array(a, order="C")
 
 
 def _number(value: Any) -> float:

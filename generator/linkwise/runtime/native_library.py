@@ -49,8 +49,8 @@ def address(array: NumberArray) -> int:
 
 def place(array: NumberArray) -> Any:
     """What ctypes takes for an array's place in memory, quicker than its address where it is writable."""
-    writable: Any = array if array.flags.writeable else None
-    return address(array) if writable is None else Place.from_buffer(writable)
+    buffer: Any = array
+    return Place.from_buffer(buffer) if array.flags.carray else address(array)
 
 
 def memory(shape: tuple[int, ...], kind: "np.dtype[Any]") -> NumberArray:

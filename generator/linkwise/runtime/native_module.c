@@ -46,7 +46,8 @@ struct answer {
 typedef struct {
     PyObject_HEAD
     PyObject *others;
-    PyObject *parameters[2]; /* arrays, empty without parameters */
+    PyObject *parameters[2]; /* arrays */
+    int parametric;          /* whether there is anything in them */
     npy_intp joints, limit;
     struct answer answers[CALLS];
     void *functions[CALLS][2];
@@ -194,7 +195,10 @@ static PyObject *answered(Calls *self, enum call which, PyObject *const *motion,
         if (!is_like(read[m], type, axes + 1, PyArray_DIMS(read[0])))
             return NULL;
     void *const function = self->functions[which][kind];
-    const npy_intp count = PyArray_SIZE(read[0]) / self->joints, width = kind ? sizeof(float) : sizeof(double);
+    npy_intp count = 1;
+    for (int axis = 0; axis < axes; ++axis)
+        count *= PyArray_DIM(read[0], axis);
+    const npy_intp width = kind ? sizeof(float) : sizeof(double);
     if (!function || count > self->limit / (answer->total * width))
         return NULL;
 
@@ -223,7 +227,7 @@ static PyObject *answered(Calls *self, enum call which, PyObject *const *motion,
     int used = 0;
     for (int m = 0; m < motions; ++m)
         arrays[used++] = PyArray_DATA(read[m]);
-    if (PyArray_SIZE((PyArrayObject *)self->parameters[kind]))
+    if (self->parametric)
         arrays[used++] = PyArray_DATA((PyArrayObject *)self->parameters[kind]);
     for (int r = 0; r < answer->results; ++r)
         if (answer->size[r]) /* a robot may have none of a kind */
@@ -373,6 +377,7 @@ static PyObject *calls_new(PyTypeObject *type, PyObject *arguments, PyObject *Py
     for (int kind = 0; kind < 2; ++kind) {
         Py_INCREF(parameters[kind]);
         self->parameters[kind] = parameters[kind];
+        self->parametric = PyArray_SIZE((PyArrayObject *)parameters[kind]) > 0;
     }
     for (int which = 0; which < CALLS; ++which) {
         PyObject *answer = PyDict_GetItemString(answers, NAMES[which]), *kind, *shapes;

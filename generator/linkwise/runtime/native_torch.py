@@ -4,7 +4,7 @@ Forward runs the C code; backward differentiates the closed forms in torch, whic
 """
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import torch
@@ -15,6 +15,11 @@ from .native_build import Sources
 from .native_calls import NativeCalls
 from .native_library import NumberArray
 from .torch_backend import TorchBackend
+
+FLOATS = (torch.float64, torch.float32)
+
+Run = Callable[[str, Sequence[NumberArray], Sequence[NumberArray] | None], Sequence[NumberArray]]
+"""A call by name: motion, and where results go, or None."""
 
 OPERATED = {
     "decomposition": "packed",
@@ -40,7 +45,14 @@ class TorchSide(TorchBackend):
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
-        motion = super().arrays(named, n)
+        motion = list(named.values())
+        q = motion[0]
+        alike = type(q) is Tensor and q.dtype in FLOATS and q.shape[-1:] == (n,)
+        if not alike or not all(
+            type(t) is Tensor and t.dtype == q.dtype and t.shape == q.shape and t.device == q.device
+            for t in motion
+        ):
+            motion = list(super().arrays(named, n))
         if motion[0].device.type != "cpu":
             raise TypeError(
                 f"the tensors lie on {motion[0].device}; this back end takes CPU tensors, torch takes all"
@@ -65,12 +77,13 @@ class TorchSide(TorchBackend):
 
     def _run(self, call: str, q: Tensor, qd: Tensor, qdd: Tensor) -> tuple[Tensor, ...]:
         if not self.needs_operators((q, qd, qdd)):
-            return compute(self.calls, OPERATED[call], (q, qd, qdd))
+            results: tuple[Tensor, ...] = compute(self.calls.run, OPERATED[call], (q, qd, qdd))
+            return results
         names = self.structure.parameters
         values = [self.parameters[name].to(q).reshape(()) for name in names]
         p = torch.stack(values) if values else q.new_empty(0)
-        results = self.operators[call](q, qd, qdd, p)
-        return results if isinstance(results, tuple) else (results,)
+        operated = self.operators[call](q, qd, qdd, p)
+        return operated if isinstance(operated, tuple) else (operated,)
 
     def needs_operators(self, motion: Sequence[Tensor]) -> bool:
         """Whether torch has to know what is computed: a gradient is recorded, or a program compiled."""
@@ -79,15 +92,13 @@ class TorchSide(TorchBackend):
         return torch.is_grad_enabled() and any(t.requires_grad for t in (*motion, *self._given))
 
 
-def compute(
-    calls: NativeCalls, call: str, motion: Sequence[Tensor], into: Sequence[Tensor] | None = None
-) -> tuple[Tensor, ...]:
-    """Results of the C code as tensors that share its memory."""
+def compute(run: Run, call: str, motion: Sequence[Tensor], into: Sequence[Tensor] | None = None) -> Any:
+    """Results of the C code, which `run` calls with arrays, as tensors that share its memory."""
     arrays = [as_numbers(t) for t in motion]
-    if into is not None:
-        calls.run(call, arrays, [as_numbers(t) for t in into])
-        return tuple(into)
-    return tuple(torch.from_numpy(result) for result in calls.run(call, arrays))
+    if into is None:
+        return tuple(torch.from_numpy(result) for result in run(call, arrays, None))
+    run(call, arrays, [as_numbers(t) for t in into])
+    return into
 
 
 def as_numbers(t: Tensor) -> NumberArray:
@@ -112,7 +123,7 @@ def _define(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
 
     def forward(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
         present = NativeCalls(structure, sources.directory, values(p.detach()))
-        return _bare(compute(present, OPERATED[call], (q, qd, qdd)))
+        return _bare(compute(present.run, OPERATED[call], (q, qd, qdd)))
 
     def fake(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
         return _bare(tuple(q.new_empty((*q.shape[:-1], size)) for size in sizes))

@@ -45,9 +45,10 @@ class NumpyBackend:
         arrays = {name: a.astype(kind, copy=False) for name, a in read.items()}
         check_axes(arrays, n)
         try:
-            return np.broadcast_arrays(*arrays.values())
+            shape = np.broadcast_shapes(*(a.shape for a in arrays.values()))
         except ValueError:
             raise no_common_shape(arrays, n) from None
+        return [a if a.shape == shape else np.broadcast_to(a, shape) for a in arrays.values()]
 
     def answers(self, check_finite: bool) -> Answers:
         """The calls of `Dynamics`."""

@@ -16,10 +16,12 @@ def accepted(
     shapes: Sequence[tuple[int, ...]],
     motion: Mapping[str, Any],
     parameters: Iterable[Any],
+    contiguous: bool,
 ) -> list[Any]:
     """The arrays or tensors of `out` in order, which an answer of these shapes a sample may be written to.
 
-    fields: names of the results where there are several; motion: what is read, in one shape (..., n).
+    fields: names of the results where there are several; motion: what is read, in one shape (..., n);
+    contiguous: whether places must be so, in C's order.
     Raises ValueError or TypeError, which names what cannot be written to and why.
     """
     like = next(iter(motion.values()))
@@ -28,6 +30,8 @@ def accepted(
     named = dict(zip((f"out.{f}" for f in fields), out, strict=True)) if fields else {"out": out}
     for (name, one), shape in zip(named.items(), shapes, strict=True):
         _check(name, one, (*like.shape[:-1], *shape), like)
+        if contiguous and not _is_contiguous(one):
+            raise ValueError(f"{name} is not contiguous; give what empty() makes, in C's order")
     if has_tensors([like]) and _recorded([*motion.values(), *parameters]):
         raise TypeError(
             "out keeps no gradient, which the motion or a parameter requires; leave it away, or call under "
@@ -54,12 +58,14 @@ def _check(name: str, one: Any, shape: tuple[int, ...], like: Any) -> None:
     if tensor:
         if one.requires_grad:
             raise TypeError(f"{name} requires a gradient; give {name}.detach()")
-        if not one.is_contiguous() or one.is_neg():
-            raise ValueError(f"{name} is not contiguous; give a tensor as torch.empty makes it")
-    elif not (one.flags.c_contiguous and one.flags.aligned):
-        raise ValueError(f"{name} is not contiguous; give an array as np.empty makes it")
     elif not one.flags.writeable:
         raise ValueError(f"{name} is read-only; give an array that may be written to")
+
+
+def _is_contiguous(one: Any) -> bool:
+    if isinstance(one, np.ndarray):
+        return one.flags.c_contiguous and one.flags.aligned
+    return bool(one.is_contiguous()) and not one.is_neg()
 
 
 def _recorded(tensors: Iterable[Any]) -> bool:

@@ -1,0 +1,183 @@
+"""The compiled module that calls C says to the bit what ctypes says, and takes nothing that it should not."""
+
+import gc
+import sys
+import weakref
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import DATA, needs_compiler
+
+pytestmark = needs_compiler
+
+TURNTABLE = str(DATA / "turntable.py")
+CALLS: dict[str, Callable[..., Any]] = {
+    "packed": lambda r, q, qd, qdd: r.packed(q, qd, qdd),
+    "packed_torque": lambda r, q, qd, qdd: r.packed_torque(q, qd, qdd),
+    "partial_torque": lambda r, q, qd, qdd: r.partial_torque(q, qd, qdd),
+    "inverse_dynamics": lambda r, q, qd, qdd: r.inverse_dynamics(q, qd, qdd),
+    "coefficients": lambda r, q, qd, qdd: r.coefficients(q, qd),
+    "propagation": lambda r, q, qd, qdd: r.propagation(q, qd, qdd),
+    "gradient": lambda r, q, qd, qdd: r.propagation(q, qd, qdd, convention="gradient"),
+    "position_gradient": lambda r, q, qd, qdd: r.position_gradient(q, qd, qdd),
+}
+
+
+def module_of(package: ModuleType) -> Any:
+    return import_module(f"{package.__name__}.runtime.native_module")
+
+
+@contextmanager
+def without(package: ModuleType, **instead: Any) -> Iterator[None]:
+    """The package's module for Python made anew, with something else in place of what it finds."""
+    module = module_of(package)
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in instead.items():
+            patch.setattr(module, name, value)
+        module.compiled_calls.cache_clear()
+        yield
+    module.compiled_calls.cache_clear()
+
+
+def is_compiled(robot: Any) -> bool:
+    return type(robot._answers.of_arrays).__name__ == "Calls"
+
+
+def parts(answer: Any) -> tuple[np.ndarray, ...]:
+    return tuple(answer) if isinstance(answer, tuple) else (answer,)
+
+
+@pytest.fixture(scope="module")
+def planar3(package_of: Callable[[str], ModuleType]) -> ModuleType:
+    package = package_of("planar3")
+    if not module_of(package).headers():
+        pytest.skip("no headers of Python")
+    return package
+
+
+@pytest.mark.parametrize("robot", ["planar3", "planar3 symbolic", "torso", TURNTABLE])
+def test_both_bindings_say_the_same_to_the_bit(robot: str, package_of: Callable[[str], ModuleType]) -> None:
+    package = package_of(robot)
+    compiled = package.load("native")
+    with without(package, headers=lambda: ()):
+        through_ctypes = package.load("native")
+    assert is_compiled(compiled) == bool(module_of(package).headers())
+    assert not is_compiled(through_ctypes)
+    draw = np.random.default_rng(0)
+    for dtype, batch in (
+        ("f8", ()),
+        ("f8", (1,)),
+        ("f4", (2, 3)),
+        ("f8", (37,)),
+        ("f4", (0,)),
+        ("f8", (9000,)),
+    ):
+        motion = draw.uniform(-2.0, 2.0, (3, *batch, compiled.n)).astype(dtype)
+        for _ in range(2):  # what is compiled at the first call is called otherwise from then on
+            for name, call in CALLS.items():
+                one, other = (call(r, *motion) for r in (compiled, through_ctypes))
+                assert type(one) is type(other)
+                for a, b in zip(parts(one), parts(other), strict=True):
+                    assert (a.dtype, a.shape) == (b.dtype, b.shape), name
+                    np.testing.assert_array_equal(a, b, err_msg=name)
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_zeros_and_values_are_those_of_numpy(call: str, planar3: ModuleType) -> None:
+    motion = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 21, 3))
+    answers = (CALLS[call](planar3.load(backend), *motion) for backend in ("native", "numpy"))
+    for a, b in zip(*map(parts, answers), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-12)
+        np.testing.assert_array_equal(a == 0.0, b == 0.0)
+
+
+NO_HEADERS = {"headers": lambda: ()}
+NO_COMPILER = {"extension": lambda *_: (_ for _ in ()).throw(RuntimeError("cc failed"))}
+
+
+@pytest.mark.parametrize("instead", [NO_HEADERS, NO_COMPILER], ids=["no headers", "no compiler"])
+def test_without_it_ctypes_answers_silently(
+    instead: dict[str, Any], planar3: ModuleType, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with without(planar3, **instead):
+        robot = planar3.load("native")
+    assert not is_compiled(robot)
+    robot.partial_torque(*np.ones((3, 3)))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_is_not_plain_is_read_as_by_the_other_back_ends(planar3: ModuleType) -> None:
+    robot, reference = planar3.load("native"), planar3.load("numpy")
+    q, qd, qdd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 6, 3))
+    frozen = q.copy()
+    frozen.flags.writeable = False
+    unusual = {
+        "strides": (np.asfortranarray(q), qd[::-1][::-1], qdd),
+        "bytes": (q.astype(">f8"), qd, qdd),
+        "offset": (np.frombuffer(b"x" + q.tobytes(), np.uint8)[1:].view("f8").reshape(6, 3), qd, qdd),
+        "lists": (q, qd.tolist(), qdd),
+        "shapes": (q, qd[0], qdd),
+        "dtypes": (q, qd.astype("f4"), qdd),
+        "subclass": (q.view(np.matrix), qd, qdd),
+        "read-only": (frozen, qd, qdd),
+    }
+    for name, motion in unusual.items():
+        given = [np.asarray(m) if name == "subclass" else m for m in motion]
+        expected = reference.partial_torque(*given)
+        np.testing.assert_allclose(
+            robot.partial_torque(*motion), expected, rtol=1e-12, atol=1e-12, err_msg=name
+        )
+
+
+def test_nothing_is_leaked_or_freed_twice(planar3: ModuleType) -> None:
+    robot = planar3.load("native")
+    q, qd, qdd = motion = [np.ones((5, 3)) for _ in range(3)]
+    out = robot.packed(*motion)
+    kinds = [type(out), type(robot.propagation(*motion))]
+
+    def counts() -> list[int]:
+        gc.collect()
+        return [sys.getrefcount(o) for o in (*motion, *out, out, None, *kinds)]
+
+    before = counts()
+    for _ in range(300):
+        for call in CALLS.values():
+            call(robot, *motion)
+        robot.packed(*motion, out=out)
+        with pytest.raises(ValueError, match="no convention 'half'"):
+            robot.propagation(*motion, "half")
+        with pytest.raises(ValueError, match="qd has shape"):
+            robot.partial_torque(q, qd[:, :2], qdd)
+    assert [abs(a - b) < 50 for a, b in zip(counts(), before, strict=True)] == [True] * len(before)
+
+
+def test_a_robot_that_nobody_holds_is_gone(planar3: ModuleType) -> None:
+    robot = planar3.load("native")
+    robot.packed(*np.ones((3, 3)))
+    gone = weakref.ref(robot.backend)
+    del robot
+    gc.collect()
+    assert gone() is None
+
+
+def test_threads_call_side_by_side(planar3: ModuleType) -> None:
+    robot = planar3.load("native")
+    motion = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 400, 3))
+    expected = robot.propagation(*motion)
+    with ThreadPoolExecutor(4) as pool:
+        for answer in pool.map(lambda _: robot.propagation(*motion), range(50)):
+            for a, b in zip(answer, expected, strict=True):
+                np.testing.assert_array_equal(a, b)
+
+
+def test_memory_that_is_not_there_is_an_error(planar3: ModuleType) -> None:
+    few = np.zeros((1, 3))
+    many = np.broadcast_to(few, (1 << 56, 3))
+    with pytest.raises((MemoryError, ValueError)):
+        planar3.load("native").propagation(many, many, many)
