@@ -1,8 +1,10 @@
 // Times Pinocchio: rnea() of the whole robot, and the full decomposition by its best recipe: for each link j the chain
 // of the joints that move it, with link j's inertia alone, through rnea, crba, computeCoriolisMatrix and
-// computeGeneralizedGravity. Standard input: joints and gravity, then a line a joint:
+// computeGeneralizedGravity; and tau_ij alone, by its best recipe for that: computeJointTorqueRegressor(), each link's block
+// times its ten parameters. Standard input: joints and gravity, then a line a joint:
 // parent kind rotation(9) translation(3) mass com(3) inertia(9). Only headers are used, so that the robot's types
-// have this compiler's alignment. Prints "name nanoseconds" lines, then "tau" and each tau_ij at q = qd = qdd = 0.1 (i + 1).
+// have this compiler's alignment. Prints "name nanoseconds" lines, then "tau" and "split": each tau_ij by either recipe at
+// q = qd = qdd = 0.1 (i + 1).
 #include <chrono>
 #include <cstdio>
 #include <iostream>
@@ -16,6 +18,7 @@
 #endif
 
 #include <pinocchio/algorithm/crba.hpp>
+#include <pinocchio/algorithm/regressor.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 
 using namespace pinocchio;
@@ -154,11 +157,30 @@ int main()
             computeGeneralizedGravity(c.model, c.data, c.q[s]);
         }
     }));
+    std::vector<Eigen::Matrix<double, 10, 1>> bodies;
+    for (int j = 0; j < n; ++j)
+        bodies.push_back(whole.model.inertias[j + 1].toDynamicParameters());
+    Eigen::MatrixXd split = Eigen::MatrixXd::Zero(n, n);
+    const auto regress = [&](int s) {
+        const auto &y = computeJointTorqueRegressor(whole.model, whole.data, whole.q[s], whole.v[s], whole.a[s]);
+        for (int j = 0; j < n; ++j)
+            split.col(j).head(j + 1).noalias() = y.block(0, 10 * j, j + 1, 10) * bodies[j];
+    };
+    std::printf("regressor %.5g\n", best(regress));
+    regress(0);
     std::printf("tau");
     for (Chain &c : chains) {
         const Eigen::VectorXd &tau = rnea(c.model, c.data, c.q[0], c.v[0], c.a[0]);
         for (Eigen::Index i = 0; i < tau.size(); ++i)
             std::printf(" %.17g", tau[i]);
+    }
+    std::printf("\nsplit");
+    for (int j = 0; j < n; ++j) {
+        std::vector<int> path;
+        for (int i = j; i >= 0; i = parts[i].parent)
+            path.insert(path.begin(), i);
+        for (int i : path)
+            std::printf(" %.17g", split(i, j));
     }
     std::printf("\n");
 }

@@ -15,7 +15,10 @@ class Case:
     name: str
     robot: Callable[[Path], str]
     options: tuple[str, ...] = ()
-    casadi: bool = False
+    kernel: str | None = None
+    """What `generate --kernel` is told; where there is no such choice, the robot is left out."""
+    casadi: bool = True
+    peers: bool = True
     every_backend: bool = False
     """Time the slow back ends at the largest batch, too."""
 
@@ -71,10 +74,13 @@ def chain_file(joints: int) -> Callable[[Path], str]:
 FINGERS = ("--lock", "panda_finger_joint1=0", "--lock", "panda_finger_joint2=0")
 
 CASES = (
-    Case("planar3", built_in("planar3"), casadi=True, every_backend=True),
-    Case("panda", shipped("panda.urdf"), FINGERS, casadi=True, every_backend=True),
+    Case("planar3", built_in("planar3"), every_backend=True),
+    Case("panda", shipped("panda.urdf"), FINGERS, every_backend=True),
+    Case("panda_loops", shipped("panda.urdf"), FINGERS, kernel="loops", peers=False),
     Case("puma560", built_in("puma560")),
     Case("planar10", built_in("planar10")),
     Case("chain20", chain_file(20)),
+    Case("chain20_straight", chain_file(20), kernel="straight", peers=False),
     Case("talos", shipped("talos_reduced.urdf")),
+    Case("chain60", chain_file(60), kernel="auto", casadi=False),
 )

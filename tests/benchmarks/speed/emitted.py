@@ -1,5 +1,6 @@
 """The emitted C, called from C."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ MOST_BYTES = 0.6e9
 
 @dataclass(frozen=True)
 class Figure:
-    """Nanoseconds a sample of the full decomposition."""
+    """Nanoseconds a sample: of the full decomposition, or of another call."""
 
     robot: str
     through: str
@@ -21,31 +22,44 @@ class Figure:
     batch: int
     threads: int
     ns: float
+    call: str = "packed"
+
+
+def least(rounds: Iterable[Sequence[Figure]]) -> list[Figure]:
+    """The least of several rounds, figure by figure."""
+    return [min(same, key=lambda figure: figure.ns) for same in zip(*rounds, strict=True)]
 
 
 def batches(package: Package, width: int, largest: int) -> list[int]:
-    """1, 1,024 and `largest`, or as many as there is room for."""
+    """1, 256, 1,024 and `largest`, or as many as there is room for."""
     while largest * package.outputs * width > MOST_BYTES:
         largest //= 2
-    return sorted({1, 1024, largest})
+    return sorted({1, 256, min(1024, largest), largest})
 
 
-def measure(package: Package, work: Path, largest: int, seconds: float) -> list[Figure]:
-    """Time both layouts in both number types, alone and with two threads."""
-    figures = []
-    for dtype, (real, suffix, width) in TYPES.items():
+def programs(package: Package, work: Path) -> dict[str, Path]:
+    """Programs that time both layouts, by number type."""
+    made = {}
+    for dtype, (real, suffix, _) in TYPES.items():
         library = package.libraries[real]
-        program = work / f"{package.name}_{dtype}"
+        made[dtype] = work / f"{package.name}_{dtype}"
         run(
             [
                 compiler() or "cc", "-std=c99", *build_flags(), f"-DROBOT={package.name}",
                 f"-DUPPER={package.name.upper()}", f"-DREAL={real}", f"-DSUFFIX={suffix}",
                 f"-DWIDTH={suffix.upper()}", "-include", str(package.directory / "c" / f"{package.name}.h"),
                 str(PEERS / "emitted.c"), str(library), f"-Wl,-rpath,{library.parent}",
-                "-lpthread", "-lm", "-o", str(program),
+                "-lpthread", "-lm", "-o", str(made[dtype]),
             ]
         )  # fmt: skip
-        sizes = [str(b) for b in batches(package, width, largest)]
+    return made
+
+
+def measure(package: Package, made: dict[str, Path], largest: int, seconds: float) -> list[Figure]:
+    """Time both layouts in both number types, alone and with two threads."""
+    figures = []
+    for dtype, program in made.items():
+        sizes = [str(b) for b in batches(package, TYPES[dtype][2], largest)]
         for line in run([str(program), str(seconds), *sizes]).splitlines():
             layout, batch, threads, ns = line.split()
             figures.append(Figure(package.name, "C", dtype, layout, int(batch), int(threads), float(ns)))

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -47,9 +48,13 @@ class Package:
         return importlib.import_module(self.name)
 
 
-def prepare(case: Case, work: Path) -> Package:
-    """Generate with all back ends in a process of its own, then compile into an empty cache."""
+def prepare(case: Case, work: Path, kernel: str | None = None) -> Package:
+    """Generate with all back ends in a process of its own, then compile into an empty cache.
+
+    kernel: what `generate --kernel` is told, if it is
+    """
     command = [sys.executable, "-m", "linkwise", "generate", case.robot(work), *case.options]
+    command += ["--kernel", kernel] if kernel else []
     start = time.perf_counter()
     subprocess.run([*command, "--name", case.name, "--out", str(work)], check=True, capture_output=True)
     generated = time.perf_counter() - start
@@ -91,12 +96,21 @@ def compiler() -> str | None:
     return next((c for c in ("cc", "gcc", "clang") if shutil.which(c)), None)
 
 
-def run(command: list[str], given: str | None = None) -> str:
-    """Run a program and return what it prints; its complaint goes into the error."""
-    done = subprocess.run(command, input=given, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise RuntimeError(f"{Path(command[0]).name} failed ({done.returncode}): {done.stderr[:500]}")
-    return done.stdout
+def run(command: list[str], given: str | None = None, limit: float | None = None) -> str:
+    """Run a program and return what it prints; its complaint goes into the error.
+
+    Past the `limit` in seconds it is ended, with what it started, and subprocess.TimeoutExpired raised.
+    """
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, start_new_session=True, **pipes) as process:
+        try:
+            printed, complaint = process.communicate(given, timeout=limit)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
+    if process.returncode:
+        raise RuntimeError(f"{Path(command[0]).name} failed ({process.returncode}): {complaint[:500]}")
+    return printed
 
 
 def pairs(text: str) -> dict[str, float]:

@@ -1,8 +1,7 @@
-"""Pinocchio beside us: rnea() of the robot, and the full decomposition by its best recipe."""
+"""Pinocchio beside us: rnea() of the robot, the full decomposition and tau_ij alone by its best recipes."""
 
 import shutil
-import sysconfig
-import time
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from speed.package import PEERS, Package, build_flags, run
+from speed.rounds import by_turns
 
 BOOST = (
     "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
@@ -23,28 +23,43 @@ BOOST = (
 
 @dataclass(frozen=True)
 class Peer:
-    """Nanoseconds for one sample, how they were measured, and the largest difference from our torques."""
+    """Nanoseconds for one sample, how they were measured, and the largest difference from our torques.
+
+    regressor: tau_ij alone, by computeJointTorqueRegressor and each link's ten parameters
+    """
 
     how: str
     rnea: float
     decomposition: float
+    regressor: float
     difference: float
+
+    def best_of(self, other: "Peer | None") -> "Peer":
+        """The least of two rounds."""
+        if other is None:
+            return self
+        times = (min(a, b) for a, b in zip(self.times, other.times, strict=True))
+        return Peer(self.how, *times, max(self.difference, other.difference))
+
+    @property
+    def times(self) -> tuple[float, float, float]:
+        """The three figures."""
+        return self.rnea, self.decomposition, self.regressor
 
 
 def headers() -> list[Path] | None:
     """Directories with Pinocchio's, Boost's and Eigen's headers, if all are there."""
-    packages = Path(sysconfig.get_paths()["purelib"])
-    prefix = packages / "cmeel.prefix" / "include"
+    packages = [Path(folder) for folder in sys.path]
+    prefixes = [folder / "cmeel.prefix" / "include" for folder in packages]
     eigen = [
-        prefix / "eigen3",
-        packages / "casadi" / "include" / "eigen3",
+        *(prefix / "eigen3" for prefix in prefixes),
+        *(folder / "casadi" / "include" / "eigen3" for folder in packages),
         Path("/usr/include/eigen3"),
         Path("/usr/local/include/eigen3"),
     ]
+    prefix = next((p for p in prefixes if (p / "pinocchio").is_dir() and (p / "boost").is_dir()), None)
     found = next((path for path in eigen if (path / "Eigen" / "Core").exists()), None)
-    if found is None or not (prefix / "pinocchio").is_dir() or not (prefix / "boost").is_dir():
-        return None
-    return [prefix, found]
+    return None if prefix is None or found is None else [prefix, found]
 
 
 def binary(work: Path) -> Path | None:
@@ -72,9 +87,10 @@ def measure(package: Package, work: Path) -> Peer:
     ours = package.module().load("numpy").packed_torque(*np.tile(0.1 * np.arange(1, n + 1), (3, 1)))
     if program is None:
         return from_python(package, ours)
-    rnea, decomposition, tau = run([str(program)], description(package)).splitlines()
-    difference = np.abs(np.array(tau.split()[1:], dtype=float) - ours).max()
-    return Peer("C++", float(rnea.split()[1]), float(decomposition.split()[1]), float(difference))
+    lines = dict(line.split(" ", 1) for line in run([str(program)], description(package)).splitlines())
+    theirs = [np.array(lines[name].split(), dtype=float) for name in ("tau", "split")]
+    difference = max(float(np.abs(tau - ours).max()) for tau in theirs)
+    return Peer("C++", *(float(lines[name]) for name in ("rnea", "decomposition", "regressor")), difference)
 
 
 def description(package: Package) -> str:
@@ -126,17 +142,35 @@ def from_python(package: Package, ours: Any) -> Peer:
             pin.computeCoriolisMatrix(model, store, y, y)
             pin.computeGeneralizedGravity(model, store, y)
 
+    split = regressor(package)
     tau = np.concatenate([pin.rnea(*part, y, y, y) for part, y in zip(parts, motions, strict=True)])
-    rnea = least(lambda: pin.rnea(whole, data, x, x, x))
-    return Peer("Python", rnea, least(decomposition), float(np.abs(tau - ours).max()))
+    by_regressor = np.concatenate([split()[path, j] for j, path in enumerate(paths)])
+    difference = max(float(np.abs(found - ours).max()) for found in (tau, by_regressor))
+    calls = {"rnea": lambda: pin.rnea(whole, data, x, x, x), "all": decomposition, "regressor": split}
+    ns = by_turns(calls, 0.3)
+    return Peer("Python", ns["rnea"], ns["all"], ns["regressor"], difference)
 
 
-def least(call: Callable[[], Any]) -> float:
-    """Least nanoseconds a call of 25 times 50 calls."""
-    found = []
-    for _ in range(25):
-        start = time.perf_counter_ns()
-        for _ in range(50):
-            call()
-        found.append((time.perf_counter_ns() - start) / 50)
-    return min(found)
+def calls_from_python(package: Package) -> dict[str, Callable[[], Any]]:
+    """Pinocchio's calls for one sample from Python: rnea, the sums, and its recipe for tau_ij."""
+    import pinocchio as pin
+
+    whole = chain(package, list(range(package.sizes["JOINTS"])), None)
+    data, x = whole.createData(), 0.1 * np.arange(1, whole.nv + 1)
+    return {"rnea": lambda: pin.rnea(whole, data, x, x, x), "regressor": regressor(package)}
+
+
+def regressor(package: Package) -> Callable[[], Any]:
+    """computeJointTorqueRegressor times each link's ten parameters: every tau_ij, (n, N)."""
+    import pinocchio as pin
+
+    whole = chain(package, list(range(package.sizes["JOINTS"])), None)
+    data, n = whole.createData(), whole.nv
+    x = 0.1 * np.arange(1, n + 1)
+    bodies = np.stack([whole.inertias[j + 1].toDynamicParameters() for j in range(n)])
+
+    def split() -> Any:
+        found = pin.computeJointTorqueRegressor(whole, data, x, x, x)
+        return (found.reshape(n, n, 10) * bodies).sum(-1)
+
+    return split

@@ -1,65 +1,113 @@
-"""The generated package, called from Python: what each back end costs."""
+"""The generated package, called from Python beside Pinocchio: what each back end and call costs."""
 
-import time
-from collections.abc import Callable
+import inspect
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from speed import pinocchio_peer
 from speed.emitted import MOST_BYTES, Figure
 from speed.package import Package
+from speed.rounds import by_turns
 
-SLOW = {"numpy": 1024, "torch": 1024, "autograd": 1024}
-"""Largest batch of the back ends that walk through the operations one by one."""
-
-
-def best(call: Callable[[], Any], seconds: float) -> float:
-    """Least time of one call, in nanoseconds: of a few calls, or of as many as the seconds hold."""
-    call()
-    start = time.perf_counter_ns()
-    call()
-    least = time.perf_counter_ns() - start
-    inner = max(1, int(2e5 / least))
-    left = max(2, int(1e9 * seconds / (inner * least)))
-    for _ in range(min(left, 2000)):
-        start = time.perf_counter_ns()
-        for _ in range(inner):
-            call()
-        least = min(least, (time.perf_counter_ns() - start) // inner)
-    return float(least)
+DENSE = ("partial_torque", "coefficients", "propagation")
+"""Calls whose answers are written with their zeros."""
+Key = tuple[str, str, int, int, str]
+"""Through what, number type, batch, threads, call."""
 
 
 def measure(
     package: Package, largest: int, seconds: float, everything: bool
-) -> tuple[list[Figure], list[str]]:
-    """Time `packed` on every back end; also returns notes about those that are not there."""
+) -> tuple[list[Figure], dict[str, float]]:
+    """Time the back ends, and for one sample Pinocchio's own calls, by turns; of these, nanoseconds by name.
+
+    everything: the slow back ends at the largest batch, too
+    """
     import torch
 
-    figures, notes = [], []
+    torch.set_num_threads(1)
+    figures: list[Figure] = []
+    peers: dict[str, float] = {}
+    for batch in sorted({1, min(1024, largest), largest}):
+        slow = batch <= 1024 or everything
+        calls = {key: call for robots in loaded(package) for key, call in timed(package, robots, batch, slow)}
+        theirs: dict[str, Callable[[], Any]] = {}
+        if batch == 1:
+            try:
+                theirs = pinocchio_peer.calls_from_python(package)
+            except (ImportError, ValueError):
+                theirs = {}
+        named = {str(key): call for key, call in calls.items()}
+        found = by_turns({**named, **theirs}, seconds)
+        peers |= {name: found[name] for name in theirs}
+        for (through, dtype, size, threads, call), name in zip(calls, named, strict=True):
+            ns = found[name] / size
+            figures.append(Figure(package.name, through, dtype, "rows", size, threads, ns, call))
+    return figures, peers
+
+
+def loaded(package: Package) -> Iterator[tuple[str, Any]]:
+    """Back ends by what they are called here, those with a choice of kernels once for each."""
     module = package.module()
-    for backend in ("native", "numpy", "torch", "autograd"):
-        if backend not in module.BACKENDS:
-            notes.append(f"{package.name}: no back end {backend} in this package")
-            continue
-        robot = module.load(backend)
-        top = largest if backend == "native" or (everything and backend != "autograd") else SLOW[backend]
-        for dtype in ("float64", "float32"):
-            for batch in sorted({1, min(1024, top), top}):
-                if batch * package.outputs * 8 > MOST_BYTES:
+    choice = "kernel" in inspect.signature(module.load).parameters
+    for backend in module.BACKENDS:
+        if choice and backend in ("numpy", "torch"):
+            for kernel in ("straight", "rule"):
+                try:
+                    robot = module.load(backend, kernel=kernel)
+                except ValueError:  # a package may have one of them only
                     continue
-                for threads in (1, 2) if backend == "native" and batch > 1 else (1,):
-                    torch.set_num_threads(threads)
-                    if backend == "native":
-                        robot.backend.threads = threads
-                    motion = sample(package, batch, dtype)
-                    if robot.backend.takes_tensors:
-                        motion = [torch.from_numpy(a) for a in motion]
-                    ns = best(lambda robot=robot, motion=motion: robot.packed(*motion), seconds) / batch
-                    figures.append(Figure(package.name, backend, dtype, "rows", batch, threads, ns))
-    return figures, notes
+                yield (backend if kernel == "straight" else f"{backend} {kernel}"), robot
+        else:
+            yield backend, module.load(backend)
 
 
-def sample(package: Package, batch: int, dtype: str) -> list[Any]:
-    """A random motion."""
+def timed(
+    package: Package, named: tuple[str, Any], batch: int, slow: bool
+) -> Iterator[tuple[Key, Callable[[], Any]]]:
+    """Calls of one back end at a batch: all on `native`, `packed` on the others."""
+    through, robot = named
+    native = through == "native"
+    if not native and (not slow or (through == "autograd" and batch > 1024)):
+        return
+    for dtype, width in (("float64", 8), ("float32", 4)):
+        motion = sample(package, batch, dtype, robot.backend.takes_tensors)
+        for call in ("packed", *DENSE) if native else ("packed",):
+            if batch * width * values(package, call) > MOST_BYTES or (call in DENSE and dtype == "float32"):
+                continue
+            method = getattr(robot, call)
+            work = partial(method, *motion[: 2 if call == "coefficients" else 3])
+            if "out" in inspect.signature(method).parameters and call in DENSE and batch > 1:
+                yield (through, dtype, batch, 1, f"{call} out"), partial(work, out=work())
+            if not native:
+                yield (through, dtype, batch, 1, call), work
+                continue
+            for threads in (1, 2) if batch > 1 and call == "packed" else (1,):
+                yield (through, dtype, batch, threads, call), partial(on_threads, robot, threads, work)
+
+
+def on_threads(robot: Any, threads: int, work: Callable[[], Any]) -> Any:
+    """A call of the native back end on so many threads."""
+    robot.backend.threads = threads
+    return work()
+
+
+def values(package: Package, call: str) -> int:
+    """Numbers of one sample that a call writes."""
+    n, links = package.sizes["JOINTS"], len(package.manifest["links"])
+    dense = n * links * (2 * n + 1)
+    return {"packed": package.outputs, "partial_torque": n * links}.get(call, dense)
+
+
+def sample(package: Package, batch: int, dtype: str, tensors: bool) -> list[Any]:
+    """A random motion; one sample is rows of no batch."""
     draw = np.random.default_rng(1)
-    return [draw.uniform(-2, 2, (batch, package.sizes["JOINTS"])).astype(dtype) for _ in range(3)]
+    shape = (batch, package.sizes["JOINTS"]) if batch > 1 else (package.sizes["JOINTS"],)
+    motion = [draw.uniform(-2, 2, shape).astype(dtype) for _ in range(3)]
+    if not tensors:
+        return motion
+    import torch
+
+    return [torch.from_numpy(a) for a in motion]

@@ -15,14 +15,12 @@ def markdown(results: Results) -> str:
         table(PACKAGE_HEAD, packages(results)),
         "## Emitted C, nanoseconds a sample",
         table(
-            ["robot", "type", "layout", "threads", *BATCHES, "of arithmetic", "of memory"], emitted(results)
+            ["robot", "type", "layout", "threads", *BATCHES, "of arithmetic", "of the limit"],
+            emitted(results),
         ),
-        f"Limits, one thread: {results.limits['flops']:.0f} GFlop/s in float64,"
-        f" {results.limits['flopsf']:.0f} in float32, additions and"
-        " multiplications apart; of memory: of filling an array of the same bytes."
-        " Shares at the largest batch, of arithmetic also at 1,024.",
-        "## Back ends from Python, nanoseconds a sample",
-        table(["robot", "back end", "type", "threads", *BATCHES], backends(results)),
+        limits_text(results),
+        "## Calls from Python, nanoseconds a sample",
+        table(["robot", "back end", "call", "type", "threads", *BATCHES], backends(results)),
         "## Peers, float64, one thread, nanoseconds a sample",
         table(PEER_HEAD, peers(results)),
         "## Targets",
@@ -30,6 +28,43 @@ def markdown(results: Results) -> str:
         *[f"Note: {note}" for note in results.notes],
     ]
     return "\n\n".join(parts)
+
+
+def limits_text(results: Results) -> str:
+    """What shares are shares of."""
+    mix = results.mix
+    given = f"{mix.fused:.0%} fused operations and {mix.products:.0%} products" if mix else "no mix"
+    return (
+        f"Limits, one thread: {results.limits['flops']:.0f} GFlop/s in float64,"
+        f" {results.limits['flopsf']:.0f} in float32, of instructions that are {given}, as in Panda's kernels,"
+        " the others being sums; memory: of writing the results past the cache or through it, whatever is"
+        " faster. Shares of arithmetic at each batch, of the lower of the two limits at the largest."
+    )
+
+
+HISTORY = {
+    "in the cache / arithmetic": "Panda, batch 1,024 / arithmetic limit",
+    "Pinocchio / batch": "Panda, Pinocchio's full decomposition / batch 1,024",
+    "CasADi / batch": "Panda, CasADi's C / batch 1,024",
+    "Pinocchio / one": "Panda, Pinocchio's full decomposition / one sample",
+    "large, of the limit": "Panda, float64, blocks, batch",
+    "τ from Python / rnea": "Panda, native from Python, one sample, partial_torque",
+    "propagation / rnea": "Panda, native from Python, one sample, propagation",
+    "Pinocchio / 20 joints": "chain20, Pinocchio's full decomposition / batch 256",
+    "autograd / torch": "Panda, batch 1,024, autograd",
+}
+"""Columns of docs/speed.md, and the targets that they show."""
+
+
+def history(results: Results) -> str:
+    """A line for docs/speed.md: when, what, on which machine, and ratios."""
+    machine = results.machine
+    start = [f"{machine[key]}" for key in ("date", "linkwise")]
+    shown = []
+    for begin in HISTORY.values():
+        measured = next(t.measured for t in targets(results) if t.what.startswith(begin))
+        shown.append("-" if measured is None else f"{measured:,.3g}")
+    return "| " + " | ".join([*start, f"{machine['processor']}, {machine['vectors']}", *shown]) + " |"
 
 
 PACKAGE_HEAD = [
@@ -43,10 +78,10 @@ PACKAGE_HEAD = [
     "code kB",
 ]
 PEER_HEAD = [
-    "robot", "Pinocchio through", "rnea", "its full decomposition", "CasADi C", "ours, one", "ours, 1,024",
-    "Pinocchio/ours", "one sample", "largest difference",
+    "robot", "Pinocchio through", "rnea", "its τ_ij", "its full decomposition", "CasADi C", "ours, one",
+    "ours, 1,024", "Pinocchio/ours", "one sample", "largest difference",
 ]  # fmt: skip
-BATCHES = ["1", "1,024", "largest"]
+BATCHES = ["1", "256", "1,024", "largest"]
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -83,29 +118,35 @@ def emitted(results: Results) -> Iterator[list[str]]:
                     key = (p["robot"], "C", dtype, layout)
                     figures = [Figure(*key, b, threads, ns) for b, ns in by_batch.items() if b > 1]
                     if figures:
-                        shares = [f"{results.arithmetic_share(f):.0%}" for f in figures]
-                        yield [
-                            p["robot"], dtype, layout, str(threads), *cells(by_batch),
-                            ", ".join(shares), f"{results.memory_share(figures[-1]):.0%}",
-                        ]  # fmt: skip
+                        shares = [share(results.arithmetic(f), f.ns) for f in figures]
+                        whole = share(results.limit(figures[-1]), figures[-1].ns) if threads == 1 else ""
+                        head = [p["robot"], dtype, layout, str(threads)]
+                        yield [*head, *cells(by_batch), ", ".join(shares), whole]
+
+
+def share(least: float | None, ns: float) -> str:
+    """What part of a time is needed at least."""
+    return f"{least / ns:.0%}" if least else "-"
 
 
 def backends(results: Results) -> Iterator[list[str]]:
-    """One row a robot, back end, number type and number of threads."""
+    """One row a robot, back end, call, number type and number of threads; then Pinocchio's own calls."""
     seen = dict.fromkeys(
-        (f.robot, f.through, f.dtype, f.threads) for f in results.figures if f.through != "C"
+        (f.robot, f.through, f.call, f.dtype, f.threads) for f in results.figures if f.through != "C"
     )
-    for robot, backend, dtype, threads in seen:
-        by_batch = results.find(robot, backend, dtype, "rows", threads)
-        yield [robot, backend, dtype, str(threads), *cells(by_batch)]
+    for robot, backend, call, dtype, threads in seen:
+        by_batch = results.find(robot, backend, dtype, "rows", threads, call)
+        yield [robot, backend, call, dtype, str(threads), *cells(by_batch)]
+    for robot, calls in results.from_python.items():
+        for call, ns in calls.items():
+            yield [robot, "Pinocchio", call, "float64", "1", *cells({1: ns})]
 
 
 def cells(by_batch: dict[int, float]) -> list[str]:
-    """Figures for one sample, for 1,024, and for more; the last names its batch if it isn't 65,536."""
+    """Figures for one sample, 256, 1,024, and more; the last names its batch if it isn't 65,536."""
     more = max((b for b in by_batch if b > 1024), default=0)
     return [
-        number(by_batch.get(1)),
-        number(by_batch.get(1024)),
+        *(number(by_batch.get(batch)) for batch in (1, 256, 1024)),
         number(by_batch.get(more)) + (f" ({more:,})" if more not in (0, 65536) else ""),
     ]
 
@@ -119,7 +160,8 @@ def peers(results: Results) -> Iterator[list[str]]:
         pin, casadi = results.pinocchio.get(robot), results.casadi.get(robot)
         whole = pin.decomposition if pin else None
         yield [
-            robot, pin.how if pin else "-", number(pin.rnea if pin else None), number(whole),
+            robot, pin.how if pin else "-", number(pin.rnea if pin else None),
+            number(pin.regressor if pin else None), number(whole),
             number(casadi.ns if casadi else None), number(one), number(batch),
             times(whole, batch), times(whole, one),
             f"{max(x.difference for x in (pin, casadi) if x):.1e}" if pin or casadi else "-",
@@ -141,6 +183,6 @@ def times(theirs: float | None, ours: float | None) -> str:
 def row(target: Target) -> list[str]:
     """One target as a row."""
     sign = "≤" if target.at_most else "≥"
-    measured = "-" if target.measured is None else f"{target.measured:,.4g} {target.unit}"
+    measured = "-" if target.measured is None else f"{target.measured:,.3g}"
     verdict = "not measured" if target.met is None else "met" if target.met else "NOT MET"
-    return [target.what, measured, f"{sign} {target.wanted:,g} {target.unit}", verdict]
+    return [target.what, measured, f"{sign} {target.wanted:,g}", verdict]

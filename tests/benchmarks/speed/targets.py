@@ -1,4 +1,4 @@
-"""The figures to reach."""
+"""The figures to reach: each is a ratio to a peer, or to what the machine can do, taken in the same run."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,7 +13,6 @@ class Target:
     what: str
     measured: float | None
     wanted: float
-    unit: str
     at_most: bool = True
 
     @property
@@ -26,56 +25,99 @@ class Target:
 
 def targets(results: Results) -> Iterator[Target]:
     """All of them; those of robots that were not timed have no value."""
-    c64, c32 = (
-        results.find("panda", "C", "float64", "blocks"),
-        results.find("panda", "C", "float32", "blocks"),
-    )
-    two = results.find("panda", "C", "float64", "blocks", 2)
-    rows = results.find("panda", "C", "float64", "rows")
-    native = results.find("panda", "native", "float64", "rows")
+    yield from in_c(results)
+    yield from large_batches(results)
+    yield from from_python(results)
+    yield from dense_batches(results)
+    yield from long_chains(results)
+    yield from arrays(results)
+
+
+def in_c(results: Results) -> Iterator[Target]:
+    """Panda in C, one sample and in the cache."""
+    blocks = results.figure("panda", "C", "float64", "blocks", 1024, 1)
+    one = results.find("panda", "C", "float64", "rows").get(1)
+    two = results.find("panda", "C", "float64", "blocks", 2).get(1024)
     pin, casadi = results.pinocchio.get("panda"), results.casadi.get("panda")
-    whole = pin.decomposition if pin else None
-    large = max((b for b in c64 if b > 1024), default=65536)
-    many = c64.get(1024)
-    yield Target("Panda, float64, batch 1,024", many, 80, "ns")
-    yield Target(f"Panda, float64, batch {large:,}", c64.get(large), 140, "ns")
-    yield Target("Panda, float64, one sample", rows.get(1), 650, "ns")
-    yield Target("Panda, float32, batch 1,024", c32.get(1024), 45, "ns")
-    yield Target("Panda, float64, rows, batch 1,024", rows.get(1024), 130, "ns")
-    yield Target("Panda, native from Python, one sample", scaled(native.get(1), 1e-3), 15, "µs")
-    yield Target("Panda, batch, Pinocchio's full decomposition / ours", ratio(whole, many), 100, "×", False)
-    yield Target(
-        "Panda, one sample, Pinocchio's full decomposition / ours", ratio(whole, rows.get(1)), 20, "×", False
-    )
-    yield Target(
-        "Panda, batch, CasADi's C / ours", ratio(casadi.ns if casadi else None, many), 15, "×", False
-    )
-    yield Target("Panda, batch, one rnea / ours", ratio(pin.rnea if pin else None, many), 1, "×", False)
-    yield Target(
-        "Panda, one sample, one rnea / ours", ratio(pin.rnea if pin else None, rows.get(1)), 1, "×", False
-    )
-    yield Target("Panda, two threads / one, batch 1,024", ratio(many, two.get(1024)), 1.6, "×", False)
-    yield Target(
-        f"Panda, two threads / one, batch {large:,}", ratio(c64.get(large), two.get(large)), 1.6, "×", False
-    )
-    for robot, seconds, most in (
-        ("panda", 5, 4300),
-        ("chain20", 30, 70000),
-        ("planar3", None, 200),
-        ("planar10", None, 3300),
+    whole, many = pin.decomposition if pin else None, blocks.ns if blocks else None
+    least = results.arithmetic(blocks) if blocks else None
+    wide = 150 if results.machine.get("vectors") == "AVX-512" else 130
+    yield Target("Panda, batch 1,024 / arithmetic limit", ratio(many, least), 1.5)
+    yield Target("Panda, Pinocchio's full decomposition / batch 1,024", ratio(whole, many), wide, False)
+    yield Target("Panda, CasADi's C / batch 1,024", ratio(casadi.ns if casadi else None, many), 20, False)
+    yield Target("Panda, Pinocchio's full decomposition / one sample", ratio(whole, one), 30, False)
+    yield Target("Panda, one sample / one rnea", ratio(one, pin.rnea if pin else None), 1)
+    yield Target("Panda, one thread / two, batch 1,024", ratio(many, two), 1.8, False)
+
+
+def large_batches(results: Results) -> Iterator[Target]:
+    """Share of the lower of the machine's two limits that Panda's largest batch reaches."""
+    for dtype in ("float64", "float32"):
+        for layout in ("blocks", "rows"):
+            batch = max(results.find("panda", "C", dtype, layout), default=0)
+            figure = results.figure("panda", "C", dtype, layout, batch, 1) if batch > 1024 else None
+            limit = results.limit(figure) if figure else None
+            share = ratio(limit, figure.ns if figure else None)
+            what = f"Panda, {dtype}, {layout}, batch {batch or 65536:,}: share of the limit"
+            yield Target(what, share, 0.6, False)
+
+
+def from_python(results: Results) -> Iterator[Target]:
+    """Panda, one sample, against Pinocchio's own calls from Python."""
+    rnea = results.from_python.get("panda", {}).get("rnea")
+    for call, wanted in (("partial_torque", 0.4), ("packed", 1), ("propagation", 1.2)):
+        took = results.find("panda", "native", "float64", "rows", call=call).get(1)
+        yield Target(f"Panda, native from Python, one sample, {call} / rnea", ratio(took, rnea), wanted)
+        through = results.find("panda", "native ctypes", "float64", "rows", call=call).get(1)
+        yield Target(f"Panda, through ctypes, one sample, {call} / rnea", ratio(through, rnea), 4)
+
+
+def dense_batches(results: Results) -> Iterator[Target]:
+    """Dense calls against the kernel and writing the bytes: into memory in use where there is `out`."""
+    kernel = results.find("panda", "C", "float64", "rows")
+    for call in ("coefficients", "propagation"):
+        found = results.find("panda", "native", "float64", "rows", call=call)
+        for batch in sorted(b for b in found if b > 1) or [1024]:
+            for name, way in ((call, "fresh"), (f"{call} out", "warm")):
+                figure = results.figure("panda", "native", "float64", "rows", batch, 1, call=name)
+                least = None
+                if figure and batch in kernel:
+                    least = kernel[batch] + results.writing(figure, way)
+                what = f"Panda, native from Python, batch {batch:,}, {name} / kernel and {way} memory"
+                yield Target(what, ratio(figure.ns if figure else None, least), 1.5)
+
+
+def long_chains(results: Results) -> Iterator[Target]:
+    """Pinocchio's decomposition over ours: 60 joints must be as good as 20."""
+    shares = {}
+    for robot in ("chain20", "chain60"):
+        ours = [results.find(robot, "C", "float64", layout) for layout in ("blocks", "rows")]
+        in_cache = [by_batch[256] for by_batch in ours if 256 in by_batch]
+        pin = results.pinocchio.get(robot)
+        shares[robot] = ratio(pin.decomposition if pin else None, min(in_cache, default=None))
+    yield Target("chain20, Pinocchio's full decomposition / batch 256", shares["chain20"], 60, False)
+    yield Target("chain60's such ratio / chain20's", ratio(shares["chain60"], shares["chain20"]), 1, False)
+
+
+def arrays(results: Results) -> Iterator[Target]:
+    """The vectorised rule against closed forms, and differentiated Lagrangians against these."""
+    for robot, backend, wanted in (
+        ("panda", "numpy", 3),
+        ("panda", "torch", 6),
+        ("chain20", "numpy", 30),
+        ("chain20", "torch", 50),
     ):
-        facts = next((p for p in results.packages if p["robot"] == robot), {})
-        if seconds:
-            took = facts["generate_seconds"] + facts["compile_seconds"]["double"] if facts else None
-            yield Target(f"{robot}, generate and compile", took, seconds, "s")
-        yield Target(f"{robot}, operations", facts.get("operations"), most, "operations")
+        forms = results.find(robot, backend, "float64", "rows").get(1)
+        rule = results.find(robot, f"{backend} rule", "float64", "rows").get(1)
+        yield Target(
+            f"{robot}, {backend}, one sample, closed forms / rule", ratio(forms, rule), wanted, False
+        )
+    for batch, wanted in ((1, 1.5), (1024, 4)):
+        forms = results.find("panda", "torch", "float64", "rows").get(batch)
+        swept = results.find("panda", "autograd", "float64", "rows").get(batch)
+        yield Target(f"Panda, batch {batch:,}, autograd / torch's closed forms", ratio(swept, forms), wanted)
 
 
-def ratio(theirs: float | None, ours: float | None) -> float | None:
-    """Their time over ours."""
-    return theirs / ours if theirs and ours else None
-
-
-def scaled(value: float | None, factor: float) -> float | None:
-    """A value in another unit."""
-    return None if value is None else value * factor
+def ratio(a: float | None, b: float | None) -> float | None:
+    """One time over another, if both were taken."""
+    return a / b if a and b else None
