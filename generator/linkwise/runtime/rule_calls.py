@@ -1,0 +1,266 @@
+"""The rigid-link rule for one robot: packed results, in the order of `Layout`, from motion and numbers."""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .joint_tree import Bodies, JointTree
+from .kinematics import KinematicTables, Twists, kinematic_tables, poses, taken, twists
+from .rigid_rule import (
+    LinkNumbers,
+    LinkStates,
+    LinkTables,
+    decomposition_columns,
+    gradient_columns,
+    gradient_matrices,
+    link_numbers,
+    link_states,
+)
+from .rule_layout import RuleLayout, rule_layout
+from .tree_arrays import TreeArrays, formula_sources, own_numbers, with_bodies, with_formulas
+
+CACHE = 1 << 21
+"""Bytes of the arrays of one chunk of samples, which are to stay in the processor's cache."""
+LINK_NUMBERS = 200
+"""Numbers that a link and its joint have of one sample, beside the products."""
+
+
+class Space(Protocol):
+    """What the rule asks of a back end: its array namespace, and constants beside the arrays that it is given."""
+
+    @property
+    def xp(self) -> Any:
+        """The array namespace, numpy or torch."""
+
+    def constant(self, values: NDArray[Any], like: Any) -> Any:
+        """A table of numbers, to compute with `like`."""
+
+    def index(self, values: NDArray[np.intp], like: Any) -> Any:
+        """A table of positions, to take from `like`."""
+
+    def chunk(self, motion: Sequence[Any], most: int) -> int | None:
+        """Samples to compute at once where `most` of them stay in the cache; None for all."""
+
+
+class RuleTables(NamedTuple):
+    """All constants of a robot, of one dtype on one device."""
+
+    frames: KinematicTables
+    links: LinkTables
+    own: TreeArrays
+    numbers: LinkNumbers
+    sources: Any
+    groups: tuple[tuple[Any, Any], ...]
+    """Links and path of each."""
+    positions: tuple[tuple[Any, ...], ...]
+    """Of c2, c1, c0, g and tau in the answers, a table for each summand."""
+
+
+class Moment(NamedTuple):
+    """Samples side by side: how joints and links move, and with which numbers."""
+
+    tables: RuleTables
+    moved: Twists
+    states: LinkStates
+
+
+class RigidRule:
+    """The rule for a robot's tree; tables are made when first asked for, and kept for each dtype and device."""
+
+    def __init__(self, tree: JointTree) -> None:
+        self.tree = tree
+        self._tables: dict[Any, RuleTables] = {}
+
+    @cached_property
+    def layout(self) -> RuleLayout:
+        """Where packed values stand."""
+        return rule_layout(self.tree)
+
+    def tables(self, space: Space, like: Any) -> RuleTables:
+        """Constants to compute with `like`."""
+        key = space.xp, like.dtype, getattr(like, "device", None)
+        if key not in self._tables:
+            self._tables[key] = _converted(self._listed, space, like)
+        return self._tables[key]
+
+    def bodies(self) -> Bodies[NDArray[np.float64]]:
+        """What the links carry, as the package has it."""
+        links = self.tree.links
+        return Bodies(
+            np.array([link.mass for link in links]),
+            np.array([link.centre for link in links]),
+            np.array([link.inertia for link in links]),
+        )
+
+    def decomposition(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], bodies: Bodies[Any] | None
+    ) -> list[Any]:
+        """c2, c1, g and tau, (..., count) each."""
+
+        def answer(at: Moment) -> list[Any]:
+            c2, c1, _, g, tau = at.tables.positions
+            columns = decomposition_columns(space.xp, at.moved)
+            dense = self._products(space.xp, at, at.states.matrices, columns)
+            single = self._torques(space.xp, at)
+            pairs = ((dense, c2), (dense, c1), (single, g), (single, tau))
+            return [_packed(space.xp, values, positions) for values, positions in pairs]
+
+        return self._answers(space, motion, p, bodies, answer)
+
+    def torque(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], bodies: Bodies[Any] | None
+    ) -> Any:
+        """tau (..., count)."""
+
+        def answer(at: Moment) -> list[Any]:
+            return [_packed(space.xp, self._torques(space.xp, at), at.tables.positions[4])]
+
+        return self._answers(space, motion, p, bodies, answer)[0]
+
+    def position_gradient(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], bodies: Bodies[Any] | None
+    ) -> Any:
+        """c0 (..., count)."""
+
+        def answer(at: Moment) -> list[Any]:
+            columns = gradient_columns(space.xp, at.moved)
+            matrices = gradient_matrices(space.xp, at.tables.links, at.states)
+            dense = self._products(space.xp, at, matrices, columns)
+            return [_packed(space.xp, dense, at.tables.positions[2])]
+
+        return self._answers(space, motion, p, bodies, answer)[0]
+
+    @cached_property
+    def _listed(self) -> RuleTables:
+        """All constants in float64, of NumPy."""
+        own, eye = own_numbers(self.tree), np.eye(3)[:, :, None, None]
+        # (a, -a, 0)
+        skew = np.array([6, 5, 1, 2, 6, 3, 4, 0, 6])
+        links = LinkTables(_span([link.joint for link in self.tree.links]), eye, skew)
+        layout = self.layout
+        fields = ("acceleration", "velocity", "position_gradient", "gravity", "torque")
+        return RuleTables(
+            kinematic_tables(self.tree),
+            links,
+            own,
+            link_numbers(np, eye, *own[2:]),
+            formula_sources(self.tree),
+            tuple((_span(group.links), _span(group.path)) for group in layout.groups),
+            tuple(tuple(getattr(layout, field)) for field in fields),
+        )
+
+    def _answers(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], bodies: Any, answer: Any
+    ) -> list[Any]:
+        """What `answer` gives for the samples of a motion, (..., n) each."""
+        q = motion[0]
+        batch, n = tuple(q.shape[:-1]), q.shape[-1]
+        xp, tables = space.xp, self.tables(space, q)
+        numbers, links = tables.own, tables.numbers
+        if self.tree.formulas or bodies is not None:
+            numbers = with_formulas(xp, self.tree, numbers, tables.sources, p, batch)
+            if bodies is not None:
+                numbers = with_bodies(xp, numbers, bodies, batch)
+            links = link_numbers(xp, tables.links.eye, *numbers[2:])
+        flat = [xp.swapaxes(a.reshape(-1, n), 0, 1) for a in motion]
+        parts = []
+        for piece in self._pieces(space, motion, flat[0].shape[1]):
+            own = [a[:, piece] for a in flat]
+            some, carried = (type(t)(*(_samples(a, piece) for a in t)) for t in (numbers, links))
+            parts.append(answer(_moment(xp, tables, own, some, carried)))
+        joined = [xp.concat(column, 0) if len(parts) > 1 else column[0] for column in zip(*parts, strict=True)]
+        return [a.reshape(*batch, a.shape[-1]) for a in joined]
+
+    def _pieces(self, space: Space, motion: Sequence[Any], samples: int) -> Sequence[slice]:
+        """Slices of the samples, each to be computed at once."""
+        links = len(self.tree.links)
+        most = CACHE // (motion[0].itemsize * (2 * self.layout.zero + LINK_NUMBERS * links)) + 1
+        size = space.chunk(motion, max(most, 16))
+        if size is None or samples <= size:
+            return [slice(None)]
+        return [slice(start, start + size) for start in range(0, samples, size)]
+
+    def _products(self, xp: Any, at: Moment, matrices: Any, columns: Any) -> Any:
+        """S_e . (L column) for each group's links and any two joints e and f on its path, (samples, entries).
+
+        Entries are ordered by e, link, column, f; groups stand in a row.
+        """
+        screws = _screws(xp, at.moved)
+        left, axes, right = (_outermost(xp, a) for a in (matrices, screws, columns))
+        samples, size, kinds = left.shape[0], left.shape[1], right.shape[2]
+        answers = []
+        for links, path in at.tables.groups:
+            block, s, behind = (taken(a, i, -1) for a, i in ((left, links), (axes, path), (right, path)))
+            count, depth = block.shape[-1], s.shape[-1]
+            rows = xp.swapaxes(block.reshape(samples, size, 6 * count), 1, 2)
+            wrench = rows @ behind.reshape(samples, size, kinds * depth)
+            answer = xp.swapaxes(s, 1, 2) @ wrench.reshape(samples, 6, count * kinds * depth)
+            answers.append(answer.reshape(samples, depth * count * kinds * depth))
+        return xp.concat(answers, 1) if len(answers) > 1 else answers[0]
+
+    def _torques(self, xp: Any, at: Moment) -> Any:
+        """tau and g of every joint and link, on the path or not, (samples, entries): joint, kind, link."""
+        axes, wrenches = _outermost(xp, _screws(xp, at.moved)), _outermost(xp, at.states.wrenches)
+        samples, joints, links = axes.shape[0], axes.shape[2], wrenches.shape[3]
+        answer = xp.swapaxes(axes, 1, 2) @ wrenches.reshape(samples, 6, 2 * links)
+        return answer.reshape(samples, joints * 2 * links)
+
+
+def _moment(
+    xp: Any, tables: RuleTables, motion: Sequence[Any], numbers: TreeArrays, links: LinkNumbers
+) -> Moment:
+    """Motion of joints and links for q, qd and qdd (n, samples)."""
+    frames = tables.frames
+    position, velocity, acceleration = (taken(a, frames.coordinates) for a in motion)
+    placed = poses(xp, frames, numbers.translations, position)
+    moved = twists(xp, frames, placed, numbers.gravity, velocity, acceleration)
+    own = velocity, acceleration
+    states = link_states(xp, tables.links, links, placed, moved, own, numbers.gravity)
+    return Moment(tables, moved, states)
+
+
+def _screws(xp: Any, moved: Twists) -> Any:
+    """z and s of the joints, (6, joints, samples)."""
+    return xp.concat([moved.screws[:3, 0, :-1], moved.screws[:3, 1, :-1]], 0)
+
+
+def _outermost(xp: Any, a: Any) -> Any:
+    """An array (..., samples) as (samples, ...), in one piece of memory."""
+    shape, samples = tuple(a.shape[:-1]), a.shape[-1]
+    flat = xp.swapaxes(a.reshape(int(np.prod(shape)), samples), 0, 1)
+    flat = np.ascontiguousarray(flat) if isinstance(flat, np.ndarray) else flat.contiguous()
+    return flat.reshape(samples, *shape)
+
+
+def _packed(xp: Any, values: Any, positions: Sequence[Any]) -> Any:
+    """Entries (samples, count) of values (samples, entries), or sums of some; the position behind is a zero's."""
+    if len(positions) > 1:
+        values = xp.concat([values, 0.0 * values[:, :1]], 1)
+    first, *others = (taken(values, index, -1) for index in positions)
+    return sum(others, first)
+
+
+def _samples(a: Any, piece: slice) -> Any:
+    """The numbers of some samples; one that all share stays."""
+    return a[..., piece] if a.shape[-1] > 1 else a
+
+
+def _span(positions: Sequence[int]) -> Any:
+    """Positions in a row as a slice, which takes no copy."""
+    first, count = positions[0], len(positions)
+    if list(positions) == list(range(first, first + count)):
+        return slice(first, first + count)
+    return np.array(positions, dtype=np.intp)
+
+
+def _converted(table: Any, space: Space, like: Any) -> Any:
+    """A table, with what it holds, for a dtype and device."""
+    if isinstance(table, np.ndarray):
+        return space.index(table, like) if table.dtype.kind == "i" else space.constant(table, like)
+    if isinstance(table, tuple):
+        entries = (_converted(entry, space, like) for entry in table)
+        return type(table)(*entries) if hasattr(table, "_fields") else tuple(entries)
+    return table
