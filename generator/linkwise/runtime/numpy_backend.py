@@ -30,6 +30,7 @@ class NumpyBackend:
     name: ClassVar = "numpy"
     takes_tensors: ClassVar = False
     xp: ClassVar[Any] = np
+    fuses: ClassVar = False
 
     def __init__(
         self,

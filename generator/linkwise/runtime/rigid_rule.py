@@ -19,7 +19,7 @@ answer for all links of a group and all pairs of joints, and `rule_layout` says 
 
 from typing import Any, NamedTuple
 
-from .kinematics import KinematicTables, Poses, Twists, around, cross, motion_cross, product, taken
+from .kinematics import Poses, Twists, around, cross, motion_cross, product, taken
 
 
 class LinkNumbers(NamedTuple):

@@ -19,7 +19,7 @@ from .rigid_rule import (
     link_numbers,
     link_states,
 )
-from .rule_layout import RuleLayout, rule_layout
+from .rule_layout import RuleLayout, pair_layout, rule_layout
 from .tree_arrays import TreeArrays, formula_sources, own_numbers, with_bodies, with_formulas
 
 CACHE = 1 << 21
@@ -41,6 +41,10 @@ class Space(Protocol):
     def index(self, values: NDArray[np.intp], like: Any) -> Any:
         """A table of positions, to take from `like`."""
 
+    @property
+    def fuses(self) -> bool:
+        """Whether a compiler makes one loop of many operations, to which a matrix product is a wall."""
+
     def chunk(self, motion: Sequence[Any], most: int) -> int | None:
         """Samples to compute at once where `most` of them stay in the cache; None for all."""
 
@@ -57,6 +61,10 @@ class RuleTables(NamedTuple):
     """Links and path of each."""
     positions: tuple[tuple[Any, ...], ...]
     """Of c2, c1, c0, g and tau in the answers, a table for each summand."""
+    pairs: tuple[Any, Any]
+    """Links and joints of the pairs of `PairLayout`."""
+    entries: tuple[tuple[tuple[Any, Any], ...], ...]
+    """Of c2, c1 and c0, its rows, and of g and tau those of joint and of kind and link."""
 
 
 class Moment(NamedTuple):
@@ -81,7 +89,7 @@ class RigidRule:
 
     def tables(self, space: Space, like: Any) -> RuleTables:
         """Constants to compute with `like`."""
-        key = space.xp, like.dtype, getattr(like, "device", None)
+        key = space.xp.__name__, like.dtype, getattr(like, "device", None)
         if key not in self._tables:
             self._tables[key] = _converted(self._listed, space, like)
         return self._tables[key]
@@ -101,12 +109,9 @@ class RigidRule:
         """c2, c1, g and tau, (..., count) each."""
 
         def answer(at: Moment) -> list[Any]:
-            c2, c1, _, g, tau = at.tables.positions
             columns = decomposition_columns(space.xp, at.moved)
-            dense = self._products(space.xp, at, at.states.matrices, columns)
-            single = self._torques(space.xp, at)
-            pairs = ((dense, c2), (dense, c1), (single, g), (single, tau))
-            return [_packed(space.xp, values, positions) for values, positions in pairs]
+            pairs = _pairs(space, at, at.states.matrices, columns, (0, 1))
+            return [*pairs, *_singles(space, at, (3, 4))]
 
         return self._answers(space, motion, p, bodies, answer)
 
@@ -116,7 +121,7 @@ class RigidRule:
         """tau (..., count)."""
 
         def answer(at: Moment) -> list[Any]:
-            return [_packed(space.xp, self._torques(space.xp, at), at.tables.positions[4])]
+            return _singles(space, at, (4,))
 
         return self._answers(space, motion, p, bodies, answer)[0]
 
@@ -128,8 +133,7 @@ class RigidRule:
         def answer(at: Moment) -> list[Any]:
             columns = gradient_columns(space.xp, at.moved)
             matrices = gradient_matrices(space.xp, at.tables.links, at.states)
-            dense = self._products(space.xp, at, matrices, columns)
-            return [_packed(space.xp, dense, at.tables.positions[2])]
+            return _pairs(space, at, matrices, columns, (2,))
 
         return self._answers(space, motion, p, bodies, answer)[0]
 
@@ -141,6 +145,11 @@ class RigidRule:
         skew = np.array([6, 5, 1, 2, 6, 3, 4, 0, 6])
         links = LinkTables(_span([link.joint for link in self.tree.links]), eye, skew)
         layout = self.layout
+        coefficients = [layout.acceleration, layout.velocity, layout.position_gradient]
+        pairs = pair_layout(layout, coefficients, len(self.tree.joints))
+        # The place of no entry is that of the ground, which has no screw.
+        width = 2 * len(self.tree.links)
+        singles = (tuple((row // width, row % width) for row in t) for t in (layout.gravity, layout.torque))
         fields = ("acceleration", "velocity", "position_gradient", "gravity", "torque")
         return RuleTables(
             kinematic_tables(self.tree),
@@ -150,6 +159,8 @@ class RigidRule:
             formula_sources(self.tree),
             tuple((_span(group.links), _span(group.path)) for group in layout.groups),
             tuple(tuple(getattr(layout, field)) for field in fields),
+            (pairs.links, pairs.joints),
+            (*pairs.entries, *singles),
         )
 
     def _answers(
@@ -169,9 +180,12 @@ class RigidRule:
         parts = []
         for piece in self._pieces(space, motion, flat[0].shape[1]):
             own = [a[:, piece] for a in flat]
-            some, carried = (type(t)(*(_samples(a, piece) for a in t)) for t in (numbers, links))
+            some = TreeArrays(*(_samples(a, piece) for a in numbers))
+            carried = LinkNumbers(*(_samples(a, piece) for a in links))
             parts.append(answer(_moment(xp, tables, own, some, carried)))
-        joined = [xp.concat(column, 0) if len(parts) > 1 else column[0] for column in zip(*parts, strict=True)]
+        joined = [
+            xp.concat(column, 0) if len(parts) > 1 else column[0] for column in zip(*parts, strict=True)
+        ]
         return [a.reshape(*batch, a.shape[-1]) for a in joined]
 
     def _pieces(self, space: Space, motion: Sequence[Any], samples: int) -> Sequence[slice]:
@@ -183,30 +197,60 @@ class RigidRule:
             return [slice(None)]
         return [slice(start, start + size) for start in range(0, samples, size)]
 
-    def _products(self, xp: Any, at: Moment, matrices: Any, columns: Any) -> Any:
-        """S_e . (L column) for each group's links and any two joints e and f on its path, (samples, entries).
 
-        Entries are ordered by e, link, column, f; groups stand in a row.
-        """
-        screws = _screws(xp, at.moved)
-        left, axes, right = (_outermost(xp, a) for a in (matrices, screws, columns))
-        samples, size, kinds = left.shape[0], left.shape[1], right.shape[2]
-        answers = []
-        for links, path in at.tables.groups:
-            block, s, behind = (taken(a, i, -1) for a, i in ((left, links), (axes, path), (right, path)))
-            count, depth = block.shape[-1], s.shape[-1]
-            rows = xp.swapaxes(block.reshape(samples, size, 6 * count), 1, 2)
-            wrench = rows @ behind.reshape(samples, size, kinds * depth)
-            answer = xp.swapaxes(s, 1, 2) @ wrench.reshape(samples, 6, count * kinds * depth)
-            answers.append(answer.reshape(samples, depth * count * kinds * depth))
-        return xp.concat(answers, 1) if len(answers) > 1 else answers[0]
+def _pairs(space: Space, at: Moment, matrices: Any, columns: Any, fields: Sequence[int]) -> list[Any]:
+    """Packed S_e . (L column) of some of c2, c1 and c0."""
+    if not space.fuses:
+        dense = _products(space.xp, at, matrices, columns)
+        return [_packed(space.xp, dense, at.tables.positions[field]) for field in fields]
+    links, joints = at.tables.pairs
+    left, right = taken(matrices, links), taken(columns, joints)
+    wrenches = sum(left[c][:, None] * right[c][None] for c in range(len(columns)))
+    flat = wrenches.reshape(6, -1, wrenches.shape[-1])
+    return [_gathered(at, flat, at.tables.entries[field]) for field in fields]
 
-    def _torques(self, xp: Any, at: Moment) -> Any:
-        """tau and g of every joint and link, on the path or not, (samples, entries): joint, kind, link."""
-        axes, wrenches = _outermost(xp, _screws(xp, at.moved)), _outermost(xp, at.states.wrenches)
-        samples, joints, links = axes.shape[0], axes.shape[2], wrenches.shape[3]
-        answer = xp.swapaxes(axes, 1, 2) @ wrenches.reshape(samples, 6, 2 * links)
-        return answer.reshape(samples, joints * 2 * links)
+
+def _gathered(at: Moment, wrenches: Any, entries: Sequence[tuple[Any, Any]]) -> Any:
+    """Sums of S_e . (wrench), of wrenches (6, rows, samples), as (samples, count)."""
+    screws = at.moved.screws
+    parts = [
+        taken(screws[axis % 3, axis // 3], e) * taken(wrenches[axis], row)
+        for e, row in entries
+        for axis in range(6)
+    ]
+    return sum(parts[1:], parts[0]).swapaxes(0, 1)
+
+
+def _products(xp: Any, at: Moment, matrices: Any, columns: Any) -> Any:
+    """S_e . (L column) for each group's links and any two joints e and f on its path, (samples, entries).
+
+    Entries are ordered by e, link, column, f; groups stand in a row.
+    """
+    screws = _screws(xp, at.moved)
+    left, axes, right = (_outermost(xp, a) for a in (matrices, screws, columns))
+    samples, size, kinds = left.shape[0], left.shape[1], right.shape[2]
+    answers = []
+    for links, path in at.tables.groups:
+        block, s, behind = (taken(a, i, -1) for a, i in ((left, links), (axes, path), (right, path)))
+        count, depth = block.shape[-1], s.shape[-1]
+        rows = xp.swapaxes(block.reshape(samples, size, 6 * count), 1, 2)
+        wrench = rows @ behind.reshape(samples, size, kinds * depth)
+        answer = xp.swapaxes(s, 1, 2) @ wrench.reshape(samples, 6, count * kinds * depth)
+        answers.append(answer.reshape(samples, depth * count * kinds * depth))
+    return xp.concat(answers, 1) if len(answers) > 1 else answers[0]
+
+
+def _singles(space: Space, at: Moment, fields: Sequence[int]) -> list[Any]:
+    """Packed S_e . (wrench) of g or tau, or both."""
+    xp = space.xp
+    if space.fuses:
+        flat = at.states.wrenches.reshape(6, -1, at.states.wrenches.shape[-1])
+        return [_gathered(at, flat, at.tables.entries[field]) for field in fields]
+    axes, wrenches = _outermost(xp, _screws(xp, at.moved)), _outermost(xp, at.states.wrenches)
+    samples, joints, links = axes.shape[0], axes.shape[2], wrenches.shape[3]
+    answer = xp.swapaxes(axes, 1, 2) @ wrenches.reshape(samples, 6, 2 * links)
+    dense = answer.reshape(samples, joints * 2 * links)
+    return [_packed(xp, dense, at.tables.positions[field]) for field in fields]
 
 
 def _moment(

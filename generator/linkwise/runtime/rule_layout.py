@@ -31,7 +31,9 @@ def link_groups(tree: JointTree) -> tuple[LinkGroup, ...]:
     chains = [tree.chain(link.joint) for link in tree.links]
     left, groups = set(range(len(chains))), []
     for end in sorted(left, key=lambda j: -len(chains[j])):
-        on_the_way = [j for j in sorted(left, key=lambda j: len(chains[j])) if set(chains[j]) <= set(chains[end])]
+        on_the_way = [
+            j for j in sorted(left, key=lambda j: len(chains[j])) if set(chains[j]) <= set(chains[end])
+        ]
         for start in range(0, len(on_the_way) if end in left else 0, SPAN):
             links = on_the_way[start : start + SPAN]
             groups.append(LinkGroup(tuple(links), chains[links[-1]]))
@@ -68,9 +70,7 @@ def rule_layout(tree: JointTree) -> RuleLayout:
     chains = [np.array(tree.chain(link.joint)) for link in tree.links]
 
     def torque(kind: int) -> NDArray[np.intp]:
-        rows = [
-            np.where(m < 0, -1, (chains[j][m] * 2 + kind) * links + j).T for j, m in enumerate(single)
-        ]
+        rows = [np.where(m < 0, -1, (chains[j][m] * 2 + kind) * links + j).T for j, m in enumerate(single)]
         return _joined(rows, joints * links * 2)
 
     upper = [b.entries(0)[:, np.triu(np.ones((b.count, b.count), bool)).reshape(-1)] for b in ordered]
@@ -83,6 +83,45 @@ def rule_layout(tree: JointTree) -> RuleLayout:
         torque(0),
         torque(1),
     )
+
+
+@dataclass(frozen=True)
+class PairLayout:
+    """The same values where every pair of a link and a joint on its way has wrenches of its own.
+
+    A value is the sum of S_e . (wrench) over rows of e and of the wrench: pairs of the first kind, then of the
+    second. Joint e is the ground, which has no screw, where there is no summand.
+    """
+
+    links: NDArray[np.intp]
+    joints: NDArray[np.intp]
+    """Link and joint of each pair."""
+    entries: tuple[tuple[tuple[NDArray[np.intp], NDArray[np.intp]], ...], ...]
+    """For each of the tables given the rows (e, wrench)."""
+
+
+def pair_layout(layout: RuleLayout, tables: Sequence[NDArray[np.intp]], ground: int) -> PairLayout:
+    """Pairs for positions in the answers of all groups."""
+    starts = np.cumsum([0, *(2 * len(g.links) * len(g.path) ** 2 for g in layout.groups)])
+    every = np.arange(layout.zero)
+    e, j, kind, f = np.empty((4, layout.zero), dtype=np.intp)
+    for group, start, end in zip(layout.groups, starts[:-1], starts[1:], strict=True):
+        links, path = np.array(group.links), np.array(group.path)
+        shape = (len(path), len(links), 2, len(path))
+        at = np.unravel_index(every[start:end] - start, shape)
+        e[start:end], j[start:end], kind[start:end], f[start:end] = (
+            path[at[0]],
+            links[at[1]],
+            at[2],
+            path[at[3]],
+        )
+    used = np.unique(np.concatenate([table[table < layout.zero] for table in tables]))
+    pairs, number = np.unique(j[used] * (ground + 1) + f[used], return_inverse=True)
+    wrench = np.zeros(layout.zero + 1, dtype=np.intp)
+    wrench[used] = number + kind[used] * len(pairs)
+    e = np.append(e, ground)
+    entries = tuple(tuple((e[row], wrench[row]) for row in table) for table in tables)
+    return PairLayout(pairs // (ground + 1), pairs % (ground + 1), entries)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ from typing import Any, ClassVar
 import numpy as np
 import torch
 from torch import Tensor
+from torch._subclasses.fake_tensor import unset_fake_temporarily
+from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
 from .arguments import as_array, check_axes, no_common_shape, precision
 from .interface import ClosedForms
@@ -54,6 +56,9 @@ class TorchBackend:
             for k, v in parameters.items()
         }
         self.bodies = None if bodies is None else checked_bodies(bodies, structure.N, _tensor)
+        if self.rule and self.kernel != "straight":  # torch.compile would trace how tables are made
+            for dtype in (torch.float32, torch.float64):
+                self.rule.tables(self, torch.empty(0, dtype=dtype))
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
@@ -99,13 +104,11 @@ class TorchBackend:
 
     def constant(self, values: Any, like: Tensor) -> Tensor:
         """A table of numbers, to compute with `like`."""
-        with torch.inference_mode(False):  # it is kept, and a later call may need its gradient
-            return torch.as_tensor(values, dtype=like.dtype, device=like.device)
+        return _kept(values, like.dtype, like.device)
 
     def index(self, values: Any, like: Tensor) -> Tensor:
         """A table of positions, to take from `like`."""
-        with torch.inference_mode(False):  # it is kept, and a later call may need its gradient
-            return torch.as_tensor(values, dtype=torch.long, device=like.device)
+        return _kept(values, torch.long, like.device)
 
     def asarray(self, value: Any, like: Tensor) -> Tensor:
         """Anything array-like, in the dtype and on the device of `like`."""
@@ -118,6 +121,11 @@ class TorchBackend:
     def concatenate(self, parts: Iterable[Tensor]) -> Tensor:
         """The parts joined along the last axis."""
         return torch.cat(list(parts), -1)
+
+    @property
+    def fuses(self) -> bool:
+        """Whether a compiler makes one loop of many operations, to which a matrix product is a wall."""
+        return torch.compiler.is_dynamo_compiling()
 
     def chunk(self, motion: Sequence[Tensor], most: int) -> int | None:
         """Samples to compute at once: all, but on a processor with nothing recorded what stays in its cache."""
@@ -142,6 +150,14 @@ class TorchBackend:
             if value.ndim:
                 fits(name, value.shape, q.shape[:-1])
         return {k: v.to(q) for k, v in self.parameters.items()}
+
+
+def _kept(values: Any, dtype: torch.dtype, device: torch.device) -> Tensor:
+    """A tensor that outlives the call: a later one may need its gradient, or not be one that torch.export traces."""
+    if torch.compiler.is_dynamo_compiling():
+        return torch.as_tensor(values, dtype=dtype, device=device)
+    with torch.inference_mode(False), disable_proxy_modes_tracing(), unset_fake_temporarily():
+        return torch.as_tensor(values, dtype=dtype, device=device)
 
 
 def _watched() -> bool:
