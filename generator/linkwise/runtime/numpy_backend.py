@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from .arguments import as_array, check_axes, no_common_shape, precision
 from .interface import ClosedForms, Entries
 from .joint_tree import Bodies
-from .kernel_choice import EVER, Crossing, known_kernel, rule_is_quicker
+from .kernel_choice import Crossing, known_kernel, rule_is_quicker
 from .parameter_values import fits
 from .rule_calls import RigidRule
 from .structure import Structure
@@ -17,9 +17,9 @@ from .tree_arrays import checked_bodies
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
 CROSSINGS: dict[str, Crossing] = {
-    "decomposition": ((36, 1), (280, 64), (4830, EVER)),
-    "torque": ((36, 1), (280, 64), (4830, EVER)),
-    "position_gradient": ((36, 1), (280, 64), (4830, EVER)),
+    "decomposition": ((70, 4), (189, 64), (1785, 256)),
+    "torque": ((100, 4), (189, 16), (1785, 64)),
+    "position_gradient": ((70, 4), (189, 64), (1785, 256)),
 }
 """Where the rule is quicker, see `kernel_choice`."""
 

@@ -22,7 +22,7 @@ from .rigid_rule import (
 from .rule_layout import RuleLayout, pair_layout, rule_layout
 from .tree_arrays import TreeArrays, formula_sources, own_numbers, with_bodies, with_formulas
 
-CACHE = 1 << 21
+CACHE = 1 << 22
 """Bytes of the arrays of one chunk of samples, which are to stay in the processor's cache."""
 LINK_NUMBERS = 200
 """Numbers that a link and its joint have of one sample, beside the products."""
@@ -177,15 +177,19 @@ class RigidRule:
                 numbers = with_bodies(xp, numbers, bodies, batch)
             links = link_numbers(xp, tables.links.eye, *numbers[2:])
         flat = [xp.swapaxes(a.reshape(-1, n), 0, 1) for a in motion]
-        parts = []
-        for piece in self._pieces(space, motion, flat[0].shape[1]):
+        joined: list[Any] = []
+        samples = flat[0].shape[1]
+        for piece in self._pieces(space, motion, samples):
             own = [a[:, piece] for a in flat]
             some = TreeArrays(*(_samples(a, piece) for a in numbers))
             carried = LinkNumbers(*(_samples(a, piece) for a in links))
-            parts.append(answer(_moment(xp, tables, own, some, carried)))
-        joined = [
-            xp.concat(column, 0) if len(parts) > 1 else column[0] for column in zip(*parts, strict=True)
-        ]
+            part = answer(_moment(xp, tables, own, some, carried))
+            if piece == slice(None):
+                joined = part
+                continue
+            joined = joined or [xp.empty((samples, a.shape[1]), dtype=q.dtype) for a in part]
+            for whole, a in zip(joined, part, strict=True):
+                whole[piece] = a
         return [a.reshape(*batch, a.shape[-1]) for a in joined]
 
     def _pieces(self, space: Space, motion: Sequence[Any], samples: int) -> Sequence[slice]:

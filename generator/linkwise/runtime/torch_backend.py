@@ -12,7 +12,7 @@ from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 from .arguments import as_array, check_axes, no_common_shape, precision
 from .interface import ClosedForms
 from .joint_tree import Bodies
-from .kernel_choice import EVER, Crossing, known_kernel, rule_is_quicker
+from .kernel_choice import Crossing, known_kernel, rule_is_quicker
 from .parameter_values import fits
 from .rule_calls import RigidRule
 from .structure import Structure
@@ -20,9 +20,9 @@ from .tree_arrays import checked_bodies
 
 FLOATS = ({torch.float32}, {torch.float64})
 CROSSINGS: dict[str, Crossing] = {
-    "decomposition": ((36, 1), (280, 64), (4830, EVER)),
-    "torque": ((36, 1), (280, 64), (4830, EVER)),
-    "position_gradient": ((36, 1), (280, 64), (4830, EVER)),
+    "decomposition": ((70, 64), (189, 256), (1785, 1024)),
+    "torque": ((70, 16), (189, 64), (280, 256), (1785, 1024)),
+    "position_gradient": ((70, 64), (189, 256), (1785, 1024)),
 }
 """Where the rule is quicker on a processor, see `kernel_choice`; elsewhere it always is."""
 
@@ -129,10 +129,11 @@ class TorchBackend:
 
     def chunk(self, motion: Sequence[Tensor], most: int) -> int | None:
         """Samples to compute at once: all, but on a processor with nothing recorded what stays in its cache."""
-        given = (*motion, *self.parameters.values(), *(self.bodies or ()))
+        given = (*motion, *self.parameters.values(), *filter(torch.is_tensor, self.bodies or ()))
         if _watched() or motion[0].device.type != "cpu":
             return None
-        return None if torch.is_grad_enabled() and any(t.requires_grad for t in given) else most
+        # An operation of torch costs some four times what one of NumPy costs: it has to do so much more.
+        return None if torch.is_grad_enabled() and any(t.requires_grad for t in given) else 4 * most
 
     def _rule(self, call: str, q: Tensor) -> RigidRule | None:
         """The rule where it is to be taken, None for closed forms."""
@@ -143,7 +144,7 @@ class TorchBackend:
         return None if self.kernel == "straight" else self.rule
 
     def _bodies(self, q: Tensor) -> Bodies[Tensor] | None:
-        return None if self.bodies is None else Bodies(*(a.to(q) for a in self.bodies))
+        return None if self.bodies is None else Bodies(*(torch.as_tensor(a, dtype=q.dtype, device=q.device) for a in self.bodies))
 
     def _values(self, q: Tensor) -> dict[str, Tensor]:
         for name, value in self.parameters.items():
@@ -165,9 +166,9 @@ def _watched() -> bool:
     return torch.compiler.is_compiling() or torch._C._are_functorch_transforms_active()
 
 
-def _tensor(name: str, value: Any) -> Tensor:
-    """A tensor as it is, an array or a list as one of float64."""
-    return value if torch.is_tensor(value) else torch.as_tensor(as_array(name, value), dtype=torch.float64)
+def _tensor(name: str, value: Any) -> Any:
+    """A tensor as it is, anything else that reads as an array."""
+    return value if torch.is_tensor(value) else as_array(name, value)
 
 
 def _tensors(named: Mapping[str, Any], device: torch.device) -> dict[str, Tensor]:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .arguments import precision
 from .joint_tree import Bodies, JointTree
 from .parameter_values import fits
 
@@ -99,16 +100,22 @@ def with_bodies(xp: Any, numbers: TreeArrays, bodies: Bodies[Any], batch: tuple[
 
 
 def checked_bodies(given: Any, links: int, read: Callable[[str, Any], Any]) -> Bodies[Any]:
-    """Bodies as `read` makes arrays of them by name; raises TypeError or ValueError where they are none."""
+    """Bodies as `read` makes arrays or tensors of them by name.
+
+    Raises TypeError for what is no number, and ValueError for a wrong shape.
+    """
     if not isinstance(given, tuple) or len(given) != len(SHAPES):
         raise TypeError(
-            f"bodies is {type(given).__name__}; give Bodies(masses, centres, inertias), such as the package's bodies()"
+            f"bodies is {type(given).__name__}; give Bodies(masses, centres, inertias), such as the "
+            "package's bodies()"
         )
-    values = {name: read(f"bodies.{name}", value) for name, value in zip(SHAPES, given, strict=True)}
-    for name, value in values.items():
-        shape = (links, *SHAPES[name])
+    values = {f"bodies.{name}": value for name, value in zip(SHAPES, given, strict=True)}
+    values = {name: read(name, value) for name, value in values.items()}
+    precision(values, values)
+    for (name, value), inner in zip(values.items(), SHAPES.values(), strict=True):
+        shape = (links, *inner)
         if tuple(value.shape[-len(shape) :]) != shape:
             raise ValueError(
-                f"bodies.{name} has shape {tuple(value.shape)}; it must be {shape}, or {('...', *shape)} with one a sample"
+                f"{name} has shape {tuple(value.shape)}; it must be {shape}, or that behind axes of samples"
             )
-    return Bodies(**values)
+    return Bodies(*values.values())
