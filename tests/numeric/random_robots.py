@@ -31,7 +31,8 @@ REDUNDANT = Options(allow_unphysical=True)
 
 
 def largest_error(robot: RobotData, folder: Path) -> float:
-    """Error of c2, c1, g and τ of every link by both kernels, relative to the largest of the robot's of the kind.
+    """Error of c2, c1, g and τ of every link by both kernels, relative to the largest of the robot's of the
+    kind.
 
     A kind that is all but zero, gravity of a level slide say, is measured by the largest of every kind, and
     a robot whose numbers are all but zero, a mass that only turns about itself say, by its mass.

@@ -1,7 +1,7 @@
 """A robot's joints and what its links carry, as a package's tree.py lists them, and bodies in their place.
 
-A joint moves a frame whose z axis lies on the joint's axis. With q its coordinate, a revolute joint places the
-frame at `translation` in the frame of its parent, turned by `rotation` Rz(ratio q); a prismatic one at
+A joint moves a frame whose z axis lies on the joint's axis. With q its coordinate, a revolute joint places
+the frame at `translation` in the frame of its parent, turned by `rotation` Rz(ratio q); a prismatic one at
 `translation` + `rotation` z ratio q.
 """
 
@@ -17,7 +17,7 @@ Formula = Callable[[Any, Mapping[str, Any]], Any]
 
 
 class TreeJoint(NamedTuple):
-    """A joint and the frame that it moves; joints that follow one coordinate, as mimic joints do, share it."""
+    """A joint and the frame that it moves; joints that follow one coordinate share it, as mimic joints do."""
 
     parent: int | None
     """Index of the joint that carries it, None for the ground."""

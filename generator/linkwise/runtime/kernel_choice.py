@@ -1,9 +1,9 @@
 """Which of its two kernels a back end of arrays takes: closed forms, straight on, or the vectorised rule.
 
-Closed forms do the fewest additions and multiplications, one array operation each: thousands, whose calls cost more
-than their work unless the batch is large. The rule does more in a hundred and fifty or so. Which is quicker hangs
-on the robot, by the packed numbers of one sample, and on the batch; `tests/benchmarks/kernel_crossing.py` measures
-it and prints the tables that the back ends keep.
+Closed forms do the fewest additions and multiplications, one array operation each: thousands, whose calls
+cost more than their work unless the batch is large. The rule does more in a hundred and fifty or so. Which
+is quicker hangs on the robot, by the packed numbers of one sample, and on the batch;
+`tests/benchmarks/kernel_crossing.py` measures it and prints the tables that the back ends keep.
 """
 
 from collections.abc import Mapping
@@ -12,8 +12,6 @@ from typing import Any
 Crossing = tuple[tuple[int, int], ...]
 """Rows (packed numbers of a sample, largest batch in which the rule is quicker), by rising numbers."""
 KERNELS = ("auto", "straight", "rule")
-EVER = 1 << 62
-"""A batch that is never reached: the rule is quicker in all."""
 
 
 def known_kernel(kernel: str, straight: bool, rule: bool, bodies: bool) -> str:

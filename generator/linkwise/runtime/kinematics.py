@@ -1,13 +1,13 @@
 """Where the frames of a tree of joints are and how they move, all joints at once.
 
-`xp` is the array namespace, numpy or torch. Arrays have their samples innermost and their joints (or links) before
-them: a vector is (3, joints, samples), and what all samples share has one. The number of array operations grows
-with the logarithm of the tree's depth alone: frames are composed over one joint, then two, four, eight, and what
-adds up along a chain of joints is one product with a matrix of zeros and ones.
+`xp` is the array namespace, numpy or torch. Arrays have their samples innermost and their joints (or links)
+before them: a vector is (3, joints, samples), and what all samples share has one. The number of array
+operations grows with the logarithm of the tree's depth alone: frames are composed over one joint, then two,
+four, eight, and what adds up along a chain of joints is one product with a matrix of zeros and ones.
 
-Vectors are in the base's axes, and moments and linear velocities about one origin o at rest: at the instant it is
-in the first hinge, so that a robot far from its base loses no digits. The screw of joint f, times its ratio, is
-S_f = (z, s): s = (p - o) x z for a hinge at p, and z = 0, s = axis for a slide.
+Vectors are in the base's axes, and moments and linear velocities about one origin o at rest: at the instant
+it is in the first hinge, so that a robot far from its base loses no digits. The screw of joint f, times its
+ratio, is S_f = (z, s): s = (p - o) x z for a hinge at p, and z = 0, s = axis for a slide.
 """
 
 from typing import Any, NamedTuple
@@ -128,7 +128,8 @@ def twists(
 ) -> Twists:
     """Screws and motion of the tree.
 
-    velocity, acceleration: qd and qdd of every frame's coordinate, (frames, samples); gravity: (3, 1, samples)
+    velocity, acceleration: qd and qdd of every frame's coordinate, (frames, samples); gravity: (3, 1,
+    samples)
     """
     axis, origin = poses.axes[:, 2], poses.places[:, tables.origin]
     z = axis * tables.turns

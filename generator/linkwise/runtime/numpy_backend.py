@@ -17,9 +17,9 @@ from .tree_arrays import checked_bodies
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
 CROSSINGS: dict[str, Crossing] = {
-    "decomposition": ((70, 4), (189, 64), (1785, 256)),
+    "decomposition": ((70, 4), (189, 64)),
     "torque": ((100, 4), (189, 16), (1785, 64)),
-    "position_gradient": ((70, 4), (189, 64), (1785, 256)),
+    "position_gradient": ((70, 4), (189, 16), (280, 64)),
 }
 """Where the rule is quicker, see `kernel_choice`."""
 

@@ -10,12 +10,16 @@ from numpy.typing import NDArray
 from .joint_tree import Bodies, JointTree
 from .kinematics import KinematicTables, Twists, kinematic_tables, poses, taken, twists
 from .rigid_rule import (
+    LinkMoments,
     LinkNumbers,
     LinkStates,
     LinkTables,
     decomposition_columns,
+    decomposition_wrenches,
     gradient_columns,
     gradient_matrices,
+    gradient_wrenches,
+    link_matrices,
     link_numbers,
     link_states,
 )
@@ -29,7 +33,7 @@ LINK_NUMBERS = 200
 
 
 class Space(Protocol):
-    """What the rule asks of a back end: its array namespace, and constants beside the arrays that it is given."""
+    """What the rule asks of a back end: its array namespace, and constants beside the arrays given."""
 
     @property
     def xp(self) -> Any:
@@ -71,12 +75,13 @@ class Moment(NamedTuple):
     """Samples side by side: how joints and links move, and with which numbers."""
 
     tables: RuleTables
+    numbers: LinkNumbers
     moved: Twists
     states: LinkStates
 
 
 class RigidRule:
-    """The rule for a robot's tree; tables are made when first asked for, and kept for each dtype and device."""
+    """The rule for a robot's tree; tables are made when first asked for, for each dtype and device."""
 
     def __init__(self, tree: JointTree) -> None:
         self.tree = tree
@@ -109,8 +114,7 @@ class RigidRule:
         """c2, c1, g and tau, (..., count) each."""
 
         def answer(at: Moment) -> list[Any]:
-            columns = decomposition_columns(space.xp, at.moved)
-            pairs = _pairs(space, at, at.states.matrices, columns, (0, 1))
+            pairs = _fused_coefficients(space, at) if space.fuses else _coefficients(space, at)
             return [*pairs, *_singles(space, at, (3, 4))]
 
         return self._answers(space, motion, p, bodies, answer)
@@ -131,9 +135,7 @@ class RigidRule:
         """c0 (..., count)."""
 
         def answer(at: Moment) -> list[Any]:
-            columns = gradient_columns(space.xp, at.moved)
-            matrices = gradient_matrices(space.xp, at.tables.links, at.states)
-            return _pairs(space, at, matrices, columns, (2,))
+            return _fused_gradient(space, at) if space.fuses else _gradient(space, at)
 
         return self._answers(space, motion, p, bodies, answer)[0]
 
@@ -202,16 +204,41 @@ class RigidRule:
         return [slice(start, start + size) for start in range(0, samples, size)]
 
 
-def _pairs(space: Space, at: Moment, matrices: Any, columns: Any, fields: Sequence[int]) -> list[Any]:
-    """Packed S_e . (L column) of some of c2, c1 and c0."""
-    if not space.fuses:
-        dense = _products(space.xp, at, matrices, columns)
-        return [_packed(space.xp, dense, at.tables.positions[field]) for field in fields]
+def _coefficients(space: Space, at: Moment) -> list[Any]:
+    """Packed c2 and c1, by matrix products."""
+    xp, tables = space.xp, at.tables
+    matrices = link_matrices(xp, tables.links, at.numbers, at.states.moments)
+    dense = _products(xp, at, matrices, decomposition_columns(xp, at.moved))
+    return [_packed(xp, dense, positions) for positions in tables.positions[:2]]
+
+
+def _gradient(space: Space, at: Moment) -> list[Any]:
+    """Packed c0, by matrix products."""
+    xp, tables = space.xp, at.tables
+    matrices = link_matrices(xp, tables.links, at.numbers, at.states.moments)
+    matrices = gradient_matrices(xp, tables.links, matrices, at.states.wrenches[:, 0])
+    dense = _products(xp, at, matrices, gradient_columns(xp, at.moved))
+    return [_packed(xp, dense, tables.positions[2])]
+
+
+def _fused_coefficients(space: Space, at: Moment) -> list[Any]:
+    """Packed c2 and c1, pair by pair."""
     links, joints = at.tables.pairs
-    left, right = taken(matrices, links), taken(columns, joints)
-    wrenches = sum(left[c][:, None] * right[c][None] for c in range(len(columns)))
-    flat = wrenches.reshape(6, -1, wrenches.shape[-1])
-    return [_gathered(at, flat, at.tables.entries[field]) for field in fields]
+    wrenches = decomposition_wrenches(space.xp, _of_pairs(at.states.moments, links), joints, at.moved)
+    return [_gathered(at, wrenches, entries) for entries in at.tables.entries[:2]]
+
+
+def _fused_gradient(space: Space, at: Moment) -> list[Any]:
+    """Packed c0, pair by pair."""
+    links, joints = at.tables.pairs
+    moments, wrench = _of_pairs(at.states.moments, links), taken(at.states.wrenches[:, 0], links)
+    wrenches = gradient_wrenches(space.xp, moments, joints, at.moved, wrench)
+    return [_gathered(at, wrenches, at.tables.entries[2])]
+
+
+def _of_pairs(moments: LinkMoments, links: Any) -> LinkMoments:
+    """The moments of each pair's link."""
+    return LinkMoments(*(taken(a, links) for a in moments))
 
 
 def _gathered(at: Moment, wrenches: Any, entries: Sequence[tuple[Any, Any]]) -> Any:
@@ -267,7 +294,7 @@ def _moment(
     moved = twists(xp, frames, placed, numbers.gravity, velocity, acceleration)
     own = velocity, acceleration
     states = link_states(xp, tables.links, links, placed, moved, own, numbers.gravity)
-    return Moment(tables, moved, states)
+    return Moment(tables, links, moved, states)
 
 
 def _screws(xp: Any, moved: Twists) -> Any:
@@ -284,7 +311,7 @@ def _outermost(xp: Any, a: Any) -> Any:
 
 
 def _packed(xp: Any, values: Any, positions: Sequence[Any]) -> Any:
-    """Entries (samples, count) of values (samples, entries), or sums of some; the position behind is a zero's."""
+    """Entries (samples, count) of values (samples, entries), or sums of some; behind them stands a zero."""
     if len(positions) > 1:
         values = xp.concat([values, 0.0 * values[:, :1]], 1)
     first, *others = (taken(values, index, -1) for index in positions)

@@ -1,8 +1,8 @@
 """Where the numbers of the rigid-link rule stand in packed results.
 
-The rule answers group by group: for every link of a group and every two joints on the group's path a dense block,
-(i, link, kind, k), whether the link hangs on these joints or not. A packed value is one of its entries; where
-several joints follow one coordinate, as mimic joints do, it is the sum of several.
+The rule answers group by group: for every link of a group and every two joints on the group's path a dense
+block, (i, link, kind, k), whether the link hangs on these joints or not. A packed value is one of its
+entries; where several joints follow one coordinate, as mimic joints do, it is the sum of several.
 """
 
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ def link_groups(tree: JointTree) -> tuple[LinkGroup, ...]:
 
 @dataclass(frozen=True)
 class RuleLayout:
-    """Positions of packed values in the rule's answers, a row for each summand; `zero` is that of no entry."""
+    """Positions of packed values in the rule's answers, a row for each summand; `zero` is no entry's."""
 
     groups: tuple[LinkGroup, ...]
     acceleration: NDArray[np.intp]
@@ -89,8 +89,8 @@ def rule_layout(tree: JointTree) -> RuleLayout:
 class PairLayout:
     """The same values where every pair of a link and a joint on its way has wrenches of its own.
 
-    A value is the sum of S_e . (wrench) over rows of e and of the wrench: pairs of the first kind, then of the
-    second. Joint e is the ground, which has no screw, where there is no summand.
+    A value is the sum of S_e . (wrench) over rows of e and of the wrench: pairs of the first kind, then of
+    the second. Joint e is the ground, which has no screw, where there is no summand.
     """
 
     links: NDArray[np.intp]
@@ -126,7 +126,7 @@ def pair_layout(layout: RuleLayout, tables: Sequence[NDArray[np.intp]], ground: 
 
 @dataclass(frozen=True)
 class _Block:
-    """The entries of one link: members (coordinates, joints), its place in its group, and where that begins."""
+    """The entries of one link: members (coordinates, joints), place in its group, where that begins."""
 
     members: NDArray[np.intp]
     at: int
@@ -139,7 +139,7 @@ class _Block:
         return len(self.members)
 
     def entries(self, kind: Any) -> NDArray[np.intp]:
-        """Positions (summands, i and k) of a kind, or of one for each two joints (path, path); -1 for none."""
+        """Positions (summands, i and k) of a kind, or of one for each two joints (path, path); -1: none."""
         i, k = self.members[:, :, None, None], self.members[None, None]
         if not isinstance(kind, int):
             kind = kind[i, k]

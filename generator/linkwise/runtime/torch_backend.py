@@ -20,9 +20,9 @@ from .tree_arrays import checked_bodies
 
 FLOATS = ({torch.float32}, {torch.float64})
 CROSSINGS: dict[str, Crossing] = {
-    "decomposition": ((70, 64), (189, 256), (1785, 1024)),
-    "torque": ((70, 16), (189, 64), (280, 256), (1785, 1024)),
-    "position_gradient": ((70, 64), (189, 256), (1785, 1024)),
+    "decomposition": ((70, 64), (189, 256)),
+    "torque": ((70, 16), (189, 64), (280, 256)),
+    "position_gradient": ((70, 64), (189, 256)),
 }
 """Where the rule is quicker on a processor, see `kernel_choice`; elsewhere it always is."""
 
@@ -128,7 +128,7 @@ class TorchBackend:
         return torch.compiler.is_dynamo_compiling()
 
     def chunk(self, motion: Sequence[Tensor], most: int) -> int | None:
-        """Samples to compute at once: all, but on a processor with nothing recorded what stays in its cache."""
+        """Samples to compute at once: all, but on a CPU, with nothing recorded, what stays in its cache."""
         given = (*motion, *self.parameters.values(), *filter(torch.is_tensor, self.bodies or ()))
         if _watched() or motion[0].device.type != "cpu":
             return None
@@ -144,7 +144,11 @@ class TorchBackend:
         return None if self.kernel == "straight" else self.rule
 
     def _bodies(self, q: Tensor) -> Bodies[Tensor] | None:
-        return None if self.bodies is None else Bodies(*(torch.as_tensor(a, dtype=q.dtype, device=q.device) for a in self.bodies))
+        return (
+            None
+            if self.bodies is None
+            else Bodies(*(torch.as_tensor(a, dtype=q.dtype, device=q.device) for a in self.bodies))
+        )
 
     def _values(self, q: Tensor) -> dict[str, Tensor]:
         for name, value in self.parameters.items():
@@ -154,7 +158,7 @@ class TorchBackend:
 
 
 def _kept(values: Any, dtype: torch.dtype, device: torch.device) -> Tensor:
-    """A tensor that outlives the call: a later one may need its gradient, or not be one that torch.export traces."""
+    """A tensor that is kept: a later call may need its gradient, or not be one that torch.export traces."""
     if torch.compiler.is_dynamo_compiling():
         return torch.as_tensor(values, dtype=dtype, device=device)
     with torch.inference_mode(False), disable_proxy_modes_tracing(), unset_fake_temporarily():
@@ -162,7 +166,7 @@ def _kept(values: Any, dtype: torch.dtype, device: torch.device) -> Tensor:
 
 
 def _watched() -> bool:
-    """Whether operations are recorded by a compiler or a transformation, which hides how many samples there are."""
+    """Whether a compiler or a transformation records operations: it hides how many samples there are."""
     return torch.compiler.is_compiling() or torch._C._are_functorch_transforms_active()
 
 
