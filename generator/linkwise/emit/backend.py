@@ -94,6 +94,8 @@ RULE_FILES = (
     "rigid_rule.py",
     "rule_calls.py",
     "rule_layout.py",
+    "rule_products.py",
+    "rule_tables.py",
     "tree_arrays.py",
 )
 """Of linkwise/runtime: the vectorised rule."""
