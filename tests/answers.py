@@ -24,14 +24,15 @@ def relative_error(value: Any, reference: Any) -> float:
 
 
 def packed(package: Any, directory: Path, backend: str, q: Any, qd: Any, qdd: Any) -> dict[str, Any]:
-    """Packed c2, c1, g, tau and c0 of a back end; `c` is compiled first."""
+    """Packed c2, c1, g, tau and c0 of a back end, "numpy by rule" say; `c` is compiled first."""
     if backend == "c":
         from compiled import Compiled
 
         library = Compiled(directory)
         answer = library.decomposition(q, qd, qdd)
         return answer | {"position_gradient": library.position_gradient(q, qd, qdd)}
-    dynamics = package.load(backend)
+    name, _, kernel = backend.partition(" by ")
+    dynamics = package.load(name, kernel=kernel or "auto")
     motion = (q, qd, qdd)
     if dynamics.backend.takes_tensors:
         import torch

@@ -525,6 +525,12 @@ def loaded_with_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "parameters, other parameters: bodies that load looks at",
         ),
         ("names.py", "('m_up $<per', ", "(", "parameters: bodies that load looks at"),
+        (
+            "tree.py",
+            "p['m_up $<per']",
+            "0.0 * p['m_up $<per'] + 1.2",
+            "numpy by rule, other parameters: g against Newton-Euler recursion",
+        ),
     ],
 )
 def test_what_is_right_for_the_parameters_own_values_alone_fails(
@@ -568,6 +574,8 @@ def test_a_listed_file_of_the_runtime_that_linkwise_does_not_have_fails(package:
             "from .runtime.arguments import *; from .runtime.structure import",
         ),
         ("names.py", "            lambda p: (", "            lambda p: 1 and ("),
+        ("tree.py", "lambda xp, p: ", "lambda xp, p: 1.0 * "),
+        ("tree.py", "RULE = RigidRule(TREE)", "RULE = RigidRule(TREE) or None"),
     ],
 )
 def test_a_package_that_is_loaded_otherwise_fails(
@@ -588,7 +596,7 @@ def test_of_another_version_it_is_said_what_was_not_checked(package: Path) -> No
     change_manifest(package, lambda data: data["checksums"].update(generator=digest))
     (runtime,) = (result for result in check_package(package, 3) if result.name == "runtime")
     assert runtime.mark == "skip"
-    assert runtime.detail.startswith("runtime/, __init__.py and names.py were not checked")
+    assert runtime.detail.startswith("runtime/, __init__.py, names.py and tree.py were not checked")
 
 
 def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp_path: Path) -> None:

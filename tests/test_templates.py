@@ -11,7 +11,7 @@ import sympy as sp
 import urdf_text
 from conftest import DATA
 from linkwise import Coordinate, LinkEnergy, Options, energy_system, generate, read_system
-from linkwise.emit import autograd, closed_forms, formula_page, shared_texts
+from linkwise.emit import autograd, closed_forms, formula_page, shared_texts, tree_file
 from linkwise.emit import render as rendering
 from linkwise.emit.c import sources
 from linkwise.emit.render import render, variables
@@ -35,7 +35,7 @@ def views() -> dict[str, list[set[str]]]:
         return render(template, view)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (rendering, autograd, sources, closed_forms, formula_page, shared_texts):
+        for module in (rendering, autograd, sources, closed_forms, formula_page, shared_texts, tree_file):
             patch.setattr(module, "render", recording)
         for robot, options in ROBOTS:
             generate(read_system(robot, options))

@@ -31,7 +31,8 @@ REDUNDANT = Options(allow_unphysical=True)
 
 
 def largest_error(robot: RobotData, folder: Path) -> float:
-    """Error of c2, c1, g and τ of every link, relative to the largest of the robot's of the kind.
+    """Error of c2, c1, g and τ of every link by both kernels, relative to the largest of the robot's of the
+    kind.
 
     A kind that is all but zero, gravity of a level slide say, is measured by the largest of every kind, and
     a robot whose numbers are all but zero, a mass that only turns about itself say, by its mass.
@@ -39,17 +40,21 @@ def largest_error(robot: RobotData, folder: Path) -> float:
     path = folder / f"robot.{robot.form}"
     path.write_text(robot.text, encoding="utf-8")
     write_package(generate(read_system(path, REDUNDANT), ["numpy"], "robot"), folder / "robot")
-    dynamics = import_package(folder / "robot").load("numpy")
-    oracle = RandomOracle(robot, dynamics.joint_names)
-    states = q, qd, qdd = random_states(dynamics.n, STATES)
-    expected = oracle.decomposition(dynamics.link_names, *states)
-    given = dynamics.coefficients(q, qd)._asdict() | {"torque": dynamics.partial_torque(q, qd, qdd)}
+    package = import_package(folder / "robot")
+    oracle = RandomOracle(robot, package.joint_names)
+    states = q, qd, qdd = random_states(len(package.joint_names), STATES)
+    expected = oracle.decomposition(package.link_names, *states)
     largest = max(float(np.abs(value).max()) for value in expected.values())
     scale = 1e-3 * max(largest, sum(link.mass for link in robot.links))
-    return max(
-        float(np.abs(given[field] - value).max() / max(np.abs(value).max(), scale))
-        for field, value in expected.items()
-    )
+    errors = []
+    for kernel in ("straight", "rule"):
+        dynamics = package.load("numpy", kernel=kernel)
+        given = dynamics.coefficients(q, qd)._asdict() | {"torque": dynamics.partial_torque(q, qd, qdd)}
+        errors += [
+            float(np.abs(given[field] - value).max() / max(np.abs(value).max(), scale))
+            for field, value in expected.items()
+        ]
+    return max(errors)
 
 
 def drawn(seed: int) -> RobotData:

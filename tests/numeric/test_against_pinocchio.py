@@ -32,7 +32,11 @@ def pinocchio_says(robot: str, joints: tuple[str, ...]) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     "backend",
-    ["numpy", "torch", "autograd", *(pytest.param(b, marks=needs_compiler) for b in ("c", "native"))],
+    [
+        *(f"{backend} by {kernel}" for backend in ("numpy", "torch") for kernel in ("straight", "rule")),
+        "autograd",
+        *(pytest.param(b, marks=needs_compiler) for b in ("c", "native")),
+    ],
 )
 @pytest.mark.parametrize("robot", MODELS, ids=["planar3", "puma560", "panda"])
 def test_decomposition_of_every_link_is_pinocchios(

@@ -8,6 +8,7 @@ from pathlib import Path
 from linkwise.check.compare import Result, Skipped
 from linkwise.emit.backend import BACKENDS
 from linkwise.emit.shared_texts import BodyText, init_text, names_text
+from linkwise.emit.tree_file import tree_text
 from linkwise.package.agreement import disagreements, miscounted
 from linkwise.package.bytecode import caches, is_compiled_from_source
 from linkwise.package.contents import added, changed
@@ -61,7 +62,7 @@ def check_runtime(package: Package) -> Result:
     directory, manifest = package.directory, package.manifest
     version = manifest.generator.get("linkwise")
     if version != VERSION:
-        unchecked = "runtime/, __init__.py and names.py were not checked"
+        unchecked = "runtime/, __init__.py, names.py and tree.py were not checked"
         return Skipped("runtime", f"{unchecked}: of linkwise {version}, which is not at hand to compare with")
     own = {path: _own(path) for path in manifest.files}
     wrong = [
@@ -87,14 +88,15 @@ def _own(path: str) -> bytes | None:
 
 
 def _made_otherwise(package: Package) -> Iterator[str]:
-    """Which of __init__.py and names.py differ from the texts that the manifest's entries give.
+    """Which of __init__.py, names.py and tree.py differ from the texts that the manifest's entries give.
 
     The manifest does not have the docstring's lines on what parameters mean, which may be any; nor the
     expressions of bodies and the links with terms linear in the velocities, which are held by what they give.
     """
     directory, manifest, robot = package.directory, package.manifest, package.module.ROBOT
     chosen = [backend for name, backend in BACKENDS.items() if name in package.backends]
-    init = init_text(manifest.name, chosen, manifest.parameters, [MARK])
+    rigid = manifest.tree is not None
+    init = init_text(manifest.name, chosen, manifest.parameters, [MARK], rigid)
     head, mark, tail = init.partition(f"    {MARK}\n")
     found = (directory / "__init__.py").read_bytes().decode()
     about = found[len(head) : len(found) - len(tail)]
@@ -109,6 +111,10 @@ def _made_otherwise(package: Package) -> Iterator[str]:
     links = {link.name: link.path for link in manifest.links}
     if names_text(manifest.name, joints, links, robot.linear, manifest.parameters, bodies) != found:
         yield "names.py"
+    if "tree.py" in manifest.files and manifest.tree is not None:
+        text = tree_text(manifest.tree, list(links), list(manifest.parameters))
+        if text != (directory / "tree.py").read_bytes().decode():
+            yield "tree.py"
 
 
 def _result(name: str, wrong: list[str], right: str) -> Result:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,14 +58,29 @@ def check_package(directory: Path, samples: int = 100) -> list[Result]:
     return results
 
 
-def _load(package: Package) -> tuple[dict[str, Model], list[Result]]:
+class Way(NamedTuple):
+    """A back end, and the kernel that it computes by."""
+
+    backend: str
+    kernel: str
+
+    @property
+    def label(self) -> str:
+        """What results are told under: of two kernels, closed forms bear the name of the back end alone."""
+        return f"{self.backend} by rule" if self.kernel == "rule" else self.backend
+
+
+def _load(package: Package) -> tuple[dict[Way, Model], list[Result]]:
     if not package.backends:
         return {}, [Skipped("back ends", "nothing to load: C and formulas only")]
-    loaded: dict[str, Model] = {}
+    loaded: dict[Way, Model] = {}
     missing: list[Result] = []
     for name in package.backends:
         try:
-            loaded[name] = package.load(name)
+            model = package.load(name)
+            chooses = getattr(model.backend, "kernel", "") == "auto" and model.backend.name != "native"
+            for kernel in ("straight", "rule") if chooses else ("auto",):
+                loaded[Way(name, kernel)] = package.load(name, kernel=kernel)
         except Exception as error:
             if _lacks(error):
                 missing.append(Skipped(f"{name}: not checked", " ".join(str(error).split())))
@@ -93,7 +109,7 @@ class _Checks:
     """The checks of one package's numbers: its formulas, its C, and the back ends that load here."""
 
     package: Package
-    loaded: Mapping[str, Model]
+    loaded: Mapping[Way, Model]
     samples: int
 
     def run(self) -> Iterator[Result]:
@@ -113,7 +129,7 @@ class _Checks:
         self,
         label: str,
         values: Mapping[str, float],
-        loaded: Mapping[str, Model],
+        loaded: Mapping[Way, Model],
         rows: IndexRows,
         compiled: CompiledPackage | None,
     ) -> Iterator[Result]:
@@ -136,21 +152,21 @@ class _Checks:
         for result in _c_results(functions, f"c{label}", reference) if functions else ():
             c_passes &= result.passed
             yield result
-        for name, model in loaded.items():
-            if name == "native" and not c_passes:
+        for way, model in loaded.items():
+            if way.backend == "native" and not c_passes:
                 # What writes beyond its arrays takes the interpreter with it.
-                yield Skipped(f"{name}{label}: not called", "its C is wrong, see above")
+                yield Skipped(f"{way.label}{label}: not called", "its C is wrong, see above")
             else:
-                yield from against_reference(Named(f"{name}{label}", model, rows, reference), manifest)
+                yield from against_reference(Named(f"{way.label}{label}", model, rows, reference), manifest)
 
     def _other_parameters(self, rows: IndexRows, compiled: CompiledPackage | None) -> Iterator[Result]:
         """Every parameter changed a little: equal ones tell no longer one from another, and none is zero."""
         changed = changed_values(self.package.manifest.parameters, self.package.manifest.tree)
-        loaded = {name: self.package.load(name, changed) for name in self.loaded}
+        loaded = {way: self.package.load(way.backend, changed, way.kernel) for way in self.loaded}
         yield from self._numbers(", other parameters", changed, loaded, rows, compiled)
 
     def _reference(
-        self, values: Mapping[str, float], loaded: Mapping[str, Model], functions: CFunctions | None
+        self, values: Mapping[str, float], loaded: Mapping[Way, Model], functions: CFunctions | None
     ) -> tuple[Reference | None, int]:
         """What numbers are held against, None if nothing can compute or at no state; how many were tried."""
         manifest = self.package.manifest
@@ -170,7 +186,7 @@ class _Checks:
         return self._own_reference(loaded, functions)
 
     def _own_reference(
-        self, loaded: Mapping[str, Model], functions: CFunctions | None
+        self, loaded: Mapping[Way, Model], functions: CFunctions | None
     ) -> tuple[Reference | None, int]:
         """The torques of one of the package's back ends, else those of its C."""
         n = len(self.package.manifest.joints)
@@ -181,8 +197,8 @@ class _Checks:
             return reference, found.tried
 
         if loaded:
-            name, model = next(iter(loaded.items()))
-            return of(name, model.partial_torque)
+            way, model = next(iter(loaded.items()))
+            return of(way.label, model.partial_torque)
         if functions is None:
             return None, 0
         return in_own_process(lambda: of("c", functions.torque))

@@ -19,6 +19,7 @@ from linkwise.emit.shared_texts import init_text, names_text
 from linkwise.errors import LinkwiseError
 from linkwise.package.manifest import FILE, JointEntry, LinkEntry, Manifest
 from linkwise.progress import Progress, silent
+from linkwise.symbolic.system import RigidSystem
 from linkwise.version import VERSION
 
 LONGEST_NAME = 60
@@ -95,7 +96,8 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     parameters = {s.name: float(v) for s, v in system.parameters.items()}
     loadable = [backend for backend in chosen if backend.loading]
     about = parameter_rules(system, bodies)
-    yield "__init__.py", init_text(derivation.package, loadable, parameters, about)
+    rigid = isinstance(system, RigidSystem)
+    yield "__init__.py", init_text(derivation.package, loadable, parameters, about, rigid)
     joints = [(c.name, c.unit) for c in system.coordinates]
     links = {name: system.path(j) for j, name in enumerate(system.link_names)}
     linear = derivation.linear

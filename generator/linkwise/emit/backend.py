@@ -30,6 +30,10 @@ class Loading:
     """Statements before it."""
     speed: int
     """Rank among the back ends that compute, 1 the fastest for a large batch."""
+    uses_rule: bool = False
+    """Whether it may be made of RULE, the vectorised rule of rigid links, which is None for energies."""
+    chooses: bool = False
+    """Whether it has kernels to choose from and takes bodies, as `kernel` and `bodies`."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,14 @@ def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
     return closed_form_files(d.system, d.kernels)
 
 
+def _tree(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.definition import rigid_tree
+    from linkwise.emit.tree_file import tree_text
+
+    if (tree := rigid_tree(d.system)) is not None:
+        yield "tree.py", tree_text(tree, d.system.link_names, [s.name for s in d.system.parameters])
+
+
 def _energies(d: Derivation) -> Iterator[tuple[str, str]]:
     from linkwise.emit.autograd import autograd_files
 
@@ -75,23 +87,49 @@ def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
 
 
 LINKS = "from .forms import LINKS"
+RULE_FILES = (
+    "joint_tree.py",
+    "array_kernels.py",
+    "kinematics.py",
+    "rigid_rule.py",
+    "rule_calls.py",
+    "rule_layout.py",
+    "rule_products.py",
+    "rule_tables.py",
+    "tree_arrays.py",
+)
+"""Of linkwise/runtime: the vectorised rule."""
 
 BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend
     for backend in (
         BackendFiles(
             "numpy",
-            "closed forms on NumPy arrays",
-            emits=(_forms,),
-            runtime=("numpy_backend.py",),
-            loading=Loading("numpy_backend", "NumpyBackend(ROBOT, LINKS, values)", (LINKS,), speed=2),
+            "closed forms, or the vectorised rule, on NumPy arrays",
+            emits=(_forms, _tree),
+            runtime=("numpy_backend.py", *RULE_FILES),
+            loading=Loading(
+                "numpy_backend",
+                "NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
+                (LINKS,),
+                speed=2,
+                uses_rule=True,
+                chooses=True,
+            ),
         ),
         BackendFiles(
             "torch",
-            "closed forms on torch tensors",
-            emits=(_forms,),
-            runtime=("torch_backend.py",),
-            loading=Loading("torch_backend", "TorchBackend(ROBOT, LINKS, values)", (LINKS,), speed=3),
+            "closed forms, or the vectorised rule, on torch tensors",
+            emits=(_forms, _tree),
+            runtime=("torch_backend.py", *RULE_FILES),
+            loading=Loading(
+                "torch_backend",
+                "TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
+                (LINKS,),
+                speed=3,
+                uses_rule=True,
+                chooses=True,
+            ),
         ),
         BackendFiles(
             "autograd",
@@ -106,6 +144,7 @@ BACKENDS: dict[str, BackendFiles] = {
                 "rigid_body.py",
                 "sweeps.py",
                 "torch_backend.py",
+                *RULE_FILES,
             ),
             loading=Loading(
                 "autograd_backend",
@@ -117,7 +156,7 @@ BACKENDS: dict[str, BackendFiles] = {
         BackendFiles(
             "native",
             "the C code, compiled by this system's compiler",
-            emits=(),
+            emits=(_tree,),
             runtime=(
                 "native_answers.py",
                 "native_backend.py",
@@ -132,12 +171,14 @@ BACKENDS: dict[str, BackendFiles] = {
                 "native_torch.py",
                 "numpy_backend.py",
                 "torch_backend.py",
+                *RULE_FILES,
             ),
             loading=Loading(
                 "native_backend",
-                'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values)',
+                'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values, RULE)',
                 ("from pathlib import Path", LINKS),
                 speed=1,
+                uses_rule=True,
             ),
             needs=("c", "torch"),
         ),

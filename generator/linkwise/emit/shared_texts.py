@@ -31,26 +31,34 @@ class Maker:
     doc: str
     imports: tuple[str, ...]
     made: str
+    chooses: bool
 
     @classmethod
-    def of(cls, backend: BackendFiles, loading: Loading) -> "Maker":
+    def of(cls, backend: BackendFiles, loading: Loading, rigid: bool) -> "Maker":
         """Its class comes from runtime/, and is the first word of the expression."""
         made = loading.made.partition("(")[0]
-        imported = f"from .runtime.{loading.module} import {made}"
-        return cls(backend.name, backend.doc, (*loading.imports, imported), loading.made)
+        imports = [*loading.imports, f"from .runtime.{loading.module} import {made}"]
+        if loading.uses_rule:
+            imports.append("from .tree import RULE" if rigid else "RULE = None")
+        return cls(backend.name, backend.doc, tuple(imports), loading.made, loading.chooses)
 
 
 def init_text(
-    package: str, chosen: Iterable[BackendFiles], parameters: Iterable[str], about: Sequence[str]
+    package: str, chosen: Iterable[BackendFiles], parameters: Iterable[str], about: Sequence[str], rigid: bool
 ) -> str:
-    """__init__.py, whose `load` makes the back ends of those `chosen`; about: lines on the parameters."""
+    """__init__.py, whose `load` makes the back ends of those `chosen`.
+
+    about: lines on the parameters; rigid: whether the links are rigid bodies
+    """
     loadable = {backend: backend.loading for backend in chosen if backend.loading}
     fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
     view = {
         "version": VERSION,
         "package": package,
         "default": next((backend.name for backend in loadable), ""),
-        "makers": [Maker.of(backend, loading) for backend, loading in loadable.items()],
+        "makers": [Maker.of(backend, loading, rigid) for backend, loading in loadable.items()],
+        "choosing": [backend.name for backend, loading in loadable.items() if loading.chooses],
+        "bodies": rigid and any(loading.uses_rule for loading in loadable.values()),
         "fastest_first": [backend.name for backend, _ in fastest_first],
         "parameters": _parameter_lines(parameters),
         "about_parameters": about,

@@ -81,10 +81,12 @@ class Package:
         """The same, the fastest for large batches first."""
         return tuple(self.module.FASTEST_FIRST)
 
-    def load(self, backend: str, parameters: Mapping[str, float] | None = None) -> Model:
+    def load(
+        self, backend: str, parameters: Mapping[str, float] | None = None, kernel: str = "auto"
+    ) -> Model:
         """Model on a back end, for any parameters; passes on what the package raises."""
         with staying():
-            dynamics = self.module.load(backend, parameters, allow_unphysical=True)
+            dynamics = self.module.load(backend, parameters, allow_unphysical=True, kernel=kernel)
         model: Model = TensorModel(dynamics) if dynamics.backend.takes_tensors else dynamics
         return model
 

@@ -13,6 +13,7 @@ from .interface import ClosedForms
 from .native_answers import NativeAnswers
 from .native_calls import NativeCalls
 from .numpy_backend import NumpyBackend
+from .rule_calls import RigidRule
 from .structure import Structure
 
 if TYPE_CHECKING:
@@ -29,14 +30,16 @@ class NativeBackend(NumpyBackend):
         self,
         structure: Structure,
         sources: Path,
-        links: Sequence[ClosedForms],
+        links: Sequence[ClosedForms] | None,
         parameters: Mapping[str, Any],
+        rule: RigidRule | None = None,
     ) -> None:
-        """`sources` is the package's folder of C; `links` serve torch, which differentiates them.
+        """`sources` is the package's folder of C; `links` or `rule` serve torch, which differentiates them.
 
         Compiles at the first call for this package; raises RuntimeError where that cannot be.
         """
-        super().__init__(structure, links, {})
+        super().__init__(structure, links, {}, rule)
+        self.forms = links
         self.parameters = dict(parameters)
         self.calls = NativeCalls(structure, sources, parameters)
         self._torch_side: TorchSide | None = None
@@ -107,5 +110,5 @@ class NativeBackend(NumpyBackend):
         if self._torch_side is None:
             from .native_torch import TorchSide  # it needs torch, which arrays do without
 
-            self._torch_side = TorchSide(self.calls, self.links)
+            self._torch_side = TorchSide(self.calls, self.forms, self.rule)
         return self._torch_side

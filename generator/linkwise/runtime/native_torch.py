@@ -1,6 +1,6 @@
 """Compiled C as torch operators, with gradients.
 
-Forward runs the C code; backward differentiates the closed forms in torch, which are there for that.
+Forward runs the C code; backward differentiates closed forms or rule in torch, which are there for that.
 """
 
 import hashlib
@@ -14,6 +14,7 @@ from .interface import ClosedForms
 from .native_build import Sources
 from .native_calls import NativeCalls
 from .native_library import NumberArray
+from .rule_calls import RigidRule
 from .torch_backend import TorchBackend
 
 FLOATS = (torch.float64, torch.float32)
@@ -37,11 +38,13 @@ class TorchSide(TorchBackend):
 
     name: ClassVar = "native"
 
-    def __init__(self, calls: NativeCalls, links: Sequence[ClosedForms]) -> None:
-        super().__init__(calls.structure, links, calls.parameters)
+    def __init__(
+        self, calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None
+    ) -> None:
+        super().__init__(calls.structure, links, calls.parameters, rule)
         self.calls = calls
         self._given = [value for value in calls.parameters.values() if torch.is_tensor(value)]
-        self.operators = {call: operator(calls, links, call) for call in OPERATED}
+        self.operators = {call: operator(calls, links, rule, call) for call in OPERATED}
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
@@ -106,15 +109,19 @@ def as_numbers(t: Tensor) -> NumberArray:
     return (t.detach() if t.requires_grad else t).resolve_neg().numpy()
 
 
-def operator(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
+def operator(
+    calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
+) -> Any:
     """Torch operator of a C function, with a gradient, made when first asked for."""
     key = (calls.sources, call)
     if key not in OPERATORS:
-        OPERATORS[key] = _define(calls, links, call)
+        OPERATORS[key] = _define(calls, links, rule, call)
     return OPERATORS[key]
 
 
-def _define(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
+def _define(
+    calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
+) -> Any:
     """Operator (q, qd, qdd, p) -> results; p holds the parameters in the structure's order."""
     structure, sources, sizes = calls.structure, calls.sources, calls.sizes[OPERATED[call]]
 
@@ -133,7 +140,7 @@ def _define(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
 
     def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
         def again(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
-            return getattr(TorchBackend(structure, links, values(p)), call)(q, qd, qdd)
+            return getattr(TorchBackend(structure, links, values(p), rule), call)(q, qd, qdd)
 
         return _backward(again, ctx.saved_tensors, ctx.needs_input_grad, slopes)
 

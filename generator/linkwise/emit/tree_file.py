@@ -1,0 +1,77 @@
+"""tree.py: a package's joints and what its links carry, in the numbers and formulas of its manifest."""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from linkwise.emit.formula_symbols import parameter_symbols
+from linkwise.emit.render import render
+from linkwise.escape import python_literal
+from linkwise.package.entries import PLACE, BodyEntry, RigidTree
+from linkwise.version import VERSION
+
+WORD = re.compile(r"\b([A-Za-z_]\w*)(\(?)")
+"""A name in a formula, and the parenthesis behind that of a function."""
+
+
+@dataclass(frozen=True)
+class TreeText:
+    """One joint, or one link: its name, and its other entries as Python expressions."""
+
+    name: str
+    entries: tuple[str, ...]
+
+
+def tree_text(tree: RigidTree, links: Sequence[str], parameters: Sequence[str]) -> str:
+    """The file, for the names of the links that carry mass and of the run-time parameters."""
+    at = {body.link: b for b, body in enumerate(tree.bodies)}
+    carriers = {at[link]: j for j, link in enumerate(links)}
+    expression = _expressions(parameters)
+    view = {
+        "version": VERSION,
+        "gravity": repr(tuple(tree.gravity)),
+        "joints": [_joint(body) for body in tree.bodies],
+        "links": [_link(b, tree.bodies[b]) for b in carriers],
+        "formulas": [
+            (place, expression(text))
+            for found, text in tree.formulas.items()
+            for place in _place(found, carriers)
+        ],
+    }
+    return render("package/tree.py.j2", view)
+
+
+def _joint(body: BodyEntry) -> TreeText:
+    placed = f"{body.rotation!r}", f"{body.translation!r}"
+    moved = f"{body.parent!r}", repr(body.kind), f"{body.coordinate}", f"{body.ratio!r}"
+    return TreeText(python_literal(body.joint), (", ".join(moved), *placed))
+
+
+def _link(b: int, body: BodyEntry) -> TreeText:
+    return TreeText(
+        python_literal(body.link), (f"{b}", f"{body.mass!r}", f"{body.com!r}", f"{body.inertia!r}")
+    )
+
+
+def _place(place: str, carriers: dict[int, int]) -> Iterator[str]:
+    """A place of the manifest's tree, bodies[2].com[0] say, in that file; none for what has no mass."""
+    found = PLACE.fullmatch(place)
+    body = found and (found["body"] or found["whole"])
+    if not body:
+        yield place
+        return
+    b, rest = int(body), place.partition(".")[2]
+    if rest.startswith("translation"):
+        yield f"joints[{b}].{rest}"
+    elif b in carriers:
+        yield f"links[{carriers[b]}].{rest.replace('com', 'centre')}"
+
+
+def _expressions(parameters: Sequence[str]) -> Callable[[str], str]:
+    """Formulas of the manifest in Python: functions of the namespace xp, parameters out of p."""
+    symbols = dict(zip((s.text for s in parameter_symbols(parameters)), parameters, strict=True))
+
+    def word(found: re.Match[str]) -> str:
+        return f"xp.{found[1].lower()}(" if found[2] else f"p[{python_literal(symbols[found[1]])}]"
+
+    return lambda text: WORD.sub(word, text)
