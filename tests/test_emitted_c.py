@@ -272,21 +272,17 @@ def test_results_that_no_cache_holds_are_the_same(directory_of: Callable[[str], 
 
 
 COUNTING = """
-/* In place of the compiler's own: counts stores past the cache, and those that no fence has ordered yet. */
+/* In place of the compiler's own: counts bytes stored past the cache, and those that no fence has ordered. */
 #include <string.h>
 typedef struct { char bytes[64]; } __m512i;
+typedef struct { char bytes[32]; } __m256i;
 __attribute__((weak)) long streamed = 0, unfenced = 0;
-static inline __m512i _mm512_load_si512(const void *from)
-{
-    __m512i value;
-    memcpy(&value, from, 64);
-    return value;
-}
-static inline void _mm512_stream_si512(void *to, __m512i value)
-{
-    memcpy(to, &value, 64);
-    ++streamed, ++unfenced;
-}
+#define STORES(width, type, load, stream) \\
+    static inline type load(const void *from) { type value; memcpy(&value, from, width); return value; } \\
+    static inline void stream(void *to, type value) \\
+    { memcpy(to, &value, width); streamed += width, unfenced += width; }
+STORES(64, __m512i, _mm512_load_si512, _mm512_stream_si512)
+STORES(32, __m256i, _mm256_load_si256, _mm256_stream_si256)
 static inline void _mm_sfence(void) { unfenced = 0; }
 """
 
@@ -298,19 +294,28 @@ def aligned(count: int, dtype: type) -> np.ndarray:
     return room[start : start + count * np.dtype(dtype).itemsize].view(dtype)
 
 
-@pytest.mark.parametrize("blocks", [False, True], ids=["rows", "blocks"])
+RESULTS = {
+    "decomposition": (10, 14, 6, 6),
+    "decomposition_blocks": (10, 14, 6, 6),
+    "propagation": (27, 27, 9),
+}
+"""Values of a sample of planar3 in each array of what streams."""
+
+
+@pytest.mark.parametrize("processor", ["__AVX512F__", "__AVX__"])
+@pytest.mark.parametrize("name", RESULTS)
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_stores_past_the_cache_end_with_a_fence(
-    dtype: type, blocks: bool, directory_of: Callable[[str], Path], tmp_path: Path
+    dtype: type, name: str, processor: str, directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:
     (tmp_path / "immintrin.h").write_text(COUNTING, encoding="utf-8")
-    compiler = ("gcc", "-std=c99", "-D__AVX512F__", f"-I{tmp_path}")
+    compiler = ("gcc", "-std=c99", f"-D{processor}", f"-I{tmp_path}")
     compile_library(directory_of("planar3"), tmp_path / "library.so", compiler)
     library = ctypes.CDLL(str(tmp_path / "library.so"))
     suffix, width = ("f", 16) if dtype is np.float32 else ("", 8)
-    compute = getattr(library, f"planar3_decomposition{'_blocks' if blocks else ''}{suffix}")
+    compute = getattr(library, f"planar3_{name}{suffix}")
     compute.restype = None
-    sizes = (10, 14, 6, 6)
+    sizes, blocks = RESULTS[name], name.endswith("blocks")
     count = (64 << 20) // (sum(sizes) * np.dtype(dtype).itemsize) // width * width + 5 * width
     outputs = [aligned(count * size, dtype) for size in sizes]
     motion = np.tile(np.full(3, 0.5, dtype), count)
@@ -319,11 +324,45 @@ def test_stores_past_the_cache_end_with_a_fence(
     compute(ctypes.c_size_t(width), *pointers)
     assert streamed.value == 0
     compute(ctypes.c_size_t(count // width if blocks else count), *pointers)
-    assert streamed.value == sum(a.nbytes for a in outputs) // 64
+    in_lines = outputs[:2] if name == "propagation" else outputs  # squares are written in place
+    assert streamed.value == sum(a.nbytes for a in in_lines)
     assert unfenced.value == 0
     for a, size in zip(outputs, sizes, strict=True):
         samples = a.reshape(-1, size, width).swapaxes(1, 2) if blocks else a.reshape(-1, size)
         assert (samples == samples[:1]).all()
+
+
+@pytest.mark.parametrize(
+    "robot", ["planar3", "torso", LEG, TURNTABLE], ids=["arm", "sharing", "tree", "energies"]
+)
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_functions_that_write_zeros_say_what_numpy_says_for_any_count(
+    robot: str,
+    dtype: type,
+    directory_of: Callable[[str], Path],
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    library, reference = Compiled(directory_of(robot)), package_of(robot).load("numpy")
+    tolerance = 1e-13 if dtype is np.float64 else 1e-5
+    off = np.ones((reference.n, reference.N), dtype=bool)
+    off[*reference.layout.torque.T] = False
+    for count in (0, 1, 2, 16, 37):
+        states = tuple(m.astype(dtype) for m in random_states(reference.n, count))
+        exact = tuple(m.astype(float) for m in states)
+        for call, (name, reads, convention) in {
+            "partial_torque": ("partial_torque", 3, ()),
+            "inverse_dynamics": ("inverse_dynamics", 3, ()),
+            "coefficients": ("coefficients", 2, ()),
+            "propagation": ("propagation", 3, ()),
+            "gradient_propagation": ("propagation", 3, ("gradient",)),
+            "dense_position_gradient": ("position_gradient", 3, ()),
+        }.items():
+            expected = getattr(reference, name)(*exact[:reads], *convention)
+            fields = expected if isinstance(expected, tuple) else (expected,)
+            given = library.dense(call, states[:reads], [field.shape[1:] for field in fields])
+            for one, other in zip(given, fields, strict=True):
+                assert relative_error(one, other) <= tolerance, (call, count)
+                assert call == "inverse_dynamics" or (one[:, off] == 0.0).all(), (call, count)
 
 
 GUARDED = """
@@ -450,6 +489,8 @@ def test_links_of_energies_with_and_without_linear_terms_go_together(tmp_path: P
 def test_no_samples_touch_no_memory(directory_of: Callable[[str], Path]) -> None:
     library = Compiled(directory_of("planar3")).library
     outputs = {"decomposition": 4, "decomposition_blocks": 4, "torque": 1, "position_gradient": 1}
+    outputs |= {"partial_torque": 1, "inverse_dynamics": 1, "dense_position_gradient": 1}
+    outputs |= {"propagation": 3, "gradient_propagation": 3, "coefficients": 2}
     child = os.fork()
     if child == 0:
         for name, count in outputs.items():
