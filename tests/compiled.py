@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+import math
 import re
 import subprocess
 import tempfile
@@ -90,6 +91,11 @@ class Compiled:
     def torque(self, *motion: Any) -> Any:
         """Packed tau."""
         return self._rows("torque", motion, [self.sizes["tau"]])[0]
+
+    def dense(self, function: str, motion: Sequence[Any], shapes: Sequence[tuple[int, ...]]) -> list[Any]:
+        """Results of a function that writes zeros too, of these shapes a sample."""
+        rows = self._rows(function, tuple(motion), [math.prod(shape) for shape in shapes])
+        return [a.reshape(len(motion[0]), *shape) for a, shape in zip(rows, shapes, strict=True)]
 
     def position_gradient(self, *motion: Any) -> Any:
         """Packed c0."""

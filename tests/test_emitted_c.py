@@ -272,7 +272,7 @@ def test_results_that_no_cache_holds_are_the_same(directory_of: Callable[[str], 
 
 
 COUNTING = """
-/* In place of the compiler's own: counts stores past the cache, and those that no fence has ordered yet. */
+/* In place of the compiler's own: counts bytes stored past the cache, and those that no fence has ordered. */
 #include <string.h>
 typedef struct { char bytes[64]; } __m512i;
 typedef struct { char bytes[32]; } __m256i;
@@ -303,13 +303,21 @@ def aligned(count: int, dtype: type, behind: int) -> np.ndarray:
     return room[start : start + count * np.dtype(dtype).itemsize].view(dtype)
 
 
+RESULTS = {
+    "decomposition": (10, 14, 6, 6),
+    "decomposition_blocks": (10, 14, 6, 6),
+    "propagation": (27, 27, 9),
+}
+"""Values of a sample of planar3 in each array of what streams."""
+
+
 @pytest.mark.parametrize("behind", [0, 16], ids=["on a line", "off a line"])
-@pytest.mark.parametrize("blocks", [False, True], ids=["rows", "blocks"])
+@pytest.mark.parametrize("name", RESULTS)
 @pytest.mark.parametrize(("dtype", "processor"), [(np.float64, "AVX512F"), (np.float32, "AVX")])
 def test_stores_past_the_cache_are_whole_lines_and_end_with_a_fence(
     dtype: type,
     processor: str,
-    blocks: bool,
+    name: str,
     behind: int,
     directory_of: Callable[[str], Path],
     tmp_path: Path,
@@ -319,9 +327,9 @@ def test_stores_past_the_cache_are_whole_lines_and_end_with_a_fence(
     compile_library(directory_of("planar3"), tmp_path / "library.so", compiler)
     library = ctypes.CDLL(str(tmp_path / "library.so"))
     suffix, width = ("f", 16) if dtype is np.float32 else ("", 8)
-    compute = getattr(library, f"planar3_decomposition{'_blocks' if blocks else ''}{suffix}")
+    compute = getattr(library, f"planar3_{name}{suffix}")
     compute.restype = None
-    sizes = (10, 14, 6, 6)
+    sizes, blocks = RESULTS[name], name.endswith("blocks")
     count = (64 << 20) // (sum(sizes) * np.dtype(dtype).itemsize) // width * width + 5 * width
     outputs = [aligned(count * size, dtype, behind) for size in sizes]
     motion = np.tile(np.full(3, 0.5, dtype), count)
@@ -330,13 +338,47 @@ def test_stores_past_the_cache_are_whole_lines_and_end_with_a_fence(
     compute(ctypes.c_size_t(width), *pointers)
     assert streamed.value == 0
     compute(ctypes.c_size_t(count // width if blocks else count), *pointers)
+    in_lines = outputs[:2] if name == "propagation" else outputs  # squares are written in place
     # Off a line, the line where one block of results ends and the next one begins is written as usual.
-    shared = len(sizes) * count // width if behind else 0
-    assert streamed.value == sum(a.nbytes for a in outputs) - 64 * shared
+    shared = len(in_lines) * count // width if behind else 0
+    assert streamed.value == sum(a.nbytes for a in in_lines) - 64 * shared
     assert unfenced.value == 0
     for a, size in zip(outputs, sizes, strict=True):
         samples = a.reshape(-1, size, width).swapaxes(1, 2) if blocks else a.reshape(-1, size)
         assert (samples == samples[:1]).all()
+
+
+@pytest.mark.parametrize(
+    "robot", ["planar3", "torso", LEG, TURNTABLE], ids=["arm", "sharing", "tree", "energies"]
+)
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_functions_that_write_zeros_say_what_numpy_says_for_any_count(
+    robot: str,
+    dtype: type,
+    directory_of: Callable[[str], Path],
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    library, reference = Compiled(directory_of(robot)), package_of(robot).load("numpy")
+    tolerance = 1e-13 if dtype is np.float64 else 1e-5
+    off = np.ones((reference.n, reference.N), dtype=bool)
+    off[*reference.layout.torque.T] = False
+    for count in (0, 1, 2, 16, 37):
+        states = tuple(m.astype(dtype) for m in random_states(reference.n, count))
+        exact = tuple(m.astype(float) for m in states)
+        for call, (name, reads, convention) in {
+            "partial_torque": ("partial_torque", 3, ()),
+            "inverse_dynamics": ("inverse_dynamics", 3, ()),
+            "coefficients": ("coefficients", 2, ()),
+            "propagation": ("propagation", 3, ()),
+            "gradient_propagation": ("propagation", 3, ("gradient",)),
+            "dense_position_gradient": ("position_gradient", 3, ()),
+        }.items():
+            expected = getattr(reference, name)(*exact[:reads], *convention)
+            fields = expected if isinstance(expected, tuple) else (expected,)
+            given = library.dense(call, states[:reads], [field.shape[1:] for field in fields])
+            for one, other in zip(given, fields, strict=True):
+                assert relative_error(one, other) <= tolerance, (call, count)
+                assert call == "inverse_dynamics" or (one[:, off] == 0.0).all(), (call, count)
 
 
 GUARDED = """
@@ -463,6 +505,8 @@ def test_links_of_energies_with_and_without_linear_terms_go_together(tmp_path: P
 def test_no_samples_touch_no_memory(directory_of: Callable[[str], Path]) -> None:
     library = Compiled(directory_of("planar3")).library
     outputs = {"decomposition": 4, "decomposition_blocks": 4, "torque": 1, "position_gradient": 1}
+    outputs |= {"partial_torque": 1, "inverse_dynamics": 1, "dense_position_gradient": 1}
+    outputs |= {"propagation": 3, "gradient_propagation": 3, "coefficients": 2}
     child = os.fork()
     if child == 0:
         for name, count in outputs.items():

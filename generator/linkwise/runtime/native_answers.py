@@ -1,17 +1,15 @@
 """Answers that C writes, zeros included, for arrays and for tensors of which no gradient is recorded."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
 from .answers import KINDS, Answers
 from .arguments import has_tensors
-from .native_calls import PER_THREAD
+from .interface import Backend
+from .native_calls import PER_THREAD, NativeCalls
 from .native_module import compiled_calls
-
-if TYPE_CHECKING:
-    from .native_backend import NativeBackend
 
 DTYPES = (np.dtype("f8"), np.dtype("f4"))
 """In the order of the compiled module."""
@@ -22,9 +20,12 @@ class NativeAnswers(Answers):
 
     contiguous: ClassVar = True
 
-    def __init__(self, backend: "NativeBackend", check_finite: bool) -> None:
-        super().__init__(backend.structure, backend, check_finite)
-        self._native, self._calls = backend, backend.calls
+    def __init__(
+        self, backend: Backend[Any], calls: NativeCalls, on_torch: Callable[[], Any], check_finite: bool
+    ) -> None:
+        """`on_torch` gives what computes with tensors, made when first asked for."""
+        super().__init__(calls.structure, backend, check_finite)
+        self._calls, self._on_torch = calls, on_torch
         made = compiled_calls()
         # What is learned may change from call to call, and what is looked at is looked at here.
         self._compiled = None if made is None or check_finite or self._calls.learned else self._made(made)
@@ -46,7 +47,7 @@ class NativeAnswers(Answers):
             return self._run(call, motion)
         from .native_torch import compute  # it needs torch, which arrays do without
 
-        if self._native.on_torch().needs_operators(motion):
+        if self._on_torch().needs_operators(motion):
             return super()._computed(call, motion)
         return compute(self._quickest, call, motion)
 
@@ -56,7 +57,7 @@ class NativeAnswers(Answers):
             return
         from .native_torch import compute
 
-        if self._native.on_torch().needs_operators(motion):
+        if self._on_torch().needs_operators(motion):
             super()._compute_into(call, motion, into)
         else:
             compute(self._quickest, call, motion, into)

@@ -62,7 +62,7 @@ class NativeBackend(NumpyBackend):
 
     def answers(self, check_finite: bool) -> Answers:
         """The calls of `Dynamics`: C writes the answers, but for tensors of which gradients are recorded."""
-        return NativeAnswers(self, check_finite)
+        return NativeAnswers(self, self.calls, self.on_torch, check_finite)
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
