@@ -50,9 +50,11 @@ def study(path: Path, options: dict[str, Any], samples: int) -> dict[str, Any]:
     row["operations"] = sum(link["operations"] for link in manifest["links"])
     with tempfile.TemporaryDirectory() as folder:
         write_package(files, Path(folder) / "robot")
-        dynamics = import_package(Path(folder) / "robot").load("numpy")
-    row["outputs"] = sum(len(block) for block in dynamics.layout)
-    return row | compare(path, options, system, dynamics, samples)
+        package = import_package(Path(folder) / "robot")
+        kernels = [package.load("numpy", kernel=kernel) for kernel in ("straight", "rule")]
+    row["outputs"] = sum(len(block) for block in kernels[0].layout)
+    errors = [compare(path, options, system, dynamics, samples) for dynamics in kernels]
+    return row | {name: max(error[name] for error in errors) for name in errors[0]}
 
 
 def compare(

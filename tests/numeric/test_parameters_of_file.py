@@ -200,7 +200,7 @@ def test_every_component_is_a_parameter_in_the_frame_of_the_file(package: Module
 def test_a_changed_parameter_is_the_changed_number_of_the_file(package: ModuleType, tmp_path: Path) -> None:
     states = random_states(4, 3)
     motion = [torch.as_tensor(a) for a in states]
-    before = package.load("numpy").partial_torque(*states)
+    before = package.load("numpy", kernel="straight").partial_torque(*states)
     without_effect = set()
     for name in NAMES:
         path = tmp_path / f"{name}.urdf"
@@ -213,8 +213,9 @@ def test_a_changed_parameter_is_the_changed_number_of_the_file(package: ModuleTy
                 for state in zip(*states, strict=True)
             ]
         )
-        given = package.load("numpy", value).partial_torque(*states)
-        assert relative_error(given, expected) <= BOUND, name
+        for kernel in ("rule", "straight"):
+            given = package.load("numpy", value, kernel=kernel).partial_torque(*states)
+            assert relative_error(given, expected) <= BOUND, name
         assert relative_error(package.load("autograd", value).partial_torque(*motion), expected) <= BOUND, (
             name
         )

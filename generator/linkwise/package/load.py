@@ -85,8 +85,10 @@ class Package:
         self, backend: str, parameters: Mapping[str, float] | None = None, kernel: str = "auto"
     ) -> Model:
         """Model on a back end, for any parameters; passes on what the package raises."""
+        # A package made before there were kernels to choose from loads as it always did.
+        chosen = {} if kernel == "auto" else {"kernel": kernel}
         with staying():
-            dynamics = self.module.load(backend, parameters, allow_unphysical=True, kernel=kernel)
+            dynamics = self.module.load(backend, parameters, allow_unphysical=True, **chosen)
         model: Model = TensorModel(dynamics) if dynamics.backend.takes_tensors else dynamics
         return model
 

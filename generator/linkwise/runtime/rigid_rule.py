@@ -180,11 +180,11 @@ def _halves(screws: Any) -> tuple[Any, Any]:
     return screws[:3, 0, :-1], screws[:3, 1, :-1]
 
 
-def decomposition_wrenches(xp: Any, link: LinkMoments, joints: Any, moved: Twists) -> Any:
-    """Wrenches of c2, then of c1, (6, 2 pairs, samples), for the link and the joint of each pair."""
+def decomposition_wrenches(xp: Any, link: LinkMoments, joints: Any, moved: Twists) -> tuple[Any, Any]:
+    """Wrenches of c2 and of c1, (6, pairs, samples) each, for the link and the joint of each pair."""
     s, rate = taken(moved.screws, joints), taken(moved.rates, joints)
     c1 = accelerated(xp, link, rate[:, 0], rate[:, 1]) + turning(xp, link, s[:, 0])
-    return xp.concat([accelerated(xp, link, s[:, 0], s[:, 1]), c1], 1)
+    return accelerated(xp, link, s[:, 0], s[:, 1]), c1
 
 
 def gradient_wrenches(xp: Any, link: LinkMoments, joints: Any, moved: Twists, wrench: Any) -> Any:

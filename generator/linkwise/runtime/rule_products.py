@@ -59,7 +59,7 @@ def _fused_coefficients(space: Space, at: Moment) -> list[Any]:
     """Packed c2 and c1, pair by pair."""
     links, joints = at.tables.pairs
     wrenches = decomposition_wrenches(space.xp, _of_pairs(at.states.moments, links), joints, at.moved)
-    return [_gathered(at, wrenches, entries) for entries in at.tables.entries[:2]]
+    return [_gathered(at, w, entries) for w, entries in zip(wrenches, at.tables.entries[:2], strict=True)]
 
 
 def _fused_gradient(space: Space, at: Moment) -> list[Any]:

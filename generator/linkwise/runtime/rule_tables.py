@@ -60,6 +60,9 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
     links = LinkTables(_span([link.joint for link in tree.links]), eye, skew)
     coefficients = [layout.acceleration, layout.velocity, layout.position_gradient]
     pairs = pair_layout(layout, coefficients, len(tree.joints))
+    # c2 and c1 have wrenches of one kind each.
+    count = len(pairs.links)
+    each = (tuple((e, row % count) for e, row in table) for table in pairs.entries[:2])
     # The place of no entry is that of the ground, which has no screw.
     width = 2 * len(tree.links)
     singles = (tuple((row // width, row % width) for row in t) for t in (layout.gravity, layout.torque))
@@ -73,7 +76,7 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
         tuple((_span(group.links), _span(group.path)) for group in layout.groups),
         tuple(tuple(getattr(layout, field)) for field in fields),
         (pairs.links, pairs.joints),
-        (*pairs.entries, *singles),
+        (*each, *pairs.entries[2:], *singles),
     )
 
 
