@@ -61,3 +61,17 @@ def test_counts_of_the_corpus_are_those_that_make_corpus_holds() -> None:
     assert {"plain": plain, "helped": helped, "never": whole - plain - helped} == COUNTS
     (error,) = stated(r"own torque agree with Pinocchio to ([\de-]+) of the largest")
     assert error <= LIMIT <= 10 * error
+
+
+def test_the_history_of_speed_has_the_columns_that_the_bench_prints(monkeypatch: pytest.MonkeyPatch) -> None:
+    tests = Path(__file__).parent
+    monkeypatch.syspath_prepend(str(tests / "benchmarks"))
+    from speed.results import Results
+    from speed.table import HISTORY, history
+
+    lines = [
+        line for line in (tests.parent / "docs" / "speed.md").read_text().splitlines() if line[:1] == "|"
+    ]
+    assert lines[0].strip("| ").split(" | ") == ["day", "linkwise", "machine", *HISTORY]
+    results = Results({"date": "", "linkwise": "", "processor": "", "vectors": "AVX2"})
+    assert {line.count("|") for line in lines} == {history(results).count("|")}

@@ -10,9 +10,7 @@ SPELL = 2e5
 
 def by_turns(calls: Mapping[str, Callable[[], Any]], seconds: float) -> dict[str, float]:
     """Least nanoseconds of one call of each, over as many rounds as the seconds for each of them hold."""
-    for call in calls.values():
-        call()
-    least = {name: spell(call, 1) for name, call in calls.items()}
+    least = {name: min(spell(call, 1) for _ in range(4)) for name, call in calls.items()}
     inner = {name: max(1, int(SPELL / ns)) for name, ns in least.items()}
     end = time.perf_counter() + seconds * len(calls)
     rounds = 0

@@ -36,9 +36,9 @@ def limits_text(results: Results) -> str:
     given = f"{mix.fused:.0%} fused operations and {mix.products:.0%} products" if mix else "no mix"
     return (
         f"Limits, one thread: {results.limits['flops']:.0f} GFlop/s in float64,"
-        f" {results.limits['flopsf']:.0f} in float32, of instructions that are {given}, as in Panda's kernels,"
-        " the others being sums; memory: of writing the results past the cache or through it, whatever is"
-        " faster. Shares of arithmetic at each batch, of the lower of the two limits at the largest."
+        f" {results.limits['flopsf']:.0f} in float32, of instructions that are {given}, as in Panda's"
+        " kernels, the others being sums; memory: of writing the results past the cache or through it,"
+        " whatever is faster. Shares of arithmetic at each batch, of the lower of the two at the largest."
     )
 
 
