@@ -6,13 +6,16 @@ An entry is read by the command line too, so that this file imports what emits o
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 from linkwise.errors import LinkwiseError
 
 if TYPE_CHECKING:
     from linkwise.emit.derivation import Derivation
+
+KernelKind = Literal["straight", "loops"]
+"""Straight lines of closed forms, or loops over links and joints."""
 
 Emitter = Callable[["Derivation"], Iterator[tuple[str, str]]]
 """Turns a derivation into files: paths inside the package and texts."""
@@ -66,6 +69,12 @@ def _c(d: Derivation) -> Iterator[tuple[str, str]]:
     from linkwise.emit.c.sources import c_files
 
     return c_files(d)
+
+
+def _loops(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.c.loops import loop_files
+
+    return loop_files(d)
 
 
 def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
@@ -145,11 +154,47 @@ BACKENDS: dict[str, BackendFiles] = {
 }
 
 
-def chosen_backends(names: Iterable[str]) -> tuple[BackendFiles, ...]:
-    """Back ends by name and those that they need, in this order; raises LinkwiseError for an unknown name."""
-    wanted = list(names)
+LOOPS: dict[str, BackendFiles] = {
+    backend.name: backend
+    for backend in (
+        replace(
+            BACKENDS["native"],
+            loading=Loading(
+                "native_backend",
+                'NativeBackend(ROBOT, Path(__file__).parent / "c", (), values)',
+                ("from pathlib import Path",),
+                speed=1,
+            ),
+            needs=("c",),
+        ),
+        replace(
+            BACKENDS["c"],
+            doc="loops over links and joints in C99 and C++17, to compile into a program of your own",
+            emits=(_loops,),
+        ),
+    )
+}
+"""Back ends of a package whose kernel is in loops, for which no closed forms are derived."""
+
+
+def backends_of(kernel: KernelKind) -> dict[str, BackendFiles]:
+    """Back ends that a package can have, by name."""
+    return LOOPS if kernel == "loops" else BACKENDS
+
+
+def chosen_backends(names: Iterable[str], kernel: KernelKind = "straight") -> tuple[BackendFiles, ...]:
+    """Back ends by name and those that they need, in this order.
+
+    Raises LinkwiseError for an unknown name, and for one that takes closed forms where there are none.
+    """
+    wanted, there = list(names), backends_of(kernel)
     for name in wanted:
         if name not in BACKENDS:
             raise LinkwiseError(f"no back end {name!r}; choose among {', '.join(BACKENDS)}")
-    wanted += [needed for name in wanted for needed in BACKENDS[name].needs]
-    return tuple(backend for name, backend in BACKENDS.items() if name in wanted)
+        if name not in there:
+            raise LinkwiseError(
+                f"the back end {name!r} is not there with --kernel loops, which derives no formulas; choose "
+                f"among {', '.join(there)}, or take --kernel straight"
+            )
+    wanted += [needed for name in wanted for needed in there[name].needs]
+    return tuple(backend for name, backend in there.items() if name in wanted)

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from linkwise.errors import LinkwiseError
 from linkwise.output import sweep
@@ -21,7 +21,7 @@ from linkwise.package.entries import (
     check_tree,
 )
 
-SCHEMA = 4
+SCHEMA = 5
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [
@@ -50,7 +50,8 @@ CONVENTIONS = {
 class Manifest:
     """What a package is of: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
 
-    request: the options of `generate`; files: the SHA-256 of every other file, by its path in the package
+    request: the options of `generate`; kernel: closed forms in straight lines, or loops
+    over links and joints; files: the SHA-256 of every other file, by its path in the package
     shared_operations: those of the kernel in which links share work; None without such a kernel
     """
 
@@ -58,6 +59,7 @@ class Manifest:
     robot: str
     generator: Mapping[str, str]
     request: Mapping[str, Any]
+    kernel: Literal["straight", "loops"]
     joints: tuple[JointEntry, ...]
     links: tuple[LinkEntry, ...]
     shared_operations: int | None

@@ -60,6 +60,11 @@ class TorchSide(TorchBackend):
         p = torch.stack(values) if values else q.new_empty(0)
         recorded = torch.is_grad_enabled() and any(t.requires_grad for t in (q, qd, qdd, p))
         if recorded or torch.compiler.is_compiling():
+            if not self.links:
+                raise TypeError(
+                    "this package's kernel is in loops and has no formulas for torch to differentiate or "
+                    "compile: detach the tensors, or generate it with --kernel straight"
+                )
             results = self.operators[call](q, qd, qdd, p)
             return results if isinstance(results, tuple) else (results,)
         return compute(self.calls, call, q, qd, qdd)

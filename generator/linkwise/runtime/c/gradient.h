@@ -1,0 +1,42 @@
+/* The position gradient of the rigid-link rule. The same in every package of linkwise.
+
+   With the twist V, its rate A less gravity, and the change Sd = V x S, all of what carries joint k, and the wrench F of tau,
+       c0(i, j, k) = S_i . (I Sdd + 2 B Sd)                     for i behind k
+                   = S_i . (I Sdd + 2 B Sd + S x* F)            for k itself and i before it
+       Sdd = A x S + V x Sd        S x* F = (z x N + s x f, z x f) */
+
+/* Sdd of every joint, by its frame. */
+static inline void KERNEL(second_changes)(const motion *m, const real *gravity, screw *second)
+{
+    const vector g = {same(gravity[0]), same(gravity[1]), same(gravity[2])};
+    for (int f = 1; f <= FRAMES; ++f) {
+        const int up = joints[f - 1].parent;
+        const screw twist = m->twist[up], rate = m->rate[up], axis = m->axis[f - 1], change = m->change[f - 1];
+        const vector s = add(cross(rate.z, axis.s), cross(subtract(rate.s, g), axis.z));
+        second[f].z = add(cross(rate.z, axis.z), cross(twist.z, change.z));
+        second[f].s = add(s, add(cross(twist.z, change.s), cross(twist.s, change.z)));
+    }
+}
+
+/* c0 of a link, to which each pair of joints on its path adds: `frames` from the base on, each of which follows the
+   coordinate at `places` of the path. */
+static inline void KERNEL(gradient)(const motion *m, const screw *second, const moving_link *l, int count, const short *frames,
+    const short *places, int length, real *c0)
+{
+    const vector force = l->wrench.s;
+    for (int b = 0; b < count; ++b) {
+        const int f = frames[b];
+        const screw axis = m->axis[f - 1], change = m->change[f - 1], sdd = second[f];
+        const screw moves = KERNEL(moves)(l, &axis);
+        const vector twice = scale(same(R(2.0)), change.z);
+        const vector slips = subtract(sdd.s, add(cross(l->com, sdd.z), cross(l->velocity, twice)));
+        const screw behind = {add(apply(l->inertia, sdd.z), apply(l->turning, twice)), scale(l->mass, slips)};
+        const screw before = {add(behind.z, add(cross(axis.z, l->wrench.z), cross(moves.s, force))),
+            add(behind.s, cross(axis.z, force))};
+        for (int a = 0; a < count; ++a) {
+            const screw of = KERNEL(moves)(l, &m->axis[frames[a] - 1]);
+            real *entry = c0 + (places[a] * length + places[b]) * W;
+            PUT(entry, TAKE(entry) + along(&of, a <= b ? &before : &behind));
+        }
+    }
+}
