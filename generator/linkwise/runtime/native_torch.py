@@ -62,8 +62,8 @@ class TorchSide(TorchBackend):
         if recorded or torch.compiler.is_compiling():
             if not self.links:
                 raise TypeError(
-                    "this package's kernel is in loops and has no formulas for torch to differentiate or "
-                    "compile: detach the tensors, or generate it with --kernel straight"
+                    "torch can neither differentiate nor compile this robot, for its kernel is in loops "
+                    "and has no formulas: detach the tensors, or generate it with --kernel straight"
                 )
             results = self.operators[call](q, qd, qdd, p)
             return results if isinstance(results, tuple) else (results,)

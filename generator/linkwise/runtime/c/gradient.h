@@ -12,9 +12,9 @@ static inline void KERNEL(second_changes)(const motion *m, const real *gravity, 
     for (int f = 1; f <= FRAMES; ++f) {
         const int up = joints[f - 1].parent;
         const screw twist = m->twist[up], rate = m->rate[up], axis = m->axis[f - 1], change = m->change[f - 1];
-        const vector s = add(cross(rate.z, axis.s), cross(subtract(rate.s, g), axis.z));
-        second[f].z = add(cross(rate.z, axis.z), cross(twist.z, change.z));
-        second[f].s = add(s, add(cross(twist.z, change.s), cross(twist.s, change.z)));
+        const vector s = add_cross(cross(rate.z, axis.s), subtract(rate.s, g), axis.z);
+        second[f].z = add_cross(cross(rate.z, axis.z), twist.z, change.z);
+        second[f].s = add_cross(add_cross(s, twist.z, change.s), twist.s, change.z);
     }
 }
 
@@ -29,10 +29,10 @@ static inline void KERNEL(gradient)(const motion *m, const screw *second, const 
         const screw axis = m->axis[f - 1], change = m->change[f - 1], sdd = second[f];
         const screw moves = KERNEL(moves)(l, &axis);
         const vector twice = scale(same(R(2.0)), change.z);
-        const vector slips = subtract(sdd.s, add(cross(l->com, sdd.z), cross(l->velocity, twice)));
-        const screw behind = {add(apply(l->inertia, sdd.z), apply(l->turning, twice)), scale(l->mass, slips)};
-        const screw before = {add(behind.z, add(cross(axis.z, l->wrench.z), cross(moves.s, force))),
-            add(behind.s, cross(axis.z, force))};
+        const vector slips = subtract_cross(subtract_cross(sdd.s, l->com, sdd.z), l->velocity, twice);
+        const screw behind = {add_applied(apply(l->inertia, sdd.z), l->turning, twice), scale(l->mass, slips)};
+        const screw before = {add_cross(add_cross(behind.z, axis.z, l->wrench.z), moves.s, force),
+            add_cross(behind.s, axis.z, force)};
         for (int a = 0; a < count; ++a) {
             const screw of = KERNEL(moves)(l, &m->axis[frames[a] - 1]);
             real *entry = c0 + (places[a] * length + places[b]) * W;

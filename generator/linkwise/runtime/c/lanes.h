@@ -24,6 +24,13 @@ typedef real lanes, lanes_anywhere;
 #define LANES_AT(at) (*(lanes_anywhere *)(at))
 #define LANES_FROM(at) (*(const lanes_anywhere *)(at))
 
+/* Memory that is about to be written may be fetched meanwhile; it need not be there. */
+#if defined(__GNUC__)
+#define WRITTEN_SOON(at) __builtin_prefetch(at, 1)
+#else
+#define WRITTEN_SOON(at) ((void)(at))
+#endif
+
 /* What is INLINE costs no call, not even without optimization: its vectors stay in registers. */
 #if defined(__GNUC__)
 #define INLINE __attribute__((always_inline)) static inline

@@ -4,6 +4,7 @@
 #define KERNEL(name) name##_one
 #define TAKE(at) (*(at))
 #define PUT(at, value) (*(at) = (value))
+#define AHEAD(at) ((void)(at))
 #include "vectors.h"
 
 #include "rule.h"
@@ -80,3 +81,4 @@ SHARED void API(torque_one)(INPUTS, real *tau)
 #undef KERNEL
 #undef TAKE
 #undef PUT
+#undef AHEAD

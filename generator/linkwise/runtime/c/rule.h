@@ -81,7 +81,7 @@ static inline void KERNEL(frame)(motion *m, int f, const struct placing *here, n
             place = add(place, scale(q, direction));
     }
     change.z = cross(twist.z, axis.z);
-    change.s = add(cross(twist.z, axis.s), cross(twist.s, axis.z));
+    change.s = add_cross(cross(twist.z, axis.s), twist.s, axis.z);
     m->turn[f] = turn;
     m->place[f] = place;
     m->axis[f - 1] = axis;
@@ -124,8 +124,8 @@ INLINE moving_link KERNEL(link_at)(const motion *m, int f, const struct body *bo
     moving_link l;
     l.mass = same(body->mass);
     l.com = add(m->place[f], turned(turn, body->com));
-    l.velocity = add(twist.s, cross(twist.z, l.com));
-    const vector acceleration = add(rate.s, add(cross(rate.z, l.com), cross(twist.z, l.velocity)));
+    l.velocity = add_cross(twist.s, twist.z, l.com);
+    const vector acceleration = add_cross(add_cross(rate.s, rate.z, l.com), twist.z, l.velocity);
     const matrix inertia = {KERNEL(inertia_row)(turn, turn.x, j), KERNEL(inertia_row)(turn, turn.y, j),
         KERNEL(inertia_row)(turn, turn.z, j)};
     l.inertia = inertia;
@@ -134,7 +134,7 @@ INLINE moving_link KERNEL(link_at)(const motion *m, int f, const struct body *bo
     const vector w = scale(same(R(0.5) * (j[0] + j[1] + j[2])), twist.z);
     const matrix turning = {{x.x, y.x + w.z, z.x - w.y}, {x.y - w.z, y.y, z.y + w.x}, {x.z + w.y, y.z - w.x, z.z}};
     l.turning = turning;
-    l.wrench.z = add(apply(inertia, rate.z), apply(turning, twist.z));
+    l.wrench.z = add_applied(apply(inertia, rate.z), turning, twist.z);
     l.wrench.s = scale(l.mass, subtract(acceleration, g));
     l.weight = scale(same(-body->mass), g);
     return l;
@@ -143,8 +143,23 @@ INLINE moving_link KERNEL(link_at)(const motion *m, int f, const struct body *bo
 /* How a link moves with a column, its partial velocities. */
 INLINE screw KERNEL(moves)(const moving_link *l, const screw *axis)
 {
-    const screw moves = {axis->z, subtract(axis->s, cross(l->com, axis->z))};
+    const screw moves = {axis->z, subtract_cross(axis->s, l->com, axis->z)};
     return moves;
+}
+
+/* A row of I z and one of I zd - w x E z, each entry of the matrices read once. */
+INLINE void KERNEL(moments)(vector inertia, vector turning, vector z, vector zd, number *c2, number *c1)
+{
+    number n = inertia.x * z.x, nd = inertia.x * zd.x;
+    n += inertia.y * z.y;
+    nd += inertia.y * zd.y;
+    n += inertia.z * z.z;
+    nd += inertia.z * zd.z;
+    nd += turning.x * z.x;
+    nd += turning.y * z.y;
+    nd += turning.z * z.z;
+    *c2 = n;
+    *c1 = nd;
 }
 
 /* The wrenches of each coordinate of a link's path. */
@@ -153,11 +168,12 @@ static inline void KERNEL(columns)(const motion *m, const moving_link *l, const 
     for (int k = 0; k < length; ++k) {
         const screw axis = m->axis[column[k]], change = m->change[column[k]];
         const screw moves = KERNEL(moves)(l, &axis);
-        const vector slips = add(cross(l->velocity, axis.z), cross(l->com, change.z));
+        const vector slips = subtract_cross(subtract_cross(change.s, l->velocity, axis.z), l->com, change.z);
         out->moves[k] = moves;
-        out->c2[k].z = apply(l->inertia, axis.z);
+        KERNEL(moments)(l->inertia.x, l->turning.x, axis.z, change.z, &out->c2[k].z.x, &out->c1[k].z.x);
+        KERNEL(moments)(l->inertia.y, l->turning.y, axis.z, change.z, &out->c2[k].z.y, &out->c1[k].z.y);
+        KERNEL(moments)(l->inertia.z, l->turning.z, axis.z, change.z, &out->c2[k].z.z, &out->c1[k].z.z);
         out->c2[k].s = scale(l->mass, moves.s);
-        out->c1[k].z = add(apply(l->inertia, change.z), apply(l->turning, axis.z));
-        out->c1[k].s = scale(l->mass, subtract(change.s, slips));
+        out->c1[k].s = scale(l->mass, slips);
     }
 }

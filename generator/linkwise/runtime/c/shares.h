@@ -1,6 +1,6 @@
 /* Rows of results from the wrenches of rule.h: what each joint bears of them. The same in every package of linkwise.
 
-   Entry e is stored at e * W by PUT. */
+   Entry e is stored at e * W by PUT. AHEAD says which memory the next rows will go to, so that it is there by then. */
 
 /* What a wrench does along two motions, each of its components read once. */
 INLINE void KERNEL(along_both)(const screw *a, const screw *b, const screw *f, real *first, real *second)
@@ -31,10 +31,17 @@ INLINE void KERNEL(two_rows)(const wrenches *RESTRICT x, int i, int length, real
         return;
     }
     const screw b = x->moves[i + 1];
-    for (int k = i + 1; k < length; ++k)
-        KERNEL(along_both)(&a, &b, &x->c2[k], c2 + (k - i) * W, c2 + (length - i + k - i - 1) * W);
-    for (int k = 0; k < length; ++k)
-        KERNEL(along_both)(&a, &b, &x->c1[k], c1 + k * W, c1 + (length + k) * W);
+    real *second2 = c2 + (length - i - 1) * W, *second1 = c1 + length * W;
+    for (int k = i + 1; k < length; ++k) {
+        AHEAD(second2 + (k - i + length - i) * W);
+        AHEAD(second2 + (k - i + 2 * (length - i)) * W);
+        KERNEL(along_both)(&a, &b, &x->c2[k], c2 + (k - i) * W, second2 + (k - i) * W);
+    }
+    for (int k = 0; k < length; ++k) {
+        AHEAD(second1 + (k + length) * W);
+        AHEAD(second1 + (k + 2 * length) * W);
+        KERNEL(along_both)(&a, &b, &x->c1[k], c1 + k * W, second1 + k * W);
+    }
 }
 
 /* A link's g and tau. */

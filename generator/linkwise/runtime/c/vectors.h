@@ -7,7 +7,10 @@
 #define subtract KERNEL(subtract)
 #define scale KERNEL(scale)
 #define cross KERNEL(cross)
+#define add_cross KERNEL(add_cross)
+#define subtract_cross KERNEL(subtract_cross)
 #define apply KERNEL(apply)
+#define add_applied KERNEL(add_applied)
 #define turned KERNEL(turned)
 #define same KERNEL(same)
 #define along KERNEL(along)
@@ -50,11 +53,32 @@ INLINE vector cross(vector a, vector b)
     return product;
 }
 
+/* a + b x c, and a - b x c: each product is added at once, and fused with the addition where the processor can. */
+INLINE vector add_cross(vector a, vector b, vector c)
+{
+    const vector sum = {a.x + b.y * c.z - b.z * c.y, a.y + b.z * c.x - b.x * c.z, a.z + b.x * c.y - b.y * c.x};
+    return sum;
+}
+
+INLINE vector subtract_cross(vector a, vector b, vector c)
+{
+    const vector difference = {a.x - b.y * c.z + b.z * c.y, a.y - b.z * c.x + b.x * c.z, a.z - b.x * c.y + b.y * c.x};
+    return difference;
+}
+
 INLINE vector apply(matrix m, vector a)
 {
     const vector product = {m.x.x * a.x + m.x.y * a.y + m.x.z * a.z, m.y.x * a.x + m.y.y * a.y + m.y.z * a.z,
         m.z.x * a.x + m.z.y * a.y + m.z.z * a.z};
     return product;
+}
+
+/* a + m b */
+INLINE vector add_applied(vector a, matrix m, vector b)
+{
+    const vector sum = {a.x + m.x.x * b.x + m.x.y * b.y + m.x.z * b.z, a.y + m.y.x * b.x + m.y.y * b.y + m.y.z * b.z,
+        a.z + m.z.x * b.x + m.z.y * b.y + m.z.z * b.z};
+    return sum;
 }
 
 /* A vector of the robot's, of one frame, in common axes. */
