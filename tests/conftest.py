@@ -35,7 +35,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def directory_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Directory of a robot's package; "planar3 symbolic" keeps its parameters, "planar3 loops" is in loops."""
+    """Directory of a robot's package; "planar3 symbolic" keeps parameters, "planar3 loops" is in loops."""
     made: dict[str, Path] = {}
 
     def directory(robot: str) -> Path:

@@ -7,15 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from linkwise.errors import LinkwiseError
 
 if TYPE_CHECKING:
     from linkwise.emit.derivation import Derivation
-
-KernelKind = Literal["straight", "loops"]
-"""Straight lines of closed forms, or loops over links and joints."""
+    from linkwise.package.entries import KernelKind
 
 Emitter = Callable[["Derivation"], Iterator[tuple[str, str]]]
 """Turns a derivation into files: paths inside the package and texts."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from linkwise.dynamics.derive import shared_kernel
 from linkwise.dynamics.kernel import Kernel
-from linkwise.emit.backend import KernelKind
+from linkwise.package.entries import KernelKind
 from linkwise.symbolic.system import System
 
 

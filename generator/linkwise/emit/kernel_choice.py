@@ -2,8 +2,9 @@
 
 from collections.abc import Iterable
 
-from linkwise.emit.backend import LOOPS, KernelKind
+from linkwise.emit.backend import LOOPS
 from linkwise.errors import LinkwiseError
+from linkwise.package.entries import KernelKind
 from linkwise.symbolic.system import EnergySystem, System
 
 CHOICES = ("auto", "straight", "loops")

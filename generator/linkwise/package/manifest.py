@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from linkwise.errors import LinkwiseError
 from linkwise.output import sweep
@@ -16,6 +16,7 @@ from linkwise.package.entries import (
     BodyEntry,
     EnergyEntry,
     JointEntry,
+    KernelKind,
     LinkEntry,
     RigidTree,
     check_tree,
@@ -50,8 +51,7 @@ CONVENTIONS = {
 class Manifest:
     """What a package is of: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
 
-    request: the options of `generate`; kernel: closed forms in straight lines, or loops
-    over links and joints; files: the SHA-256 of every other file, by its path in the package
+    request: the options of `generate`; kernel: which kind its C is; files: the SHA-256 of every other file, by its path in the package
     shared_operations: those of the kernel in which links share work; None without such a kernel
     """
 
@@ -59,7 +59,7 @@ class Manifest:
     robot: str
     generator: Mapping[str, str]
     request: Mapping[str, Any]
-    kernel: Literal["straight", "loops"]
+    kernel: KernelKind
     joints: tuple[JointEntry, ...]
     links: tuple[LinkEntry, ...]
     shared_operations: int | None

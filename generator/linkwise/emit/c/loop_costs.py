@@ -6,7 +6,7 @@ robot alone, such as half the trace of an inertia, is not counted, nor are sines
 
 from collections.abc import Sequence
 
-from linkwise.emit.c.tables import columns, placed
+from linkwise.emit.c.robot_tables import columns, placed
 from linkwise.robot.robot import Joint
 from linkwise.symbolic.system import RigidSystem
 

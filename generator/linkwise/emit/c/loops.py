@@ -9,8 +9,8 @@ from linkwise.emit.c import header
 from linkwise.emit.c.loop_costs import decomposition_cost, gradient_cost, torque_cost
 from linkwise.emit.c.prototypes import pointers
 from linkwise.emit.c.robot_files import given, header_view, totals
+from linkwise.emit.c.robot_tables import formulas, path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
-from linkwise.emit.c.tables import formulas, path_spans, table_view
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.system import RigidSystem
