@@ -275,6 +275,7 @@ COUNTING = """
 /* In place of the compiler's own: counts stores past the cache, and those that no fence has ordered yet. */
 #include <string.h>
 typedef struct { char bytes[64]; } __m512i;
+typedef struct { char bytes[32]; } __m256i;
 __attribute__((weak)) long streamed = 0, unfenced = 0;
 static inline __m512i _mm512_load_si512(const void *from)
 {
@@ -285,6 +286,15 @@ static inline __m512i _mm512_load_si512(const void *from)
 static inline void _mm512_stream_si512(void *to, __m512i value)
 {
     memcpy(to, &value, 64);
+    ++streamed, ++unfenced;
+}
+static inline __m256i _mm256_load_si256(const __m256i *from)
+{
+    return *from;
+}
+static inline void _mm256_stream_si256(__m256i *to, __m256i value)
+{
+    memcpy(to, &value, 32);
     ++streamed, ++unfenced;
 }
 static inline void _mm_sfence(void) { unfenced = 0; }
@@ -300,11 +310,17 @@ def aligned(count: int, dtype: type) -> np.ndarray:
 
 @pytest.mark.parametrize("blocks", [False, True], ids=["rows", "blocks"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize(("vectors", "width_of_store"), [("__AVX512F__", 64), ("__AVX__", 32)])
 def test_stores_past_the_cache_end_with_a_fence(
-    dtype: type, blocks: bool, directory_of: Callable[[str], Path], tmp_path: Path
+    vectors: str,
+    width_of_store: int,
+    dtype: type,
+    blocks: bool,
+    directory_of: Callable[[str], Path],
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "immintrin.h").write_text(COUNTING, encoding="utf-8")
-    compiler = ("gcc", "-std=c99", "-D__AVX512F__", f"-I{tmp_path}")
+    compiler = ("gcc", "-std=c99", f"-D{vectors}", f"-I{tmp_path}")
     compile_library(directory_of("planar3"), tmp_path / "library.so", compiler)
     library = ctypes.CDLL(str(tmp_path / "library.so"))
     suffix, width = ("f", 16) if dtype is np.float32 else ("", 8)
@@ -319,7 +335,7 @@ def test_stores_past_the_cache_end_with_a_fence(
     compute(ctypes.c_size_t(width), *pointers)
     assert streamed.value == 0
     compute(ctypes.c_size_t(count // width if blocks else count), *pointers)
-    assert streamed.value == sum(a.nbytes for a in outputs) // 64
+    assert streamed.value == sum(a.nbytes for a in outputs) // width_of_store
     assert unfenced.value == 0
     for a, size in zip(outputs, sizes, strict=True):
         samples = a.reshape(-1, size, width).swapaxes(1, 2) if blocks else a.reshape(-1, size)

@@ -51,7 +51,8 @@ CONVENTIONS = {
 class Manifest:
     """What a package is of: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
 
-    request: the options of `generate`; kernel: which kind its C is; files: the SHA-256 of every other file, by its path in the package
+    request: the options of `generate`; kernel: which kind its C is
+    files: the SHA-256 of every other file, by its path in the package
     shared_operations: those of the kernel in which links share work; None without such a kernel
     """
 

@@ -105,8 +105,9 @@ static void results_of_block(const struct numbers *x, const motion *m, struct re
                 r->c2_count += c2_count;
                 r->c1_count += rows * length;
             }
-            for (int part = 0; part < BLOCK_PARTS; ++part)
-                two_rows_block(&w[part], i, length, c2 + part * LANES, c1 + part * LANES);
+            two_rows_block(&w[0], i, length, 1, c2, c1);
+            for (int part = 1; part < BLOCK_PARTS; ++part)
+                two_rows_block(&w[part], i, length, 0, c2 + part * LANES, c1 + part * LANES);
             c2 += c2_count * BLOCK;
             c1 += rows * length * BLOCK;
         }

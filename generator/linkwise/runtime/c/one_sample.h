@@ -35,7 +35,7 @@ static inline void link_one(const struct numbers *x, int j, const motion *m, rea
     columns_one(m, &l, columns + path_start[j], length, &w);
     torques_one(&l, &w, length, g, tau);
     for (int i = 0; i < length; i += 2) {
-        two_rows_one(&w, i, length, c2, c1);
+        two_rows_one(&w, i, length, 0, c2, c1);
         c2 += 2 * (length - i) - 1;
         c1 += 2 * length;
     }
