@@ -9,7 +9,7 @@ from linkwise.symbolic.system import EnergySystem, System
 
 CHOICES = ("auto", "straight", "loops")
 
-MOST_STRAIGHT = 2500
+MOST_STRAIGHT = 1500
 """Values of c2, c1, g and tau of one sample up to which closed forms are derived: see docs/kernels.md."""
 
 

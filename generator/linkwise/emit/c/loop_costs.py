@@ -10,19 +10,19 @@ from linkwise.emit.c.robot_tables import columns, placed
 from linkwise.robot.robot import Joint
 from linkwise.symbolic.system import RigidSystem
 
-FRAME, TURN, PLACE, SLIDE = 150, 1, 18, 6
+FRAME, TURN, PLACE, SLIDE = 141, 1, 18, 6
 """A joint's frame and axis; its angle; its place and what a slide adds to it, where places matter."""
 SUM = 12
 """A column that is the sum of two."""
-LINK = 219
+LINK = 216
 """A link's inertia and motion."""
-COLUMN = 90
+COLUMN = 87
 """How a coordinate moves a link, and the wrenches of its c2 and c1."""
 ALONG = 11
 """A wrench along a motion: c2, c1 and tau."""
 WEIGHT = 5
 """A force along a motion: g."""
-MOVES = 12
+MOVES = 15
 """How a joint moves a link."""
 SECOND_CHANGE = 69
 """The second change of a joint's axis."""

@@ -27,14 +27,14 @@ static inline void KERNEL(gradient)(const motion *m, const screw *second, const 
     for (int b = 0; b < count; ++b) {
         const int f = frames[b];
         const screw axis = m->axis[f - 1], change = m->change[f - 1], sdd = second[f];
-        const screw moves = KERNEL(moves)(l, &axis);
+        const screw moves = KERNEL(moves)(l, &axis, KERNEL(arm)(l, &axis));
         const vector twice = scale(same(R(2.0)), change.z);
         const vector slips = subtract_cross(subtract_cross(sdd.s, l->com, sdd.z), l->velocity, twice);
-        const screw behind = {add_applied(apply(l->inertia, sdd.z), l->turning, twice), scale(l->mass, slips)};
+        const screw behind = {add_applied(apply(l->inertia, sdd.z), l->turning, twice), slips};
         const screw before = {add_cross(add_cross(behind.z, axis.z, l->wrench.z), moves.s, force),
             add_cross(behind.s, axis.z, force)};
         for (int a = 0; a < count; ++a) {
-            const screw of = KERNEL(moves)(l, &m->axis[frames[a] - 1]);
+            const screw *other = &m->axis[frames[a] - 1], of = KERNEL(moves)(l, other, KERNEL(arm)(l, other));
             real *entry = c0 + (places[a] * length + places[b]) * W;
             PUT(entry, TAKE(entry) + along(&of, a <= b ? &before : &behind));
         }

@@ -188,7 +188,8 @@ void API(torque)(size_t count, INPUTS, real *tau)
             for (int part = 0; part < BLOCK_PARTS; ++part) {
                 const moving_link l = link_at_block(&m[part], links[j].frame, &x->bodies[j], x->gravity);
                 for (int i = 0; i < length; ++i) {
-                    const screw moves = moves_block(&l, &m[part].axis[columns[path_start[j] + i]]);
+                    const screw *axis = &m[part].axis[columns[path_start[j] + i]];
+                    const screw moves = moves_block(&l, axis, arm_block(&l, axis));
                     PUT(r.tau_room + (r.g_count + i) * BLOCK + part * LANES, along(&moves, &l.wrench));
                 }
             }

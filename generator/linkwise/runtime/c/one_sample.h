@@ -70,7 +70,7 @@ SHARED void API(torque_one)(INPUTS, real *tau)
     for (int j = 0; j < LINKS; ++j) {
         const moving_link l = link_at_one(&m, links[j].frame, &x->bodies[j], x->gravity);
         for (int e = path_start[j]; e < path_start[j + 1]; ++e) {
-            const screw moves = moves_one(&l, &m.axis[columns[e]]);
+            const screw *axis = &m.axis[columns[e]], moves = moves_one(&l, axis, arm_one(&l, axis));
             *tau++ = along(&moves, &l.wrench);
         }
     }

@@ -7,12 +7,13 @@
    place p; a slide has z = 0 and its direction for s. Where the twist (w, v) is that of what carries the joint, S changes by
        zd = w x z                    sd = w x s + v x z
    Coordinate k turns a link by z_k and moves its centre of mass c by s_k - c x z_k, its partial velocity, which changes by
-   sd_k - cd x z_k - c x zd_k. With mass m, inertia I about c, and E = tr(I) / 2 - I, the link needs the wrenches (N, f)
-       c2 of k:  N = I z             f = m (s - c x z)
-       c1 of k:  N = I zd - w x E z  f = m (sd - cd x z - c x zd)
-       tau:      N = I wd - w x E w  f = m (cdd - gravity)
-       g:        N = 0               f = -m gravity
-   and joint i bears z_i . N + (s_i - c x z_i) . f of each. The term with E is that by which c1 is 1/2 d(tau)/d(qd)
+   sd_k - cd x z_k - c x zd_k. With inertia I about c and E = tr(I) / 2 - I, the link needs the wrenches (N, f), f for each
+   unit of its mass m,
+       c2 of k:  N = I z             f = s - c x z
+       c1 of k:  N = I zd - w x E z  f = sd - cd x z - c x zd
+       tau:      N = I wd - w x E w  f = cdd - gravity
+       g:        N = 0               f = -gravity
+   and joint i bears z_i . N + m (s_i - c x z_i) . f of each. The term with E is that by which c1 is 1/2 d(tau)/d(qd)
    (S. Echeandia, P. Wensing, J. Comput. Nonlinear Dynam. 16(9), 2021). */
 
 #define motion KERNEL(motion)
@@ -28,7 +29,7 @@ typedef struct {
     screw axis[COLUMNS], change[COLUMNS];
 } motion;
 
-/* A link: c, cd, m, I, the matrix of z to -w x E z, and its wrench for tau and force for g. */
+/* A link: c, cd, m, I, the matrix of z to -w x E z, and its wrenches for tau and g, of which the latter is a force. */
 typedef struct {
     vector com, velocity;
     number mass;
@@ -37,7 +38,7 @@ typedef struct {
     vector weight;
 } moving_link;
 
-/* For each coordinate of a link's path: how the link moves, and the wrenches that it needs for c2 and c1. */
+/* For each coordinate of a link's path: how the link moves, with its mass, and the wrenches that it needs for c2 and c1. */
 typedef struct {
     screw moves[LONGEST], c2[LONGEST], c1[LONGEST];
 } wrenches;
@@ -135,16 +136,21 @@ INLINE moving_link KERNEL(link_at)(const motion *m, int f, const struct body *bo
     const matrix turning = {{x.x, y.x + w.z, z.x - w.y}, {x.y - w.z, y.y, z.y + w.x}, {x.z + w.y, y.z - w.x, z.z}};
     l.turning = turning;
     l.wrench.z = add_applied(apply(inertia, rate.z), turning, twist.z);
-    l.wrench.s = scale(l.mass, subtract(acceleration, g));
-    l.weight = scale(same(-body->mass), g);
+    l.wrench.s = subtract(acceleration, g);
+    l.weight = subtract(m->place[0], g);
     return l;
 }
 
-/* How a link moves with a column, its partial velocities. */
-INLINE screw KERNEL(moves)(const moving_link *l, const screw *axis)
+/* How a link moves with a column: z, and its mass times how its centre of mass does, which is `arm`. */
+INLINE screw KERNEL(moves)(const moving_link *l, const screw *axis, vector arm)
 {
-    const screw moves = {axis->z, subtract_cross(axis->s, l->com, axis->z)};
+    const screw moves = {axis->z, scale(l->mass, arm)};
     return moves;
+}
+
+INLINE vector KERNEL(arm)(const moving_link *l, const screw *axis)
+{
+    return subtract_cross(axis->s, l->com, axis->z);
 }
 
 /* A row of I z and one of I zd - w x E z, each entry of the matrices read once. */
@@ -167,13 +173,12 @@ static inline void KERNEL(columns)(const motion *m, const moving_link *l, const 
 {
     for (int k = 0; k < length; ++k) {
         const screw axis = m->axis[column[k]], change = m->change[column[k]];
-        const screw moves = KERNEL(moves)(l, &axis);
-        const vector slips = subtract_cross(subtract_cross(change.s, l->velocity, axis.z), l->com, change.z);
-        out->moves[k] = moves;
+        const vector arm = KERNEL(arm)(l, &axis);
+        out->moves[k] = KERNEL(moves)(l, &axis, arm);
         KERNEL(moments)(l->inertia.x, l->turning.x, axis.z, change.z, &out->c2[k].z.x, &out->c1[k].z.x);
         KERNEL(moments)(l->inertia.y, l->turning.y, axis.z, change.z, &out->c2[k].z.y, &out->c1[k].z.y);
         KERNEL(moments)(l->inertia.z, l->turning.z, axis.z, change.z, &out->c2[k].z.z, &out->c1[k].z.z);
-        out->c2[k].s = scale(l->mass, moves.s);
-        out->c1[k].s = scale(l->mass, slips);
+        out->c2[k].s = arm;
+        out->c1[k].s = subtract_cross(subtract_cross(change.s, l->velocity, axis.z), l->com, change.z);
     }
 }
