@@ -10,12 +10,13 @@ from types import ModuleType
 
 import pytest
 from answers import random_states, relative_error
-from compiled import STRICT, Compiled, compile_library
+from compiled import STRICT, Compiled, compile_library, name_of
 from conftest import DATA, needs_compiler
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
 from linkwise.check import check_package
 from linkwise.cli.app import app
 from linkwise.package.load import import_package
+from linkwise.package.manifest import Manifest
 from test_emitted_c import COMPILERS, PARTS, strict
 from typer.testing import CliRunner
 
@@ -95,6 +96,26 @@ def test_its_code_does_not_grow_with_the_robot(directory_of: Callable[[str], Pat
         return int(re.findall(r"^\.text\S* +(\d+)", sizes, re.M)[0])
 
     assert instructions("planar20") < 1.1 * instructions("planar3")
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
+@pytest.mark.parametrize("robot", [CRANE, "puma560"], ids=["crane", "arm"])
+def test_the_header_counts_its_operations(
+    robot: str, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    directory = directory_of(f"{robot} loops")
+    name = name_of(directory)
+    defined = f'-DSOURCE="{directory / "c" / name}.c"'
+    made = tmp_path / "count"
+    subprocess.run(
+        ["g++", "-std=c++17", "-w", defined, DATA / "count_operations.cpp", "-o", made], check=True
+    )
+    counted = subprocess.run([made], check=True, capture_output=True, text=True).stdout.split()
+    header = (directory / "c" / f"{name}.h").read_text(encoding="utf-8")
+    told = [re.search(rf"{what}: (\d+) operations", header) for what in ("but c0", "Torques alone")]
+    # Once for the base and for each link, numbers that do not vary are put into all samples, and gravity turned.
+    links = len(Manifest.read(directory).links)
+    assert [int(count) - 2 - 5 * links for count in counted] == [int(found[1]) for found in told if found]
 
 
 @needs_compiler

@@ -33,7 +33,8 @@ static inline void moved_block(const struct numbers *x, const real *q, const rea
 }
 
 /* Up to BLOCK rows to a block, and its motion. */
-static inline void rows_moved(const struct numbers *x, size_t samples, const real *q, const real *qd, const real *qdd, motion *m)
+static inline void rows_moved(const struct numbers *x, size_t samples, const real *q, const real *qd, const real *qdd,
+    motion *m)
 {
     ALIGNED real block[3][N * BLOCK];
     gather(samples, N, q, block[0]);

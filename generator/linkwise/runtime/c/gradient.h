@@ -1,6 +1,6 @@
 /* The position gradient of the rigid-link rule. The same in every package of linkwise.
 
-   With the twist V, its rate A less gravity, and the change Sd = V x S, all of what carries joint k, and the wrench F of tau,
+   With the twist V of what carries joint k, its rate A less gravity, the change Sd = V x S, and the wrench F of tau,
        c0(i, j, k) = S_i . (I Sdd + 2 B Sd)                     for i behind k
                    = S_i . (I Sdd + 2 B Sd + S x* F)            for k itself and i before it
        Sdd = A x S + V x Sd        S x* F = (z x N + s x f, z x f) */

@@ -15,7 +15,8 @@ static inline void angles(const struct numbers *x, int width, const real *q, rea
 {
     for (int f = 0; f < FRAMES; ++f)
         for (int b = 0; b < width; ++b)
-            angle[f * width + b] = joints[f].kind == REVOLUTE ? x->placings[f].ratio * q[joints[f].coordinate * width + b] : 0;
+            angle[f * width + b]
+                = joints[f].kind == REVOLUTE ? x->placings[f].ratio * q[joints[f].coordinate * width + b] : R(0.0);
 }
 #endif
 

@@ -12,7 +12,8 @@
 #include "shares.h"
 
 /* The motion of all frames, or of the `wanted` ones. */
-static inline void moved_one(const struct numbers *x, const real *q, const real *qd, const real *qdd, const char *wanted, motion *m)
+static inline void moved_one(const struct numbers *x, const real *q, const real *qd, const real *qdd, const char *wanted,
+    motion *m)
 {
     real angle[FRAMES], sine[FRAMES], cosine[FRAMES];
     angles(x, 1, q, angle);

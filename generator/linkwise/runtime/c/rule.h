@@ -141,16 +141,17 @@ INLINE moving_link KERNEL(link_at)(const motion *m, int f, const struct body *bo
     return l;
 }
 
-/* How a link moves with a column: z, and its mass times how its centre of mass does, which is `arm`. */
+/* How a link's centre of mass moves with a joint: s - c x z. */
+INLINE vector KERNEL(arm)(const moving_link *l, const screw *axis)
+{
+    return subtract_cross(axis->s, l->com, axis->z);
+}
+
+/* What a wrench is put together with: z and, as forces are for each unit of mass, m times the `arm`. */
 INLINE screw KERNEL(moves)(const moving_link *l, const screw *axis, vector arm)
 {
     const screw moves = {axis->z, scale(l->mass, arm)};
     return moves;
-}
-
-INLINE vector KERNEL(arm)(const moving_link *l, const screw *axis)
-{
-    return subtract_cross(axis->s, l->com, axis->z);
 }
 
 /* A row of I z and one of I zd - w x E z, each entry of the matrices read once. */
