@@ -113,7 +113,7 @@ def test_the_header_counts_its_operations(
     counted = subprocess.run([made], check=True, capture_output=True, text=True).stdout.split()
     header = (directory / "c" / f"{name}.h").read_text(encoding="utf-8")
     told = [re.search(rf"{what}: (\d+) operations", header) for what in ("but c0", "Torques alone")]
-    # Once for the base and for each link, numbers that do not vary are put into all samples, and gravity turned.
+    # Besides, numbers that do not vary are spread over all samples: 2 for the base, 5 for each link.
     links = len(Manifest.read(directory).links)
     assert [int(count) - 2 - 5 * links for count in counted] == [int(found[1]) for found in told if found]
 

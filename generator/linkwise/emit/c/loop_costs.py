@@ -1,8 +1,8 @@
 """Arithmetic operations of a kernel in loops: those that rule.h, shares.h and gradient.h write down.
 
 Additions, subtractions and multiplications for each sample, fused ones counted as two. What depends on the
-robot alone, such as half the trace of an inertia, is not counted, nor are sines and cosines. A test counts them
-in the C of one sample.
+robot alone, such as half the trace of an inertia, is not counted, nor are sines and cosines. A test counts
+them in the C of one sample.
 """
 
 from collections.abc import Sequence
