@@ -48,6 +48,7 @@ report: $(READY)
 # Every real robot at hand, beside Pinocchio: minutes.
 corpus: $(READY)
 	$(BIN)/python tests/corpus.py --out out/corpus
+	$(BIN)/python tests/corpus.py --kernel loops --out out/corpus-loops
 
 # `generate` and `analyze` killed at each system call that touches files; needs strace: minutes.
 crash: $(READY)

@@ -35,14 +35,15 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def directory_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Directory of a robot's package; "planar3 symbolic" keeps its parameters."""
+    """Directory of a robot's package; "planar3 symbolic" keeps parameters, "planar3 loops" is in loops."""
     made: dict[str, Path] = {}
 
     def directory(robot: str) -> Path:
         if robot not in made:
-            system = read_system(robot.removesuffix(" symbolic"), OPTIONS.get(robot))
+            read, kernel = robot.removesuffix(" loops"), "loops" if robot.endswith(" loops") else "straight"
+            system = read_system(read.removesuffix(" symbolic"), OPTIONS.get(read))
             made[robot] = tmp_path_factory.mktemp("package") / system.name
-            write_package(generate(system), made[robot])
+            write_package(generate(system, kernel=kernel), made[robot])
         return made[robot]
 
     return directory

@@ -1,5 +1,7 @@
 """Every URDF of the package example-robot-data through the generator, beside Pinocchio: `make corpus`.
 
+With `--kernel loops` through C in loops, whose seconds to compile and to answer first count too.
+
 Writes corpus.json, corpus.md and a plot: for each file its joints, links, what was merged or mimicked,
 generation seconds, peak memory, operations, outputs, and the errors for the sums and for each link's own
 torque, or the reason for refusing it. A refused file runs again with the option that the message names.
@@ -29,7 +31,7 @@ ALSO = {"human.urdf": ({"base": "floating"},)}
 """Further options to run a file with."""
 
 
-def study(path: Path, options: dict[str, Any], samples: int) -> dict[str, Any]:
+def study(path: Path, options: dict[str, Any], samples: int, kernel: str = "straight") -> dict[str, Any]:
     """Generate one robot in this process and compare it; a process of its own makes peak memory honest."""
     from linkwise import LinkwiseError, Options, generate, read_system, write_package
     from linkwise.package.load import import_package
@@ -40,7 +42,8 @@ def study(path: Path, options: dict[str, Any], samples: int) -> dict[str, Any]:
         system = read_system(path, Options(**options))
     except LinkwiseError as error:
         return row | {"refused": str(error).removeprefix(f"{path}: ")}
-    files = generate(system, ("numpy", "c"), "robot")
+    backends = ("native",) if kernel == "loops" else ("numpy", "c")
+    files = generate(system, backends, "robot", kernel=kernel)
     row["seconds"] = time.perf_counter() - start
     row["megabytes"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     notes = Counter(note.kind for note in system.robot.notes) if system.robot else Counter()
@@ -51,9 +54,13 @@ def study(path: Path, options: dict[str, Any], samples: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         write_package(files, Path(folder) / "robot")
         package = import_package(Path(folder) / "robot")
-        kernels = [package.load("numpy", kernel=kernel) for kernel in ("straight", "rule")]
-    row["outputs"] = sum(len(block) for block in kernels[0].layout)
-    errors = [compare(path, options, system, dynamics, samples) for dynamics in kernels]
+        ways = [("native", "auto")] if kernel == "loops" else [("numpy", "straight"), ("numpy", "rule")]
+        loaded = [package.load(backend, kernel=way) for backend, way in ways]
+        if kernel == "loops":
+            loaded[0].packed(*np.zeros((3, loaded[0].n)))
+            row["seconds"] = time.perf_counter() - start
+        row["outputs"] = sum(len(block) for block in loaded[0].layout)
+        errors = [compare(path, options, system, dynamics, samples) for dynamics in loaded]
     return row | {name: max(error[name] for error in errors) for name in errors[0]}
 
 
@@ -85,9 +92,10 @@ def relative(mine: Any, reference: Any) -> float:
     return float(np.abs(mine - reference).max() / max(np.abs(reference).max(), 1e-300))
 
 
-def run(path: Path, options: dict[str, Any], samples: int) -> dict[str, Any]:
+def run(path: Path, options: dict[str, Any], samples: int, kernel: str) -> dict[str, Any]:
     """Study one robot in a fresh process."""
     chosen = ["--one", str(path), "--options", json.dumps(options), "--samples", str(samples)]
+    chosen += ["--kernel", kernel]
     done = subprocess.run([sys.executable, __file__, *chosen], capture_output=True, text=True, check=False)
     if done.returncode:
         file = str(path.relative_to(ROBOTS))
@@ -95,16 +103,16 @@ def run(path: Path, options: dict[str, Any], samples: int) -> dict[str, Any]:
     return json.loads(done.stdout)  # type: ignore[no-any-return]
 
 
-def ways(path: Path, samples: int) -> list[dict[str, Any]]:
+def ways(path: Path, samples: int, kernel: str) -> list[dict[str, Any]]:
     """Rows of one file: as it is, with the options that its refusals name, and those of ALSO."""
-    rows = [run(path, {}, samples)]
+    rows = [run(path, {}, samples, kernel)]
     while "refused" in rows[-1]:
         last = rows[-1]
         past = [way for flag, way in WAYS_PAST.items() if flag in last["refused"]]
         if not past or past[0].items() <= last["options"].items():
             break
-        rows.append(run(path, last["options"] | past[0], samples))
-    return rows + [run(path, options, samples) for options in ALSO.get(path.name, ())]
+        rows.append(run(path, last["options"] | past[0], samples, kernel))
+    return rows + [run(path, options, samples, kernel) for options in ALSO.get(path.name, ())]
 
 
 def main() -> None:
@@ -113,11 +121,16 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out/corpus"))
     parser.add_argument("--samples", type=int, default=100)
     parser.add_argument("--only", default="", help="part of a file's name")
+    parser.add_argument("--kernel", choices=("straight", "loops"), default="straight")
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--options", default="{}", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
-        print(json.dumps(study(arguments.one, json.loads(arguments.options), arguments.samples)))
+        print(
+            json.dumps(
+                study(arguments.one, json.loads(arguments.options), arguments.samples, arguments.kernel)
+            )
+        )
         return
     from corpus_report import COUNTS, HEAD, line, sorted_out, write
 
@@ -125,7 +138,7 @@ def main() -> None:
     print(HEAD)
     for path in sorted(ROBOTS.rglob("*.urdf"), key=lambda p: (p.name, p)):
         if arguments.only in path.name:
-            rows += (new := ways(path, arguments.samples))
+            rows += (new := ways(path, arguments.samples, arguments.kernel))
             print("\n".join(map(line, new)), flush=True)
     print(write(rows, arguments.out))
     counts = {key: len(files) for key, files in sorted_out(rows).items()}

@@ -74,8 +74,10 @@ def test_generate_replaces_an_earlier_package_whole(linkwise: Run, planar2: Path
 
 def test_manifest_tells_how_to_make_the_package_again(planar2: Path) -> None:
     manifest = json.loads((planar2 / "manifest.json").read_text())
-    assert manifest["schema"] == 4
-    assert manifest["request"] == {"robot": "planar2", "backends": ["numpy"], **asdict(Options())}
+    assert manifest["schema"] == 5
+    asked = {"robot": "planar2", "backends": ["numpy"], "kernel": "auto"}
+    assert manifest["request"] == asked | asdict(Options())
+    assert manifest["kernel"] == "straight"
     assert [joint["name"] for joint in manifest["joints"]] == ["joint1", "joint2"]
     assert manifest["links"][1]["path"] == [0, 1]
     written = {p.relative_to(planar2).as_posix() for p in planar2.rglob("*") if p.is_file()}

@@ -132,7 +132,7 @@ def test_a_damaged_manifest_is_named(case: str, package: Path) -> None:
 
 def test_a_manifest_of_another_version_is_told_apart_from_a_damaged_one(package: Path) -> None:
     change_manifest(package, lambda data: data.update(schema=1))
-    with pytest.raises(LinkwiseError, match=r"another version of linkwise \(schema 1, this one reads 4\)"):
+    with pytest.raises(LinkwiseError, match=r"another version of linkwise \(schema 1, this one reads 5\)"):
         check_package(package)
 
 
@@ -254,9 +254,9 @@ TEXTS: dict[str, tuple[Callable[[str], str], str]] = {
     ),
     "list": (lambda t: "[]", "the whole is not an object"),
     "nothing": (lambda t: "", "Expecting value"),
-    "schema": (lambda t: t.replace('"schema": 4', '"schema": "3"'), "schema is not the number 4"),
-    "truth": (lambda t: t.replace('"schema": 4', '"schema": true'), "schema is not the number 4"),
-    "no schema": (lambda t: t.replace('"schema": 4,', ""), "schema is not the number 4"),
+    "schema": (lambda t: t.replace('"schema": 5', '"schema": "3"'), "schema is not the number 5"),
+    "truth": (lambda t: t.replace('"schema": 5', '"schema": true'), "schema is not the number 5"),
+    "no schema": (lambda t: t.replace('"schema": 5,', ""), "schema is not the number 5"),
     "unknown": (
         lambda t: t.replace('"lock": {}', '"lock": {}},"more": {"a": 1'),
         "more is not an entry of a",

@@ -13,7 +13,7 @@ from conftest import DATA
 from linkwise import Coordinate, LinkEnergy, Options, energy_system, generate, read_system
 from linkwise.emit import autograd, closed_forms, formula_page, shared_texts, tree_file
 from linkwise.emit import render as rendering
-from linkwise.emit.c import sources
+from linkwise.emit.c import loops, sources
 from linkwise.emit.render import render, variables
 from urdf_text import joint
 
@@ -35,10 +35,12 @@ def views() -> dict[str, list[set[str]]]:
         return render(template, view)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (rendering, autograd, sources, closed_forms, formula_page, shared_texts, tree_file):
+        modules = (rendering, autograd, loops, sources, closed_forms, formula_page, shared_texts, tree_file)
+        for module in modules:
             patch.setattr(module, "render", recording)
         for robot, options in ROBOTS:
             generate(read_system(robot, options))
+        generate(read_system("planar2", Options("symbolic")), kernel="loops")
     return seen
 
 

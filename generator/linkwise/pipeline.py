@@ -4,7 +4,7 @@
     energies in Python ─read_energies───────────▶ EnergySystem ─┤
                                                                 ▼
     derive         closed forms, one kernel per link: by the rigid-link rule, which differentiates nothing, or
-                   by Euler–Lagrange from energies that a user wrote
+                   by Euler–Lagrange from energies that a user wrote; left out where the kernel is in loops
     package_files  their text in each back end (C also asks for one kernel of all links, where they share
                    work), the runtime, the manifest
 
@@ -18,8 +18,9 @@ from typing import Any
 
 from linkwise.dynamics.derive import derive
 from linkwise.emit.assemble import checked_identifier, package_files
-from linkwise.emit.backend import BACKENDS, chosen_backends
+from linkwise.emit.backend import backends_of, chosen_backends
 from linkwise.emit.derivation import Derivation
+from linkwise.emit.kernel_choice import chosen_kernel
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import is_file
 from linkwise.progress import Progress, silent
@@ -45,17 +46,23 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
 
 def generate(
     robot: System | Robot,
-    backends: Iterable[str] = tuple(BACKENDS),
+    backends: Iterable[str] | None = None,
     name: str | None = None,
     request: Mapping[str, Any] | None = None,
     progress: Progress = silent,
+    kernel: str = "auto",
 ) -> dict[str, str]:
     """Files of a package, {path inside the package: text}.
 
+    `backends` are all that there are if not given. `kernel` is straight, loops, or auto, which chooses by the
+    robot's size; with loops, nothing is derived, and only the C and what calls it are there.
+
     `request` goes into the manifest, so that a reader sees how to make the package again.
-    Raises LinkwiseError for a name or back end that cannot be.
+    Raises LinkwiseError for a name, back end or kernel that cannot be.
     """
     system = rigid_system(robot) if isinstance(robot, Robot) else robot
-    chosen, package = chosen_backends(backends), checked_identifier(name, system.name)
-    kernels = derive(system, progress)
+    kind = chosen_kernel(system, kernel, backends)
+    chosen = chosen_backends(backends_of(kind) if backends is None else backends, kind)
+    package = checked_identifier(name, system.name)
+    kernels = derive(system, progress) if kind == "straight" else ()
     return package_files(Derivation(system, kernels, package, request or {}), chosen, progress)

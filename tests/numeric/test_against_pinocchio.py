@@ -1,4 +1,4 @@
-"""Every back end against Pinocchio: mass and Coriolis matrices, gravity, torques, gradients of each link."""
+"""Every back end, and C in loops, against Pinocchio: matrices, gravity, torques, gradients of each link."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -35,7 +35,7 @@ def pinocchio_says(robot: str, joints: tuple[str, ...]) -> dict[str, Any]:
     [
         *(f"{backend} by {kernel}" for backend in ("numpy", "torch") for kernel in ("straight", "rule")),
         "autograd",
-        *(pytest.param(b, marks=needs_compiler) for b in ("c", "native")),
+        *(pytest.param(b, marks=needs_compiler) for b in ("c", "c loops", "native")),
     ],
 )
 @pytest.mark.parametrize("robot", MODELS, ids=["planar3", "puma560", "panda"])
@@ -49,7 +49,8 @@ def test_decomposition_of_every_link_is_pinocchios(
     dynamics = package.load("numpy")
     states = random_states(dynamics.n, STATES)
     expected = pinocchio_says(robot, dynamics.joint_names)
-    given = packed(package, directory_of(robot), backend, *states)
+    name, _, kernel = backend.partition(" ")
+    given = packed(package, directory_of(f"{robot} {kernel}".strip()), name, *states)
     for field in expected:
         rows = getattr(dynamics.layout, "velocity" if field == "position_gradient" else field)
         error = relative_error(given[field], expected[field][:, *rows.T])

@@ -6,7 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from linkwise.check.compare import Result, Skipped
-from linkwise.emit.backend import BACKENDS
+from linkwise.emit.backend import backends_of
 from linkwise.emit.shared_texts import BodyText, init_text, names_text
 from linkwise.emit.tree_file import tree_text
 from linkwise.package.agreement import disagreements, miscounted
@@ -94,9 +94,9 @@ def _made_otherwise(package: Package) -> Iterator[str]:
     expressions of bodies and the links with terms linear in the velocities, which are held by what they give.
     """
     directory, manifest, robot = package.directory, package.manifest, package.module.ROBOT
-    chosen = [backend for name, backend in BACKENDS.items() if name in package.backends]
+    chosen = [backend for name, backend in backends_of(manifest.kernel).items() if name in package.backends]
     rigid = manifest.tree is not None
-    init = init_text(manifest.name, chosen, manifest.parameters, [MARK], rigid)
+    init = init_text(manifest.name, chosen, manifest.parameters, [MARK], rigid, manifest.kernel)
     head, mark, tail = init.partition(f"    {MARK}\n")
     found = (directory / "__init__.py").read_bytes().decode()
     about = found[len(head) : len(found) - len(tail)]

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -10,7 +10,8 @@ from linkwise import pipeline
 from linkwise.cli import Details, counted, tell
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import checked_identifier
-from linkwise.emit.backend import BACKENDS, chosen_backends
+from linkwise.emit.backend import BACKENDS, backends_of, chosen_backends
+from linkwise.emit.kernel_choice import chosen_kernel
 from linkwise.input_file import is_file
 from linkwise.output import require_writable, sweep
 from linkwise.package.write import check_target, write_package
@@ -30,19 +31,33 @@ def generate(
     backend: Annotated[
         list[str] | None, typer.Option(help=f"{', '.join(BACKENDS)}; may be repeated; all if not given")
     ] = None,
+    kernel: Annotated[
+        Literal["auto", "straight", "loops"],
+        typer.Option(
+            help="straight: closed forms; loops: nothing is derived, C in loops over links and joints; "
+            "auto: by the robot's size"
+        ),
+    ] = "auto",
     details: Details = False,
 ) -> None:
     """Write the package of a robot."""
     sweep(out)  # also where this one is refused: an earlier one may have died while it took a package away
-    backends = [chosen.name for chosen in chosen_backends(backend or BACKENDS)]
+    chosen_backends(backend or ())
     path = Path(robot)
-    request = {"robot": path.name if is_file(path) else robot, "backends": backends, **asdict(options)}
     system = pipeline.read_system(robot, options)
+    kind = chosen_kernel(system, kernel, backend)
+    backends = [chosen.name for chosen in chosen_backends(backend or backends_of(kind), kind)]
+    request = {
+        "robot": path.name if is_file(path) else robot,
+        "backends": backends,
+        "kernel": kernel,
+        **asdict(options),
+    }
     directory = out / checked_identifier(name, system.name)
     check_target(directory, system.name)
     require_writable(directory)
     with progress() as report:
-        files = pipeline.generate(system, backends, name, request, report)
+        files = pipeline.generate(system, backends, name, request, report, kind)
     write_package(files, directory)
     for effect in effects(system.notes, details):
         tell(f"warning: {robot}: {effect}", err=True)

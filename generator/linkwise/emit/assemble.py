@@ -13,6 +13,7 @@ from linkwise import runtime
 from linkwise.dynamics.kernel import Kernel, decomposition_cost
 from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
+from linkwise.emit.c import loop_costs
 from linkwise.emit.definition import energies, rigid_tree
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.shared_texts import init_text, names_text
@@ -97,7 +98,7 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     loadable = [backend for backend in chosen if backend.loading]
     about = parameter_rules(system, bodies)
     rigid = isinstance(system, RigidSystem)
-    yield "__init__.py", init_text(derivation.package, loadable, parameters, about, rigid)
+    yield "__init__.py", init_text(derivation.package, loadable, parameters, about, rigid, derivation.kernel)
     joints = [(c.name, c.unit) for c in system.coordinates]
     links = {name: system.path(j) for j, name in enumerate(system.link_names)}
     linear = derivation.linear
@@ -111,19 +112,31 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
 def manifest(derivation: Derivation, shared: Kernel | None, files: Mapping[str, str]) -> Manifest:
     """What was generated, from what, what it costs, and the SHA-256 of every file."""
     system = derivation.system
+    costs, together = _costs(derivation, shared)
     return Manifest(
         derivation.package,
         system.name,
         {"linkwise": VERSION, "sympy": sp.__version__},
         dict(derivation.request),
+        derivation.kernel,
         tuple(JointEntry(c.name, c.unit) for c in system.coordinates),
         tuple(
-            LinkEntry(name, system.path(j), decomposition_cost([kernel]))
-            for j, (name, kernel) in enumerate(zip(system.link_names, derivation.kernels, strict=True))
+            LinkEntry(name, system.path(j), cost)
+            for j, (name, cost) in enumerate(zip(system.link_names, costs, strict=True))
         ),
-        decomposition_cost([shared]) if shared else None,
+        together,
         {s.name: float(v) for s, v in system.parameters.items()},
         rigid_tree(system),
         energies(system),
         {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(files.items())},
     )
+
+
+def _costs(derivation: Derivation, shared: Kernel | None) -> tuple[list[int], int | None]:
+    """Operations of each link's decomposition by itself, and of all links where they share work."""
+    system = derivation.system
+    if derivation.kernel == "loops" and isinstance(system, RigidSystem):
+        alone = [loop_costs.link_cost(system, j) for j in range(len(system.links))]
+        return alone, loop_costs.decomposition_cost(system)
+    alone = [decomposition_cost([kernel]) for kernel in derivation.kernels]
+    return alone, decomposition_cost([shared]) if shared else None

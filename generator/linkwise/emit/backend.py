@@ -6,13 +6,14 @@ An entry is read by the command line too, so that this file imports what emits o
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from linkwise.errors import LinkwiseError
 
 if TYPE_CHECKING:
     from linkwise.emit.derivation import Derivation
+    from linkwise.package.entries import KernelKind
 
 Emitter = Callable[["Derivation"], Iterator[tuple[str, str]]]
 """Turns a derivation into files: paths inside the package and texts."""
@@ -30,6 +31,8 @@ class Loading:
     """Statements before it."""
     speed: int
     """Rank among the back ends that compute, 1 the fastest for a large batch."""
+    uses_forms: bool = False
+    """Whether it may be made of LINKS, the closed forms, which are None where the kernel is in loops."""
     uses_rule: bool = False
     """Whether it may be made of RULE, the vectorised rule of rigid links, which is None for energies."""
     chooses: bool = False
@@ -80,13 +83,18 @@ def _c(d: Derivation) -> Iterator[tuple[str, str]]:
     return c_files(d)
 
 
+def _loops(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.c.loops import loop_files
+
+    return loop_files(d)
+
+
 def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
     from linkwise.emit.formulas import formula_files
 
     return formula_files(d)
 
 
-LINKS = "from .forms import LINKS"
 RULE_FILES = (
     "joint_tree.py",
     "array_kernels.py",
@@ -111,8 +119,9 @@ BACKENDS: dict[str, BackendFiles] = {
             loading=Loading(
                 "numpy_backend",
                 "NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
-                (LINKS,),
+                (),
                 speed=2,
+                uses_forms=True,
                 uses_rule=True,
                 chooses=True,
             ),
@@ -125,8 +134,9 @@ BACKENDS: dict[str, BackendFiles] = {
             loading=Loading(
                 "torch_backend",
                 "TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
-                (LINKS,),
+                (),
                 speed=3,
+                uses_forms=True,
                 uses_rule=True,
                 chooses=True,
             ),
@@ -176,8 +186,9 @@ BACKENDS: dict[str, BackendFiles] = {
             loading=Loading(
                 "native_backend",
                 'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values, RULE)',
-                ("from pathlib import Path", LINKS),
+                ("from pathlib import Path",),
                 speed=1,
+                uses_forms=True,
                 uses_rule=True,
             ),
             needs=("c", "torch"),
@@ -193,11 +204,41 @@ BACKENDS: dict[str, BackendFiles] = {
 }
 
 
-def chosen_backends(names: Iterable[str]) -> tuple[BackendFiles, ...]:
-    """Back ends by name and those that they need, in this order; raises LinkwiseError for an unknown name."""
-    wanted = list(names)
+LOOPS: dict[str, BackendFiles] = {
+    backend.name: backend
+    for backend in (
+        replace(BACKENDS["numpy"], doc="the vectorised rule on NumPy arrays", emits=(_tree,)),
+        replace(BACKENDS["torch"], doc="the vectorised rule on torch tensors", emits=(_tree,)),
+        BACKENDS["autograd"],
+        BACKENDS["native"],
+        replace(
+            BACKENDS["c"],
+            doc="loops over links and joints in C99 and C++17, to compile into a program of your own",
+            emits=(_loops,),
+        ),
+    )
+}
+"""Back ends of a package whose kernel is in loops, for which no closed forms are derived."""
+
+
+def backends_of(kernel: KernelKind) -> dict[str, BackendFiles]:
+    """Back ends that a package can have, by name."""
+    return LOOPS if kernel == "loops" else BACKENDS
+
+
+def chosen_backends(names: Iterable[str], kernel: KernelKind = "straight") -> tuple[BackendFiles, ...]:
+    """Back ends by name and those that they need, in this order.
+
+    Raises LinkwiseError for an unknown name, and for one that takes closed forms where there are none.
+    """
+    wanted, there = list(names), backends_of(kernel)
     for name in wanted:
         if name not in BACKENDS:
             raise LinkwiseError(f"no back end {name!r}; choose among {', '.join(BACKENDS)}")
-    wanted += [needed for name in wanted for needed in BACKENDS[name].needs]
-    return tuple(backend for name, backend in BACKENDS.items() if name in wanted)
+        if name not in there:
+            raise LinkwiseError(
+                f"the back end {name!r} is not there with --kernel loops, which derives no formulas; choose "
+                f"among {', '.join(there)}, or take --kernel straight"
+            )
+    wanted += [needed for name in wanted for needed in there[name].needs]
+    return tuple(backend for name, backend in there.items() if name in wanted)

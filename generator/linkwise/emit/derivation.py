@@ -7,12 +7,16 @@ from typing import Any
 
 from linkwise.dynamics.derive import shared_kernel
 from linkwise.dynamics.kernel import Kernel
+from linkwise.package.entries import KernelKind
 from linkwise.symbolic.system import System
 
 
 @dataclass(frozen=True)
 class Derivation:
-    """What every back end emits from: the system, one kernel per link, and the request that led to it."""
+    """What every back end emits from: the system, one kernel per link, and the request that led to it.
+
+    Without kernels, which rigid bodies alone can do, the package's kernel is in loops.
+    """
 
     system: System
     kernels: tuple[Kernel, ...]
@@ -22,9 +26,14 @@ class Derivation:
     @cached_property
     def shared(self) -> Kernel | None:
         """Kernel of all links together, None where they share no work; found when first asked for."""
-        return shared_kernel(self.system, self.kernels)
+        return shared_kernel(self.system, self.kernels) if self.kernels else None
 
     @property
     def linear(self) -> frozenset[int]:
         """Links whose energy has terms linear in the velocities."""
         return frozenset(j for j, k in enumerate(self.kernels) if k.forms[0].velocity_linear)
+
+    @property
+    def kernel(self) -> KernelKind:
+        """Kind of the package's kernel."""
+        return "straight" if self.kernels else "loops"

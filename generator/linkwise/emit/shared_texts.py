@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.render import render
 from linkwise.escape import python_docstring, python_literal
+from linkwise.package.entries import KernelKind
 from linkwise.version import VERSION
 
 LINE = 100
@@ -34,21 +35,31 @@ class Maker:
     chooses: bool
 
     @classmethod
-    def of(cls, backend: BackendFiles, loading: Loading, rigid: bool) -> "Maker":
+    def of(cls, backend: BackendFiles, loading: Loading, rigid: bool, kernel: KernelKind) -> "Maker":
         """Its class comes from runtime/, and is the first word of the expression."""
         made = loading.made.partition("(")[0]
-        imports = [*loading.imports, f"from .runtime.{loading.module} import {made}"]
+        imports = [*loading.imports]
+        if loading.uses_forms and kernel == "straight":
+            imports.append("from .forms import LINKS")
+        imports.append(f"from .runtime.{loading.module} import {made}")
         if loading.uses_rule:
             imports.append("from .tree import RULE" if rigid else "RULE = None")
+        if loading.uses_forms and kernel == "loops":
+            imports.append("LINKS = None")
         return cls(backend.name, backend.doc, tuple(imports), loading.made, loading.chooses)
 
 
 def init_text(
-    package: str, chosen: Iterable[BackendFiles], parameters: Iterable[str], about: Sequence[str], rigid: bool
+    package: str,
+    chosen: Iterable[BackendFiles],
+    parameters: Iterable[str],
+    about: Sequence[str],
+    rigid: bool,
+    kernel: KernelKind,
 ) -> str:
     """__init__.py, whose `load` makes the back ends of those `chosen`.
 
-    about: lines on the parameters; rigid: whether the links are rigid bodies
+    about: lines on the parameters; rigid: whether the links are rigid bodies; kernel: the package's
     """
     loadable = {backend: backend.loading for backend in chosen if backend.loading}
     fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
@@ -56,7 +67,7 @@ def init_text(
         "version": VERSION,
         "package": package,
         "default": next((backend.name for backend in loadable), ""),
-        "makers": [Maker.of(backend, loading, rigid) for backend, loading in loadable.items()],
+        "makers": [Maker.of(backend, loading, rigid, kernel) for backend, loading in loadable.items()],
         "choosing": [backend.name for backend, loading in loadable.items() if loading.chooses],
         "bodies": rigid and any(loading.uses_rule for loading in loadable.values()),
         "fastest_first": [backend.name for backend, _ in fastest_first],

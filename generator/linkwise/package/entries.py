@@ -9,6 +9,9 @@ import numpy as np
 
 Row = tuple[float, float, float]
 
+KernelKind = Literal["straight", "loops"]
+"""Closed forms in straight lines, or loops over links and joints."""
+
 ROUNDING = 1e-6
 """Largest error of an entry of a rotation times its transpose."""
 

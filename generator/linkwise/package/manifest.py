@@ -16,12 +16,13 @@ from linkwise.package.entries import (
     BodyEntry,
     EnergyEntry,
     JointEntry,
+    KernelKind,
     LinkEntry,
     RigidTree,
     check_tree,
 )
 
-SCHEMA = 4
+SCHEMA = 5
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [
@@ -50,7 +51,8 @@ CONVENTIONS = {
 class Manifest:
     """What a package is of: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
 
-    request: the options of `generate`; files: the SHA-256 of every other file, by its path in the package
+    request: the options of `generate`; kernel: which kind its C is
+    files: the SHA-256 of every other file, by its path in the package
     shared_operations: those of the kernel in which links share work; None without such a kernel
     """
 
@@ -58,6 +60,7 @@ class Manifest:
     robot: str
     generator: Mapping[str, str]
     request: Mapping[str, Any]
+    kernel: KernelKind
     joints: tuple[JointEntry, ...]
     links: tuple[LinkEntry, ...]
     shared_operations: int | None

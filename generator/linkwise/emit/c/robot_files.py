@@ -26,7 +26,7 @@ def robot_view(
     parts = tuple(groups(links))
     waiting = _most([whole(part).size for part in parts])
     names = list(parameter_names(system).values())
-    motion = _inputs(system)
+    motion = given(system)
     shared = [("shared", together.values)] if together else []
     calls = [link_calls(link, k) for link, k in zip(links, kernels, strict=True)]
     return {
@@ -34,7 +34,7 @@ def robot_view(
         "paths": [", ".join(map(str, path)) for path in paths if path],
         "path_starts": ", ".join(map(str, accumulate(map(len, paths), initial=0))),
         "linear": ", ".join("1" if link.size.h1 else "0" for link in links),
-        "totals": _totals(robot.size),
+        "totals": totals(robot.size),
         "total": robot.size.total,
         "parameters": [(name, place) for place, name in enumerate(names)],
         "kernels": f"link_1.h to link_{len(links)}.h" if len(links) > 1 else "link_1.h",
@@ -74,7 +74,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "tuned": header.TUNED,
         "tuned_arm": header.TUNED_ARM,
         "n": len(system.coordinates),
-        "totals": _totals(robot.size),
+        "totals": totals(robot.size),
         "full": ", ".join(array for array in ("c1", "c0", "h1") if robot.size.of(array)),
         "causes": causes(system),
         "quantities": list(quantity_lines(system, linear)),
@@ -82,7 +82,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "joints": list(header.joint_lines(system)),
         "parameters": header.parameter_lines(system),
         "blocks": tuple(header.BLOCK.values()),
-        "functions": list(functions(_inputs(system), robot, links)),
+        "functions": list(functions(given(system), robot, links)),
     }
 
 
@@ -96,12 +96,12 @@ def costs(kernels: Sequence[LinkKernels], together: SharedWork | None) -> dict[s
     }
 
 
-def _inputs(system: System) -> tuple[str, ...]:
+def given(system: System) -> tuple[str, ...]:
     """Arrays that every function takes."""
     return ("q", "qd", "qdd", "p") if system.parameters else ("q", "qd", "qdd")
 
 
-def _totals(size: EntryCounts) -> list[tuple[str, int]]:
+def totals(size: EntryCounts) -> list[tuple[str, int]]:
     """Names in C and values of the robot's numbers of entries."""
     return [(total(array), size.of(array)) for array in size.arrays if array != "tau"]
 

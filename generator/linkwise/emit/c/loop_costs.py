@@ -1,0 +1,78 @@
+"""Arithmetic operations of a kernel in loops: those that rule.h, shares.h and gradient.h write down.
+
+Additions, subtractions and multiplications for each sample, fused ones counted as two. What depends on the
+robot alone, such as half the trace of an inertia, is not counted, nor are sines and cosines. A test counts
+them in the C of one sample.
+"""
+
+from collections.abc import Sequence
+
+from linkwise.emit.c.robot_tables import columns, placed
+from linkwise.robot.robot import Joint
+from linkwise.symbolic.system import RigidSystem
+
+FRAME, TURN, PLACE, SLIDE = 141, 1, 18, 6
+"""A joint's frame and axis; its angle; its place and what a slide adds to it, where places matter."""
+SUM = 12
+"""A column that is the sum of two."""
+LINK = 216
+"""A link's inertia and motion."""
+COLUMN = 87
+"""How a coordinate moves a link, and the wrenches of its c2 and c1."""
+ALONG = 11
+"""A wrench along a motion: c2, c1 and tau."""
+WEIGHT = 5
+"""A force along a motion: g."""
+MOVES = 15
+"""How a joint moves a link."""
+SECOND_CHANGE = 69
+"""The second change of a joint's axis."""
+GRADIENT = 111
+"""The wrenches of a joint's c0."""
+
+
+def link_cost(system: RigidSystem, link: int) -> int:
+    """Operations of one link's decomposition by itself."""
+    found = columns(system)
+    chain = system.links[link].chain
+    sums = sum(last in chain for _, last in found.sums)
+    return _frames(system, chain) + SUM * sums + _link(system, link)
+
+
+def decomposition_cost(system: RigidSystem) -> int:
+    """Operations of the decomposition of all links."""
+    links = range(len(system.links))
+    return _motion(system) + sum(_link(system, j) for j in links)
+
+
+def torque_cost(system: RigidSystem) -> int:
+    """Operations of the torques alone."""
+    lengths = [len(system.path(j)) for j in range(len(system.links))]
+    return _motion(system) + sum(LINK + d * (MOVES + ALONG) for d in lengths)
+
+
+def gradient_cost(system: RigidSystem) -> int:
+    """Operations of the position gradient."""
+    chains = [len(link.chain) for link in system.links]
+    second = SECOND_CHANGE * len(system.robot.links)
+    return _motion(system) + second + sum(LINK + d * GRADIENT + d * d * (MOVES + ALONG + 1) for d in chains)
+
+
+def _motion(system: RigidSystem) -> int:
+    return _frames(system, range(len(system.robot.links))) + SUM * len(columns(system).sums)
+
+
+def _frames(system: RigidSystem, frames: Sequence[int]) -> int:
+    matters = placed(system)
+    return sum(FRAME + _by_kind(system.robot.links[f].joint, matters[f]) for f in frames)
+
+
+def _by_kind(joint: Joint, matters: bool) -> int:
+    if joint.kind == "revolute":
+        return TURN + PLACE * matters
+    return (PLACE + SLIDE) * matters
+
+
+def _link(system: RigidSystem, link: int) -> int:
+    d = len(system.path(link))
+    return LINK + d * (COLUMN + WEIGHT + ALONG) + ALONG * (d * (d + 1) // 2 + d * d)

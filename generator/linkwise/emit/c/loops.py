@@ -1,0 +1,73 @@
+"""A kernel in loops in C: the robot in tables, and fixed files that go by them."""
+
+from collections.abc import Iterator, Sequence
+from importlib.resources import files
+from typing import Any
+
+from linkwise.dynamics.kernel import parameter_names
+from linkwise.emit.c import header
+from linkwise.emit.c.loop_costs import decomposition_cost, gradient_cost, torque_cost
+from linkwise.emit.c.prototypes import pointers
+from linkwise.emit.c.robot_files import given, header_view, totals
+from linkwise.emit.c.robot_tables import formulas, path_spans, table_view
+from linkwise.emit.c.sizes import Span, whole
+from linkwise.emit.derivation import Derivation
+from linkwise.emit.render import render
+from linkwise.symbolic.system import RigidSystem
+from linkwise.version import VERSION
+
+FIXED = (
+    "blocks.h",
+    "dense.h",
+    "dense_rows.h",
+    "gradient.h",
+    "lanes.h",
+    "loops.h",
+    "numbers.h",
+    "one_sample.h",
+    "rows.h",
+    "rule.h",
+    "shares.h",
+    "sines.h",
+    "stream.h",
+    "tree.h",
+    "vectors.h",
+)
+"""Files that are the same in every package with a kernel in loops."""
+
+
+def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
+    """Paths inside the package and texts; raises TypeError for what is not rigid bodies."""
+    system, name = derivation.system, derivation.package
+    if not isinstance(system, RigidSystem):
+        raise TypeError("a kernel in loops goes over rigid bodies")
+    links = path_spans(system)
+    common = {"version": VERSION, "name": name}
+    yield f"c/{name}.c", render("c/robot_loops.c.j2", common | _robot_view(system, links))
+    yield f"c/{name}f.c", render("c/robotf.c.j2", common)
+    names = common | {"upper": name.upper()}
+    costs = {
+        "decomposition_cost": decomposition_cost(system),
+        "torque_cost": torque_cost(system),
+        "gradient_cost": gradient_cost(system),
+    }
+    yield f"c/{name}.h", render("c/robot.h.j2", names | header_view(system, links, name) | costs)
+    tables = {"tables": list(header.index_tables(system, links))}
+    yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)
+    for file in FIXED:
+        yield f"c/{file}", files("linkwise.runtime").joinpath("c", file).read_text(encoding="utf-8")
+
+
+def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
+    """Fields of NAME.c but for its name."""
+    robot, motion = whole(links), given(system)
+    return table_view(system, links) | {
+        "n": len(system.coordinates),
+        "totals": totals(robot.size),
+        "parameters": list(enumerate(parameter_names(system).values())),
+        "formulas": formulas(system),
+        "inputs": pointers("const real", motion),
+        "passed": ", ".join(motion),
+        "inputs_at_rest": pointers("const real", (array for array in motion if array != "qdd")),
+        "passed_at_rest": ", ".join("qd" if array == "qdd" else array for array in motion),
+    }

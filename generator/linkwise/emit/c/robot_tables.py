@@ -1,0 +1,157 @@
+"""A tree of rigid bodies as tables in C: what a kernel in loops goes by."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any
+
+import sympy as sp
+
+from linkwise.dynamics.kernel import lowering, parameter_names
+from linkwise.emit.c.sizes import EntryCounts, Span
+from linkwise.emit.printer import CPrinter
+from linkwise.emit.straight_line import straight_line
+from linkwise.escape import c_comment
+from linkwise.robot.robot import Scalar
+from linkwise.symbolic.system import RigidSystem
+
+PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Entries of an inertia, in the order of `struct body` in tree.h."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What moves each link, one column for each coordinate of its path, ascending: see tree.h.
+
+    sums: columns beyond those of joints, as (column, joint's column), for joints that follow one coordinate
+    """
+
+    of_links: tuple[tuple[int, ...], ...]
+    sums: tuple[tuple[int, int], ...]
+
+
+def columns(system: RigidSystem) -> Columns:
+    """Columns of a robot."""
+    frames = len(system.robot.links)
+    found: dict[tuple[int, int], int] = {}
+    of_links = []
+    for link in system.links:
+        own: dict[int, int] = {}
+        for frame in link.chain:
+            k = system.robot.links[frame].joint.coordinate
+            own[k] = found.setdefault((own[k], frame), frames + len(found)) if k in own else frame
+        of_links.append(tuple(own[k] for k in sorted(own)))
+    return Columns(tuple(of_links), tuple(found))
+
+
+def path_spans(system: RigidSystem) -> tuple[Span, ...]:
+    """Return each link by itself, in order, all its values being there whether or not they are zero."""
+    sizes = []
+    for j in range(len(system.links)):
+        d = len(system.path(j))
+        sizes.append(EntryCounts(d * (d + 1) // 2, d * d, d))
+    starts = accumulate(sizes, initial=EntryCounts())
+    return tuple(
+        Span(number, number, size, start)
+        for number, (size, start) in enumerate(zip(sizes, starts, strict=False), 1)
+    )
+
+
+def table_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
+    """Fields of NAME.c that are tables."""
+    found, robot = columns(system), system.robot
+    paths = [system.path(j) for j in range(len(links))]
+    return {
+        "frames": len(robot.links),
+        "columns": len(robot.links) + len(found.sums),
+        "longest": max(map(len, paths)),
+        "joints": list(_joints(system)),
+        "sums": [f"{{{a}, {b}}}" for a, b in found.sums],
+        "links": [
+            f"{{{link.chain[-1] + 1}, {span.start.c2}, {span.start.c1}, {span.start.g}}}, "
+            f"/* {span.first}, {c_comment(link.name)} */"
+            for link, span in zip(system.links, links, strict=True)
+        ],
+        "path_starts": ", ".join(map(str, accumulate(map(len, paths), initial=0))),
+        "paths": [", ".join(map(str, path)) for path in paths],
+        "path_columns": [", ".join(map(str, own)) for own in found.of_links],
+        "placings": list(_placings(system)),
+        "bodies": list(_bodies(system)),
+        "gravity": _row(_values(system, robot.gravity)),
+    }
+
+
+def formulas(system: RigidSystem) -> list[str]:
+    """Statements that set the numbers `x` of a robot that hang on run-time parameters, which `p` holds."""
+    lower, _ = lowering(system)
+    places = [
+        (place, value)
+        for place, value in _places(system)
+        if isinstance(value, sp.Expr) and value.free_symbols
+    ]
+    code = straight_line(lower.graph, [lower(value) for _, value in places], CPrinter())
+    names = [name for name in parameter_names(system).values() if name in code.symbols]
+    return [
+        *(f"const real {name} = p[at_{name}];" for name in names),
+        *(f"const real {variable} = {text};" for variable, text in code.assignments),
+        *(f"x.{place} = {text};" for (place, _), text in zip(places, code.outputs, strict=True)),
+    ]
+
+
+def placed(system: RigidSystem) -> list[bool]:
+    """Whether the place of each frame matters: what nothing before it turns may as well be at the origin."""
+    turned: list[bool] = []
+    matters = []
+    for link in system.robot.links:
+        matters.append(link.parent is not None and turned[link.parent])
+        turned.append(matters[-1] or link.joint.kind == "revolute")
+    return matters
+
+
+def _joints(system: RigidSystem) -> Iterator[str]:
+    matters = placed(system)
+    for number, link in enumerate(system.robot.links, 1):
+        joint = link.joint
+        up = 0 if link.parent is None else link.parent + 1
+        yield (
+            f"{{{up}, {joint.coordinate}, {joint.kind.upper()}, {int(matters[number - 1])}}}, "
+            f"/* {number}, {c_comment(joint.name)} */"
+        )
+
+
+def _placings(system: RigidSystem) -> Iterator[str]:
+    for link in system.robot.links:
+        joint = link.joint
+        turn = _row(entry for row in joint.rotation for entry in row)
+        yield f"{{{turn}, {_row(_values(system, joint.translation))}, {joint.ratio!r}}}"
+
+
+def _bodies(system: RigidSystem) -> Iterator[str]:
+    for link in system.links:
+        [mass] = _values(system, (link.mass,))
+        inertia = _values(system, (link.inertia[i][k] for i, k in PRODUCTS))
+        yield f"{{{mass!r}, {_row(_values(system, link.com))}, {_row(inertia)}}}"
+
+
+def _places(system: RigidSystem) -> Iterator[tuple[str, Scalar]]:
+    """Every number that may hang on parameters, by its place in `struct numbers`."""
+    for f, frame in enumerate(system.robot.links):
+        yield from _entries(f"placings[{f}].place", frame.joint.translation)
+    for j, link in enumerate(system.links):
+        yield f"bodies[{j}].mass", link.mass
+        yield from _entries(f"bodies[{j}].com", link.com)
+        yield from _entries(f"bodies[{j}].inertia", (link.inertia[i][k] for i, k in PRODUCTS))
+    yield from _entries("gravity", system.robot.gravity)
+
+
+def _entries(place: str, values: Iterable[Scalar]) -> Iterator[tuple[str, Scalar]]:
+    return ((f"{place}[{at}]", value) for at, value in enumerate(values))
+
+
+def _values(system: RigidSystem, scalars: Iterable[Scalar]) -> list[float]:
+    parameters = system.parameters
+    return [float(s.xreplace(parameters)) if isinstance(s, sp.Expr) else float(s) for s in scalars]
+
+
+def _row(values: Iterable[float]) -> str:
+    return f"{{{', '.join(map(repr, map(float, values)))}}}"

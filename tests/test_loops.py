@@ -1,0 +1,188 @@
+"""A kernel in loops: it answers as the closed forms do, for robots of every kind, and is chosen by size."""
+
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from answers import random_states, relative_error
+from compiled import STRICT, Compiled, compile_library, name_of
+from conftest import DATA, needs_compiler
+from linkwise import LinkwiseError, Options, generate, read_system, write_package
+from linkwise.check import check_package
+from linkwise.cli.app import app
+from linkwise.package.load import import_package
+from linkwise.package.manifest import Manifest
+from test_emitted_c import COMPILERS, PARTS, strict
+from typer.testing import CliRunner
+
+CRANE, LEG, TURNTABLE = str(DATA / "crane.urdf"), str(DATA / "leg.toml"), str(DATA / "turntable.py")
+FIELDS = ("acceleration", "velocity", "gravity", "torque")
+
+
+def crane(folder: Path, options: Options) -> Path:
+    """Package of a tree with slides, a part without mass, and joints that follow another."""
+    write_package(generate(read_system(CRANE, options), kernel="loops"), folder / "crane")
+    return folder / "crane"
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "options",
+    [Options(), Options("symbolic", base="floating")],
+    ids=["numbers", "floating, with parameters"],
+)
+def test_every_function_agrees_with_a_recursion(options: Options, tmp_path: Path) -> None:
+    """c2, c1, g, tau and c0 in double and float: one sample, few, blocks, past the cache, each link alone."""
+    results = check_package(crane(tmp_path, options), samples=30)
+    assert [result for result in results if not result.passed] == []
+    names = " ".join(result.name for result in results)
+    for function in ("decomposition", "decomposition_blocksf", "torquef", "position_gradient", "link_5f"):
+        assert f"crane_{function}" in names
+    assert ("other parameters" in names) == (options.parameters == "symbolic")
+
+
+@needs_compiler
+@pytest.mark.parametrize("robot", ["puma560", LEG], ids=["arm", "tree"])
+def test_it_answers_as_the_closed_forms_do(
+    robot: str, package_of: Callable[[str], ModuleType], directory_of: Callable[[str], Path]
+) -> None:
+    straight, loops = package_of(robot).load("numpy"), Compiled(directory_of(f"{robot} loops"))
+    for count in (1, 2, 16, 37):
+        states = random_states(straight.n, count)
+        expected, given = straight.packed(*states), loops.decomposition(*states)
+        for field in FIELDS:
+            assert relative_error(given[field], getattr(expected, field)) <= 1e-14, (count, field)
+        slopes = straight.position_gradient(*states)[:, *straight.layout.velocity.T]
+        assert relative_error(loops.position_gradient(*states), slopes) <= 1e-14, count
+
+
+def test_where_the_base_is_does_not_matter(tmp_path: Path) -> None:
+    library = Compiled(crane(tmp_path, Options(base="floating")))
+    q, qd, qdd = random_states(9, 5)
+    here = library.decomposition(q, qd, qdd)
+    q[:, :3] += 1e6
+    for field, values in library.decomposition(q, qd, qdd).items():
+        assert (values == here[field]).all(), field
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_it_compiles_without_a_warning_whole_and_in_parts(
+    compiler: str, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    directory = directory_of("planar3 symbolic loops")
+    compile_library(directory, tmp_path / "library.so", strict(compiler))
+    command, source = (*strict(compiler), *STRICT), directory / "c" / "planar3.c"
+    objects = [str(tmp_path / f"{part}.o") for part in PARTS]
+    for part, made in zip(PARTS, objects, strict=True):
+        subprocess.run([*command, f"-DLINKWISE_PART={part}", "-c", str(source), "-o", made], check=True)
+    linked = [compiler, "-shared", "-Wl,--no-undefined", *objects, "-lm", "-o", str(tmp_path / "all.so")]
+    subprocess.run(linked, check=True)
+
+
+@needs_compiler
+def test_its_code_does_not_grow_with_the_robot(directory_of: Callable[[str], Path], tmp_path: Path) -> None:
+    def instructions(robot: str) -> int:
+        directory, made = directory_of(f"{robot} loops"), str(tmp_path / "robot.o")
+        source = str(directory / "c" / f"{robot}.c")
+        subprocess.run(
+            ["gcc", "-std=c99", "-O2", "-DLINKWISE_PART=BLOCKS", "-c", source, "-o", made], check=True
+        )
+        sizes = subprocess.run(["size", "-A", made], check=True, capture_output=True, text=True).stdout
+        return int(re.findall(r"^\.text\S* +(\d+)", sizes, re.M)[0])
+
+    assert instructions("planar20") < 1.1 * instructions("planar3")
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
+@pytest.mark.parametrize("robot", [CRANE, "puma560"], ids=["crane", "arm"])
+def test_the_header_counts_its_operations(
+    robot: str, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    directory = directory_of(f"{robot} loops")
+    name = name_of(directory)
+    defined = f'-DSOURCE="{directory / "c" / name}.c"'
+    made = tmp_path / "count"
+    subprocess.run(
+        ["g++", "-std=c++17", "-w", defined, DATA / "count_operations.cpp", "-o", made], check=True
+    )
+    counted = subprocess.run([made], check=True, capture_output=True, text=True).stdout.split()
+    header = (directory / "c" / f"{name}.h").read_text(encoding="utf-8")
+    told = [re.search(rf"{what}: (\d+) operations", header) for what in ("but c0", "Torques alone")]
+    # Besides, numbers that do not vary are spread over all samples: 2 for the base, 5 for each link.
+    links = len(Manifest.read(directory).links)
+    assert [int(count) - 2 - 5 * links for count in counted] == [int(found[1]) for found in told if found]
+
+
+@needs_compiler
+def test_native_answers_arrays_and_tensors_and_says_where_gradients_are_not(
+    directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    torch = pytest.importorskip("torch")
+    package, states = import_package(directory_of("puma560 loops")), random_states(6, 5)
+    assert package.BACKENDS == ("native",)
+    native, expected = package.load(), package_of("puma560").load("numpy").partial_torque(*states)
+    assert relative_error(native.partial_torque(*states), expected) <= 1e-14
+    q, qd, qdd = map(torch.from_numpy, states)
+    assert relative_error(native.partial_torque(q, qd, qdd), expected) <= 1e-14
+    with pytest.raises(TypeError, match="its kernel is in loops and has no formulas"):
+        native.partial_torque(q.requires_grad_(), qd, qdd)
+
+
+@pytest.mark.parametrize(
+    ("robot", "choice", "kernel"),
+    [
+        ("planar3", "auto", "straight"),
+        ("planar40", "auto", "loops"),
+        ("planar3", "loops", "loops"),
+        (TURNTABLE, "auto", "straight"),
+    ],
+)
+def test_the_manifest_says_which_kernel_was_chosen(robot: str, choice: str, kernel: str) -> None:
+    manifest = json.loads(generate(read_system(robot), ["c"], kernel=choice)["manifest.json"])
+    assert manifest["kernel"] == kernel
+    assert all(link["operations"] > 0 for link in manifest["links"])
+
+
+def test_back_ends_asked_for_by_name_decide_where_loops_would_lack_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("linkwise.emit.kernel_choice.MOST_STRAIGHT", 0)
+    kernels = {
+        backend: json.loads(generate(read_system("planar3"), [backend])["manifest.json"])["kernel"]
+        for backend in ("numpy", "c")
+    }
+    assert kernels == {"numpy": "straight", "c": "loops"}
+
+
+@pytest.mark.parametrize(
+    ("robot", "asked", "told"),
+    [
+        (TURNTABLE, {"kernel": "loops"}, "--kernel loops goes over rigid bodies, and here are energies"),
+        ("planar3", {"kernel": "loops", "backends": ["numpy"]}, "'numpy' is not there with --kernel loops"),
+        ("planar3", {"kernel": "curved"}, "no kernel 'curved'; choose among auto, straight, loops"),
+    ],
+)
+def test_a_kernel_that_cannot_be_is_refused(robot: str, asked: dict[str, object], told: str) -> None:
+    with pytest.raises(LinkwiseError, match=re.escape(told)):
+        generate(read_system(robot), **asked)  # type: ignore[arg-type]
+
+
+def test_the_flag_chooses_the_kernel(tmp_path: Path) -> None:
+    def run(robot: str) -> int:
+        return (
+            CliRunner()
+            .invoke(app, ["generate", robot, "--kernel", "loops", "--out", str(tmp_path)])
+            .exit_code
+        )
+
+    assert run("planar3") == 0
+    request = json.loads((tmp_path / "planar3" / "manifest.json").read_text())["request"]
+    assert (request["kernel"], request["backends"]) == ("loops", ["native", "c"])
+    assert not (tmp_path / "planar3" / "forms").exists()
+    assert run(TURNTABLE) != 0
+    shutil.rmtree(tmp_path / "planar3")
