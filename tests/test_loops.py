@@ -119,18 +119,24 @@ def test_the_header_counts_its_operations(
 
 
 @needs_compiler
-def test_native_answers_arrays_and_tensors_and_says_where_gradients_are_not(
-    directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd", "native"])
+def test_every_back_end_answers_without_closed_forms(
+    backend: str, directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
 ) -> None:
     torch = pytest.importorskip("torch")
-    package, states = import_package(directory_of("puma560 loops")), random_states(6, 5)
-    assert package.BACKENDS == ("native",)
-    native, expected = package.load(), package_of("puma560").load("numpy").partial_torque(*states)
-    assert relative_error(native.partial_torque(*states), expected) <= 1e-14
-    q, qd, qdd = map(torch.from_numpy, states)
-    assert relative_error(native.partial_torque(q, qd, qdd), expected) <= 1e-14
-    with pytest.raises(TypeError, match="its kernel is in loops and has no formulas"):
-        native.partial_torque(q.requires_grad_(), qd, qdd)
+    robot = import_package(directory_of("puma560 loops")).load(backend)
+    states = random_states(6, 5)
+    expected = package_of("puma560").load("numpy", kernel="straight").propagation(*states)
+    tensors = [torch.from_numpy(a) for a in states]
+    given = robot.propagation(*(states if backend in ("numpy", "native") else tensors))
+    for one, other in zip(given, expected, strict=True):
+        assert relative_error(one, other) <= 1e-13
+    if backend != "numpy":
+        slopes = torch.autograd.functional.jacobian(
+            lambda q: robot.partial_torque(q, *tensors[1:]).sum(0), tensors[0]
+        )
+        stiffness = package_of("puma560").load("numpy").position_gradient(*states)
+        assert relative_error(slopes.movedim(2, 0), stiffness) <= 1e-12
 
 
 @pytest.mark.parametrize(
@@ -148,22 +154,24 @@ def test_the_manifest_says_which_kernel_was_chosen(robot: str, choice: str, kern
     assert all(link["operations"] > 0 for link in manifest["links"])
 
 
-def test_back_ends_asked_for_by_name_decide_where_loops_would_lack_them(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("linkwise.emit.kernel_choice.MOST_STRAIGHT", 0)
     kernels = {
         backend: json.loads(generate(read_system("planar3"), [backend])["manifest.json"])["kernel"]
-        for backend in ("numpy", "c")
+        for backend in ("formulas", "numpy", "c")
     }
-    assert kernels == {"numpy": "straight", "c": "loops"}
+    assert kernels == {"formulas": "straight", "numpy": "loops", "c": "loops"}
 
 
 @pytest.mark.parametrize(
     ("robot", "asked", "told"),
     [
         (TURNTABLE, {"kernel": "loops"}, "--kernel loops goes over rigid bodies, and here are energies"),
-        ("planar3", {"kernel": "loops", "backends": ["numpy"]}, "'numpy' is not there with --kernel loops"),
+        (
+            "planar3",
+            {"kernel": "loops", "backends": ["formulas"]},
+            "'formulas' is not there with --kernel loops",
+        ),
         ("planar3", {"kernel": "curved"}, "no kernel 'curved'; choose among auto, straight, loops"),
     ],
 )
@@ -182,7 +190,10 @@ def test_the_flag_chooses_the_kernel(tmp_path: Path) -> None:
 
     assert run("planar3") == 0
     request = json.loads((tmp_path / "planar3" / "manifest.json").read_text())["request"]
-    assert (request["kernel"], request["backends"]) == ("loops", ["native", "c"])
+    assert (request["kernel"], request["backends"]) == (
+        "loops",
+        ["numpy", "torch", "autograd", "native", "c"],
+    )
     assert not (tmp_path / "planar3" / "forms").exists()
     assert run(TURNTABLE) != 0
     shutil.rmtree(tmp_path / "planar3")

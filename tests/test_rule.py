@@ -225,7 +225,7 @@ def test_gradients_of_native_need_no_closed_forms(
     made = package.load("native").backend
     bare = type(made)(package.ROBOT, directory_of("planar3") / "c", None, {}, made.rule)
     motion = [a.requires_grad_() for a in motion_of("torch", 3)]
-    bare._torch().operators = {call: made._torch().operators[call] for call in made._torch().operators}
+    bare.on_torch().operators = dict(made.on_torch().operators)
     assert torch.autograd.gradcheck(bare.torque, motion)
 
 

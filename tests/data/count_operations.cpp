@@ -19,6 +19,8 @@ static real operator-(real a, real b) { return result(a.value - b.value, a, b); 
 static real operator*(real a, real b) { return result(a.value * b.value, a, b); }
 static real operator-(real a) { return real(-a.value, a.varies); }
 static real &operator+=(real &a, real b) { return a = a + b; }
+static real &operator-=(real &a, real b) { return a = a - b; }
+static real &operator*=(real &a, real b) { return a = a * b; }
 #define R(x) real(x, true)
 #define F(function) function##_counted
 static real sin_counted(real a) { return real(std::sin(a.value), true); }

@@ -15,7 +15,7 @@ SHARED void API(dense_one)(INPUTS, const struct dense *to);
 SHARED void API(dense_torque_one)(INPUTS, int sums, real *torque);
 
 /* No link of rigid bodies has h1. */
-#if !PART(SINES) || PART(BLOCKS)
+#if PART(ONE_SAMPLE) || PART(BLOCKS) || PART(POSITION_GRADIENT)
 static const char linear[LINKS] = {0};
 #endif
 
