@@ -1,8 +1,9 @@
 """Memory for large results, in huge pages, and taken again once nobody holds what was in it.
 
 The system clears fresh memory page by page, which costs more than large results do, so blocks are kept.
-An array over a block has a `Lease` for a base: that is gone when the last array, view, tensor or buffer over it
-is, and only then is the block free again. Meanwhile the system may take its pages, if it needs them (MADV_FREE).
+An array over a block has a `Lease` for a base: that is gone when the last array, view, tensor or buffer over
+it is, and only then is the block free again. Meanwhile the system may take its pages, if it needs them
+(MADV_FREE).
 """
 
 import mmap
