@@ -30,7 +30,9 @@ def planar3_symbolic(package_of: Callable[[str], ModuleType]) -> ModuleType:
 
 @pytest.fixture(scope="module")
 def motion() -> np.ndarray:
-    return np.random.default_rng(0).uniform(-2.0, 2.0, (3, 4000, 3))
+    return np.random.default_rng(0).uniform(
+        -2.0, 2.0, (3, 24000, 3)
+    )  # every result is large enough for a block
 
 
 def test_a_parameter_that_is_learned_counts_with_its_present_value(planar3_symbolic: ModuleType) -> None:
@@ -119,6 +121,15 @@ def values_of(held: Any) -> list[np.ndarray]:
 def nobody_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """How many references an object has is the interpreter's own affair, and changed with Python 3.14."""
     monkeypatch.setattr(sys, "getrefcount", lambda _: 2)
+
+
+def test_memory_that_nobody_holds_is_taken_again(planar3: ModuleType, motion: np.ndarray) -> None:
+    robot = planar3.load("native")
+    robot.backend.threads = 1
+    places = {robot.partial_torque(*motion).__array_interface__["data"][0] for _ in range(20)}
+    held = [robot.partial_torque(*motion) for _ in range(4)]
+    assert len(places) == 1
+    assert len({tau.ctypes.data for tau in held}) == 4
 
 
 @pytest.mark.usefixtures("nobody_counts")

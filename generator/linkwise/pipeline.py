@@ -55,7 +55,7 @@ def generate(
     """Files of a package, {path inside the package: text}.
 
     `backends` are all that there are if not given. `kernel` is straight, loops, or auto, which chooses by the
-    robot's size; with loops, nothing is derived, and only the C and what calls it are there.
+    robot's size; with loops no closed forms are derived, and `formulas` are not there.
 
     `request` goes into the manifest, so that a reader sees how to make the package again.
     Raises LinkwiseError for a name, back end or kernel that cannot be.

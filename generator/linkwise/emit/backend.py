@@ -175,6 +175,7 @@ BACKENDS: dict[str, BackendFiles] = {
                 "native_calls.py",
                 "native_compiler.py",
                 "native_library.py",
+                "native_memory.py",
                 "native_module.c",
                 "native_module.py",
                 "native_process.py",

@@ -8,7 +8,8 @@ import numpy as np
 from .answers import KINDS, Answers
 from .arguments import has_tensors
 from .interface import Backend
-from .native_calls import PER_THREAD, NativeCalls
+from .native_calls import NativeCalls
+from .native_memory import LARGE
 from .native_module import compiled_calls
 
 DTYPES = (np.dtype("f8"), np.dtype("f4"))
@@ -40,7 +41,7 @@ class NativeAnswers(Answers):
         """The compiled module's side of this robot."""
         constants = [self._calls.constants(kind) for kind in DTYPES]
         answers = {call: (KINDS.get(call), shapes) for call, shapes in self._shapes.items()}
-        return made(self, self._structure.n, 2 * PER_THREAD - 1, *constants, answers)
+        return made(self, self._structure.n, LARGE - 1, *constants, answers)
 
     def _computed(self, call: str, motion: Sequence[Any]) -> Any:
         if type(motion[0]) is np.ndarray or not has_tensors(motion):

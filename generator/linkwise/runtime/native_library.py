@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .native_build import Sources, library
+from .native_memory import LARGE, lasting
 
 NumberArray = NDArray[Any]
 
@@ -56,13 +57,13 @@ def place(array: NumberArray) -> Any:
 def memory(shape: tuple[int, ...], kind: "np.dtype[Any]") -> NumberArray:
     """New memory for an array; unless it is little, it starts on a cache line, as C wants it.
 
-    It is never that of an earlier result: whether somebody still holds one cannot be known for sure, and the
-    system's allocator, which knows what was freed, is as fast as a store of old results. NumPy asks for huge
-    pages where there is much of it.
+    It is never that of an earlier result that somebody still holds.
     """
     count = math.prod(shape) * kind.itemsize
     if count < LITTLE:
         return np.empty(shape, kind)
+    if count >= LARGE:
+        return lasting(count)[:count].view(kind).reshape(shape)
     owner = np.empty(count + 64, np.uint8)
     start = -address(owner) % 64
     return owner[start : start + count].view(kind).reshape(shape)
