@@ -13,6 +13,7 @@ from typing import Any
 from .names import ROBOT
 from .runtime.dynamics import Dynamics
 from .runtime.interface import Backend
+from .runtime.joint_tree import Bodies
 from .runtime.quantities import Coefficients, GradientPropagation, Packed, Propagation
 from .runtime.structure import Layout
 
@@ -27,18 +28,27 @@ def load(
     parameters: Mapping[str, Any] | None = None,
     check_finite: bool = False,
     allow_unphysical: bool = False,
+    kernel: str = "auto",
+    bodies: Bodies[Any] | None = None,
 ) -> Dynamics:
     """Return the robot on a back end; all of them answer the same calls.
 
     backend: one of
-        numpy: closed forms on NumPy arrays
-        torch: closed forms on torch tensors
+        numpy: closed forms, or the vectorised rule, on NumPy arrays
+        torch: closed forms, or the vectorised rule, on torch tensors
         autograd: each link's Lagrangian, differentiated by torch
         native: the C code, compiled by this system's compiler
 
     parameters: none here; generate with --parameters symbolic to keep them.
 
     allow_unphysical: whether values of parameters are taken that no body has: there are none here.
+
+    kernel: what numpy and torch compute by: "straight", closed forms, thousands of operations on arrays;
+    "rule", one hundred and fifty or so that serve all links at once; or "auto", what was measured to be quicker.
+
+    bodies: masses, centres and inertias in place of the package's own, as `Bodies` says and `bodies()` has them, for
+    numpy and torch: arrays or, for torch, tensors, through which gradients flow; one for all samples or one for each.
+    Any values are taken, also such as no body has.
 
     check_finite: whether every call looks at q, qd and qdd first and raises ValueError for NaN and infinity.
 
@@ -54,42 +64,56 @@ def load(
         raise ValueError("this package has no back end to load; generate it with --backend numpy, say")
     if backend not in BACKENDS:
         raise ValueError(f"no back end {backend!r} in this package; choose one of {', '.join(BACKENDS)}")
-    made = _MAKERS[backend](ROBOT.values(parameters, allow_unphysical))
-    asked = backend, dict(parameters or {}), check_finite, allow_unphysical
+    made = _MAKERS[backend](ROBOT.values(parameters, allow_unphysical), kernel, bodies)
+    asked = backend, dict(parameters or {}), check_finite, allow_unphysical, kernel, bodies
     return Dynamics(ROBOT, made, load, asked, check_finite)
 
 
-def _numpy(values: Mapping[str, Any]) -> Backend[Any]:
+def bodies() -> Bodies[Any]:
+    """What the links carry, in arrays of NumPy; with run-time parameters, for their built-in values."""
+    from .tree import RULE
+
+    return RULE.bodies()
+
+
+def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any) -> Backend[Any]:
     from .forms import LINKS
     from .runtime.numpy_backend import NumpyBackend
+    from .tree import RULE
 
-    return NumpyBackend(ROBOT, LINKS, values)
+    return NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
 
 
-def _torch(values: Mapping[str, Any]) -> Backend[Any]:
+def _torch(values: Mapping[str, Any], kernel: str, bodies: Any) -> Backend[Any]:
     from .forms import LINKS
     from .runtime.torch_backend import TorchBackend
+    from .tree import RULE
 
-    return TorchBackend(ROBOT, LINKS, values)
+    return TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
 
 
-def _autograd(values: Mapping[str, Any]) -> Backend[Any]:
+def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any) -> Backend[Any]:
     from .energies import links
     from .runtime.autograd_backend import AutogradBackend
+    from .runtime.array_kernels import refuse_choice
 
+    refuse_choice("autograd", kernel, bodies)
     return AutogradBackend(ROBOT, links, values)
 
 
-def _native(values: Mapping[str, Any]) -> Backend[Any]:
+def _native(values: Mapping[str, Any], kernel: str, bodies: Any) -> Backend[Any]:
     from pathlib import Path
     from .forms import LINKS
     from .runtime.native_backend import NativeBackend
+    from .tree import RULE
+    from .runtime.array_kernels import refuse_choice
 
-    return NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values)
+    refuse_choice("native", kernel, bodies)
+    return NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values, RULE)
 
 
 # Libraries are imported, and C is compiled, for the back end that is loaded.
-_MAKERS: dict[str, Callable[[Mapping[str, Any]], Backend[Any]]] = {
+_MAKERS: dict[str, Callable[[Mapping[str, Any], str, Any], Backend[Any]]] = {
     "numpy": _numpy,
     "torch": _torch,
     "autograd": _autograd,
@@ -108,12 +132,14 @@ FASTEST_FIRST: tuple[str, ...] = (
 __all__ = [
     "BACKENDS",
     "FASTEST_FIRST",
+    "Bodies",
     "Coefficients",
     "Dynamics",
     "GradientPropagation",
     "Layout",
     "Packed",
     "Propagation",
+    "bodies",
     "joint_names",
     "link_names",
     "load",

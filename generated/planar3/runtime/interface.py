@@ -56,6 +56,9 @@ class Backend(Protocol[Kind]):
     def position_gradient(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
         """c0 (..., count) in the order of `Layout.velocity`."""
 
+    def answers(self, check_finite: bool) -> Any:
+        """The calls of `Dynamics` on this back end: an `Answers`."""
+
     def constant(self, values: NDArray[Any], like: Kind) -> Kind:
         """A table of numbers, to compute with `like`."""
 

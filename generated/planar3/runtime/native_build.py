@@ -8,7 +8,7 @@ another cache directory, CC another compiler.
 import hashlib
 import platform
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,11 @@ from .native_process import Tell, run_all, told
 
 PARTS = {"decomposition": ("BLOCKS", "ONE_SAMPLE", "SINES"), "gradient": ("POSITION_GRADIENT", "SINES")}
 """Parts of a robot's file (see numbers.h) in its two libraries; what nobody asks for is not compiled."""
+
+MADE = "library.so"
+
+Commands = Callable[[Path], Sequence[Sequence[Sequence[str]]]]
+"""Command lines that make a library in a folder: those that run side by side, then those after them."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +44,48 @@ def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
     A terminal is told of the wait on stderr.
     """
     compiler = find_compiler()
+
+    def commands(folder: Path) -> list[list[list[str]]]:
+        parts = PARTS[what]
+        objects = [f"{folder}/{part}.o" for part in parts]
+        source = sources.file(real)
+        compiling = [
+            compiler.compiling(source, part, made) for part, made in zip(parts, objects, strict=True)
+        ]
+        return [compiling, [compiler.linking(objects, str(folder / MADE))]]
+
     name = f"{sources.name}-{what}-{real}-{_fingerprint(sources, compiler)}"
+    return _kept(name, f"{sources.name} ({what}, {real})", compiler, commands)
+
+
+def extension(source: Path, headers: Sequence[str], versions: Sequence[str]) -> Path:
+    """Path of a module for Python, made of one file, compiled likewise.
+
+    versions: what it depends on beside its text and the compiler
+    """
+    compiler = find_compiler()
+
+    def commands(folder: Path) -> list[list[list[str]]]:
+        return [[compiler.extending(source, headers, str(folder / MADE))]]
+
+    place = (
+        compiler.command,
+        compiler.extending(source, headers, ""),
+        compiler.version(),
+        platform.machine(),
+    )
+    digest = hashlib.sha256(source.read_bytes() + repr((place, *versions)).encode())
+    return _kept(f"{source.stem}-{digest.hexdigest()[:20]}", source.stem, compiler, commands)
+
+
+def _kept(name: str, what: str, compiler: Compiler, commands: Commands) -> Path:
+    """Path of a library in the cache, made there if need be."""
     target = cache_directory() / f"{name}.so"
     if not is_whole(target):
         lock = target.with_suffix(".lock")
-        with told(f"compiling {sources.name} ({what}, {real}), once") as tell, locked(lock, tell):
+        with told(f"compiling {what}, once") as tell, locked(lock, tell):
             if not is_whole(target):
-                _build(compiler, sources.file(real), PARTS[what], target, tell)
+                _build(compiler, commands, target, tell)
     return target
 
 
@@ -59,18 +99,18 @@ def _fingerprint(sources: Sources, compiler: Compiler) -> str:
     return digest.hexdigest()[:20]
 
 
-def _build(compiler: Compiler, source: Path, parts: Sequence[str], target: Path, tell: Tell) -> None:
-    """Compile the parts side by side, link them, and move the library into place in one step."""
+def _build(compiler: Compiler, commands: Commands, target: Path, tell: Tell) -> None:
+    """Compile side by side, link, and move the library into place in one step."""
     folder = target.with_suffix(".build")
     try:
         shutil.rmtree(folder, ignore_errors=True)  # of a process that was killed: this one holds the lock
         folder.mkdir(mode=0o700)
-        objects = [f"{folder}/{part}.o" for part in parts]
-        commands = [compiler.compiling(source, part, made) for part, made in zip(parts, objects, strict=True)]
-        made = folder / "library.so"
+        made = folder / MADE
         try:
-            run_all(commands, tell)
-            run_all([compiler.linking(objects, str(made))], lambda _: tell("linking"))
+            first, *last = commands(folder)
+            run_all(first, tell)
+            for linking in last:
+                run_all(linking, lambda _: tell("linking"))
         except RuntimeError as error:
             raise RuntimeError(f"{error}; the other back ends need no compiler") from None
         if not made.is_file():

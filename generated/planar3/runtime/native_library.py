@@ -1,6 +1,7 @@
 """The functions of a robot's compiled C, and memory for their results."""
 
 import ctypes
+import math
 from contextlib import suppress
 from functools import cache
 from typing import Any
@@ -9,8 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .native_build import Sources, library
+from .native_memory import LARGE, lasting
 
 NumberArray = NDArray[Any]
+
+Place = ctypes.c_char * 0
 
 LITTLE = 1 << 15
 """Bytes below which where memory starts is of no account."""
@@ -20,10 +24,10 @@ LITTLE = 1 << 15
 def function(sources: Sources, call: str, kind: str, arrays: int) -> Any:
     """C function of a call that takes a count and `arrays` pointers; the first from a library compiles it.
 
-    call: decomposition, torque or position_gradient; kind: f8 or f4. Raises RuntimeError if it cannot be had.
+    call: its name in C; kind: f8 or f4. Raises RuntimeError if it cannot be had.
     """
     real, suffix = {"f8": ("double", ""), "f4": ("float", "f")}[kind]
-    path = library(sources, real, "gradient" if call == "position_gradient" else "decomposition")
+    path = library(sources, real, "gradient" if call.endswith("position_gradient") else "decomposition")
     try:
         found = getattr(ctypes.CDLL(str(path)), f"{sources.name}_{call}{suffix}")
     except (OSError, AttributeError) as error:
@@ -44,15 +48,22 @@ def address(array: NumberArray) -> int:
     return start
 
 
-def memory(size: int, kind: "np.dtype[Any]") -> NumberArray:
-    """New memory for `size` numbers; unless it is little, it starts on a cache line, as C wants it.
+def place(array: NumberArray) -> Any:
+    """What ctypes takes for an array's place in memory, quicker than its address where it is writable."""
+    buffer: Any = array
+    return Place.from_buffer(buffer) if array.flags.carray else address(array)
 
-    It is never that of an earlier result: whether somebody still holds one cannot be known for sure, and the
-    system's allocator, which knows what was freed, is as fast as a store of old results.
+
+def memory(shape: tuple[int, ...], kind: "np.dtype[Any]") -> NumberArray:
+    """New memory for an array; unless it is little, it starts on a cache line, as C wants it.
+
+    It is never that of an earlier result that somebody still holds.
     """
-    count = size * kind.itemsize
+    count = math.prod(shape) * kind.itemsize
     if count < LITTLE:
-        return np.empty(size, kind)
+        return np.empty(shape, kind)
+    if count >= LARGE:
+        return lasting(count)[:count].view(kind).reshape(shape)
     owner = np.empty(count + 64, np.uint8)
     start = -address(owner) % 64
-    return owner[start : start + count].view(kind)
+    return owner[start : start + count].view(kind).reshape(shape)

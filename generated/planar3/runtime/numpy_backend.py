@@ -1,4 +1,4 @@
-"""Closed forms on NumPy arrays."""
+"""Closed forms and the vectorised rule on NumPy arrays."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
@@ -6,12 +6,23 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .answers import Answers
 from .arguments import as_array, check_axes, no_common_shape, precision
+from .array_kernels import Crossing, known_kernel, rule_is_quicker
 from .interface import ClosedForms, Entries
+from .joint_tree import Bodies
 from .parameter_values import fits
+from .rule_calls import RigidRule
 from .structure import Structure
+from .tree_arrays import checked_bodies
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
+CROSSINGS: dict[str, Crossing] = {
+    "decomposition": ((70, 4), (189, 64)),
+    "torque": ((100, 4), (189, 16), (1785, 64)),
+    "position_gradient": ((70, 4), (189, 16), (280, 64)),
+}
+"""Where the rule is quicker, see `array_kernels`."""
 
 
 class NumpyBackend:
@@ -19,15 +30,30 @@ class NumpyBackend:
 
     name: ClassVar = "numpy"
     takes_tensors: ClassVar = False
+    xp: ClassVar[Any] = np
+    fuses: ClassVar = False
 
     def __init__(
-        self, structure: Structure, links: Sequence[ClosedForms], parameters: Mapping[str, Any]
+        self,
+        structure: Structure,
+        links: Sequence[ClosedForms] | None,
+        parameters: Mapping[str, Any],
+        rule: RigidRule | None = None,
+        kernel: str = "auto",
+        bodies: Bodies[Any] | None = None,
     ) -> None:
+        """`links` are the closed forms, `rule` the vectorised rule: a package has one of them, or both.
+
+        Raises ValueError for a kernel that cannot be and for bodies of a wrong shape.
+        """
         self.structure = structure
-        self.links = links
+        self.links = links or ()
+        self.rule = rule
+        self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
         self.parameters: dict[str, Any] = {
             k: as_array(f"parameter {k!r}", v).astype(float) for k, v in parameters.items()
         }
+        self.bodies = None if bodies is None else checked_bodies(bodies, structure.N, as_array)
 
     def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
@@ -44,13 +70,20 @@ class NumpyBackend:
         arrays = {name: a.astype(kind, copy=False) for name, a in read.items()}
         check_axes(arrays, n)
         try:
-            return np.broadcast_arrays(*arrays.values())
+            shape = np.broadcast_shapes(*(a.shape for a in arrays.values()))
         except ValueError:
             raise no_common_shape(arrays, n) from None
+        return [a if a.shape == shape else np.broadcast_to(a, shape) for a in arrays.values()]
+
+    def answers(self, check_finite: bool) -> Answers:
+        """The calls of `Dynamics`."""
+        return Answers(self.structure, self, check_finite)
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         p = self._values(q)
+        if rule := self._rule("decomposition", q):
+            return [*rule.decomposition(self, (q, qd, qdd), p, self._bodies(q)), self.zeros(q, 0)]
         packed = [_Columns(q, size) for size in self.structure.sizes]
         for link in self.links:
             # A link without energy terms linear in the velocities has no h1.
@@ -60,14 +93,20 @@ class NumpyBackend:
 
     def torque(self, q: Any, qd: Any, qdd: Any) -> Any:
         """tau (..., count) in the order of `Layout.torque`."""
-        p, columns = self._values(q), _Columns(q, self.structure.sizes.tau)
+        p = self._values(q)
+        if rule := self._rule("torque", q):
+            return rule.torque(self, (q, qd, qdd), p, self._bodies(q))
+        columns = _Columns(q, self.structure.sizes.tau)
         for link in self.links:
             columns.fill(link.torque(np, q, qd, qdd, p))
         return columns.array
 
     def position_gradient(self, q: Any, qd: Any, qdd: Any) -> Any:
         """c0 (..., count) in the order of `Layout.velocity`."""
-        p, columns = self._values(q), _Columns(q, self.structure.sizes.c1)
+        p = self._values(q)
+        if rule := self._rule("position_gradient", q):
+            return rule.position_gradient(self, (q, qd, qdd), p, self._bodies(q))
+        columns = _Columns(q, self.structure.sizes.c1)
         for link in self.links:
             columns.fill(link.position_gradient(np, q, qd, qdd, p))
         return columns.array
@@ -91,6 +130,21 @@ class NumpyBackend:
     def concatenate(self, parts: Iterable[Any]) -> Any:
         """The parts joined along the last axis."""
         return np.concatenate(list(parts), -1)
+
+    def chunk(self, motion: Sequence[Any], most: int) -> int | None:
+        """Samples to compute at once: as many as stay in the cache."""
+        return most
+
+    def _rule(self, call: str, q: Any) -> RigidRule | None:
+        """The rule where it is to be taken, None for closed forms."""
+        if self.kernel == "auto":
+            samples = q.size // q.shape[-1]
+            quicker = rule_is_quicker(CROSSINGS, call, sum(self.structure.sizes), samples)
+            return self.rule if quicker else None
+        return self.rule if self.kernel == "rule" else None
+
+    def _bodies(self, q: Any) -> Bodies[Any] | None:
+        return None if self.bodies is None else Bodies(*(a.astype(q.dtype) for a in self.bodies))
 
     def _values(self, q: Any) -> dict[str, Any]:
         for name, value in self.parameters.items():

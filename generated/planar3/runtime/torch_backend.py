@@ -1,4 +1,4 @@
-"""Closed forms on torch tensors."""
+"""Closed forms and the vectorised rule on torch tensors."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
@@ -6,13 +6,26 @@ from typing import Any, ClassVar
 import numpy as np
 import torch
 from torch import Tensor
+from torch._subclasses.fake_tensor import unset_fake_temporarily
+from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
+from .answers import Answers
 from .arguments import as_array, check_axes, no_common_shape, precision
+from .array_kernels import Crossing, known_kernel, rule_is_quicker
 from .interface import ClosedForms
+from .joint_tree import Bodies
 from .parameter_values import fits
+from .rule_calls import RigidRule
 from .structure import Structure
+from .tree_arrays import checked_bodies
 
 FLOATS = ({torch.float32}, {torch.float64})
+CROSSINGS: dict[str, Crossing] = {
+    "decomposition": ((70, 64), (189, 256)),
+    "torque": ((70, 16), (189, 64), (280, 256)),
+    "position_gradient": ((70, 64), (189, 256)),
+}
+"""Where the rule is quicker on a processor, see `array_kernels`; elsewhere it always is."""
 
 
 class TorchBackend:
@@ -20,16 +33,33 @@ class TorchBackend:
 
     name: ClassVar = "torch"
     takes_tensors: ClassVar = True
+    xp: ClassVar[Any] = torch
 
     def __init__(
-        self, structure: Structure, links: Sequence[ClosedForms], parameters: Mapping[str, Any]
+        self,
+        structure: Structure,
+        links: Sequence[ClosedForms] | None,
+        parameters: Mapping[str, Any],
+        rule: RigidRule | None = None,
+        kernel: str = "auto",
+        bodies: Bodies[Any] | None = None,
     ) -> None:
+        """`links` are the closed forms, `rule` the vectorised rule: a package has one of them, or both.
+
+        Raises ValueError for a kernel that cannot be and for bodies of a wrong shape.
+        """
         self.structure = structure
-        self.links = links
+        self.links = links or ()
+        self.rule = rule
+        self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
         self.parameters: dict[str, Any] = {
             k: v if torch.is_tensor(v) else torch.as_tensor(v, dtype=torch.float64)
             for k, v in parameters.items()
         }
+        self.bodies = None if bodies is None else checked_bodies(bodies, structure.N, _tensor)
+        if self.rule and self.kernel != "straight":  # torch.compile would trace how tables are made
+            for dtype in (torch.float32, torch.float64):
+                self.rule.tables(self, torch.empty(0, dtype=dtype))
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
@@ -44,9 +74,15 @@ class TorchBackend:
         except RuntimeError:
             raise no_common_shape(named, n) from None
 
+    def answers(self, check_finite: bool) -> Answers:
+        """The calls of `Dynamics`."""
+        return Answers(self.structure, self, check_finite)
+
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         p = self._values(q)
+        if rule := self._rule("decomposition", q):
+            return [*rule.decomposition(self, (q, qd, qdd), p, self._bodies(q)), self.zeros(q, 0)]
         groups: list[list[Tensor]] = [[] for _ in self.structure.sizes]
         for link in self.links:
             # Link by link, so that one link's values lend their memory to the next one's. A link without
@@ -58,24 +94,26 @@ class TorchBackend:
     def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """tau (..., count) in the order of `Layout.torque`."""
         p = self._values(q)
+        if rule := self._rule("torque", q):
+            return rule.torque(self, (q, qd, qdd), p, self._bodies(q))  # type: ignore[no-any-return]
         return self.concatenate(_stacked(q, link.torque(torch, q, qd, qdd, p)) for link in self.links)
 
     def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """c0 (..., count) in the order of `Layout.velocity`."""
         p = self._values(q)
+        if rule := self._rule("position_gradient", q):
+            return rule.position_gradient(self, (q, qd, qdd), p, self._bodies(q))  # type: ignore[no-any-return]
         return self.concatenate(
             _stacked(q, link.position_gradient(torch, q, qd, qdd, p)) for link in self.links
         )
 
     def constant(self, values: Any, like: Tensor) -> Tensor:
         """A table of numbers, to compute with `like`."""
-        with torch.inference_mode(False):  # it is kept, and a later call may need its gradient
-            return torch.as_tensor(values, dtype=like.dtype, device=like.device)
+        return _kept(values, like.dtype, like.device)
 
     def index(self, values: Any, like: Tensor) -> Tensor:
         """A table of positions, to take from `like`."""
-        with torch.inference_mode(False):  # it is kept, and a later call may need its gradient
-            return torch.as_tensor(values, dtype=torch.long, device=like.device)
+        return _kept(values, torch.long, like.device)
 
     def asarray(self, value: Any, like: Tensor) -> Tensor:
         """Anything array-like, in the dtype and on the device of `like`."""
@@ -89,11 +127,57 @@ class TorchBackend:
         """The parts joined along the last axis."""
         return torch.cat(list(parts), -1)
 
+    @property
+    def fuses(self) -> bool:
+        """Whether a compiler makes one loop of many operations, to which a matrix product is a wall."""
+        return torch.compiler.is_dynamo_compiling()
+
+    def chunk(self, motion: Sequence[Tensor], most: int) -> int | None:
+        """Samples to compute at once: all, but on a CPU, with nothing recorded, what stays in its cache."""
+        given = (*motion, *self.parameters.values(), *filter(torch.is_tensor, self.bodies or ()))
+        if _watched() or motion[0].device.type != "cpu":
+            return None
+        # An operation of torch costs some four times what one of NumPy costs: it has to do so much more.
+        return None if torch.is_grad_enabled() and any(t.requires_grad for t in given) else 4 * most
+
+    def _rule(self, call: str, q: Tensor) -> RigidRule | None:
+        """The rule where it is to be taken, None for closed forms."""
+        if self.kernel == "auto" and not _watched() and q.device.type == "cpu":
+            samples = q.numel() // q.shape[-1]
+            quicker = rule_is_quicker(CROSSINGS, call, sum(self.structure.sizes), samples)
+            return self.rule if quicker else None
+        return None if self.kernel == "straight" else self.rule
+
+    def _bodies(self, q: Tensor) -> Bodies[Tensor] | None:
+        return (
+            None
+            if self.bodies is None
+            else Bodies(*(torch.as_tensor(a, dtype=q.dtype, device=q.device) for a in self.bodies))
+        )
+
     def _values(self, q: Tensor) -> dict[str, Tensor]:
         for name, value in self.parameters.items():
             if value.ndim:
                 fits(name, value.shape, q.shape[:-1])
         return {k: v.to(q) for k, v in self.parameters.items()}
+
+
+def _kept(values: Any, dtype: torch.dtype, device: torch.device) -> Tensor:
+    """A tensor that is kept: a later call may need its gradient, or not be one that torch.export traces."""
+    if torch.compiler.is_dynamo_compiling():
+        return torch.as_tensor(values, dtype=dtype, device=device)
+    with torch.inference_mode(False), disable_proxy_modes_tracing(), unset_fake_temporarily():
+        return torch.as_tensor(values, dtype=dtype, device=device)
+
+
+def _watched() -> bool:
+    """Whether a compiler or a transformation records operations: it hides how many samples there are."""
+    return torch.compiler.is_compiling() or torch._C._are_functorch_transforms_active()
+
+
+def _tensor(name: str, value: Any) -> Any:
+    """A tensor as it is, anything else that reads as an array."""
+    return value if torch.is_tensor(value) else as_array(name, value)
 
 
 def _tensors(named: Mapping[str, Any], device: torch.device) -> dict[str, Tensor]:

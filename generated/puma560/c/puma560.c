@@ -9,21 +9,47 @@
 #include "numbers.h"
 #include "sines.h"
 
-enum { N = 6, C2 = 56, C1 = 91, G = 21 };
+enum { N = 6, LINKS = 6, C2 = 56, C1 = 91, G = 21 };
+
+#if !PART(SINES) || PART(BLOCKS)
+/* The joints on each link's path, counted from 0; where each path begins; which links have h1. */
+static const short path[] = {
+    0,
+    0, 1,
+    0, 1, 2,
+    0, 1, 2, 3,
+    0, 1, 2, 3, 4,
+    0, 1, 2, 3, 4, 5,
+};
+static const int path_start[] = {0, 1, 3, 6, 10, 15, 21};
+static const char linear[] = {0, 0, 0, 0, 0, 0};
+#endif
 
 /* What kernels read. */
 struct inputs {
     const real *q, *qd, *qdd, *sine, *cosine;
 };
 
+/* Where results go. */
+struct results {
+    real *c2, *c1, *g, *tau;
+};
+
+/* Where those with their zeros go: see dense.h. */
+struct dense;
+
 SHARED void API(decomposition_one)(const real *q, const real *qd, const real *qdd,
     real *c2, real *c1, real *g, real *tau);
 SHARED void API(torque_one)(const real *q, const real *qd, const real *qdd, real *tau);
+SHARED void API(dense_one)(const real *q, const real *qd, const real *qdd, const struct dense *to);
+SHARED void API(dense_torque_one)(const real *q, const real *qd, const real *qdd, int sums, real *torque);
 
 /* ---- One sample ---- */
 #if PART(ONE_SAMPLE)
 #define W 1
-#define KERNEL(name) static void name##_one
+#define SIZED(name) name##_one
+#define KERNEL(name) static void SIZED(name)
+#include "dense.h"
 #define WANT_DECOMPOSITION
 #define WANT_TORQUE
 #include "link_1.h"
@@ -116,7 +142,60 @@ SHARED void API(torque_one)(const real *q, const real *qd, const real *qdd, real
     link_6_torque_one(m.qd, m.qdd, m.sine, m.cosine, tau + 15 * W);
 }
 
+/* Results of link j to their places. */
+static void to_dense_one(int j, const struct inputs *m, const struct results *r, const struct dense *to)
+{
+    const size_t at = (size_t)j * N;
+    real ones[N];
+    for (int k = 0; k < N; ++k)
+        ones[k] = 1;
+    if (to->slopes)
+        to_slopes_one(j, j + 1, r->c1, NULL);
+    place_one(j, j + 1, 1, r->c2, to->torques ? m->qdd : ones, LINKS, to->acceleration + at);
+    place_one(j, j + 1, 0, r->c1, to->torques ? m->qd : ones, LINKS, to->velocity + at);
+    to_squares_one(j, j + 1, r->g, 1, to->gravity);
+}
+
+SHARED void API(dense_one)(const real *q, const real *qd, const real *qdd, const struct dense *to)
+{
+    real sine[N], cosine[N];
+    const struct inputs m = {q, qd, qdd, sine, cosine};
+    real c2[21];
+    real c1[36];
+    real g[6];
+    real tau[6];
+    const struct results r = {c2, c1, g, tau};
+    API(sines)(N, m.q, sine, cosine);
+    memset(to->acceleration, 0, CUBE * sizeof(real));
+    memset(to->velocity, 0, CUBE * sizeof(real));
+    memset(to->gravity, 0, SQUARE * sizeof(real));
+    link_1_decomposition_one(m.qdd, c2, c1, g, tau);
+    to_dense_one(0, &m, &r, to);
+    link_2_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
+    to_dense_one(1, &m, &r, to);
+    link_3_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
+    to_dense_one(2, &m, &r, to);
+    link_4_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
+    to_dense_one(3, &m, &r, to);
+    link_5_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
+    to_dense_one(4, &m, &r, to);
+    link_6_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
+    to_dense_one(5, &m, &r, to);
+}
+
+SHARED void API(dense_torque_one)(const real *q, const real *qd, const real *qdd, int sums, real *torque)
+{
+    real tau[G];
+    API(torque_one)(q, qd, qdd, tau);
+    memset(torque, 0, (sums ? (size_t)N : (size_t)SQUARE) * sizeof(real));
+    if (sums)
+        to_sums_one(0, LINKS, tau, 1, torque);
+    else
+        to_squares_one(0, LINKS, tau, 1, torque);
+}
+
 #undef W
+#undef SIZED
 #undef KERNEL
 #endif
 
@@ -125,7 +204,11 @@ SHARED void API(torque_one)(const real *q, const real *qd, const real *qdd, real
 #include "rows.h"
 
 #define W BLOCK
-#define KERNEL(name) APART void name##_block
+#define SIZED(name) name##_block
+#define KERNEL(name) APART void SIZED(name)
+#include "dense.h"
+#include "stream.h"
+#include "dense_rows.h"
 
 struct block {
     ALIGNED real q[N * BLOCK], qd[N * BLOCK], qdd[N * BLOCK], sine[N * BLOCK], cosine[N * BLOCK];
@@ -142,8 +225,6 @@ static void load(size_t samples, const real *q, const real *qd, const real *qdd,
 #endif
 
 #if PART(BLOCKS)
-#include "stream.h"
-
 #define WANT_DECOMPOSITION
 #define WANT_TORQUE
 #include "link_1.h"
@@ -155,10 +236,6 @@ static void load(size_t samples, const real *q, const real *qd, const real *qdd,
 #undef WANT_DECOMPOSITION
 #undef WANT_TORQUE
 
-/* Where results go. */
-struct results {
-    real *c2, *c1, *g, *tau;
-};
 
 /* Links 1 to 6: results begin where r says. */
 static void links_1_to_6(const struct inputs *m, const struct results *r)
@@ -241,26 +318,116 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
         stream_end();
 }
 
-void API(torque)(size_t count, const real *q, const real *qd, const real *qdd, real *tau)
+/* Torques alone: packed, with their zeros, or their sums over the links. */
+enum torques { PACKED, DENSE, SUMS };
+
+static void torque_rows(size_t count, const real *q, const real *qd, const real *qdd, enum torques kind, real *tau)
 {
-    if (count == 1) {
-        API(torque_one)(q, qd, qdd, tau);
-        return;
-    }
+    const size_t rows_of[] = {G, SQUARE, N}, row = rows_of[kind];
     struct block x;
     const struct inputs m = {x.q, x.qd, x.qdd, x.sine, x.cosine};
     ALIGNED real tau_block[21 * BLOCK];
     for (size_t s = 0; s < count; s += BLOCK) {
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
+        real *const rows = tau + s * row;
         load(samples, q + s * N, qd + s * N, qdd + s * N, &x);
+        if (kind != PACKED)
+            memset(rows, 0, samples * row * sizeof(real));
         link_1_torque_block(m.qdd, tau_block);
         link_2_torque_block(m.qd, m.qdd, m.sine, m.cosine, tau_block + 1 * W);
         link_3_torque_block(m.qd, m.qdd, m.sine, m.cosine, tau_block + 3 * W);
         link_4_torque_block(m.qd, m.qdd, m.sine, m.cosine, tau_block + 6 * W);
         link_5_torque_block(m.qd, m.qdd, m.sine, m.cosine, tau_block + 10 * W);
         link_6_torque_block(m.qd, m.qdd, m.sine, m.cosine, tau_block + 15 * W);
-        scatter(samples, 21, G, tau_block, tau + s * G);
+        if (kind == PACKED)
+            scatter(samples, 21, G, tau_block, tau + s * G);
+        else if (kind == DENSE)
+            to_squares_block(0, 6, tau_block, samples, rows);
+        else
+            to_sums_block(0, 6, tau_block, samples, rows);
     }
+}
+
+void API(torque)(size_t count, const real *q, const real *qd, const real *qdd, real *tau)
+{
+    if (count == 1)
+        API(torque_one)(q, qd, qdd, tau);
+    else
+        torque_rows(count, q, qd, qdd, PACKED, tau);
+}
+
+void API(partial_torque)(size_t count, const real *q, const real *qd, const real *qdd, real *torque)
+{
+    if (count == 1)
+        API(dense_torque_one)(q, qd, qdd, 0, torque);
+    else
+        torque_rows(count, q, qd, qdd, DENSE, torque);
+}
+
+void API(inverse_dynamics)(size_t count, const real *q, const real *qd, const real *qdd, real *torque)
+{
+    if (count == 1)
+        API(dense_torque_one)(q, qd, qdd, 1, torque);
+    else
+        torque_rows(count, q, qd, qdd, SUMS, torque);
+}
+
+/* Results of links, which wait where r says, to their places from sample s on. */
+static void to_dense(int first, int last, const struct inputs *m, const struct results *r, size_t s, size_t samples,
+    struct waiting_cubes *wait, const struct dense *to)
+{
+    if (to->slopes)
+        to_slopes_block(first, last, r->c1, NULL);
+    to_cubes(first, last, 1, r->c2, to->torques ? m->qdd : wait->ones, samples, wait, to->acceleration + s * CUBE);
+    to_cubes(first, last, 0, r->c1, to->torques ? m->qd : wait->ones, samples, wait, to->velocity + s * CUBE);
+    to_squares_block(first, last, r->g, samples, to->gravity + s * SQUARE);
+}
+
+static void dense_rows(size_t count, const real *q, const real *qd, const real *qdd, const struct dense *to)
+{
+    if (count == 1) {
+        API(dense_one)(q, qd, qdd, to);
+        return;
+    }
+    struct block x;
+    const struct inputs m = {x.q, x.qd, x.qdd, x.sine, x.cosine};
+    ALIGNED real c2_block[56 * BLOCK];
+    ALIGNED real c1_block[91 * BLOCK];
+    ALIGNED real g_block[21 * BLOCK];
+    ALIGNED real tau_block[21 * BLOCK];
+    const struct results r = {c2_block, c1_block, g_block, tau_block};
+    struct waiting_cubes wait;
+    begin_cubes(&wait, count, (2 * CUBE + SQUARE) * sizeof(real));
+    for (size_t s = 0; s < count; s += BLOCK) {
+        const size_t samples = count - s < BLOCK ? count - s : BLOCK;
+        load(samples, q + s * N, qd + s * N, qdd + s * N, &x);
+        memset(to->gravity + s * SQUARE, 0, samples * SQUARE * sizeof(real));
+        links_1_to_6(&m, &r);
+        to_dense(0, 6, &m, &r, s, samples, &wait, to);
+    }
+    if (wait.large)
+        stream_end();
+}
+
+void API(coefficients)(size_t count, const real *q, const real *qd,
+    real *acceleration, real *velocity, real *gravity)
+{
+    const struct dense to = {acceleration, velocity, gravity, 0, 0};
+    dense_rows(count, q, qd, qd, &to); /* any qdd: coefficients don't depend on it */
+}
+
+void API(propagation)(size_t count, const real *q, const real *qd, const real *qdd,
+    real *acceleration, real *velocity, real *gravity)
+{
+    const struct dense to = {acceleration, velocity, gravity, 1, 0};
+    dense_rows(count, q, qd, qdd, &to);
+}
+
+void API(gradient_propagation)(size_t count, const real *q, const real *qd, const real *qdd,
+    real *acceleration, real *velocity, real *gravity)
+{
+    const struct dense to = {acceleration, velocity, gravity, 1, 1};
+    dense_rows(count, q, qd, qdd, &to);
 }
 #endif
 
@@ -274,26 +441,59 @@ void API(torque)(size_t count, const real *q, const real *qd, const real *qdd, r
 #include "link_5.h"
 #include "link_6.h"
 
-void API(position_gradient)(size_t count, const real *q, const real *qd, const real *qdd, real *c0)
+/* Packed, or with its zeros. */
+static void gradient_rows(size_t count, const real *q, const real *qd, const real *qdd, int dense, real *c0)
 {
+    const size_t row = dense ? (size_t)CUBE : (size_t)C1;
     struct block x;
     const struct inputs m = {x.q, x.qd, x.qdd, x.sine, x.cosine};
     ALIGNED real c0_block[36 * BLOCK];
+    struct waiting_cubes wait;
+    begin_cubes(&wait, 0, 1);
     for (size_t s = 0; s < count; s += BLOCK) {
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
+        real *const rows = c0 + s * row;
         load(samples, q + s * N, qd + s * N, qdd + s * N, &x);
         link_1_position_gradient_block(c0_block);
-        scatter(samples, 1, C1, c0_block, c0 + s * C1);
+        if (dense)
+            to_cubes(0, 1, 0, c0_block, wait.ones, samples, &wait, rows);
+        else
+            scatter(samples, 1, C1, c0_block, c0 + s * C1);
         link_2_position_gradient_block(m.qd, m.qdd, m.sine, m.cosine, c0_block);
-        scatter(samples, 4, C1, c0_block, c0 + s * C1 + 1);
+        if (dense)
+            to_cubes(1, 2, 0, c0_block, wait.ones, samples, &wait, rows);
+        else
+            scatter(samples, 4, C1, c0_block, c0 + s * C1 + 1);
         link_3_position_gradient_block(m.qd, m.qdd, m.sine, m.cosine, c0_block);
-        scatter(samples, 9, C1, c0_block, c0 + s * C1 + 5);
+        if (dense)
+            to_cubes(2, 3, 0, c0_block, wait.ones, samples, &wait, rows);
+        else
+            scatter(samples, 9, C1, c0_block, c0 + s * C1 + 5);
         link_4_position_gradient_block(m.qd, m.qdd, m.sine, m.cosine, c0_block);
-        scatter(samples, 16, C1, c0_block, c0 + s * C1 + 14);
+        if (dense)
+            to_cubes(3, 4, 0, c0_block, wait.ones, samples, &wait, rows);
+        else
+            scatter(samples, 16, C1, c0_block, c0 + s * C1 + 14);
         link_5_position_gradient_block(m.qd, m.qdd, m.sine, m.cosine, c0_block);
-        scatter(samples, 25, C1, c0_block, c0 + s * C1 + 30);
+        if (dense)
+            to_cubes(4, 5, 0, c0_block, wait.ones, samples, &wait, rows);
+        else
+            scatter(samples, 25, C1, c0_block, c0 + s * C1 + 30);
         link_6_position_gradient_block(m.qd, m.qdd, m.sine, m.cosine, c0_block);
-        scatter(samples, 36, C1, c0_block, c0 + s * C1 + 55);
+        if (dense)
+            to_cubes(5, 6, 0, c0_block, wait.ones, samples, &wait, rows);
+        else
+            scatter(samples, 36, C1, c0_block, c0 + s * C1 + 55);
     }
+}
+
+void API(position_gradient)(size_t count, const real *q, const real *qd, const real *qdd, real *c0)
+{
+    gradient_rows(count, q, qd, qdd, 0, c0);
+}
+
+void API(dense_position_gradient)(size_t count, const real *q, const real *qd, const real *qdd, real *gradient)
+{
+    gradient_rows(count, q, qd, qdd, 1, gradient);
 }
 #endif

@@ -12,52 +12,93 @@ static void gather(size_t samples, size_t entries, const real *RESTRICT rows, re
     }
 }
 
-/* 8 entries of 8 samples to 8 rows, in registers where the compiler has vectors: three rounds, each of which
-   interleaves vector e with vector e + 4. */
-#if defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12)
-typedef real eight __attribute__((vector_size(8 * sizeof(real)), aligned(sizeof(real)), may_alias));
-#define LOW(a, b) __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11)
-#define HIGH(a, b) __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15)
-#define LOAD(e) *(const eight *)(block + e * BLOCK)
-#define STORE(e) *(eight *)(rows + e * stride)
-#define ROUND(to, a, b, c, d, e, f, g, h) \
-    const eight to##0 = LOW(a, e), to##1 = HIGH(a, e), to##2 = LOW(b, f), to##3 = HIGH(b, f), \
-                to##4 = LOW(c, g), to##5 = HIGH(c, g), to##6 = LOW(d, h), to##7 = HIGH(d, h)
+/* SIDE entries of as many samples to rows, in registers: vectors that the processor has, as compilers take longer ones
+   apart value by value. Each round exchanges corners of all squares of 2, of 4, of 8 values. */
+#if (defined(__clang__) || (defined(__GNUC__) && __GNUC__ >= 12)) && defined(__AVX__)
+#if defined(LINKWISE_FLOAT) || defined(__AVX512F__)
+#define SIDE 8
+#define ABOVE_OF_2(a, b) __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14)
+#define BELOW_OF_2(a, b) __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15)
+#define ABOVE_OF_4(a, b) __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13)
+#define BELOW_OF_4(a, b) __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15)
+#define ABOVE_OF_8(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11)
+#define BELOW_OF_8(a, b) __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15)
+#else
+#define SIDE 4
+#define ABOVE_OF_2(a, b) __builtin_shufflevector(a, b, 0, 4, 2, 6)
+#define BELOW_OF_2(a, b) __builtin_shufflevector(a, b, 1, 5, 3, 7)
+#define ABOVE_OF_4(a, b) __builtin_shufflevector(a, b, 0, 1, 4, 5)
+#define BELOW_OF_4(a, b) __builtin_shufflevector(a, b, 2, 3, 6, 7)
+#endif
+typedef real line __attribute__((vector_size(SIDE * sizeof(real)), aligned(sizeof(real)), may_alias));
+#define LOAD(e) const line w##e = *(const line *)(block + e * BLOCK)
+#define STORE(e, from) *(line *)(rows + e * stride) = from##e
+#define CORNERS(size, to, from, e, f) \
+    const line to##e = ABOVE_OF_##size(from##e, from##f), to##f = BELOW_OF_##size(from##e, from##f)
 static void tile(const real *RESTRICT block, real *RESTRICT rows, size_t stride)
 {
-    ROUND(x, LOAD(0), LOAD(1), LOAD(2), LOAD(3), LOAD(4), LOAD(5), LOAD(6), LOAD(7));
-    ROUND(y, x0, x1, x2, x3, x4, x5, x6, x7);
-    ROUND(z, y0, y1, y2, y3, y4, y5, y6, y7);
-    STORE(0) = z0;
-    STORE(1) = z1;
-    STORE(2) = z2;
-    STORE(3) = z3;
-    STORE(4) = z4;
-    STORE(5) = z5;
-    STORE(6) = z6;
-    STORE(7) = z7;
+    LOAD(0);
+    LOAD(1);
+    LOAD(2);
+    LOAD(3);
+    CORNERS(2, x, w, 0, 1);
+    CORNERS(2, x, w, 2, 3);
+    CORNERS(4, y, x, 0, 2);
+    CORNERS(4, y, x, 1, 3);
+#if SIDE == 8
+    LOAD(4);
+    LOAD(5);
+    LOAD(6);
+    LOAD(7);
+    CORNERS(2, x, w, 4, 5);
+    CORNERS(2, x, w, 6, 7);
+    CORNERS(4, y, x, 4, 6);
+    CORNERS(4, y, x, 5, 7);
+    CORNERS(8, z, y, 0, 4);
+    CORNERS(8, z, y, 1, 5);
+    CORNERS(8, z, y, 2, 6);
+    CORNERS(8, z, y, 3, 7);
+    STORE(0, z);
+    STORE(1, z);
+    STORE(2, z);
+    STORE(3, z);
+    STORE(4, z);
+    STORE(5, z);
+    STORE(6, z);
+    STORE(7, z);
+#else
+    STORE(0, y);
+    STORE(1, y);
+    STORE(2, y);
+    STORE(3, y);
+#endif
 }
-#undef LOW
-#undef HIGH
+#undef ABOVE_OF_2
+#undef BELOW_OF_2
+#undef ABOVE_OF_4
+#undef BELOW_OF_4
+#undef ABOVE_OF_8
+#undef BELOW_OF_8
 #undef LOAD
 #undef STORE
-#undef ROUND
+#undef CORNERS
 #else
+#define SIDE 8
 static void tile(const real *RESTRICT block, real *RESTRICT rows, size_t stride)
 {
-    for (size_t b = 0; b < 8; ++b)
-        for (size_t e = 0; e < 8; ++e)
+    for (size_t b = 0; b < SIDE; ++b)
+        for (size_t e = 0; e < SIDE; ++e)
             rows[b * stride + e] = block[e * BLOCK + b];
 }
 #endif
 
-/* A block of `entries` values to rows, `stride` apart; the last tile of 8 entries overlaps the one before. */
+/* A block of `entries` values to rows, `stride` apart; the last tiles overlap those before. */
 APART void scatter(size_t samples, size_t entries, size_t stride, const real *RESTRICT block, real *RESTRICT rows)
 {
-    if (samples == BLOCK && entries >= 8) {
-        for (size_t e = 0; e < entries; e += 8) {
-            const size_t at = e + 8 <= entries ? e : entries - 8;
-            for (size_t b = 0; b < BLOCK; b += 8)
+    if (samples == BLOCK && entries >= SIDE) {
+        for (size_t e = 0; e < entries; e += SIDE) {
+            const size_t at = e + SIDE <= entries ? e : entries - SIDE;
+            for (size_t b = 0; b < BLOCK; b += SIDE)
                 tile(block + at * BLOCK + b, rows + b * stride + at, stride);
         }
         return;

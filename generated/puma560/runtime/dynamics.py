@@ -9,14 +9,12 @@ tau_ij is zero off the path of link j, so results are kept packed, beside a list
 tensors are a view that is built on request.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, overload
 
-import numpy as np
+from numpy import ndarray
 from numpy.typing import ArrayLike
 
-from .arguments import check_numbers
-from .dense import Dense
 from .interface import Array, Backend
 from .quantities import Coefficients, GradientPropagation, Packed, Propagation
 from .structure import Layout, Structure
@@ -31,6 +29,10 @@ class Dynamics:
 
     Answers are arrays or tensors, as the back end computes with, of float32 or float64 as the motion is, on
     its device; torques in N m, or N where joint i is prismatic.
+
+    out: where the answer is written, and what is then returned: an array or tensor of its shape and dtype,
+    writable, apart from the motion and, for native, contiguous; several of them, in order, where there are
+    several results. What cannot hold the answer is refused by name, as is any where a gradient is recorded.
 
     Every call raises ValueError for a wrong shape, and TypeError for what cannot be taken without a doubt;
     the message names the argument.
@@ -72,7 +74,8 @@ class Dynamics:
         self.link_names, self.layout = structure.link_names, structure.layout
         self.backend, self.parameters = backend, backend.parameters
         self._load, self._asked = load, asked
-        self._dense = Dense(structure, backend)
+        self._answers = backend.answers(check_finite)
+        self._of_arrays = self._answers.of_arrays
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}
@@ -83,45 +86,61 @@ class Dynamics:
         """Pickled, copied or sent to another process, it is loaded again there."""
         return self._load, self._asked
 
-    def packed(self, q: Array, qd: Array, qdd: Array) -> Packed[Array]:
+    def packed(self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None) -> Packed[Array]:
         """Full decomposition without the zeros: c2, c1 (closing), g, tau, h1, (..., count) each."""
-        return Packed(*self.backend.decomposition(*self._motion(q=q, qd=qd, qdd=qdd)))
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        answer: Packed[Array] = calls.packed(q, qd, qdd, out)
+        return answer
 
-    def packed_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
+    def packed_torque(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_ij on the paths only, (..., count); its indices are `layout.torque`."""
-        tau: Array = self.backend.torque(*self._motion(q=q, qd=qd, qdd=qdd))
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        tau: Array = calls.packed_torque(q, qd, qdd, out)
         return tau
 
-    def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
+    def partial_torque(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_ij, the torque on joint i through link j, shape (..., n, N)."""
-        tau: Array = self._dense.spread(self.packed_torque(q, qd, qdd), "torque")
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        tau: Array = calls.partial_torque(q, qd, qdd, out)
         return tau
 
-    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_i = sum_j tau_ij, shape (..., n)."""
-        tau: Array = self._dense.summed(self.packed_torque(q, qd, qdd))
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        tau: Array = calls.inverse_dynamics(q, qd, qdd, out)
         return tau
 
-    def coefficients(self, q: Array, qd: Array) -> Coefficients[Array]:
+    def coefficients(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Coefficients[Array]:
         """c2, c1 (..., n, N, n) and g (..., n, N) of the closing convention."""
-        q, qd = self._motion(q=q, qd=qd)
-        packed = self.packed(q, qd, self.backend.zeros(q, self.n))
-        return Coefficients(
-            self._dense.spread(packed.acceleration, "acceleration"),
-            self._dense.spread(packed.velocity, "velocity"),
-            self._dense.spread(packed.gravity, "gravity"),
-        )
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        answer: Coefficients[Array] = calls.coefficients(q, qd, out)
+        return answer
 
     @overload
     def propagation(
-        self, q: Array, qd: Array, qdd: Array, convention: Literal["closing"] = ...
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        convention: Literal["closing"] = ...,
+        out: Sequence[Array] | None = None,
     ) -> Propagation[Array]: ...
     @overload
     def propagation(
-        self, q: Array, qd: Array, qdd: Array, convention: Literal["gradient"]
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        convention: Literal["gradient"],
+        out: Sequence[Array] | None = None,
     ) -> GradientPropagation[Array]: ...
     def propagation(
-        self, q: Array, qd: Array, qdd: Array, convention: str = "closing"
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        convention: str = "closing",
+        out: Sequence[Array] | None = None,
     ) -> Propagation[Array] | GradientPropagation[Array]:
         """Motion propagation torques c2_ijk qdd_k and c1_ijk qd_k (..., n, N, n), and g_ij (..., n, N).
 
@@ -129,51 +148,24 @@ class Dynamics:
         paper's Eq. 1 to the letter, whose velocity part sums to twice the velocity force. Any other word
         raises ValueError.
         """
-        if convention not in ("closing", "gradient"):
-            raise ValueError(f"no convention {convention!r}; choose closing or gradient")
-        q, qd, qdd = self._motion(q=q, qd=qd, qdd=qdd)
-        packed = self.packed(q, qd, qdd)
-        c2: Any = self._dense.spread(packed.acceleration, "acceleration")
-        c1: Any = self._dense.spread(packed.velocity, "velocity")
-        if convention == "gradient":
-            c1 = 2.0 * c1 - self._dense.spread(packed.velocity_linear, "velocity_linear")
-        kind = Propagation if convention == "closing" else GradientPropagation
-        return kind(
-            c2 * qdd[..., None, None, :],
-            c1 * qd[..., None, None, :],
-            self._dense.spread(packed.gravity, "gravity"),
-        )
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        answer: Propagation[Array] | GradientPropagation[Array]
+        answer = calls.propagation(q, qd, qdd, convention, out)
+        return answer
 
-    def position_gradient(self, q: Array, qd: Array, qdd: Array) -> Array:
+    def position_gradient(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
-        packed = self.backend.position_gradient(*self._motion(q=q, qd=qd, qdd=qdd))
-        c0: Array = self._dense.spread(packed, "velocity")
+        calls = self._of_arrays if type(q) is ndarray else self._answers
+        c0: Array = calls.position_gradient(q, qd, qdd, out)
         return c0
 
-    def masked(self, q: Array, qd: Array, qdd: Array, mask: ArrayLike | Array) -> Array:
+    def masked(
+        self, q: Array, qd: Array, qdd: Array, mask: ArrayLike | Array, out: Array | None = None
+    ) -> Array:
         """sum over m, k of mask_mk c_m,ijk q_k^(m) (the paper's Eq. 21-24), shape (..., n, N).
 
         mask: shape (3, n), zeros and ones, or weights between; row m is the order: 0 position, 1 velocity,
         2 acceleration. Gravity is in no row: a mask of ones in rows 1 and 2 gives tau_ij - g_ij.
         """
-        if np.shape(mask) != (3, self.n):
-            raise ValueError(
-                f"the mask has shape {tuple(np.shape(mask))}; it must be (3, {self.n}): order, coordinate"
-            )
-        q, qd, qdd = self._motion(q=q, qd=qd, qdd=qdd)
-        weights = self.backend.asarray(mask, q)
-        coefficients = self.coefficients(q, qd)
-        total = coefficients.velocity @ (weights[1] * qd)[..., None, :, None]
-        total = total + coefficients.acceleration @ (weights[2] * qdd)[..., None, :, None]
-        # A tensor of numbers that nobody may look at yet, as under vmap, might ask for positions too.
-        if not isinstance(weights, np.ndarray) or weights[0].any():
-            total = total + self.position_gradient(q, qd, qdd) @ (weights[0] * q)[..., None, :, None]
-        torque: Array = total[..., 0]
+        torque: Array = self._answers.masked(q, qd, qdd, mask, out)
         return torque
-
-    def _motion(self, **named: Any) -> Any:
-        """The motion as the back end computes with it, in one shape, and looked at if that was asked for."""
-        arrays = self.backend.arrays(named, self.n)
-        if self.check_finite:
-            check_numbers(named, self.joint_names)
-        return arrays

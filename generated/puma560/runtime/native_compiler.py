@@ -4,6 +4,7 @@ import os
 import platform
 import shlex
 import shutil
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,9 @@ from .native_process import answer
 
 FLAGS = ("-std=c99", "-O2", "-ftree-vectorize", "-fno-tree-slp-vectorize", "-ffp-contract=fast")
 """Flags of gcc and clang. Multiplications and additions may fuse, which -std=c99 alone forbids gcc."""
+
+EXTENSION = ("-std=c11", "-O2", "-fPIC", "-shared")
+"""Flags for a module of Python, whose headers C99 does not do for."""
 
 TUNING = {
     "x86_64": ("-march=native", "-mprefer-vector-width=512"),
@@ -44,6 +48,12 @@ class Compiler:
     def compiling(self, source: Path, part: str, target: str) -> list[str]:
         """Command line that compiles one part of a robot's file."""
         return [*self.command, *self.flags, f"-DLINKWISE_PART={part}", "-c", str(source), "-o", target]
+
+    def extending(self, source: Path, headers: Sequence[str], target: str) -> list[str]:
+        """Command line that makes a module for Python, for any machine of this kind."""
+        open_symbols = ("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()
+        included = [f"-I{folder}" for folder in headers]
+        return [*self.command, *EXTENSION, *open_symbols, *included, str(source), "-o", target]
 
     def linking(self, objects: Sequence[str], target: str) -> list[str]:
         """Command line that makes a shared library."""

@@ -1,10 +1,10 @@
 """Compiled C as torch operators, with gradients.
 
-Forward runs the C code; backward differentiates the closed forms in torch, which are there for that.
+Forward runs the C code; backward differentiates closed forms or rule in torch, which are there for that.
 """
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import torch
@@ -13,7 +13,21 @@ from torch import Tensor
 from .interface import ClosedForms
 from .native_build import Sources
 from .native_calls import NativeCalls
+from .native_library import NumberArray
+from .rule_calls import RigidRule
 from .torch_backend import TorchBackend
+
+FLOATS = (torch.float64, torch.float32)
+
+Run = Callable[[str, Sequence[NumberArray], Sequence[NumberArray] | None], Sequence[NumberArray]]
+"""A call by name: motion, and where results go, or None."""
+
+OPERATED = {
+    "decomposition": "packed",
+    "torque": "packed_torque",
+    "position_gradient": "packed_position_gradient",
+}
+"""What torch is given as operators, from which all answers are composed, and what `NativeCalls` calls it."""
 
 OPERATORS: dict[tuple[Sources, str], Any] = {}
 """Operators made so far; torch wants each to be made once."""
@@ -24,14 +38,24 @@ class TorchSide(TorchBackend):
 
     name: ClassVar = "native"
 
-    def __init__(self, calls: NativeCalls, links: Sequence[ClosedForms]) -> None:
-        super().__init__(calls.structure, links, calls.parameters)
+    def __init__(
+        self, calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None
+    ) -> None:
+        super().__init__(calls.structure, links, calls.parameters, rule)
         self.calls = calls
-        self.operators = {call: operator(calls, links, call) for call in calls.sizes}
+        self._given = [value for value in calls.parameters.values() if torch.is_tensor(value)]
+        self.operators = {call: operator(calls, links, rule, call) for call in OPERATED}
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
-        motion = super().arrays(named, n)
+        motion = list(named.values())
+        q = motion[0]
+        alike = type(q) is Tensor and q.dtype in FLOATS and q.shape[-1:] == (n,)
+        if not alike or not all(
+            type(t) is Tensor and t.dtype == q.dtype and t.shape == q.shape and t.device == q.device
+            for t in motion
+        ):
+            motion = list(super().arrays(named, n))
         if motion[0].device.type != "cpu":
             raise TypeError(
                 f"the tensors lie on {motion[0].device}; this back end takes CPU tensors, torch takes all"
@@ -55,40 +79,58 @@ class TorchSide(TorchBackend):
         return self._run("position_gradient", q, qd, qdd)[0]
 
     def _run(self, call: str, q: Tensor, qd: Tensor, qdd: Tensor) -> tuple[Tensor, ...]:
+        if not self.needs_operators((q, qd, qdd)):
+            results: tuple[Tensor, ...] = compute(self.calls.run, OPERATED[call], (q, qd, qdd))
+            return results
         names = self.structure.parameters
         values = [self.parameters[name].to(q).reshape(()) for name in names]
         p = torch.stack(values) if values else q.new_empty(0)
-        recorded = torch.is_grad_enabled() and any(t.requires_grad for t in (q, qd, qdd, p))
-        if recorded or torch.compiler.is_compiling():
-            results = self.operators[call](q, qd, qdd, p)
-            return results if isinstance(results, tuple) else (results,)
-        return compute(self.calls, call, q, qd, qdd)
+        operated = self.operators[call](q, qd, qdd, p)
+        return operated if isinstance(operated, tuple) else (operated,)
+
+    def needs_operators(self, motion: Sequence[Tensor]) -> bool:
+        """Whether torch has to know what is computed: a gradient is recorded, or a program compiled."""
+        if torch.compiler.is_compiling():
+            return True
+        return torch.is_grad_enabled() and any(t.requires_grad for t in (*motion, *self._given))
 
 
-def compute(calls: NativeCalls, call: str, *motion: Tensor) -> tuple[Tensor, ...]:
-    """Results of the C code as tensors that share its memory."""
-    arrays = (t.detach().resolve_neg().numpy() for t in motion)
-    return tuple(torch.from_numpy(result) for result in calls.run(call, *arrays))
+def compute(run: Run, call: str, motion: Sequence[Tensor], into: Sequence[Tensor] | None = None) -> Any:
+    """Results of the C code, which `run` calls with arrays, as tensors that share its memory."""
+    arrays = [as_numbers(t) for t in motion]
+    if into is None:
+        return tuple(torch.from_numpy(result) for result in run(call, arrays, None))
+    run(call, arrays, [as_numbers(t) for t in into])
+    return into
 
 
-def operator(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
+def as_numbers(t: Tensor) -> NumberArray:
+    """The array that a CPU tensor's numbers are; it shares its memory, unless they are to be negated."""
+    return (t.detach() if t.requires_grad else t).resolve_neg().numpy()
+
+
+def operator(
+    calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
+) -> Any:
     """Torch operator of a C function, with a gradient, made when first asked for."""
     key = (calls.sources, call)
     if key not in OPERATORS:
-        OPERATORS[key] = _define(calls, links, call)
+        OPERATORS[key] = _define(calls, links, rule, call)
     return OPERATORS[key]
 
 
-def _define(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
+def _define(
+    calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
+) -> Any:
     """Operator (q, qd, qdd, p) -> results; p holds the parameters in the structure's order."""
-    structure, sources, sizes = calls.structure, calls.sources, calls.sizes[call]
+    structure, sources, sizes = calls.structure, calls.sources, calls.sizes[OPERATED[call]]
 
     def values(p: Tensor) -> dict[str, Tensor]:
         return dict(zip(structure.parameters, p.unbind(), strict=True))
 
     def forward(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
         present = NativeCalls(structure, sources.directory, values(p.detach()))
-        return _bare(compute(present, call, q, qd, qdd))
+        return _bare(compute(present.run, OPERATED[call], (q, qd, qdd)))
 
     def fake(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
         return _bare(tuple(q.new_empty((*q.shape[:-1], size)) for size in sizes))
@@ -98,7 +140,7 @@ def _define(calls: NativeCalls, links: Sequence[ClosedForms], call: str) -> Any:
 
     def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
         def again(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
-            return getattr(TorchBackend(structure, links, values(p)), call)(q, qd, qdd)
+            return getattr(TorchBackend(structure, links, values(p), rule), call)(q, qd, qdd)
 
         return _backward(again, ctx.saved_tensors, ctx.needs_input_grad, slopes)
 

@@ -16,24 +16,21 @@ class Recording:
     """One value a sample, shape (...)."""
     wanted: bool
     """Whether the caller may differentiate the results."""
-    keep: bool
-    """Whether gradients must be differentiable in their turn."""
 
     @classmethod
-    def of(cls, motion: Sequence[Tensor], parameters: Iterable[Tensor], again: bool = False) -> "Recording":
-        """Begin a call in the caller's grad mode; `again` if it differentiates its own gradients."""
+    def of(cls, motion: Sequence[Tensor], parameters: Iterable[Tensor]) -> "Recording":
+        """Begin a call in the caller's grad mode."""
         recorded = any(t.requires_grad for t in (*motion, *parameters))
-        wanted = recorded and torch.is_grad_enabled()
-        return cls(motion[0][..., 0], wanted, wanted or again)
+        return cls(motion[0][..., 0], recorded and torch.is_grad_enabled())
 
-    def finish(self, *groups: Sequence[Tensor]) -> list[Tensor]:
-        """Each group of values (...) as one tensor (..., count), as the caller's grad mode wants them."""
-        empty = self.like.new_zeros((*self.like.shape, 0))
-        packed = [
-            torch.stack([v.expand(self.like.shape) for v in group], -1) if group else empty
-            for group in groups
-        ]
-        return packed if self.wanted else [p.detach() for p in packed]
+    def lanes(self, values: Tensor) -> Tensor:
+        """One value a lane, (lanes,), for every sample: shape (lanes, ...)."""
+        return values.reshape(-1, *[1] * self.like.dim()).expand(-1, *self.like.shape)
+
+    def finish(self, values: Tensor) -> Tensor:
+        """Values (count, ...) as (..., count), as the caller's grad mode wants them."""
+        packed = values.movedim(0, -1).contiguous()
+        return packed if self.wanted else packed.detach()
 
 
 def variable(a: Tensor) -> Tensor:
@@ -41,10 +38,22 @@ def variable(a: Tensor) -> Tensor:
     return a.view_as(a) if a.requires_grad else a.detach().requires_grad_()
 
 
-def gradient(value: Any, inputs: Sequence[Tensor], keep: bool) -> Sequence[Tensor]:
-    """Gradients of the sum of `value`; zeros where it doesn't depend on an input."""
-    if not (torch.is_tensor(value) and value.requires_grad):
+def gradient(
+    values: Sequence[Any], weights: Sequence[Tensor] | None, inputs: Sequence[Tensor], keep: bool, last: bool
+) -> Sequence[Tensor]:
+    """Gradients of the weighted sum of `values`, of their sum if no weights are given.
+
+    Zeros where it doesn't depend on an input. With `keep` gradients can be differentiated in turn; after the
+    `last` sweep without it the graph is gone, and its memory with it.
+    """
+    chosen = [
+        (value, torch.ones_like(value) if weights is None else weights[i])
+        for i, value in enumerate(values)
+        if torch.is_tensor(value) and value.requires_grad
+    ]
+    if not chosen or not inputs:
         return [torch.zeros_like(a) for a in inputs]
+    outputs, given = zip(*chosen, strict=True)
     return torch.autograd.grad(
-        value.sum(), inputs, create_graph=keep, retain_graph=True, materialize_grads=True
+        outputs, inputs, given, retain_graph=keep or not last, create_graph=keep, materialize_grads=True
     )

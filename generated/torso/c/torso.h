@@ -22,6 +22,7 @@
    An array holds the entries of link 1, then those of link 2, and so on; the table says where a link's entries begin,
    counted from 0. Within a link, i runs over the joints on its path, ascending, and for each i so does k: from i on in
    c2, where c2(k, j, i) is the same, over all of them in c1, c0. What is in no array is zero.
+   Functions whose results have their zeros say so: there a row is a tensor (JOINTS, LINKS, JOINTS) or (JOINTS, LINKS).
    torso_index.h lists i, j and k of every entry.
 
    link   path        c2   c1, c0   g, tau   name
@@ -86,9 +87,38 @@ void torso_decomposition_blocks(size_t blocks, const double *q, const double *qd
    Reads q, qd, qdd (count, JOINTS); writes tau (count, G). */
 void torso_torque(size_t count, const double *q, const double *qd, const double *qdd, double *tau);
 
+/* With their zeros: the torque at every joint through every link, entry (i - 1, j - 1) of a row being tau(i, j).
+   Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS, LINKS). */
+void torso_partial_torque(size_t count, const double *q, const double *qd, const double *qdd, double *torque);
+
+/* Their sums over the links, ordinary inverse dynamics.
+   Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS). */
+void torso_inverse_dynamics(size_t count, const double *q, const double *qd, const double *qdd, double *torque);
+
+/* Coefficients with their zeros: entry (i - 1, j - 1, k - 1) of a row is c2(i, j, k) in acceleration, c1(i, j, k) in
+   velocity; gravity has g(i, j).
+   Reads q, qd (count, JOINTS);
+   writes acceleration, velocity (count, JOINTS, LINKS, JOINTS), gravity (count, JOINTS, LINKS). */
+void torso_coefficients(size_t count, const double *q, const double *qd,
+    double *acceleration, double *velocity, double *gravity);
+
+/* Torques by each joint's motion, with their zeros: c2(i, j, k) qdd_k and c1(i, j, k) qd_k, and g(i, j). Over k and the
+   three they sum to tau(i, j).
+   Reads q, qd, qdd (count, JOINTS);
+   writes acceleration, velocity (count, JOINTS, LINKS, JOINTS), gravity (count, JOINTS, LINKS). */
+void torso_propagation(size_t count, const double *q, const double *qd, const double *qdd,
+    double *acceleration, double *velocity, double *gravity);
+
+/* The same, with d(tau)/d(qd) in place of c1: velocities then count twice in that sum. */
+void torso_gradient_propagation(size_t count, const double *q, const double *qd, const double *qdd,
+    double *acceleration, double *velocity, double *gravity);
+
 /* Position gradient: 2268 operations.
    Reads q, qd, qdd (count, JOINTS); writes c0 (count, C1). */
 void torso_position_gradient(size_t count, const double *q, const double *qd, const double *qdd, double *c0);
+
+/* The same with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
+void torso_dense_position_gradient(size_t count, const double *q, const double *qd, const double *qdd, double *gradient);
 
 /* All quantities but c0 of one link, for one sample. Each function reads q, qd, qdd (JOINTS). */
 
@@ -130,9 +160,38 @@ void torso_decomposition_blocksf(size_t blocks, const float *q, const float *qd,
    Reads q, qd, qdd (count, JOINTS); writes tau (count, G). */
 void torso_torquef(size_t count, const float *q, const float *qd, const float *qdd, float *tau);
 
+/* With their zeros: the torque at every joint through every link, entry (i - 1, j - 1) of a row being tau(i, j).
+   Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS, LINKS). */
+void torso_partial_torquef(size_t count, const float *q, const float *qd, const float *qdd, float *torque);
+
+/* Their sums over the links, ordinary inverse dynamics.
+   Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS). */
+void torso_inverse_dynamicsf(size_t count, const float *q, const float *qd, const float *qdd, float *torque);
+
+/* Coefficients with their zeros: entry (i - 1, j - 1, k - 1) of a row is c2(i, j, k) in acceleration, c1(i, j, k) in
+   velocity; gravity has g(i, j).
+   Reads q, qd (count, JOINTS);
+   writes acceleration, velocity (count, JOINTS, LINKS, JOINTS), gravity (count, JOINTS, LINKS). */
+void torso_coefficientsf(size_t count, const float *q, const float *qd,
+    float *acceleration, float *velocity, float *gravity);
+
+/* Torques by each joint's motion, with their zeros: c2(i, j, k) qdd_k and c1(i, j, k) qd_k, and g(i, j). Over k and the
+   three they sum to tau(i, j).
+   Reads q, qd, qdd (count, JOINTS);
+   writes acceleration, velocity (count, JOINTS, LINKS, JOINTS), gravity (count, JOINTS, LINKS). */
+void torso_propagationf(size_t count, const float *q, const float *qd, const float *qdd,
+    float *acceleration, float *velocity, float *gravity);
+
+/* The same, with d(tau)/d(qd) in place of c1: velocities then count twice in that sum. */
+void torso_gradient_propagationf(size_t count, const float *q, const float *qd, const float *qdd,
+    float *acceleration, float *velocity, float *gravity);
+
 /* Position gradient: 2268 operations.
    Reads q, qd, qdd (count, JOINTS); writes c0 (count, C1). */
 void torso_position_gradientf(size_t count, const float *q, const float *qd, const float *qdd, float *c0);
+
+/* The same with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
+void torso_dense_position_gradientf(size_t count, const float *q, const float *qd, const float *qdd, float *gradient);
 
 /* All quantities but c0 of one link, for one sample. Each function reads q, qd, qdd (JOINTS). */
 

@@ -8,7 +8,11 @@ from torch import Tensor
 
 from .partial_lagrangian import PartialLagrangian
 from .structure import Structure
+from .sweeps import decomposition, position_gradient, torque
 from .torch_backend import TorchBackend
+
+AT_A_TIME = 1 << 16
+"""Samples times lanes in one sweep, so that memory does not grow with the batch."""
 
 
 class AutogradBackend(TorchBackend):
@@ -41,21 +45,32 @@ class AutogradBackend(TorchBackend):
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
-        parts = self._each("decomposition", q, qd, qdd)
-        return [self.concatenate(column) for column in zip(*parts, strict=True)]
+        return self._of_links(decomposition, q, qd, qdd)  # type: ignore[no-any-return]
 
     def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """tau (..., count) in the order of `Layout.torque`."""
-        return self.concatenate(self._each("torque", q, qd, qdd))
+        return self._of_links(torque, q, qd, qdd)  # type: ignore[no-any-return]
 
     def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """c0 (..., count) in the order of `Layout.velocity`."""
-        return self.concatenate(self._each("position_gradient", q, qd, qdd))
+        return self._of_links(position_gradient, q, qd, qdd)  # type: ignore[no-any-return]
 
-    def _each(self, call: str, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Any]:
-        """One answer per link of the Lagrangians' method `call`."""
+    def _of_links(self, call: Callable[..., Any], q: Tensor, qd: Tensor, qdd: Tensor) -> Any:
+        """What a function of sweeps.py makes of the Lagrangians."""
         if torch.is_inference_mode_enabled():
             # Nothing can be differentiated in that mode, and the answer would be zeros.
             with torch.inference_mode(False), torch.no_grad():
-                return self._each(call, q.clone(), qd.clone(), qdd.clone())
-        return [getattr(lagrangian, call)(q, qd, qdd) for lagrangian in self.lagrangians(self._values(q))]
+                return self._of_links(call, q.clone(), qd.clone(), qdd.clone())
+        values, most = self._values(q), max(1, AT_A_TIME // self.structure.sizes.tau)
+        if q[..., 0].numel() <= most:
+            return call(self.lagrangians(values), q, qd, qdd)
+        batch = q.shape[:-1]
+        flat = [a.reshape(-1, a.shape[-1]) for a in (q, qd, qdd)]
+        values = {name: p.expand(batch).reshape(-1) if p.dim() else p for name, p in values.items()}
+        parts = []
+        for at in range(0, len(flat[0]), most):
+            some = {name: p[at : at + most] if p.dim() else p for name, p in values.items()}
+            parts.append(call(self.lagrangians(some), *(a[at : at + most] for a in flat)))
+        if torch.is_tensor(parts[0]):
+            return torch.cat(parts).reshape(*batch, -1)
+        return [torch.cat(part).reshape(*batch, part[0].shape[-1]) for part in zip(*parts, strict=True)]

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .answers import Answers
 from .arguments import has_tensors
 from .interface import ClosedForms
+from .native_answers import NativeAnswers
 from .native_calls import NativeCalls
 from .numpy_backend import NumpyBackend
+from .rule_calls import RigidRule
 from .structure import Structure
 
 if TYPE_CHECKING:
@@ -27,14 +30,16 @@ class NativeBackend(NumpyBackend):
         self,
         structure: Structure,
         sources: Path,
-        links: Sequence[ClosedForms],
+        links: Sequence[ClosedForms] | None,
         parameters: Mapping[str, Any],
+        rule: RigidRule | None = None,
     ) -> None:
-        """`sources` is the package's folder of C; `links` serve torch, which differentiates them.
+        """`sources` is the package's folder of C; `links` or `rule` serve torch, which differentiates them.
 
         Compiles at the first call for this package; raises RuntimeError where that cannot be.
         """
-        super().__init__(structure, links, {})
+        super().__init__(structure, links, {}, rule)
+        self.forms = links
         self.parameters = dict(parameters)
         self.calls = NativeCalls(structure, sources, parameters)
         self._torch_side: TorchSide | None = None
@@ -50,50 +55,60 @@ class NativeBackend(NumpyBackend):
 
     def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
-        return self._torch().arrays(named, n) if has_tensors(named.values()) else super().arrays(named, n)
+        values = named.values()
+        if {np.ndarray}.issuperset(map(type, values)) or not has_tensors(values):
+            return super().arrays(named, n)
+        return self.on_torch().arrays(named, n)
+
+    def answers(self, check_finite: bool) -> Answers:
+        """The calls of `Dynamics`: C writes the answers, but for tensors of which gradients are recorded."""
+        return NativeAnswers(self, self.calls, self.on_torch, check_finite)
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         if has_tensors([q]):
-            return self._torch().decomposition(q, qd, qdd)
-        return self.calls.run("decomposition", q, qd, qdd)
+            return self.on_torch().decomposition(q, qd, qdd)
+        return self.calls.run("packed", (q, qd, qdd))
 
     def torque(self, q: Any, qd: Any, qdd: Any) -> Any:
         """tau (..., count) in the order of `Layout.torque`."""
         if has_tensors([q]):
-            return self._torch().torque(q, qd, qdd)
-        return self.calls.run("torque", q, qd, qdd)[0]
+            return self.on_torch().torque(q, qd, qdd)
+        return self.calls.run("packed_torque", (q, qd, qdd))[0]
 
     def position_gradient(self, q: Any, qd: Any, qdd: Any) -> Any:
         """c0 (..., count) in the order of `Layout.velocity`."""
         if has_tensors([q]):
-            return self._torch().position_gradient(q, qd, qdd)
-        return self.calls.run("position_gradient", q, qd, qdd)[0]
+            return self.on_torch().position_gradient(q, qd, qdd)
+        return self.calls.run("packed_position_gradient", (q, qd, qdd))[0]
 
     def constant(self, values: NDArray[Any], like: Any) -> Any:
         """A table of numbers, to compute with `like`."""
-        return self._torch().constant(values, like) if has_tensors([like]) else super().constant(values, like)
+        return (
+            self.on_torch().constant(values, like) if has_tensors([like]) else super().constant(values, like)
+        )
 
     def index(self, values: NDArray[np.intp], like: Any) -> Any:
         """A table of positions, to take from `like`."""
-        return self._torch().index(values, like) if has_tensors([like]) else super().index(values, like)
+        return self.on_torch().index(values, like) if has_tensors([like]) else super().index(values, like)
 
     def asarray(self, value: Any, like: Any) -> Any:
         """Anything array-like, of the kind and dtype of `like`."""
-        return self._torch().asarray(value, like) if has_tensors([like]) else super().asarray(value, like)
+        return self.on_torch().asarray(value, like) if has_tensors([like]) else super().asarray(value, like)
 
     def zeros(self, like: Any, count: int) -> Any:
         """Zeros of shape (..., count) for `like` of shape (..., m)."""
-        return self._torch().zeros(like, count) if has_tensors([like]) else super().zeros(like, count)
+        return self.on_torch().zeros(like, count) if has_tensors([like]) else super().zeros(like, count)
 
     def concatenate(self, parts: Iterable[Any]) -> Any:
         """The parts joined along the last axis."""
         parts = list(parts)
-        return self._torch().concatenate(parts) if has_tensors(parts) else super().concatenate(parts)
+        return self.on_torch().concatenate(parts) if has_tensors(parts) else super().concatenate(parts)
 
-    def _torch(self) -> "TorchSide":
+    def on_torch(self) -> "TorchSide":
+        """What computes with tensors."""
         if self._torch_side is None:
             from .native_torch import TorchSide  # it needs torch, which arrays do without
 
-            self._torch_side = TorchSide(self.calls, self.links)
+            self._torch_side = TorchSide(self.calls, self.forms, self.rule)
         return self._torch_side

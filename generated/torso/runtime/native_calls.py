@@ -1,21 +1,43 @@
 """Calls of the compiled C: arrays in, arrays out, large batches on several threads."""
 
+import ctypes
+import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .answers import answer_shapes
 from .arguments import has_tensors
 from .native_build import Sources
-from .native_library import NumberArray, address, function, memory
+from .native_library import NumberArray, address, function, memory, place
 from .structure import Structure
 
 PER_THREAD = 1 << 20
 """Bytes of results below which another thread costs more than it saves."""
+
+FUNCTIONS = {
+    "packed": "decomposition",
+    "packed_torque": "torque",
+    "packed_position_gradient": "position_gradient",
+    "position_gradient": "dense_position_gradient",
+    **{
+        call: call
+        for call in (
+            "partial_torque",
+            "inverse_dynamics",
+            "coefficients",
+            "propagation",
+            "gradient_propagation",
+        )
+    },
+}
+"""What the calls are called in C."""
 
 
 @cache
@@ -29,6 +51,16 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=pool.cache_clear)
 
 
+@dataclass(frozen=True)
+class Desk:
+    """Memory for one sample's motion and results, and where a C function finds it."""
+
+    compute: Any
+    motion: list[NumberArray]
+    results: list[NumberArray]
+    addresses: tuple[int, ...]
+
+
 class NativeCalls:
     """The C functions of a package for given parameters; each parameter is one number for all samples.
 
@@ -40,53 +72,94 @@ class NativeCalls:
         self.structure, self.parameters = structure, dict(parameters)
         self.sources = Sources(structure.name, sources)
         self.threads = os.cpu_count() or 1
-        self.sizes = result_sizes(structure)
-        self._learned = has_tensors(parameters.values())
+        self.shapes = answer_shapes(structure)
+        self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
+        self._complete = {call: all(sizes) for call, sizes in self.sizes.items()}
+        self._widths = {call: sum(sizes) for call, sizes in self.sizes.items()}
+        self.learned = has_tensors(parameters.values())
         self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
+        self._desks: dict[tuple[str, np.dtype[Any]], list[Desk]] = {}
         self._functions: dict[tuple[str, np.dtype[Any]], Any] = {}
-        self._function("decomposition", np.dtype("f8"))
+        self._function("packed", np.dtype("f8"))
 
-    def run(self, call: str, q: NumberArray, qd: NumberArray, qdd: NumberArray) -> list[NumberArray]:
-        """Results (..., size) of a C function for arrays of one shape (..., n), in one piece of memory."""
+    def run(
+        self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
+    ) -> Sequence[NumberArray]:
+        """Results of a call for arrays of one shape (..., n), written to `into`, or to new memory."""
+        q = motion[0]
+        kind, batch = q.dtype, q.shape[:-1]
+        count = q.size // q.shape[-1]
+        if count == 1 and into is None and not self.learned:
+            return self._one(call, motion, kind, batch)
+        shapes = self.shapes[call]
+        if into is None:
+            into = [memory((*batch, *shape), kind) for shape in shapes]
+        if not count:
+            return into
+        compute = self._functions.get((call, kind)) or self._function(call, kind)
+        read = [a if a.flags.carray else plain(a) for a in motion]
+        if self.parameters:
+            read.append(self._numbers(kind) if self.learned else self._constants[kind])
         sizes = self.sizes[call]
-        kind, shape, n = q.dtype, q.shape[:-1], q.shape[-1]
-        count, width = q.size // n, kind.itemsize
-        buffer = memory(count * sum(sizes), kind)
-        motion = [
-            a if a.flags.c_contiguous and a.flags.aligned else np.array(a, order="C") for a in (q, qd, qdd)
+        # A robot may have none of a kind; its functions then take no array for it.
+        written = into if self._complete[call] else [a for a, size in zip(into, sizes, strict=True) if size]
+        parts = min(self.threads, count * self._widths[call] * kind.itemsize // PER_THREAD)
+        if parts <= 1:
+            compute(count, *[place(a) for a in read], *[place(a) for a in written])
+            return into
+        width = kind.itemsize
+        arrays = [
+            *((address(a), q.shape[-1] * width) for a in read[: len(motion)]),
+            *((address(a), 0) for a in read[len(motion) :]),
+            *((address(a), size * width) for a, size in zip(written, filter(None, sizes), strict=True)),
         ]
-        inputs = [(address(a), n * width) for a in motion]
-        results, outputs, at, start = [], [], 0, address(buffer)
-        for size in sizes:
-            end = at + count * size
-            results.append(buffer[at:end].reshape(*shape, size) if shape else buffer[at:end])
-            if size:  # for what a robot has none of, its functions take no array
-                outputs.append((start + at * width, size * width))
-            at = end
-        values = self._numbers(kind) if self._learned else self._constants[kind]
-        p = [(address(values), 0)] if self.parameters else []
-        parts = min(self.threads, buffer.nbytes // PER_THREAD)
-        if count:
-            self._call(self._function(call, kind), count, [*inputs, *p, *outputs], parts)
-        return results
+        self._share(compute, count, arrays, parts)
+        return into
+
+    def _one(
+        self, call: str, motion: Sequence[NumberArray], kind: "np.dtype[Any]", batch: tuple[int, ...]
+    ) -> Sequence[NumberArray]:
+        """Results for one sample; copies to and from a desk cost less than to find out where arrays lie."""
+        desks = self._desks.setdefault((call, kind), [])
+        try:
+            desk = desks.pop()  # so that neither a thread nor a signal's handler finds it in use
+        except IndexError:
+            desk = self._new_desk(call, kind)
+        for to, a in zip(desk.motion, motion, strict=True):
+            to[...] = a
+        desk.compute(1, *desk.addresses)
+        results = [a.copy() for a in desk.results]
+        desks.append(desk)
+        return [a.reshape(*batch, *a.shape) for a in results] if batch else results
+
+    def _new_desk(self, call: str, kind: "np.dtype[Any]") -> "Desk":
+        compute = self._functions.get((call, kind)) or self._function(call, kind)
+        motion = [np.empty(self.structure.n, kind) for _ in range(2 if call == "coefficients" else 3)]
+        results = [np.empty(shape, kind) for shape in self.shapes[call]]
+        constants = [self._constants[kind]] if self.parameters else []
+        arrays = [*motion, *constants, *(a for a in results if a.size)]
+        return Desk(compute, motion, results, tuple(map(address, arrays)))
+
+    def constants(self, kind: "np.dtype[Any]") -> NumberArray:
+        """Values of parameters that stay as they are, in the order of the structure."""
+        return self._constants[kind]
+
+    def address(self, call: str, kind: "np.dtype[Any]") -> int:
+        """Where the C function of a call that has been made stands in memory."""
+        return ctypes.cast(self._functions[call, kind], ctypes.c_void_p).value or 0
 
     def _function(self, call: str, kind: "np.dtype[Any]") -> Any:
         """C function of a call for a dtype, compiled if it is not there yet."""
-        found = self._functions.get((call, kind))
-        if found is None:
-            outputs = sum(size > 0 for size in self.sizes[call])
-            arrays = 3 + bool(self.parameters) + outputs
-            found = self._functions[call, kind] = function(self.sources, call, kind.str[1:], arrays)
+        reads = 2 if call == "coefficients" else 3
+        arrays = reads + bool(self.parameters) + sum(size > 0 for size in self.sizes[call])
+        found = self._functions[call, kind] = function(self.sources, FUNCTIONS[call], kind.str[1:], arrays)
         return found
 
-    def _call(self, compute: Any, count: int, arrays: Sequence[tuple[int, int]], parts: int) -> None:
-        """Call a C function; `arrays` are addresses, and bytes from one sample to the next.
+    def _share(self, compute: Any, count: int, arrays: Sequence[tuple[int, int]], parts: int) -> None:
+        """Call a C function in several parts; `arrays` are addresses, and bytes from one sample to the next.
 
-        In several `parts`, threads take shares of the samples; shares of 16 fill blocks of either type.
+        Threads take shares of the samples; shares of 16 fill blocks of either type.
         """
-        if parts <= 1:
-            compute(count, *(start for start, _ in arrays))
-            return
         share = -(-count // parts // 16) * 16
 
         def run(first: int) -> None:
@@ -109,14 +182,9 @@ class NativeCalls:
         return np.array([_number(self.parameters[name]) for name in self.structure.parameters], dtype=kind)
 
 
-def result_sizes(structure: Structure) -> dict[str, tuple[int, ...]]:
-    """Values of one sample in each array that a C function answers with."""
-    sizes = structure.sizes
-    return {
-        "decomposition": tuple(sizes),
-        "torque": (sizes.tau,),
-        "position_gradient": (sizes.c1,),
-    }
+def plain(a: NumberArray) -> NumberArray:
+    """An array, or a copy of it that lies in memory as C reads it."""
+    return a if a.flags.c_contiguous and a.flags.aligned else np.array(a, order="C")
 
 
 def _number(value: Any) -> float:

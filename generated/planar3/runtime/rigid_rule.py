@@ -1,0 +1,196 @@
+"""The rigid-link rule on arrays: all links and all pairs of joints at once, nothing differentiated.
+
+Vectors, screws S_f = (z, s) and twists V = (omega, v) are those of `kinematics`, A is the rate of V, from
+minus gravity. A link of mass m, first moment h, inertia I about o and second moment E = 1/2 tr(I) - I has
+
+    P = m v + omega x h        B = -[omega]x E - v h^T + (h . v) 1
+
+and asks of each joint f a wrench (N, f), whose part on joint e is S_e . (N, f) = z_e . N + s_e . f:
+
+    c2:   N = h x s + I z                 f = m s + z x h                      of S_f = (z, s)
+    c1:   N = h x sd + I zd + B z         f = m sd + zd x h + z x P            of its rate (zd, sd) too
+    tau:  the same two, of A and of omega; g: the first, of minus gravity
+    c0:   those of S-dot-dot and of twice zd; and where joint e is not behind f,
+          S_f x* (N, f) = (z x N + s x f, z x f) of tau's wrench
+
+They are linear in the screws. So a link is also a matrix of 6 rows, whose columns meet (z, s) and z, and
+matrix products answer for the links of a group and all pairs of joints, of which `rule_layout` says what is
+packed.
+"""
+
+from typing import Any, NamedTuple
+
+from .kinematics import Poses, Twists, around, cross, motion_cross, product, taken
+
+
+class LinkNumbers(NamedTuple):
+    """What the links carry, in the axes of their frames."""
+
+    masses: Any
+    """(N, samples)"""
+    mass_matrices: Any
+    """m 1, (3, 3, N, samples)"""
+    centres: Any
+    """(3, N, samples)"""
+    half_traces: Any
+    """Half the traces of the inertias J about the centres, (N, samples)."""
+    second_moments: Any
+    """1/2 tr(J) - J, (3, 3, N, samples)"""
+
+
+class LinkTables(NamedTuple):
+    """Constants of the rule."""
+
+    joints: Any
+    """Joint of each link."""
+    eye: Any
+    """(3, 3, 1, 1)"""
+    skew: Any
+    """Where (a, -a, 0) stands in [a]x, row by row."""
+
+
+class LinkMoments(NamedTuple):
+    """Links in motion, about the common origin; vectors end with their x and y once more, matrices have their
+    columns first."""
+
+    m: Any
+    """(N, samples)"""
+    h: Any
+    """(5, N, samples)"""
+    inertia: Any
+    """(3, 3, N, samples)"""
+    momentum: Any
+    """P, (5, N, samples)."""
+    b: Any
+    """(3, 3, N, samples)"""
+
+
+class LinkStates(NamedTuple):
+    """Links in motion, and their wrenches (6, 2, N, samples): tau's and that of their weight."""
+
+    moments: LinkMoments
+    wrenches: Any
+
+
+def link_numbers(xp: Any, eye: Any, masses: Any, centres: Any, inertias: Any) -> LinkNumbers:
+    """From masses (N, samples), centres (3, N, samples) and inertias (3, 3, N, samples) about them."""
+    inertias = 0.5 * (inertias + xp.swapaxes(inertias, 0, 1))
+    half = 0.5 * (inertias[0, 0] + inertias[1, 1] + inertias[2, 2])
+    return LinkNumbers(masses, masses * eye, centres, half, half * eye - inertias)
+
+
+def link_states(
+    xp: Any, tables: LinkTables, numbers: LinkNumbers, poses: Poses, moved: Twists, own: Any, gravity: Any
+) -> LinkStates:
+    """Moments and wrenches of the links.
+
+    own: velocity and acceleration of every joint's coordinate, (frames, samples) each; gravity (3, 1,
+    samples)
+    """
+    joints = tables.joints
+    screws, rates = taken(moved.screws, joints), taken(moved.rates, joints)
+    qd, qdd = (taken(a, joints) for a in own)
+    twist = taken(moved.twists, joints) + screws * qd
+    change = taken(moved.accelerations, joints) + screws * qdd + rates * qd
+    moments = _moments(xp, tables, numbers, poses, twist, moved.origin)
+    whole = accelerated(xp, moments, change[:, 0], change[:, 1]) + turning(xp, moments, twist[:, 0])
+    moment = cross(moments.h, around(xp, gravity))
+    weight = xp.concat([moment, xp.broadcast_to(moments.m * gravity, moment.shape)], 0)
+    return LinkStates(moments, xp.stack([whole, -weight], 1))
+
+
+def _moments(
+    xp: Any, tables: LinkTables, numbers: LinkNumbers, poses: Poses, twist: Any, origin: Any
+) -> LinkMoments:
+    """Moments of the links from their frames and twists (5, 2, N, samples)."""
+    omega, v, m, c = twist[:, 0], twist[:, 1], numbers.masses, numbers.centres
+    axes, place = taken(poses.axes, tables.joints), taken(poses.places, tables.joints)
+    centre = place - origin + axes[:, 0] * c[0] + axes[:, 1] * c[1] + axes[:, 2] * c[2]
+    h = m * centre
+    # About o: E = R (1/2 tr(J) - J) R^T + h c^T, I = tr(E) - E with tr(E) = 1/2 tr(J) + h . c.
+    turned = product(axes, numbers.second_moments)
+    e = product(turned, xp.swapaxes(axes, 0, 1)) + h[:, None] * centre[None]
+    inertia = (numbers.half_traces + (h * centre).sum(0)) * tables.eye - e
+    # P = m v + omega x h
+    first = around(xp, h)
+    momentum = m * v[:3] + cross(omega, first)
+    # B = -[omega]x E - v h^T + (h . v) 1; column k of the first part is E_k x omega.
+    columns = xp.swapaxes(cross(around(xp, e), omega[:, None]), 0, 1)
+    b = columns - h[:, None] * v[None, :3] + (h * v[:3]).sum(0) * tables.eye
+    return LinkMoments(m, first, inertia, around(xp, momentum), b)
+
+
+def accelerated(xp: Any, link: LinkMoments, z: Any, s: Any) -> Any:
+    """N = h x s + I z over f = m s + z x h, (6, ...), of vectors (5, ...)."""
+    moment = cross(link.h, s) + applied(link.inertia, z)
+    return xp.concat([moment, link.m * s[:3] + cross(z, link.h)], 0)
+
+
+def turning(xp: Any, link: LinkMoments, z: Any) -> Any:
+    """N = B z over f = z x P, (6, ...), of a vector (5, ...)."""
+    return xp.concat([applied(link.b, z), cross(z, link.momentum)], 0)
+
+
+def applied(matrix: Any, z: Any) -> Any:
+    """A matrix, columns first, times a vector."""
+    return matrix[0] * z[0] + matrix[1] * z[1] + matrix[2] * z[2]
+
+
+def link_matrices(xp: Any, tables: LinkTables, numbers: LinkNumbers, link: LinkMoments) -> Any:
+    """`accelerated` and `turning` as matrices that meet (z, s) and z, columns first: (9, 6, N, samples)."""
+    hx, px = _skew(tables, xp, link.h[:3]), _skew(tables, xp, link.momentum[:3])
+    mass = xp.broadcast_to(numbers.mass_matrices, link.inertia.shape)
+    # z x h = -[h]x z, and the transpose of -[h]x is [h]x.
+    rows = [link.inertia, hx], [xp.swapaxes(hx, 0, 1), mass], [link.b, px]
+    return xp.concat([xp.concat(row, 1) for row in rows], 0)
+
+
+def gradient_matrices(xp: Any, tables: LinkTables, matrices: Any, wrench: Any) -> Any:
+    """The same with S x* (wrench) behind: -[N]x z - [f]x s over -[f]x z, (15, 6, N, samples)."""
+    n, f = _skew(tables, xp, wrench[:3]), _skew(tables, xp, wrench[3:])
+    return xp.concat([matrices, xp.concat([n, f], 1), xp.concat([f, 0.0 * f], 1)], 0)
+
+
+def _skew(tables: LinkTables, xp: Any, a: Any) -> Any:
+    """[a]x of vectors (3, N, samples), (3, 3, N, samples)."""
+    rows = xp.concat([a, -a, 0.0 * a[:1]], 0)[tables.skew]
+    return rows.reshape(3, 3, *a.shape[1:])
+
+
+def decomposition_columns(xp: Any, moved: Twists) -> Any:
+    """What the matrices meet for c2 and for c1, (9, 2, joints, samples)."""
+    (z, s), (zd, sd) = _halves(moved.screws), _halves(moved.rates)
+    return xp.stack([xp.concat([z, s, 0.0 * z], 0), xp.concat([zd, sd, z], 0)], 1)
+
+
+def gradient_columns(xp: Any, moved: Twists) -> Any:
+    """What the matrices meet for c0 of joints behind joint f, and of it and those before, (15, 2, ...)."""
+    (z, s), (zd, _), (zdd, sdd) = (_halves(a) for a in (moved.screws, moved.rates, second_rates(xp, moved)))
+    after = xp.concat([zdd, sdd, 2.0 * zd], 0)
+    return xp.stack([xp.concat([after, 0.0 * z, 0.0 * s], 0), xp.concat([after, z, s], 0)], 1)
+
+
+def second_rates(xp: Any, moved: Twists) -> Any:
+    """S-dot-dot = A x S + V x S-dot, (5, 2, frames, samples)."""
+    return motion_cross(xp, moved.accelerations, moved.screws) + motion_cross(xp, moved.twists, moved.rates)
+
+
+def _halves(screws: Any) -> tuple[Any, Any]:
+    """z and s of pairs of vectors (5, 2, frames, samples), without the ground."""
+    return screws[:3, 0, :-1], screws[:3, 1, :-1]
+
+
+def decomposition_wrenches(xp: Any, link: LinkMoments, joints: Any, moved: Twists) -> tuple[Any, Any]:
+    """Wrenches of c2 and of c1, (6, pairs, samples) each, for the link and the joint of each pair."""
+    s, rate = taken(moved.screws, joints), taken(moved.rates, joints)
+    c1 = accelerated(xp, link, rate[:, 0], rate[:, 1]) + turning(xp, link, s[:, 0])
+    return accelerated(xp, link, s[:, 0], s[:, 1]), c1
+
+
+def gradient_wrenches(xp: Any, link: LinkMoments, joints: Any, moved: Twists, wrench: Any) -> Any:
+    """Wrenches of c0 for joints behind joint f, then for it and those before, (6, 2 pairs, samples)."""
+    s, rate, second = (taken(a, joints) for a in (moved.screws, moved.rates, second_rates(xp, moved)))
+    after = accelerated(xp, link, second[:, 0], second[:, 1]) + 2.0 * turning(xp, link, rate[:, 0])
+    n, f = around(xp, wrench[:3]), around(xp, wrench[3:])
+    turned = xp.concat([cross(s[:, 0], n) + cross(s[:, 1], f), cross(s[:, 0], f)], 0)
+    return xp.concat([after, after + turned], 1)

@@ -1,0 +1,149 @@
+"""The calls of `Dynamics` behind its face: motion is checked, answers computed and put where `out` says."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .arguments import check_numbers
+from .composed import Composed
+from .interface import Backend
+from .outputs import accepted
+from .quantities import Coefficients, GradientPropagation, Packed, Propagation
+from .structure import Structure
+
+KINDS: dict[str, Any] = {
+    "packed": Packed,
+    "coefficients": Coefficients,
+    "propagation": Propagation,
+    "gradient_propagation": GradientPropagation,
+}
+"""What calls with several results answer with; the others answer with one array or tensor."""
+
+Shapes = tuple[tuple[int, ...], ...]
+
+
+def answer_shapes(structure: Structure) -> dict[str, Shapes]:
+    """Shapes of each call's results for one sample."""
+    n, links, sizes = structure.n, structure.N, structure.sizes
+    cubes: Shapes = ((n, links, n), (n, links, n), (n, links))
+    return {
+        "packed": tuple((size,) for size in sizes),
+        "packed_torque": ((sizes.tau,),),
+        "partial_torque": ((n, links),),
+        "inverse_dynamics": ((n,),),
+        "coefficients": cubes,
+        "propagation": cubes,
+        "gradient_propagation": cubes,
+        "position_gradient": ((n, links, n),),
+        "packed_position_gradient": ((sizes.c1,),),
+        "masked": ((n, links),),
+    }
+
+
+class Answers:
+    """The calls of a back end whose packed values answers are composed of; arguments as `Dynamics` says."""
+
+    contiguous: ClassVar = False
+    """Whether what `out` says must be contiguous."""
+
+    def __init__(
+        self, structure: Structure, backend: Backend[Any], check_finite: bool, composed: Any = None
+    ) -> None:
+        """`composed` computes; the closed forms' packed values, composed, unless given."""
+        self._structure, self._backend, self._check_finite = structure, backend, check_finite
+        self._composed = composed or Composed(structure, backend)
+        self._shapes = answer_shapes(structure)
+
+    @property
+    def of_arrays(self) -> Any:
+        """What answers in place of this where q is an array: what is quicker then, if there is anything."""
+        return self
+
+    def packed(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
+        """See `Dynamics.packed`."""
+        return self._answer("packed", {"q": q, "qd": qd, "qdd": qdd}, out)
+
+    def packed_torque(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
+        """See `Dynamics.packed_torque`."""
+        return self._answer("packed_torque", {"q": q, "qd": qd, "qdd": qdd}, out)
+
+    def partial_torque(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
+        """See `Dynamics.partial_torque`."""
+        return self._answer("partial_torque", {"q": q, "qd": qd, "qdd": qdd}, out)
+
+    def inverse_dynamics(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
+        """See `Dynamics.inverse_dynamics`."""
+        return self._answer("inverse_dynamics", {"q": q, "qd": qd, "qdd": qdd}, out)
+
+    def coefficients(self, q: Any, qd: Any, out: Any = None) -> Any:
+        """See `Dynamics.coefficients`."""
+        return self._answer("coefficients", {"q": q, "qd": qd}, out)
+
+    def propagation(self, q: Any, qd: Any, qdd: Any, convention: str, out: Any = None) -> Any:
+        """See `Dynamics.propagation`."""
+        if convention not in ("closing", "gradient"):
+            raise ValueError(f"no convention {convention!r}; choose closing or gradient")
+        call = "propagation" if convention == "closing" else "gradient_propagation"
+        return self._answer(call, {"q": q, "qd": qd, "qdd": qdd}, out)
+
+    def position_gradient(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
+        """See `Dynamics.position_gradient`."""
+        return self._answer("position_gradient", {"q": q, "qd": qd, "qdd": qdd}, out)
+
+    def masked(self, q: Any, qd: Any, qdd: Any, mask: Any, out: Any = None) -> Any:
+        """See `Dynamics.masked`."""
+        n = self._structure.n
+        if np.shape(mask) != (3, n):
+            raise ValueError(
+                f"the mask has shape {tuple(np.shape(mask))}; it must be (3, {n}): order, coordinate"
+            )
+        motion = self._motion({"q": q, "qd": qd, "qdd": qdd})
+        into = self._accepted("masked", {"q": motion[0], "qd": motion[1], "qdd": motion[2]}, out)
+        q, qd, qdd = motion
+        weights = self._backend.asarray(mask, q)
+        acceleration, velocity, _ = self._computed("coefficients", [q, qd])
+        total = velocity @ (weights[1] * qd)[..., None, :, None]
+        total = total + acceleration @ (weights[2] * qdd)[..., None, :, None]
+        # A tensor of numbers that nobody may look at yet, as under vmap, might ask for positions too.
+        if not isinstance(weights, np.ndarray) or weights[0].any():
+            (stiffness,) = self._computed("position_gradient", motion)
+            total = total + stiffness @ (weights[0] * q)[..., None, :, None]
+        torque = total[..., 0]
+        if into is None:
+            return torque
+        into[0][...] = torque
+        return out
+
+    def _answer(self, call: str, named: dict[str, Any], out: Any) -> Any:
+        motion = self._motion(named)
+        kind = KINDS.get(call)
+        if out is None:
+            values = self._computed(call, motion)
+            return kind(*values) if kind else values[0]
+        into = self._accepted(call, dict(zip(named, motion, strict=True)), out)
+        self._compute_into(call, motion, into)
+        return kind(*out) if kind else out
+
+    def _motion(self, named: dict[str, Any]) -> Any:
+        """The motion as the back end computes with it, in one shape, and looked at if that was asked for."""
+        arrays = self._backend.arrays(named, self._structure.n)
+        if self._check_finite:
+            check_numbers(named, self._structure.joint_names)
+        return arrays
+
+    def _accepted(self, call: str, motion: Mapping[str, Any], out: Any) -> Any:
+        if out is None:
+            return None
+        kind = KINDS.get(call)
+        fields, parameters = kind._fields if kind else (), self._backend.parameters.values()
+        return accepted(out, fields, self._shapes[call], motion, parameters, self.contiguous)
+
+    def _computed(self, call: str, motion: Any) -> Any:
+        """Results of a call in order."""
+        return getattr(self._composed, call)(*motion)
+
+    def _compute_into(self, call: str, motion: Any, into: Any) -> None:
+        """Compute a call's results where these arrays or tensors lie."""
+        for place, value in zip(into, self._computed(call, motion), strict=True):
+            place[...] = value

@@ -1,0 +1,141 @@
+"""The rigid-link rule for one robot: packed results, in the order of `Layout`, from motion and numbers."""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .joint_tree import Bodies, JointTree
+from .kinematics import poses, taken, twists
+from .rigid_rule import LinkNumbers, link_numbers, link_states
+from .rule_layout import RuleLayout, rule_layout
+from .rule_products import Moment, coefficients, gradient, singles
+from .rule_tables import RuleTables, Space, converted, listed_tables
+from .tree_arrays import TreeArrays, with_bodies, with_formulas
+
+CACHE = 1 << 22
+"""Bytes of the arrays of one chunk of samples, which are to stay in the processor's cache."""
+LINK_NUMBERS = 200
+"""Numbers that a link and its joint have of one sample, beside the products."""
+
+
+class RigidRule:
+    """The rule for a robot's tree; tables are made when first asked for, for each dtype and device."""
+
+    def __init__(self, tree: JointTree) -> None:
+        self.tree = tree
+        self._tables: dict[Any, RuleTables] = {}
+
+    @cached_property
+    def layout(self) -> RuleLayout:
+        """Where packed values stand."""
+        return rule_layout(self.tree)
+
+    @cached_property
+    def _listed(self) -> RuleTables:
+        return listed_tables(self.tree, self.layout)
+
+    def tables(self, space: Space, like: Any) -> RuleTables:
+        """Constants to compute with `like`."""
+        key = space.xp.__name__, like.dtype, getattr(like, "device", None)
+        if key not in self._tables:
+            self._tables[key] = converted(self._listed, space, like)
+        return self._tables[key]
+
+    def bodies(self) -> Bodies[NDArray[np.float64]]:
+        """What the links carry, as the package has it."""
+        links = self.tree.links
+        return Bodies(
+            np.array([link.mass for link in links]),
+            np.array([link.centre for link in links]),
+            np.array([link.inertia for link in links]),
+        )
+
+    def decomposition(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], bodies: Bodies[Any] | None
+    ) -> list[Any]:
+        """c2, c1, g and tau, (..., count) each."""
+
+        def answer(at: Moment) -> list[Any]:
+            pairs = coefficients(space, at)
+            return [*pairs, *singles(space, at, (3, 4))]
+
+        return self._answers(space, motion, p, bodies, answer)
+
+    def torque(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], bodies: Bodies[Any] | None
+    ) -> Any:
+        """tau (..., count)."""
+
+        def answer(at: Moment) -> list[Any]:
+            return singles(space, at, (4,))
+
+        return self._answers(space, motion, p, bodies, answer)[0]
+
+    def position_gradient(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], bodies: Bodies[Any] | None
+    ) -> Any:
+        """c0 (..., count)."""
+
+        def answer(at: Moment) -> list[Any]:
+            return gradient(space, at)
+
+        return self._answers(space, motion, p, bodies, answer)[0]
+
+    def _answers(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], bodies: Any, answer: Any
+    ) -> list[Any]:
+        """What `answer` gives for the samples of a motion, (..., n) each."""
+        q = motion[0]
+        batch, n = tuple(q.shape[:-1]), q.shape[-1]
+        xp, tables = space.xp, self.tables(space, q)
+        numbers, links = tables.own, tables.numbers
+        if self.tree.formulas or bodies is not None:
+            numbers = with_formulas(xp, self.tree, numbers, tables.sources, p, batch)
+            if bodies is not None:
+                numbers = with_bodies(xp, numbers, bodies, batch)
+            links = link_numbers(xp, tables.links.eye, *numbers[2:])
+        flat = [xp.swapaxes(a.reshape(-1, n), 0, 1) for a in motion]
+        joined: list[Any] = []
+        samples = flat[0].shape[1]
+        for piece in self._pieces(space, motion, samples):
+            own = [a[:, piece] for a in flat]
+            some = TreeArrays(*(_samples(a, piece) for a in numbers))
+            carried = LinkNumbers(*(_samples(a, piece) for a in links))
+            part = answer(_moment(xp, tables, own, some, carried))
+            if piece == slice(None):
+                joined = part
+                continue
+            joined = joined or [xp.empty((samples, a.shape[1]), dtype=q.dtype) for a in part]
+            for whole, a in zip(joined, part, strict=True):
+                whole[piece] = a
+        return [a.reshape(*batch, a.shape[-1]) for a in joined]
+
+    def _pieces(self, space: Space, motion: Sequence[Any], samples: int) -> Sequence[slice]:
+        """Slices of the samples, each to be computed at once."""
+        links = len(self.tree.links)
+        most = CACHE // (motion[0].itemsize * (2 * self.layout.zero + LINK_NUMBERS * links)) + 1
+        size = space.chunk(motion, max(most, 16))
+        if size is None or samples <= size:
+            return [slice(None)]
+        return [slice(start, start + size) for start in range(0, samples, size)]
+
+
+def _moment(
+    xp: Any, tables: RuleTables, motion: Sequence[Any], numbers: TreeArrays, links: LinkNumbers
+) -> Moment:
+    """Motion of joints and links for q, qd and qdd (n, samples)."""
+    frames = tables.frames
+    position, velocity, acceleration = (taken(a, frames.coordinates) for a in motion)
+    placed = poses(xp, frames, numbers.translations, position)
+    moved = twists(xp, frames, placed, numbers.gravity, velocity, acceleration)
+    own = velocity, acceleration
+    states = link_states(xp, tables.links, links, placed, moved, own, numbers.gravity)
+    return Moment(tables, links, moved, states)
+
+
+def _samples(a: Any, piece: slice) -> Any:
+    """The numbers of some samples; one that all share stays."""
+    return a[..., piece] if a.shape[-1] > 1 else a

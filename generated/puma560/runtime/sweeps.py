@@ -1,0 +1,180 @@
+"""Partial torques and their coefficients of all links, by differentiating their Lagrangians.
+
+With L = K - P of one link, K of degree two in the velocities, and D_i = d/dt d/dqd_i - d/dq_i,
+
+    tau_i = D_i L           M = d2K/dqd2            p = dK/dqd = M qd + b
+    c1_ik = 1/2 (dM_ik/dt + dp_i/dq_k - dp_k/dq_i) = 1/2 d(tau_i)/d(qd_k), if K has no linear terms (b = 0)
+
+Nothing here is worked out beforehand. A first reverse sweep gives the gradient of K. The Hessian of K times a
+direction is the gradient of (gradient . direction), as the Hessian is symmetric: a second reverse sweep over
+the graph of the first. What is wanted in several directions, or of several links, goes side by side in lanes.
+
+Link j has these lanes; e_k is a velocity of 1 of coordinate k alone:
+
+    at e_k       dK/dqd is column k of M, its change along qd column k of dM/dt; dp_k/dq = d(e_k . M qd)/dq
+    at rest      one lane, if K has terms linear in qd: what of the above is due to b
+    at rest      one lane for each coordinate then: dK/dqd_k = b_k, whose derivatives are needed by themselves
+"""
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+
+import torch
+from torch import Tensor
+
+from .lane_entries import NOWHERE, Indices, LaneEntries, Rows, pick
+from .lanes import Leaf, Motion, Plan
+from .partial_lagrangian import PartialLagrangian
+from .recording import Recording, gradient, variable
+
+Links = Sequence[PartialLagrangian]
+
+
+class Sweep:
+    """The motion of one call in the lanes of a plan: what can be asked of the Lagrangians there."""
+
+    def __init__(self, links: Links, plan: Plan, motion: Sequence[Tensor], record: Recording) -> None:
+        self.links, self.plan, self.motion, self.record = links, plan, motion, record
+        self.x, self.v, self.a = (part.unbind(-1) for part in motion)
+        self.n, self.dim = len(self.x), record.like.dim() + 1
+
+    def same(self, values: Sequence[Tensor]) -> Leaf:
+        """The same value of a coordinate in all lanes."""
+        return lambda k, rows: values[k].expand(rows.stop - rows.start, *self.record.like.shape)
+
+    def lay(self, leaf: Leaf) -> Motion:
+        """Variables with the values of `leaf`."""
+        return self.plan.lay(lambda k, rows: variable(leaf(k, rows)), self.dim)
+
+    def kinetic(self, velocity: Leaf) -> tuple[Motion, Motion, Sequence[Tensor], Sequence[Tensor]]:
+        """q and qd in lanes, and the gradient of the kinetic energy with respect to their variables."""
+        q, qd = self.lay(self.same(self.x)), self.lay(velocity)
+        energies = [link.kinetic(*at) for link, *at in zip(self.links, q.own, qd.own, strict=True)]
+        x, v = q.variables(), qd.variables()
+        slopes = gradient(energies, None, [*x, *v], keep=True, last=False)
+        return q, qd, slopes[: len(x)], slopes[len(x) :]
+
+    def potential(self, keep: bool) -> tuple[Motion, Sequence[Tensor]]:
+        """q in lanes, and the gradient of the potential energy with respect to its variables."""
+        q = self.lay(self.same(self.x))
+        energies = [link.potential(at) for link, at in zip(self.links, q.own, strict=True)]
+        return q, gradient(energies, None, q.variables(), keep, last=True)
+
+    def rows(self, motion: Motion, values: Sequence[Tensor]) -> Rows:
+        """Values that belong to the variables of a motion."""
+        return Rows(motion.places(), values, self.n, self.record.like)
+
+    def along(self, motion: Motion, direction: Leaf) -> list[Tensor]:
+        """A direction for each variable of a motion."""
+        return [direction(k, rows) for k, rows in motion.places()]
+
+    def marks(self, chosen: Callable[[int], Indices]) -> Leaf:
+        """One in the lanes that are chosen for a coordinate, zero in the others."""
+        like = self.record.like
+        columns = [torch.from_numpy(chosen(k)).to(like.device, like.dtype) for k in range(self.n)]
+        return lambda k, rows: self.record.lanes(columns[k][rows])
+
+    def torque(self, keep: bool) -> tuple[tuple[Motion, ...], tuple[Sequence[Tensor], ...]]:
+        """Variables qd, q and q again, and for each of them its part of tau: d/dt dK/dqd, dK/dq and dP/dq."""
+        q, qd, force, momentum = self.kinetic(self.same(self.v))
+        way = [*self.along(q, self.same(self.v)), *self.along(qd, self.same(self.a))]
+        rate = gradient([*force, *momentum], way, qd.variables(), keep, last=True)
+        place, gravity = self.potential(keep)
+        return (qd, q, place), (rate, force, gravity)
+
+
+@lru_cache(maxsize=64)
+def entries_of(kinds: tuple[type[PartialLagrangian], ...]) -> LaneEntries:
+    """Where the entries of these links are."""
+    numbers = {kind: j for j, kind in enumerate(kinds)}
+    parents = tuple(None if kind.parent is None else numbers.get(kind.parent) for kind in kinds)
+    return LaneEntries(tuple(k.path for k in kinds), parents, tuple(k.linear for k in kinds))
+
+
+def decomposition(links: Links, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Tensor]:
+    """c2 (i <= k), c1, g, tau and h1, the part of c1 linear in qd, packed link by link: (..., count) each."""
+    entries, record = _begin(links, q, qd, qdd)
+    with torch.enable_grad():
+        sweep = Sweep(links, entries.plan, (q, qd, qdd), record)
+        mass, c1, h1 = _second_derivatives(sweep, entries)
+        gravity = _gravity(sweep, entries)
+        k = entries.pairs[:, 1]
+        terms = mass * pick(qdd.movedim(-1, 0), k) + c1 * pick(qd.movedim(-1, 0), k)
+        tau = _sums(terms, entries) + gravity
+        return [record.finish(part) for part in (pick(mass, entries.upper), c1, gravity, tau, h1)]
+
+
+def torque(links: Links, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+    """tau of every link over its path, shape (..., count)."""
+    entries, record = _begin(links, q, qd, qdd)
+    with torch.enable_grad():
+        sweep = Sweep(links, entries.single, (q, qd, qdd), record)
+        rate, force, gravity = (
+            sweep.rows(motion, values)(*entries.paths_in_lanes)
+            for motion, values in zip(*sweep.torque(record.wanted), strict=True)
+        )
+        return record.finish(rate - force + gravity)
+
+
+def position_gradient(links: Links, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+    """d(tau_i)/d(q_k) of every link over its path, row by row, shape (..., count)."""
+    entries, record = _begin(links, q, qd, qdd)
+    resting = LaneEntries(entries.paths, entries.parents, (False,) * len(links))
+    with torch.enable_grad():
+        # Lane e_i of a link is there for its tau_i.
+        sweep = Sweep(links, resting.plan, (q, qd, qdd), record)
+        (qd_, q_, place), (rate, force, gravity) = sweep.torque(keep=True)
+        mine = sweep.marks(lambda k: resting.lanes[:, 1] == k)
+        weights = [*sweep.along(qd_, mine), *(-m for m in sweep.along(q_, mine)), *sweep.along(place, mine)]
+        moved = [*q_.variables(), *place.variables()]
+        slopes = gradient([*rate, *force, *gravity], weights, moved, record.wanted, last=True)
+        found = Rows([*q_.places(), *place.places()], slopes, sweep.n, record.like)
+        return record.finish(found(resting.pairs[:, 1], resting.pairs[:, 2]))
+
+
+def _begin(links: Links, *motion: Tensor) -> tuple[LaneEntries, Recording]:
+    parameters = (value for link in links for value in link.p.values())
+    return entries_of(tuple(map(type, links))), Recording.of(motion, parameters)
+
+
+def _second_derivatives(sweep: Sweep, entries: LaneEntries) -> tuple[Tensor, Tensor, Tensor]:
+    """M_ik and c1_ik of all pairs (i, k), and twice the part of c1 that is due to terms linear in qd."""
+    coordinate, kind = entries.lanes[:, 1], entries.lanes[:, 2]
+    keep, along_qd = sweep.record.wanted, sweep.same(sweep.v)
+    q, qd, force, momentum = sweep.kinetic(sweep.marks(lambda k: (coordinate == k) & (kind == 0)))
+    rate = gradient(force, sweep.along(q, along_qd), qd.variables(), keep, last=False)
+    mass_rate, mass = sweep.rows(qd, rate), sweep.rows(qd, momentum)
+    i, k, at_i, at_k, rest, rest_i, rest_k = entries.pairs.T
+    if not any(entries.linear):
+        bent = gradient(momentum, sweep.along(qd, along_qd), q.variables(), keep, last=True)
+        bend = sweep.rows(q, bent)
+        c1 = 0.5 * (mass_rate(i, at_k) + bend(k, at_i) - bend(i, at_k))
+        return mass(i, at_k), c1, c1[:0]
+    along_unit = sweep.marks(lambda k: (coordinate == k) & (kind == 2))
+    moving = sweep.marks(lambda k: kind != 2)
+    way = [along_unit(c, rows) + moving(c, rows) * along_qd(c, rows) for c, rows in qd.places()]
+    x, v = q.variables(), qd.variables()
+    both = gradient(momentum, way, [*x, *v], keep, last=True)
+    bend, lean = sweep.rows(q, both[: len(x)]), sweep.rows(qd, both[len(x) :])
+    # At rest along e_k, the Hessian gives column k of M without dK/dqd's part b, which may be far larger.
+    still = torch.from_numpy(rest != NOWHERE).to(sweep.record.like.device)
+    columns = lean(i, rest_k), mass(i, at_k)
+    mass_ik = torch.where(still.reshape(-1, *[1] * sweep.record.like.dim()), *columns)
+    c1 = mass_rate(i, at_k) - mass_rate(i, rest)
+    c1 = c1 + bend(k, at_i) - bend(k, rest) - bend(i, at_k) + bend(i, rest)
+    h1 = bend(k, rest_i) - bend(i, rest_k)
+    return mass_ik, 0.5 * c1 + h1, pick(h1, entries.moving)
+
+
+def _gravity(sweep: Sweep, entries: LaneEntries) -> Tensor:
+    """dP/dq_i of every link over its path, in one lane for each link."""
+    sweep = Sweep(sweep.links, entries.single, sweep.motion, sweep.record)
+    place, slopes = sweep.potential(sweep.record.wanted)
+    return sweep.rows(place, slopes)(*entries.paths_in_lanes)
+
+
+def _sums(terms: Tensor, entries: LaneEntries) -> Tensor:
+    """Sums over k of terms (i, k), link by link."""
+    sizes = [len(path) for path in entries.paths]
+    blocks = terms.split_with_sizes([d * d for d in sizes])
+    return torch.cat([b.reshape(d, d, *b.shape[1:]).sum(1) for d, b in zip(sizes, blocks, strict=True)])
