@@ -172,6 +172,7 @@ def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch)
             {"kernel": "loops", "backends": ["formulas"]},
             "'formulas' is not there with --kernel loops",
         ),
+        ("planar151", {"backends": ["c"]}, "151 joints are too many for C in loops"),
         ("planar3", {"kernel": "curved"}, "no kernel 'curved'; choose among auto, straight, loops"),
     ],
 )

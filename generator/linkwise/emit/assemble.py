@@ -136,7 +136,6 @@ def _costs(derivation: Derivation, shared: Kernel | None) -> tuple[list[int], in
     """Operations of each link's decomposition by itself, and of all links where they share work."""
     system = derivation.system
     if derivation.kernel == "loops" and isinstance(system, RigidSystem):
-        alone = [loop_costs.link_cost(system, j) for j in range(len(system.links))]
-        return alone, loop_costs.decomposition_cost(system)
+        return loop_costs.link_costs(system), loop_costs.decomposition_cost(system)
     alone = [decomposition_cost([kernel]) for kernel in derivation.kernels]
     return alone, decomposition_cost([shared]) if shared else None

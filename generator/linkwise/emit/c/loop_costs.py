@@ -5,8 +5,6 @@ robot alone, such as half the trace of an inertia, is not counted, nor are sines
 them in the C of one sample.
 """
 
-from collections.abc import Sequence
-
 from linkwise.emit.c.robot_tables import columns, placed
 from linkwise.robot.robot import Joint
 from linkwise.symbolic.system import RigidSystem
@@ -31,12 +29,15 @@ GRADIENT = 111
 """The wrenches of a joint's c0."""
 
 
-def link_cost(system: RigidSystem, link: int) -> int:
-    """Operations of one link's decomposition by itself."""
-    found = columns(system)
-    chain = system.links[link].chain
-    sums = sum(last in chain for _, last in found.sums)
-    return _frames(system, chain) + SUM * sums + _link(system, link)
+def link_costs(system: RigidSystem) -> list[int]:
+    """Operations of each link's decomposition by itself."""
+    frames, sums = _frames(system), columns(system).sums
+    costs = []
+    for j, link in enumerate(system.links):
+        chain = set(link.chain)
+        own = sum(last in chain for _, last in sums)
+        costs.append(sum(frames[f] for f in chain) + SUM * own + _link(system, j))
+    return costs
 
 
 def decomposition_cost(system: RigidSystem) -> int:
@@ -59,12 +60,15 @@ def gradient_cost(system: RigidSystem) -> int:
 
 
 def _motion(system: RigidSystem) -> int:
-    return _frames(system, range(len(system.robot.links))) + SUM * len(columns(system).sums)
+    return sum(_frames(system)) + SUM * len(columns(system).sums)
 
 
-def _frames(system: RigidSystem, frames: Sequence[int]) -> int:
-    matters = placed(system)
-    return sum(FRAME + _by_kind(system.robot.links[f].joint, matters[f]) for f in frames)
+def _frames(system: RigidSystem) -> list[int]:
+    """Operations of each frame."""
+    links = system.robot.links
+    return [
+        FRAME + _by_kind(link.joint, matters) for link, matters in zip(links, placed(system), strict=True)
+    ]
 
 
 def _by_kind(joint: Joint, matters: bool) -> int:

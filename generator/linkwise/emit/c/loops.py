@@ -13,6 +13,7 @@ from linkwise.emit.c.robot_tables import formulas, path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
+from linkwise.errors import LinkwiseError
 from linkwise.symbolic.system import RigidSystem
 from linkwise.version import VERSION
 
@@ -36,11 +37,24 @@ FIXED = (
 """Files that are the same in every package with a kernel in loops."""
 
 
+MOST_JOINTS = 150
+"""Coordinates of which all pairs' results for one link wait on the stack: some 4 MB of a thread's 8."""
+
+
 def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
-    """Paths inside the package and texts; raises TypeError for what is not rigid bodies."""
+    """Paths inside the package and texts.
+
+    Raises TypeError for what is not rigid bodies, and LinkwiseError for a robot of too many joints.
+    """
     system, name = derivation.system, derivation.package
     if not isinstance(system, RigidSystem):
         raise TypeError("a kernel in loops goes over rigid bodies")
+    joints = len(system.coordinates)
+    if joints > MOST_JOINTS:
+        raise LinkwiseError(
+            f"{joints} joints are too many for C in loops, which takes {MOST_JOINTS}, as results "
+            "wait on the stack; ask for back ends without C: --backend numpy, say"
+        )
     links = path_spans(system)
     common = {"version": VERSION, "name": name}
     yield f"c/{name}.c", render("c/robot_loops.c.j2", common | _robot_view(system, links))
