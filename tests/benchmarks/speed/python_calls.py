@@ -3,7 +3,10 @@
 import inspect
 from collections.abc import Callable, Iterator
 from functools import partial
+from importlib import import_module
+from types import ModuleType
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -65,6 +68,18 @@ def loaded(package: Package) -> Iterator[tuple[str, Any]]:
                 yield (backend if kernel == "straight" else f"{backend} {kernel}"), robot
         else:
             yield backend, module.load(backend)
+    if "native" in module.BACKENDS:
+        yield "native ctypes", without_compiled_module(module)
+
+
+def without_compiled_module(module: ModuleType) -> Any:
+    """`native` as it is where Python's headers are missing."""
+    binding = import_module(f"{module.__name__}.runtime.native_module")
+    with patch.object(binding, "headers", tuple):
+        binding.compiled_calls.cache_clear()
+        robot = module.load("native")
+    binding.compiled_calls.cache_clear()
+    return robot
 
 
 def timed(
@@ -72,7 +87,9 @@ def timed(
 ) -> Iterator[tuple[Key, Callable[[], Any]]]:
     """Calls of one back end at a batch: all on `native`, `packed` on the others."""
     through, robot = named
-    native = through == "native"
+    native = through.startswith("native")
+    if through == "native ctypes" and batch > 1:
+        return
     if not native and (not slow or (through == "autograd" and batch > 1024)):
         return
     for dtype, width in (("float64", 8), ("float32", 4)):
