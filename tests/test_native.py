@@ -4,6 +4,8 @@ import gc
 import multiprocessing
 import pickle
 import sys
+import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
@@ -219,3 +221,41 @@ def test_subclasses_and_negated_views_of_tensors_are_tensors(planar3: ModuleType
     assert torch.is_tensor(robot.inverse_dynamics(q.as_subclass(Special), q, q))
     view = torch._neg_view(q)
     torch.testing.assert_close(robot.inverse_dynamics(view, q, q), robot.inverse_dynamics(-q, q, q))
+
+
+def test_an_interrupted_call_lets_nobody_write_to_its_memory_any_more(
+    package_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = package_of("planar3").load("native")
+    robot.backend.threads = 2
+    calls = robot.backend.calls
+    motion, begun = np.ones((3, 40_000, 3)), threading.Event()
+    out = np.empty((40_000, 3, 3))
+    real = calls._function("partial_torque", np.dtype("f8"))
+
+    def compute(count: int, q: int, *arrays: int) -> None:
+        if q == motion[0].ctypes.data:  # the part of the caller's own thread
+            begun.wait(10)
+            raise KeyboardInterrupt
+        begun.set()
+        time.sleep(0.2)
+        real(count, q, *arrays)
+
+    monkeypatch.setitem(calls._functions, ("partial_torque", np.dtype("f8")), compute)
+    with pytest.raises(KeyboardInterrupt):
+        robot.partial_torque(*motion, out=out)
+    out[...] = 0.0
+    time.sleep(0.5)
+    assert not out.any()
+
+
+def test_what_is_written_to_is_known_to_have_changed(package_of: Callable[[str], ModuleType]) -> None:
+    robot, q = package_of("planar3").load("native"), torch.ones(3, dtype=torch.float64)
+    out, factor = (
+        torch.ones(3, 3, dtype=torch.float64),
+        torch.ones((), requires_grad=True, dtype=torch.float64),
+    )
+    product = (factor * out).sum()
+    robot.partial_torque(q, q, q, out=out)
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        product.backward()

@@ -280,3 +280,30 @@ def test_a_robot_is_compiled_in_one_piece(tmp_path: Path) -> None:
     motion = motion_of("torch", 2, 16)
     expected = package.load("torch", kernel="straight").partial_torque(*motion)
     assert relative_error(compiled(*motion), expected) <= 1e-14
+
+
+@pytest.mark.parametrize("far", ["10 0 0", "1000 300 0"])
+def test_an_arm_far_from_another_one_keeps_its_digits(far: str, tmp_path: Path) -> None:
+    arms = [
+        f'<link name="{side}{j}"><inertial><origin xyz="0.1 0.02 0.03"/><mass value="1"/>'
+        '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="0.002" iyz="-0.001"/></inertial></link>'
+        f'<joint name="{side}{j}" type="revolute"><parent link="{side}{j - 1}"/><child link="{side}{j}"/>'
+        f'<origin rpy="1 0.3 0" xyz="0.2 0 0.1"/><axis xyz="0 0 1"/><limit effort="1" velocity="1"/></joint>'
+        for side in "ab"
+        for j in (1, 2, 3)
+    ]
+    bases = '<link name="base"/><link name="a0"/><link name="b0"/>' + "".join(
+        f'<joint name="to_{side}" type="fixed"><parent link="base"/><child link="{side}0"/>'
+        f'<origin xyz="{place}"/></joint>'
+        for side, place in (("a", "0 0 0"), ("b", far))
+    )
+    (tmp_path / "arms.urdf").write_text(f'<robot name="arms">{bases}{"".join(arms)}</robot>')
+    write_package(generate(read_system(tmp_path / "arms.urdf"), ["numpy"]), tmp_path / "arms")
+    package = import_package(tmp_path / "arms")
+    motion = motion_of("numpy", 6, 5)
+    exact = package.load("numpy", kernel="straight").packed(*motion)
+    single = package.load("numpy", kernel="rule").packed(*(a.astype(np.float32) for a in motion))
+    for one, other in zip(package.load("numpy", kernel="rule").packed(*motion), exact, strict=True):
+        assert relative_error(one, other) <= 1e-14
+    for one, other in zip(single, exact, strict=True):
+        assert relative_error(one, other) <= 3e-6

@@ -7,7 +7,9 @@ it is, and only then is the block free again. Meanwhile the system may take its 
 """
 
 import mmap
+import sys
 from contextlib import suppress
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -19,8 +21,12 @@ MOST = 1 << 29
 """Bytes of blocks that are kept while nobody needs them."""
 PAGE = 1 << 21
 
-_free: dict[int, list[mmap.mmap]] = {}
-"""Free blocks by size. Nothing is locked, as a lease may end anywhere: lists give and take in one step."""
+_shared = sys.modules.setdefault(
+    "_linkwise_blocks", ModuleType("_linkwise_blocks", "Blocks of all packages.")
+)
+_free: dict[int, list[mmap.mmap]] = vars(_shared).setdefault("free", {})
+"""Free blocks by size, those of all packages in this process. Nothing is locked, as a lease may end anywhere:
+lists give and take in one step."""
 
 
 class Lease:

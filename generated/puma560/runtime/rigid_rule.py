@@ -50,8 +50,10 @@ class LinkTables(NamedTuple):
 
 
 class LinkMoments(NamedTuple):
-    """Links in motion, about the common origin; vectors end with their x and y once more, matrices have their
-    columns first."""
+    """Links in motion, about the first hinge of their path.
+
+    Vectors end with their x and y once more, matrices have their columns first.
+    """
 
     m: Any
     """(N, samples)"""
@@ -92,20 +94,18 @@ def link_states(
     qd, qdd = (taken(a, joints) for a in own)
     twist = taken(moved.twists, joints) + screws * qd
     change = taken(moved.accelerations, joints) + screws * qdd + rates * qd
-    moments = _moments(xp, tables, numbers, poses, twist, moved.origin)
+    moments = _moments(xp, tables, numbers, poses, twist)
     whole = accelerated(xp, moments, change[:, 0], change[:, 1]) + turning(xp, moments, twist[:, 0])
     moment = cross(moments.h, around(xp, gravity))
     weight = xp.concat([moment, xp.broadcast_to(moments.m * gravity, moment.shape)], 0)
     return LinkStates(moments, xp.stack([whole, -weight], 1))
 
 
-def _moments(
-    xp: Any, tables: LinkTables, numbers: LinkNumbers, poses: Poses, twist: Any, origin: Any
-) -> LinkMoments:
+def _moments(xp: Any, tables: LinkTables, numbers: LinkNumbers, poses: Poses, twist: Any) -> LinkMoments:
     """Moments of the links from their frames and twists (5, 2, N, samples)."""
     omega, v, m, c = twist[:, 0], twist[:, 1], numbers.masses, numbers.centres
     axes, place = taken(poses.axes, tables.joints), taken(poses.places, tables.joints)
-    centre = place - origin + axes[:, 0] * c[0] + axes[:, 1] * c[1] + axes[:, 2] * c[2]
+    centre = place + axes[:, 0] * c[0] + axes[:, 1] * c[1] + axes[:, 2] * c[2]
     h = m * centre
     # About o: E = R (1/2 tr(J) - J) R^T + h c^T, I = tr(E) - E with tr(E) = 1/2 tr(J) + h . c.
     turned = product(axes, numbers.second_moments)

@@ -100,6 +100,8 @@ def compute(run: Run, call: str, motion: Sequence[Tensor], into: Sequence[Tensor
     arrays = [as_numbers(t) for t in motion]
     if into is None:
         return tuple(torch.from_numpy(result) for result in run(call, arrays, None))
+    for t in into:
+        torch.autograd.graph.increment_version(t)  # so that no gradient is taken of what stood there
     run(call, arrays, [as_numbers(t) for t in into])
     return into
 

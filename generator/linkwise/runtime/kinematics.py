@@ -5,9 +5,10 @@ before them: a vector is (3, joints, samples), and what all samples share has on
 operations grows with the logarithm of the tree's depth alone: frames are composed over one joint, then two,
 four, eight, and what adds up along a chain of joints is one product with a matrix of zeros and ones.
 
-Vectors are in the base's axes, and moments and linear velocities about one origin o at rest: at the instant
-it is in the first hinge, so that a robot far from its base loses no digits. The screw of joint f, times its
-ratio, is S_f = (z, s): s = (p - o) x z for a hinge at p, and z = 0, s = axis for a slide.
+Vectors are in the base's axes, and moments and linear velocities about an origin o at rest: at the instant
+it is in the first hinge of each path, and places are counted from there, so that what is far from the base,
+or from another arm, loses no digits. The screw of joint f, times its ratio, is S_f = (z, s): s = (p - o) x z
+for a hinge at p, and z = 0, s = axis for a slide, wherever it is.
 """
 
 from typing import Any, NamedTuple
@@ -40,8 +41,8 @@ class KinematicTables(NamedTuple):
     """For each step of composition the frame that each one's axes are in so far."""
     before: Any
     """(frames, frames): ones for the joints before each, itself apart."""
-    origin: slice
-    """The frame in whose place the common origin is taken."""
+    reach: Any
+    """(frames, frames): ones for the joints on each one's path behind the first hinge, itself included."""
 
 
 class Poses(NamedTuple):
@@ -50,11 +51,14 @@ class Poses(NamedTuple):
     axes: Any
     """(3, 3, frames, samples): [component, axis x, y or z]."""
     places: Any
-    """(3, frames, samples), in m."""
+    """From the first hinge of the path, (3, frames, samples), in m; zero before it."""
 
 
 class Twists(NamedTuple):
-    """Screws and motion about the common origin; vectors end with their x and y once more, see `around`."""
+    """Screws and motion about the first hinge of each path.
+
+    Vectors end with their x and y once more, see `around`.
+    """
 
     screws: Any
     """(5, 2, frames, samples): z and s of each joint times its ratio; none for the ground."""
@@ -64,8 +68,6 @@ class Twists(NamedTuple):
     """The same: omega and v of what carries each joint."""
     accelerations: Any
     """The same: their rates, from minus gravity."""
-    origin: Any
-    """Place of the common origin in the base's axes, (3, 1, samples)."""
 
 
 def kinematic_tables(tree: JointTree) -> KinematicTables:
@@ -80,7 +82,6 @@ def kinematic_tables(tree: JointTree) -> KinematicTables:
     before = np.zeros((ground + 1, ground + 1))
     for f, joint in enumerate(joints):
         before[f, list(tree.chain(joint.parent))] = 1.0
-    first = int(np.argmax(hinge))
     return KinematicTables(
         np.array([*(j.coordinate for j in joints), 0]),
         np.where(hinge, ratio, 0.0),
@@ -93,8 +94,15 @@ def kinematic_tables(tree: JointTree) -> KinematicTables:
         parents,
         tuple(_doubled(parents)),
         before,
-        slice(first, first + 1),
+        _reach(tree, before),
     )
+
+
+def _reach(tree: JointTree, before: Any) -> Any:
+    """Joints whose steps lie between the first hinge of a path and each frame: those with a hinge before."""
+    turns = np.array([*(joint.kind == "revolute" for joint in tree.joints), False])
+    behind = (before @ turns > 0.0)[None]
+    return np.where(behind, before + np.eye(len(before)), 0.0)
 
 
 def _doubled(parents: Any) -> Any:
@@ -120,7 +128,7 @@ def poses(xp: Any, tables: KinematicTables, translations: Any, position: Any) ->
         step = step + tables.axes * (tables.slides * position)
     before = taken(axes, tables.parents)
     step = before[:, 0] * step[0] + before[:, 1] * step[1] + before[:, 2] * step[2]
-    return Poses(axes, tables.before @ step + step)
+    return Poses(axes, tables.reach @ step)
 
 
 def twists(
@@ -131,9 +139,9 @@ def twists(
     velocity, acceleration: qd and qdd of every frame's coordinate, (frames, samples); gravity: (3, 1,
     samples)
     """
-    axis, origin = poses.axes[:, 2], poses.places[:, tables.origin]
+    axis = poses.axes[:, 2]
     z = axis * tables.turns
-    s = cross(around(xp, poses.places - origin), around(xp, z))
+    s = cross(around(xp, poses.places), around(xp, z))
     if tables.slides is not None:
         s = s + axis * tables.slides
     screws = around(xp, xp.stack([z, s], 1))
@@ -142,7 +150,7 @@ def twists(
     rates = motion_cross(xp, before, screws)
     change = tables.before @ (screws * acceleration + rates * velocity)
     weight = around(xp, xp.stack([0.0 * gravity, gravity], 1))
-    return Twists(screws, rates, before, change - weight, origin)
+    return Twists(screws, rates, before, change - weight)
 
 
 def taken(a: Any, index: Any, axis: int = -2) -> Any:

@@ -4,7 +4,7 @@ import ctypes
 import math
 import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -113,7 +113,7 @@ class NativeCalls:
             *((address(a), 0) for a in read[len(motion) :]),
             *((address(a), size * width) for a, size in zip(written, filter(None, sizes), strict=True)),
         ]
-        self._share(compute, count, arrays, parts)
+        self._share(compute, count, arrays, parts, (read, into))
         return into
 
     def _one(
@@ -155,19 +155,34 @@ class NativeCalls:
         found = self._functions[call, kind] = function(self.sources, FUNCTIONS[call], kind.str[1:], arrays)
         return found
 
-    def _share(self, compute: Any, count: int, arrays: Sequence[tuple[int, int]], parts: int) -> None:
+    def _share(
+        self, compute: Any, count: int, arrays: Sequence[tuple[int, int]], parts: int, held: Any
+    ) -> None:
         """Call a C function in several parts; `arrays` are addresses, and bytes from one sample to the next.
 
-        Threads take shares of the samples; shares of 16 fill blocks of either type.
+        Threads take shares of the samples; shares of 16 fill blocks of either type. `held` are the arrays:
+        each part holds them, so that their memory lasts as long as it runs.
         """
         share = -(-count // parts // 16) * 16
 
-        def run(first: int) -> None:
+        def run(first: int, held: Any = held) -> None:
             compute(min(share, count - first), *(start + first * step for start, step in arrays))
 
         first, *others = range(0, count, share)
-        waiting = [pool(self.threads).submit(run, start) for start in others]
-        run(first)
+        waiting: list[Future[None]] = []
+        try:
+            for start in others:
+                try:
+                    waiting.append(pool(self.threads).submit(run, start))
+                except RuntimeError:  # Python is ending, and starts no threads any more
+                    run(start)
+            run(first)
+        except BaseException:  # a signal, say
+            for future in waiting:
+                future.cancel()
+            raise
+        finally:
+            wait(waiting)  # nobody may write to memory that has been given back
         for future in waiting:
             future.result()
 

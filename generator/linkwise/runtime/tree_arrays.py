@@ -94,8 +94,12 @@ def with_bodies(xp: Any, numbers: TreeArrays, bodies: Bodies[Any], batch: tuple[
             value = xp.broadcast_to(value, (*batch, *shape)).reshape(-1, *shape)
         else:
             value = value[None]
-        # (samples, N, ...) -> (..., N, samples)
-        given[name] = xp.moveaxis(xp.moveaxis(value, 0, -1), 0, -2)
+        # (samples, N, ...) -> (..., N, samples): N to the front, then both to the end, one axis after another
+        for axis in range(value.ndim - 1):
+            value = xp.swapaxes(value, axis, axis + 1)
+        for axis in range(value.ndim - 2):
+            value = xp.swapaxes(value, axis, axis + 1)
+        given[name] = value
     return numbers._replace(**given)
 
 
