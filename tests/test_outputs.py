@@ -123,3 +123,18 @@ def test_where_a_gradient_is_recorded_there_is_no_out(
         robot.inverse_dynamics(*motion, out=out)
     with torch.no_grad():
         assert robot.inverse_dynamics(*motion, out=out) is out
+
+
+@pytest.mark.parametrize("backend", BACKENDS[:3])
+def test_an_array_that_overlaps_itself_is_refused(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot, motion = package_of("planar3").load(backend), motion_of(backend, 5)
+    room = np.empty(60)
+    overlapping = np.lib.stride_tricks.as_strided(room, (5, 3, 3), (16, 24, 8))
+    fortran = np.asfortranarray(np.empty((5, 3, 3)))
+    if backend != "numpy":
+        overlapping, fortran = (torch.from_numpy(a) for a in (overlapping, fortran))
+    with pytest.raises(ValueError, match=r"^out overlaps itself; give it memory of its own$"):
+        robot.partial_torque(*motion, out=overlapping)
+    robot.partial_torque(*motion, out=fortran)

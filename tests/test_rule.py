@@ -130,6 +130,11 @@ def test_bodies_may_differ_from_sample_to_sample(
 
 WRONG = {
     "no bodies": ([1.0], TypeError, r"bodies is list; give Bodies\(masses, centres, inertias\), such as"),
+    "none": (
+        {"masses": None},
+        TypeError,
+        r"bodies.masses is None; give an array or a tensor of shape \(3,\)",
+    ),
     "count": ({"masses": np.ones(2)}, ValueError, r"bodies.masses has shape \(2,\); it must be \(3,\)"),
     "axes": (
         {"inertias": np.ones((3, 3))},

@@ -55,11 +55,27 @@ def _check(name: str, one: Any, shape: tuple[int, ...], like: Any) -> None:
         raise TypeError(f"{name} lies on {one.device}; the answer lies on {like.device}")
     if tuple(one.shape) != shape:
         raise ValueError(f"{name} has shape {tuple(one.shape)}; the answer has {shape}")
+    if _overlaps_itself(one):
+        raise ValueError(f"{name} overlaps itself; give it memory of its own")
     if tensor:
         if one.requires_grad:
             raise TypeError(f"{name} requires a gradient; give {name}.detach()")
     elif not one.flags.writeable:
         raise ValueError(f"{name} is read-only; give an array that may be written to")
+
+
+def _overlaps_itself(one: Any) -> bool:
+    """Whether steps along one axis are smaller than what the others cover, or nothing at all."""
+    if 0 in one.shape:
+        return False
+    array = isinstance(one, np.ndarray)
+    steps = one.strides if array else one.stride()
+    covered = one.itemsize - 1 if array else 0
+    for step, size in sorted((abs(step), size) for step, size in zip(steps, one.shape, strict=True)):
+        if size > 1 and step <= covered:
+            return True
+        covered += (size - 1) * step
+    return False
 
 
 def _is_contiguous(one: Any) -> bool:

@@ -114,6 +114,9 @@ def checked_bodies(given: Any, links: int, read: Callable[[str, Any], Any]) -> B
             "package's bodies()"
         )
     values = {f"bodies.{name}": value for name, value in zip(SHAPES, given, strict=True)}
+    for (name, value), inner in zip(values.items(), SHAPES.values(), strict=True):
+        if value is None:
+            raise TypeError(f"{name} is None; give an array or a tensor of shape {(links, *inner)}")
     values = {name: read(name, value) for name, value in values.items()}
     precision(values, values)
     for (name, value), inner in zip(values.items(), SHAPES.values(), strict=True):
