@@ -26,6 +26,7 @@ class Target:
 def targets(results: Results) -> Iterator[Target]:
     """All of them; those of robots that were not timed have no value."""
     yield from in_c(results)
+    yield from operations(results)
     yield from large_batches(results)
     yield from from_python(results)
     yield from dense_batches(results)
@@ -37,7 +38,7 @@ def in_c(results: Results) -> Iterator[Target]:
     """Panda in C, one sample and in the cache."""
     blocks = results.figure("panda", "C", "float64", "blocks", 1024, 1)
     one = results.find("panda", "C", "float64", "rows").get(1)
-    two = results.find("panda", "C", "float64", "blocks", 2).get(1024)
+    alone, both = (results.find("panda", "C", "float64", "blocks", threads) for threads in (1, 2))
     pin, casadi = results.pinocchio.get("panda"), results.casadi.get("panda")
     whole, many = pin.decomposition if pin else None, blocks.ns if blocks else None
     least = results.arithmetic(blocks) if blocks else None
@@ -47,7 +48,16 @@ def in_c(results: Results) -> Iterator[Target]:
     yield Target("Panda, CasADi's C / batch 1,024", ratio(casadi.ns if casadi else None, many), 20, False)
     yield Target("Panda, Pinocchio's full decomposition / one sample", ratio(whole, one), 30, False)
     yield Target("Panda, one sample / one rnea", ratio(one, pin.rnea if pin else None), 1)
-    yield Target("Panda, one thread / two, batch 1,024", ratio(many, two), 1.8, False)
+    for batch in sorted(b for b in both if b >= 1024) or [1024]:
+        shared = ratio(alone.get(batch), both.get(batch))
+        yield Target(f"Panda, one thread / two, batch {batch:,}", shared, 1.8, False)
+
+
+def operations(results: Results) -> Iterator[Target]:
+    """Additions and multiplications of straight kernels: numbers that no machine changes."""
+    counted = {facts["robot"]: facts["operations"] for facts in results.packages}
+    for robot, most in (("panda", 4300), ("chain20_straight", 70000), ("planar3", 200), ("planar10", 3300)):
+        yield Target(f"{robot}, operations", counted.get(robot), most)
 
 
 def large_batches(results: Results) -> Iterator[Target]:
