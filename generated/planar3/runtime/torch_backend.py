@@ -95,14 +95,16 @@ class TorchBackend:
         """tau (..., count) in the order of `Layout.torque`."""
         p = self._values(q)
         if rule := self._rule("torque", q):
-            return rule.torque(self, (q, qd, qdd), p, self._bodies(q))  # type: ignore[no-any-return]
+            tau: Tensor = rule.torque(self, (q, qd, qdd), p, self._bodies(q))
+            return tau
         return self.concatenate(_stacked(q, link.torque(torch, q, qd, qdd, p)) for link in self.links)
 
     def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """c0 (..., count) in the order of `Layout.velocity`."""
         p = self._values(q)
         if rule := self._rule("position_gradient", q):
-            return rule.position_gradient(self, (q, qd, qdd), p, self._bodies(q))  # type: ignore[no-any-return]
+            c0: Tensor = rule.position_gradient(self, (q, qd, qdd), p, self._bodies(q))
+            return c0
         return self.concatenate(
             _stacked(q, link.position_gradient(torch, q, qd, qdd, p)) for link in self.links
         )

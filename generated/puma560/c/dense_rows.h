@@ -1,5 +1,8 @@
 /* Results of blocks to rows with their zeros. The same in every package of linkwise. It needs dense.h and stream.h. */
 
+/* Torques alone: packed, with their zeros, or their sums over the links. */
+enum torques { PACKED, DENSE, SUMS };
+
 /* Links whose cubes wait in a block at a time, as many as a usual second-level cache holds beside their rows, and whether
    that is all of them. */
 enum {

@@ -183,17 +183,6 @@ SHARED void API(dense_one)(const real *q, const real *qd, const real *qdd, const
     to_dense_one(5, &m, &r, to);
 }
 
-SHARED void API(dense_torque_one)(const real *q, const real *qd, const real *qdd, int sums, real *torque)
-{
-    real tau[G];
-    API(torque_one)(q, qd, qdd, tau);
-    memset(torque, 0, (sums ? (size_t)N : (size_t)SQUARE) * sizeof(real));
-    if (sums)
-        to_sums_one(0, LINKS, tau, 1, torque);
-    else
-        to_squares_one(0, LINKS, tau, 1, torque);
-}
-
 #undef W
 #undef SIZED
 #undef KERNEL
@@ -318,9 +307,7 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
         stream_end();
 }
 
-/* Torques alone: packed, with their zeros, or their sums over the links. */
-enum torques { PACKED, DENSE, SUMS };
-
+/* Torques alone. */
 static void torque_rows(size_t count, const real *q, const real *qd, const real *qdd, enum torques kind, real *tau)
 {
     const size_t rows_of[] = {G, SQUARE, N}, row = rows_of[kind];
@@ -346,30 +333,6 @@ static void torque_rows(size_t count, const real *q, const real *qd, const real 
         else
             to_sums_block(0, 6, tau_block, samples, rows);
     }
-}
-
-void API(torque)(size_t count, const real *q, const real *qd, const real *qdd, real *tau)
-{
-    if (count == 1)
-        API(torque_one)(q, qd, qdd, tau);
-    else
-        torque_rows(count, q, qd, qdd, PACKED, tau);
-}
-
-void API(partial_torque)(size_t count, const real *q, const real *qd, const real *qdd, real *torque)
-{
-    if (count == 1)
-        API(dense_torque_one)(q, qd, qdd, 0, torque);
-    else
-        torque_rows(count, q, qd, qdd, DENSE, torque);
-}
-
-void API(inverse_dynamics)(size_t count, const real *q, const real *qd, const real *qdd, real *torque)
-{
-    if (count == 1)
-        API(dense_torque_one)(q, qd, qdd, 1, torque);
-    else
-        torque_rows(count, q, qd, qdd, SUMS, torque);
 }
 
 /* Results of links, which wait where r says, to their places from sample s on. */
@@ -409,26 +372,6 @@ static void dense_rows(size_t count, const real *q, const real *qd, const real *
         stream_end();
 }
 
-void API(coefficients)(size_t count, const real *q, const real *qd,
-    real *acceleration, real *velocity, real *gravity)
-{
-    const struct dense to = {acceleration, velocity, gravity, 0, 0};
-    dense_rows(count, q, qd, qd, &to); /* any qdd: coefficients don't depend on it */
-}
-
-void API(propagation)(size_t count, const real *q, const real *qd, const real *qdd,
-    real *acceleration, real *velocity, real *gravity)
-{
-    const struct dense to = {acceleration, velocity, gravity, 1, 0};
-    dense_rows(count, q, qd, qdd, &to);
-}
-
-void API(gradient_propagation)(size_t count, const real *q, const real *qd, const real *qdd,
-    real *acceleration, real *velocity, real *gravity)
-{
-    const struct dense to = {acceleration, velocity, gravity, 1, 1};
-    dense_rows(count, q, qd, qdd, &to);
-}
 #endif
 
 /* ---- Position gradients of rows ---- */
@@ -486,14 +429,10 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
             scatter(samples, 36, C1, c0_block, c0 + s * C1 + 55);
     }
 }
-
-void API(position_gradient)(size_t count, const real *q, const real *qd, const real *qdd, real *c0)
-{
-    gradient_rows(count, q, qd, qdd, 0, c0);
-}
-
-void API(dense_position_gradient)(size_t count, const real *q, const real *qd, const real *qdd, real *gradient)
-{
-    gradient_rows(count, q, qd, qdd, 1, gradient);
-}
 #endif
+
+#define INPUTS const real *q, const real *qd, const real *qdd
+#define PASSED q, qd, qdd
+#define AT_REST const real *q, const real *qd
+#define PASSED_AT_REST q, qd, qd
+#include "calls.h"

@@ -45,15 +45,18 @@ class AutogradBackend(TorchBackend):
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
-        return self._of_links(decomposition, q, qd, qdd)  # type: ignore[no-any-return]
+        parts: Sequence[Tensor] = self._of_links(decomposition, q, qd, qdd)
+        return parts
 
     def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """tau (..., count) in the order of `Layout.torque`."""
-        return self._of_links(torque, q, qd, qdd)  # type: ignore[no-any-return]
+        tau: Tensor = self._of_links(torque, q, qd, qdd)
+        return tau
 
     def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """c0 (..., count) in the order of `Layout.velocity`."""
-        return self._of_links(position_gradient, q, qd, qdd)  # type: ignore[no-any-return]
+        c0: Tensor = self._of_links(position_gradient, q, qd, qdd)
+        return c0
 
     def _of_links(self, call: Callable[..., Any], q: Tensor, qd: Tensor, qdd: Tensor) -> Any:
         """What a function of sweeps.py makes of the Lagrangians."""

@@ -19,6 +19,7 @@ from linkwise.version import VERSION
 
 FIXED = (
     "blocks.h",
+    "calls.h",
     "dense.h",
     "dense_rows.h",
     "gradient.h",

@@ -26,7 +26,7 @@ from linkwise.escape import c_comment
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 
-FIXED = ("numbers.h", "sines.h", "rows.h", "dense.h", "stream.h", "dense_rows.h")
+FIXED = ("numbers.h", "sines.h", "rows.h", "dense.h", "stream.h", "dense_rows.h", "calls.h")
 """Files that are the same in every package."""
 
 

@@ -192,9 +192,7 @@ static void torques_of_link(const struct numbers *x, const motion *m, int j, rea
     }
 }
 
-/* Torques alone: packed, with their zeros, or their sums over the links. */
-enum torques { PACKED, DENSE, SUMS };
-
+/* Torques alone. */
 static void torque_rows(size_t count, INPUTS, enum torques kind, real *tau)
 {
     if (!count)
@@ -224,30 +222,6 @@ static void torque_rows(size_t count, INPUTS, enum torques kind, real *tau)
         }
         leave_torques(&r);
     }
-}
-
-void API(torque)(size_t count, INPUTS, real *tau)
-{
-    if (count == 1)
-        API(torque_one)(PASSED, tau);
-    else
-        torque_rows(count, PASSED, PACKED, tau);
-}
-
-void API(partial_torque)(size_t count, INPUTS, real *torque)
-{
-    if (count == 1)
-        API(dense_torque_one)(PASSED, 0, torque);
-    else
-        torque_rows(count, PASSED, DENSE, torque);
-}
-
-void API(inverse_dynamics)(size_t count, INPUTS, real *torque)
-{
-    if (count == 1)
-        API(dense_torque_one)(PASSED, 1, torque);
-    else
-        torque_rows(count, PASSED, SUMS, torque);
 }
 
 /* All results of link j in a block, packed. */
@@ -300,23 +274,6 @@ static void dense_rows(size_t count, INPUTS, const struct dense *to)
     }
 }
 
-void API(coefficients)(size_t count, AT_REST, real *acceleration, real *velocity, real *gravity)
-{
-    const struct dense to = {acceleration, velocity, gravity, 0, 0};
-    dense_rows(count, PASSED_AT_REST, &to); /* any qdd: coefficients don't depend on it */
-}
-
-void API(propagation)(size_t count, INPUTS, real *acceleration, real *velocity, real *gravity)
-{
-    const struct dense to = {acceleration, velocity, gravity, 1, 0};
-    dense_rows(count, PASSED, &to);
-}
-
-void API(gradient_propagation)(size_t count, INPUTS, real *acceleration, real *velocity, real *gravity)
-{
-    const struct dense to = {acceleration, velocity, gravity, 1, 1};
-    dense_rows(count, PASSED, &to);
-}
 #endif
 
 #if PART(POSITION_GRADIENT)
@@ -371,14 +328,6 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
         }
     }
 }
-
-void API(position_gradient)(size_t count, INPUTS, real *c0)
-{
-    gradient_rows(count, PASSED, 0, c0);
-}
-
-void API(dense_position_gradient)(size_t count, INPUTS, real *gradient)
-{
-    gradient_rows(count, PASSED, 1, gradient);
-}
 #endif
+
+#include "calls.h"

@@ -102,17 +102,6 @@ SHARED void API(dense_one)(INPUTS, const struct dense *to)
     }
 }
 
-SHARED void API(dense_torque_one)(INPUTS, int sums, real *torque)
-{
-    real tau[G];
-    API(torque_one)(PASSED, tau);
-    memset(torque, 0, (sums ? (size_t)N : (size_t)SQUARE) * sizeof(real));
-    if (sums)
-        to_sums_one(0, LINKS, tau, 1, torque);
-    else
-        to_squares_one(0, LINKS, tau, 1, torque);
-}
-
 #undef W
 #undef number
 #undef KERNEL
