@@ -50,7 +50,7 @@ def test_numbers_and_operations_of_panda(
         pytest.skip("needs the package example-robot-data")
     manifest = json.loads((directory_of(str(PANDA)) / "manifest.json").read_text())
     (operations,) = stated(r"The full decomposition costs ([\d,]+) additions and multiplications")
-    assert manifest["shared_operations"] == operations
+    assert manifest["operations"] == operations
     (numbers,) = stated(r"\(7 joints, (\d+) numbers a sample")
     assert sum(map(len, package_of(str(PANDA)).load("numpy").layout)) == numbers
 

@@ -7,8 +7,6 @@ from types import ModuleType
 import numpy as np
 import pytest
 from linkwise import check_package, generate, read_system, write_package
-from linkwise.dynamics.derive import derive, shared_kernel
-from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.robot import BUILT_IN, DESCRIPTIONS, read_robot
 
 
@@ -41,7 +39,7 @@ def test_planar_arms_have_the_torques_of_the_textbook(package_of: Callable[[str]
     np.testing.assert_allclose(answer, np.stack(exact, -1), rtol=0, atol=1e-14)
 
 
-def test_torso_is_a_small_tree_whose_links_share_work() -> None:
+def test_torso_is_a_small_tree() -> None:
     system = read_system("torso")
     assert [link.name for link in system.links] == [
         "chest",
@@ -52,9 +50,6 @@ def test_torso_is_a_small_tree_whose_links_share_work() -> None:
     ]
     assert system.path(2) == (0, 1, 2, 3, 4)
     assert system.path(4) == (0, 1, 2, 5, 6)
-    together = shared_kernel(system, derive(system))
-    assert together is not None
-    assert decomposition_cost([together]) < 0.95 * decomposition_cost(derive(system))
 
 
 def test_arms_of_the_torso_mirror_each_other() -> None:
@@ -71,6 +66,5 @@ def test_arms_of_the_torso_mirror_each_other() -> None:
 
 def test_torso_agrees_with_an_independent_recursion(tmp_path: Path) -> None:
     files = generate(read_system("torso"), ["numpy", "c"])
-    assert "shared_part" in files["c/links_together.h"]
     write_package(files, tmp_path / "torso")
     assert all(result.passed for result in check_package(tmp_path / "torso", samples=20))

@@ -14,7 +14,7 @@
    at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
-/* Decomposition: 47 additions and multiplications, 4 sines and cosines apart. */
+/* Decomposition: 40 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_2_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
     real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
@@ -33,31 +33,32 @@ KERNEL(link_2_decomposition)(
         /* Intermediate values, and each output as soon as it is known. */
         c1_out[3 * W + b] = R(0.0); /* c1(2, 2, 2) */
         const real w2_z = qd1 + qd2;
-        const real wd2_z = qdd1 + qdd2;
         const real t1 = R(0.125) * c2;
         const real t2 = R(0.125) * s2;
         const real v1_y = R(0.25) * qd1;
-        const real t3 = R(9.80665) * c1 + R(0.25) * qdd1;
         const real f2_c2_y = R(0.075) * c2;
-        const real t4 = R(0.075) * s2;
-        const real n2_c2_z = R(0.005) + t1 * f2_c2_y + t2 * t4;
+        const real t3 = R(0.075) * s2;
+        const real n2_c2_z = R(0.005) + t1 * f2_c2_y + t2 * t3;
         c2_out[2 * W + b] = n2_c2_z; /* c2(2, 2, 2) */
-        const real t5 = w2_z * t4;
-        const real n1_c1_z = v1_y * t4;
+        const real n1_c1_z = v1_y * t3;
         c1_out[2 * W + b] = n1_c1_z; /* c1(2, 2, 1) */
-        const real t6 = t1 * (R(5.88399) * c1) - t2 * (R(5.88399) * s1);
-        g_out[0 * W + b] = t6 + R(1.4709975) * c1; /* g(1, 2) */
-        g_out[1 * W + b] = t6; /* g(2, 2) */
-        const real t7 = t3 * f2_c2_y - (R(9.80665) * s1 + qd2 * v1_y) * t4 + wd2_z * n2_c2_z + w2_z * n1_c1_z;
-        tau_out[0 * W + b] = t7 + R(0.25) * (R(0.6) * t3 + wd2_z * f2_c2_y - w2_z * t5); /* tau(1, 2) */
-        tau_out[1 * W + b] = t7; /* tau(2, 2) */
+        const real g_2 = t1 * (R(5.88399) * c1) - t2 * (R(5.88399) * s1);
+        g_out[1 * W + b] = g_2; /* g(2, 2) */
+        const real g_1 = g_2 + R(1.4709975) * c1;
+        g_out[0 * W + b] = g_1; /* g(1, 2) */
         const real n1_c2_z = n2_c2_z + R(0.01875) * c2;
         c2_out[1 * W + b] = n1_c2_z; /* c2(1, 2, 2) */
         const real f1_c2_y = f2_c2_y + R(0.15);
-        c2_out[0 * W + b] = n1_c2_z + R(0.25) * f1_c2_y; /* c2(1, 2, 1) */
-        const real t8 = R(0.25) * t5;
-        c1_out[0 * W + b] = n1_c1_z - t8; /* c1(1, 2, 1) */
-        c1_out[1 * W + b] = -t8; /* c1(1, 2, 2) */
+        const real c2_1_1 = n1_c2_z + R(0.25) * f1_c2_y;
+        c2_out[0 * W + b] = c2_1_1; /* c2(1, 2, 1) */
+        const real t4 = R(0.25) * (w2_z * t3);
+        c1_out[1 * W + b] = -t4; /* c1(1, 2, 2) */
+        const real c1_1_1 = n1_c1_z - t4;
+        c1_out[0 * W + b] = c1_1_1; /* c1(1, 2, 1) */
+        const real tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1;
+        tau_out[0 * W + b] = tau1_1 + qdd2 * n1_c2_z - qd2 * t4; /* tau(1, 2) */
+        const real tau2_1 = g_2 + qd1 * n1_c1_z;
+        tau_out[1 * W + b] = tau2_1 + qdd1 * n1_c2_z + qdd2 * n2_c2_z; /* tau(2, 2) */
     }
 }
 #endif

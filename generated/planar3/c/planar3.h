@@ -65,7 +65,7 @@ enum {
 
 /* ---- All links, many samples, in double ---- */
 
-/* All quantities but c0: 153 operations.
+/* All quantities but c0: 146 operations.
    Reads q, qd, qdd (count, JOINTS);
    writes c2 (count, C2), c1 (count, C1), g, tau (count, G). */
 void planar3_decomposition(size_t count, const double *q, const double *qd, const double *qdd,
@@ -77,7 +77,7 @@ void planar3_decomposition(size_t count, const double *q, const double *qd, cons
 void planar3_decomposition_blocks(size_t blocks, const double *q, const double *qd, const double *qdd,
     double *c2, double *c1, double *g, double *tau);
 
-/* Torques alone: 100 operations.
+/* Torques alone: 103 operations.
    Reads q, qd, qdd (count, JOINTS); writes tau (count, G). */
 void planar3_torque(size_t count, const double *q, const double *qd, const double *qdd, double *tau);
 
@@ -107,7 +107,7 @@ void planar3_propagation(size_t count, const double *q, const double *qd, const 
 void planar3_gradient_propagation(size_t count, const double *q, const double *qd, const double *qdd,
     double *acceleration, double *velocity, double *gravity);
 
-/* Position gradient: 142 operations.
+/* Position gradient: 149 operations.
    Reads q, qd, qdd (count, JOINTS); writes c0 (count, C1). */
 void planar3_position_gradient(size_t count, const double *q, const double *qd, const double *qdd, double *c0);
 
@@ -130,7 +130,7 @@ void planar3_link_3(const double *q, const double *qd, const double *qdd,
 
 /* ---- All links, many samples, in float ---- */
 
-/* All quantities but c0: 153 operations.
+/* All quantities but c0: 146 operations.
    Reads q, qd, qdd (count, JOINTS);
    writes c2 (count, C2), c1 (count, C1), g, tau (count, G). */
 void planar3_decompositionf(size_t count, const float *q, const float *qd, const float *qdd,
@@ -142,7 +142,7 @@ void planar3_decompositionf(size_t count, const float *q, const float *qd, const
 void planar3_decomposition_blocksf(size_t blocks, const float *q, const float *qd, const float *qdd,
     float *c2, float *c1, float *g, float *tau);
 
-/* Torques alone: 100 operations.
+/* Torques alone: 103 operations.
    Reads q, qd, qdd (count, JOINTS); writes tau (count, G). */
 void planar3_torquef(size_t count, const float *q, const float *qd, const float *qdd, float *tau);
 
@@ -172,7 +172,7 @@ void planar3_propagationf(size_t count, const float *q, const float *qd, const f
 void planar3_gradient_propagationf(size_t count, const float *q, const float *qd, const float *qdd,
     float *acceleration, float *velocity, float *gravity);
 
-/* Position gradient: 142 operations.
+/* Position gradient: 149 operations.
    Reads q, qd, qdd (count, JOINTS); writes c0 (count, C1). */
 void planar3_position_gradientf(size_t count, const float *q, const float *qd, const float *qdd, float *c0);
 

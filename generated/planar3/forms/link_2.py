@@ -17,7 +17,7 @@ PATH = (0, 1)  # coordinates that move the link, counted from 0
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
-    47 additions and multiplications, 4 sines, cosines and the like.
+    40 additions and multiplications, 4 sines, cosines and the like.
     """
     # inputs
     q1 = q[..., 0]
@@ -33,42 +33,43 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     s2 = xp.sin(q2)
     c2 = xp.cos(q2)
     w2_z = qd1 + qd2
-    wd2_z = qdd1 + qdd2
     t1 = 0.125 * c2
     t2 = 0.125 * s2
     v1_y = 0.25 * qd1
-    t3 = 9.80665 * c1 + 0.25 * qdd1
     f2_c2_y = 0.075 * c2
-    t4 = 0.075 * s2
-    n2_c2_z = 0.005 + t1 * f2_c2_y + t2 * t4
-    t5 = w2_z * t4
-    n1_c1_z = v1_y * t4
-    t6 = t1 * (5.88399 * c1) - t2 * (5.88399 * s1)
-    t7 = t3 * f2_c2_y - (9.80665 * s1 + qd2 * v1_y) * t4 + wd2_z * n2_c2_z + w2_z * n1_c1_z
+    t3 = 0.075 * s2
+    n2_c2_z = 0.005 + t1 * f2_c2_y + t2 * t3
+    n1_c1_z = v1_y * t3
+    g_2 = t1 * (5.88399 * c1) - t2 * (5.88399 * s1)
+    g_1 = g_2 + 1.4709975 * c1
     n1_c2_z = n2_c2_z + 0.01875 * c2
     f1_c2_y = f2_c2_y + 0.15
-    t8 = 0.25 * t5
+    c2_1_1 = n1_c2_z + 0.25 * f1_c2_y
+    t4 = 0.25 * (w2_z * t3)
+    c1_1_1 = n1_c1_z - t4
+    tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
+    tau2_1 = g_2 + qd1 * n1_c1_z
 
     # outputs
     return (
         (
-            n1_c2_z + 0.25 * f1_c2_y,  # c2(1, 2, 1)
+            c2_1_1,  # c2(1, 2, 1)
             n1_c2_z,  # c2(1, 2, 2)
             n2_c2_z,  # c2(2, 2, 2)
         ),
         (
-            n1_c1_z - t8,  # c1(1, 2, 1)
-            -t8,  # c1(1, 2, 2)
+            c1_1_1,  # c1(1, 2, 1)
+            -t4,  # c1(1, 2, 2)
             n1_c1_z,  # c1(2, 2, 1)
             0.0,  # c1(2, 2, 2)
         ),
         (
-            t6 + 1.4709975 * c1,  # g(1, 2)
-            t6,  # g(2, 2)
+            g_1,  # g(1, 2)
+            g_2,  # g(2, 2)
         ),
         (
-            t7 + 0.25 * (0.6 * t3 + wd2_z * f2_c2_y - w2_z * t5),  # tau(1, 2)
-            t7,  # tau(2, 2)
+            tau1_1 + qdd2 * n1_c2_z - qd2 * t4,  # tau(1, 2)
+            tau2_1 + qdd1 * n1_c2_z + qdd2 * n2_c2_z,  # tau(2, 2)
         ),
     )
 

@@ -14,7 +14,7 @@
    at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
-/* Decomposition: 56 additions and multiplications, 2 sines and cosines apart. */
+/* Decomposition: 48 additions and multiplications, 2 sines and cosines apart. */
 KERNEL(link_2_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
     real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
@@ -31,31 +31,29 @@ KERNEL(link_2_decomposition)(
         /* Intermediate values, and each output as soon as it is known. */
         c1_out[3 * W + b] = R(0.0); /* c1(2, 2, 2) */
         g_out[0 * W + b] = R(0.0); /* g(1, 2) */
-        const real t1 = qd1 * qd2;
-        const real t2 = R(0.068) * c2 - R(0.006) * s2;
-        const real t3 = R(0.068) * s2 + R(0.006) * c2;
-        const real f1_c2_y = R(17.4) * t2;
-        const real t4 = R(3.9585) * t2;
-        const real t5 = c2 * (R(0.0725) * s2) - s2 * (R(0.4665) * c2) - t3 * f1_c2_y;
-        const real n1_c2_y = R(3.9585) * t3;
+        const real t1 = R(0.068) * c2 - R(0.006) * s2;
+        const real t2 = R(0.068) * s2 + R(0.006) * c2;
+        const real f1_c2_y = R(17.4) * t1;
+        const real t3 = c2 * (R(0.0725) * s2) - s2 * (R(0.4665) * c2) - t2 * f1_c2_y;
+        const real n1_c2_y = R(3.9585) * t2;
         c2_out[1 * W + b] = n1_c2_y; /* c2(1, 2, 2) */
-        const real t6 = t3 * (R(17.4) * t3);
-        const real t7 = R(0.5965) + t6 + t2 * f1_c2_y + R(0.90055875);
-        const real n2_c2_y = t7 - R(0.95805875);
+        const real t4 = t2 * (R(17.4) * t2);
+        const real t5 = R(0.5965) + t4 + t1 * f1_c2_y + R(0.90055875);
+        const real n2_c2_y = t5 - R(0.95805875);
         c2_out[2 * W + b] = n2_c2_y; /* c2(2, 2, 2) */
-        const real n1_c2_z = t7 - (s2 * (R(0.4665) * s2) + c2 * (R(0.0725) * c2) + t6);
+        const real n1_c2_z = t5 - (s2 * (R(0.4665) * s2) + c2 * (R(0.0725) * c2) + t4);
         c2_out[0 * W + b] = n1_c2_z; /* c2(1, 2, 1) */
-        const real n1_c1_z = qd2 * t5;
+        const real n1_c1_z = qd2 * t3;
         c1_out[0 * W + b] = n1_c1_z; /* c1(1, 2, 1) */
-        const real t8 = qd2 * t4;
-        tau_out[0 * W + b] = t1 * t5 + qdd2 * n1_c2_y + qdd1 * n1_c2_z + qd2 * t8 + qd1 * n1_c1_z; /* tau(1, 2) */
-        const real t9 = qd1 * t5;
-        c1_out[2 * W + b] = -t9; /* c1(2, 2, 1) */
-        const real t10 = R(170.694) * t2;
-        g_out[1 * W + b] = -t10; /* g(2, 2) */
-        tau_out[1 * W + b] = t1 * t4 + qdd2 * n2_c2_y + qdd1 * n1_c2_y - t10 - (qd2 * (qd1 * t4) + qd1 * t9); /* tau(2, 2) */
-        const real n2_c1_z = t8 + t9;
+        const real t6 = qd1 * t3;
+        c1_out[2 * W + b] = -t6; /* c1(2, 2, 1) */
+        const real t7 = R(170.694) * t1;
+        g_out[1 * W + b] = -t7; /* g(2, 2) */
+        tau_out[1 * W + b] = qdd2 * n2_c2_y + qdd1 * n1_c2_y - (t7 + qd1 * t6); /* tau(2, 2) */
+        const real tau1_1 = qdd1 * n1_c2_z + qd1 * n1_c1_z;
+        const real n2_c1_z = qd2 * (R(3.9585) * t1) + t6;
         c1_out[1 * W + b] = n2_c1_z; /* c1(1, 2, 2) */
+        tau_out[0 * W + b] = qdd2 * n1_c2_y + tau1_1 + qd2 * n2_c1_z; /* tau(1, 2) */
     }
 }
 #endif

@@ -14,7 +14,7 @@
    at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
-/* Decomposition: 137 additions and multiplications, 4 sines and cosines apart. */
+/* Decomposition: 122 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_3_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
     real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
@@ -35,54 +35,68 @@ KERNEL(link_3_decomposition)(
         /* Intermediate values, and each output as soon as it is known. */
         g_out[0 * W + b] = R(0.0); /* g(1, 3) */
         const real x3_x = c2 * c3 - s2 * s3;
-        c2_out[2 * W + b] = -R(0.0551376) * x3_x; /* c2(1, 3, 3) */
         const real t1 = s2 * c3 + c2 * s3;
-        g_out[2 * W + b] = -R(3.29616) * t1; /* g(3, 3) */
         const real w3_y = qd2 + qd3;
-        const real wd3_y = qdd2 + qdd3;
         const real t2 = R(0.15336231610144652) * t1;
         const real s3_x = R(0.15336231610144652) * x3_x;
-        c2_out[5 * W + b] = R(0.086) + s3_x * s3_x + t2 * t2; /* c2(3, 3, 3) */
         const real s1_y = t2 + R(0.9460264013229229) * c2;
-        g_out[1 * W + b] = -R(21.49263315650272) * s1_y; /* g(2, 3) */
         const real t3 = R(0.9460264013229229) * s2 - s3_x;
-        c2_out[1 * W + b] = R(0.35952508674639105) * t3; /* c2(1, 3, 2) */
-        c2_out[4 * W + b] = R(0.086) + t2 * s1_y - s3_x * t3; /* c2(2, 3, 3) */
         const real t4 = qd3 * s3_x;
         const real v2_z = qd3 * t2;
         const real v1_x = qd2 * t3 - t4;
         const real v1_z = v2_z + qd2 * s1_y;
-        c1_out[4 * W + b] = t3 * v1_z - s1_y * v1_x; /* c1(2, 3, 2) */
-        c1_out[7 * W + b] = -(s3_x * v1_z + t2 * v1_x); /* c1(3, 3, 2) */
         const real t5 = qd1 * s1_y;
         const real v0_x = v1_x + R(0.35952508674639105) * qd1;
-        const real t6 = qd1 * t3;
         const real sd3_y = qd1 * s3_x;
-        const real t7 = v2_z + qd2 * t2;
-        const real t8 = t4 + qd2 * s3_x;
-        c1_out[5 * W + b] = t3 * t7 + s1_y * t8; /* c1(2, 3, 3) */
-        c1_out[8 * W + b] = t2 * t8 - s3_x * t7; /* c1(3, 3, 3) */
-        const real t9 = qdd2 * t3 + qd1 * t5 + R(0.35952508674639105) * qdd1 + qd2 * v1_z + qd3 * t7;
-        const real t10 = qdd3 * s3_x - t9;
-        const real t11 = R(21.49263315650272) + qd2 * v1_x - qdd2 * s1_y - qd3 * t8 - qdd3 * t2;
-        const real t12 = x3_x * (R(0.06975) * t1) - t1 * (R(0.01625) * x3_x);
+        const real t6 = v2_z + qd2 * t2;
+        const real t7 = t4 + qd2 * s3_x;
+        const real t8 = x3_x * (R(0.06975) * t1) - t1 * (R(0.01625) * x3_x);
         const real n1_c2_z = R(0.08225) - (t1 * (R(0.01625) * t1) + x3_x * (R(0.06975) * x3_x));
-        const real n1_c1_z = w3_y * t12;
-        c1_out[0 * W + b] = n1_c1_z + R(0.35952508674639105) * t5 - s1_y * v0_x; /* c1(1, 3, 1) */
-        const real n2_c1_z = qd1 * t12;
-        c1_out[1 * W + b] = n2_c1_z + R(0.35952508674639105) * v1_z - s1_y * t6; /* c1(1, 3, 2) */
-        c1_out[2 * W + b] = n2_c1_z + R(0.35952508674639105) * t7 + s1_y * sd3_y; /* c1(1, 3, 3) */
-        c1_out[3 * W + b] = t3 * t5 - n2_c1_z; /* c1(2, 3, 1) */
-        c1_out[6 * W + b] = -(n2_c1_z + s3_x * t5); /* c1(3, 3, 1) */
-        const real t13 = R(0.086) * wd3_y - qd1 * n2_c1_z;
-        tau_out[1 * W + b] = t13 - (s1_y * t11 + t3 * t10); /* tau(2, 3) */
-        tau_out[2 * W + b] = t13 + s3_x * t10 - t2 * t11; /* tau(3, 3) */
-        const real t14 = s1_y * (qdd1 * s1_y - qd1 * v0_x - qd2 * t6 + qd3 * sd3_y);
-        const real t15 = (qd1 * qd2 + qd1 * qd3) * t12 + qdd1 * n1_c2_z + qd1 * n1_c1_z;
-        tau_out[0 * W + b] = t15 + t14 - R(0.35952508674639105) * t10; /* tau(1, 3) */
-        const real t16 = s1_y * s1_y;
-        c2_out[0 * W + b] = n1_c2_z + R(0.129258288) + t16; /* c2(1, 3, 1) */
-        c2_out[3 * W + b] = R(0.086) + t16 + t3 * t3; /* c2(2, 3, 2) */
+        const real n1_c1_z = w3_y * t8;
+        const real n2_c1_z = qd1 * t8;
+        const real t9 = R(21.49263315650272) * s1_y;
+        g_out[1 * W + b] = -t9; /* g(2, 3) */
+        const real t10 = R(3.29616) * t1;
+        g_out[2 * W + b] = -t10; /* g(3, 3) */
+        const real t11 = s1_y * s1_y;
+        const real c2_1_1 = n1_c2_z + R(0.129258288) + t11;
+        c2_out[0 * W + b] = c2_1_1; /* c2(1, 3, 1) */
+        const real c1_1_1 = n1_c1_z + R(0.35952508674639105) * t5 - s1_y * v0_x;
+        c1_out[0 * W + b] = c1_1_1; /* c1(1, 3, 1) */
+        const real c1_2_1 = t3 * t5 - n2_c1_z;
+        c1_out[3 * W + b] = c1_2_1; /* c1(2, 3, 1) */
+        const real t12 = n2_c1_z + s3_x * t5;
+        c1_out[6 * W + b] = -t12; /* c1(3, 3, 1) */
+        const real tau1_1 = qdd1 * c2_1_1 + qd1 * c1_1_1;
+        const real tau2_1 = qd1 * c1_2_1 - t9;
+        const real c2_1_2 = R(0.35952508674639105) * t3;
+        c2_out[1 * W + b] = c2_1_2; /* c2(1, 3, 2) */
+        const real c1_1_2 = n2_c1_z + R(0.35952508674639105) * v1_z - s1_y * (qd1 * t3);
+        c1_out[1 * W + b] = c1_1_2; /* c1(1, 3, 2) */
+        const real c2_2_2 = R(0.086) + t11 + t3 * t3;
+        c2_out[3 * W + b] = c2_2_2; /* c2(2, 3, 2) */
+        const real c1_2_2 = t3 * v1_z - s1_y * v1_x;
+        c1_out[4 * W + b] = c1_2_2; /* c1(2, 3, 2) */
+        const real t13 = s3_x * v1_z + t2 * v1_x;
+        c1_out[7 * W + b] = -t13; /* c1(3, 3, 2) */
+        const real tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2;
+        const real tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2;
+        const real t14 = R(0.0551376) * x3_x;
+        c2_out[2 * W + b] = -t14; /* c2(1, 3, 3) */
+        const real c1_1_3 = n2_c1_z + R(0.35952508674639105) * t6 + s1_y * sd3_y;
+        c1_out[2 * W + b] = c1_1_3; /* c1(1, 3, 3) */
+        tau_out[0 * W + b] = tau1_2 - qdd3 * t14 + qd3 * c1_1_3; /* tau(1, 3) */
+        const real c2_2_3 = R(0.086) + t2 * s1_y - s3_x * t3;
+        c2_out[4 * W + b] = c2_2_3; /* c2(2, 3, 3) */
+        const real c1_2_3 = t3 * t6 + s1_y * t7;
+        c1_out[5 * W + b] = c1_2_3; /* c1(2, 3, 3) */
+        tau_out[1 * W + b] = tau2_2 + qdd3 * c2_2_3 + qd3 * c1_2_3; /* tau(2, 3) */
+        const real c2_3_3 = R(0.086) + s3_x * s3_x + t2 * t2;
+        c2_out[5 * W + b] = c2_3_3; /* c2(3, 3, 3) */
+        const real c1_3_3 = t2 * t7 - s3_x * t6;
+        c1_out[8 * W + b] = c1_3_3; /* c1(3, 3, 3) */
+        const real t15 = qdd2 * c2_2_3 - (t10 + qd1 * t12 + qd2 * t13 + qdd1 * t14) + qdd3 * c2_3_3;
+        tau_out[2 * W + b] = t15 + qd3 * c1_3_3; /* tau(3, 3) */
     }
 }
 #endif
@@ -129,7 +143,7 @@ KERNEL(link_3_torque)(
         const real n1_c1_z = w3_y * t8;
         const real n2_c1_z = qd1 * t8;
         const real t9 = R(0.086) * wd3_y - qd1 * n2_c1_z;
-        tau_out[1 * W + b] = t9 - (s1_y * t7 + t3 * t6); /* tau(2, 3) */
+        tau_out[1 * W + b] = t9 - (t3 * t6 + s1_y * t7); /* tau(2, 3) */
         tau_out[2 * W + b] = t9 + s3_x * t6 - t2 * t7; /* tau(3, 3) */
         const real t10 = s1_y * (qdd1 * s1_y - qd1 * v0_x - qd2 * (qd1 * t3) + qd3 * sd3_y);
         const real t11 = (qd1 * qd2 + qd1 * qd3) * t8 + qdd1 * n1_c2_z + qd1 * n1_c1_z;

@@ -16,6 +16,8 @@
        n3_c2, f3_c2    wrench (moment, force) that accelerating joint 3 asks of the link: c2(i, j, 3) is its part on joint i
        n3_c1, f3_c1    the same for the velocity of joint 3 and c1(i, j, 3)
        ag              gravity
+       c2_3_4, c1_3_4  coefficients c2(3, j, 4) and c1(3, j, 4) of this link j, where they are used again
+       g_3, tau3_4     gravity's torque at joint 3, and with it what the motions of joints 1 to 4 ask of joint 3
        t1, t2, ...     parts of the above with the other sign, and whatever else is used more than once
 
    Equal components keep the name of the first joint that has them. Where a joint follows another (mimic), its z is times

@@ -71,7 +71,7 @@ enum {
 
 /* ---- All links, many samples, in double ---- */
 
-/* All quantities but c0: 1610 operations.
+/* All quantities but c0: 1516 operations.
    Reads q, qd, qdd (count, JOINTS);
    writes c2 (count, C2), c1 (count, C1), g, tau (count, G). */
 void puma560_decomposition(size_t count, const double *q, const double *qd, const double *qdd,
@@ -148,7 +148,7 @@ void puma560_link_6(const double *q, const double *qd, const double *qdd,
 
 /* ---- All links, many samples, in float ---- */
 
-/* All quantities but c0: 1610 operations.
+/* All quantities but c0: 1516 operations.
    Reads q, qd, qdd (count, JOINTS);
    writes c2 (count, C2), c1 (count, C1), g, tau (count, G). */
 void puma560_decompositionf(size_t count, const float *q, const float *qd, const float *qdd,

@@ -17,7 +17,7 @@ PATH = (0, 1)  # coordinates that move the link, counted from 0
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
-    56 additions and multiplications, 2 sines, cosines and the like.
+    48 additions and multiplications, 2 sines, cosines and the like.
     """
     # inputs
     q2 = q[..., 1]
@@ -29,22 +29,20 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     # intermediate values
     s2 = xp.sin(q2)
     c2 = xp.cos(q2)
-    t1 = qd1 * qd2
-    t2 = 0.068 * c2 - 0.006 * s2
-    t3 = 0.068 * s2 + 0.006 * c2
-    f1_c2_y = 17.4 * t2
-    t4 = 3.9585 * t2
-    t5 = c2 * (0.0725 * s2) - s2 * (0.4665 * c2) - t3 * f1_c2_y
-    n1_c2_y = 3.9585 * t3
-    t6 = t3 * (17.4 * t3)
-    t7 = 0.5965 + t6 + t2 * f1_c2_y + 0.90055875
-    n2_c2_y = t7 - 0.95805875
-    n1_c2_z = t7 - (s2 * (0.4665 * s2) + c2 * (0.0725 * c2) + t6)
-    n1_c1_z = qd2 * t5
-    t8 = qd2 * t4
-    t9 = qd1 * t5
-    t10 = 170.694 * t2
-    n2_c1_z = t8 + t9
+    t1 = 0.068 * c2 - 0.006 * s2
+    t2 = 0.068 * s2 + 0.006 * c2
+    f1_c2_y = 17.4 * t1
+    t3 = c2 * (0.0725 * s2) - s2 * (0.4665 * c2) - t2 * f1_c2_y
+    n1_c2_y = 3.9585 * t2
+    t4 = t2 * (17.4 * t2)
+    t5 = 0.5965 + t4 + t1 * f1_c2_y + 0.90055875
+    n2_c2_y = t5 - 0.95805875
+    n1_c2_z = t5 - (s2 * (0.4665 * s2) + c2 * (0.0725 * c2) + t4)
+    n1_c1_z = qd2 * t3
+    t6 = qd1 * t3
+    t7 = 170.694 * t1
+    tau1_1 = qdd1 * n1_c2_z + qd1 * n1_c1_z
+    n2_c1_z = qd2 * (3.9585 * t1) + t6
 
     # outputs
     return (
@@ -56,16 +54,16 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
         (
             n1_c1_z,  # c1(1, 2, 1)
             n2_c1_z,  # c1(1, 2, 2)
-            -t9,  # c1(2, 2, 1)
+            -t6,  # c1(2, 2, 1)
             0.0,  # c1(2, 2, 2)
         ),
         (
             0.0,  # g(1, 2)
-            -t10,  # g(2, 2)
+            -t7,  # g(2, 2)
         ),
         (
-            t1 * t5 + qdd2 * n1_c2_y + qdd1 * n1_c2_z + qd2 * t8 + qd1 * n1_c1_z,  # tau(1, 2)
-            t1 * t4 + qdd2 * n2_c2_y + qdd1 * n1_c2_y - t10 - (qd2 * (qd1 * t4) + qd1 * t9),  # tau(2, 2)
+            qdd2 * n1_c2_y + tau1_1 + qd2 * n2_c1_z,  # tau(1, 2)
+            qdd2 * n2_c2_y + qdd1 * n1_c2_y - (t7 + qd1 * t6),  # tau(2, 2)
         ),
     )
 

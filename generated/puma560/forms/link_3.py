@@ -17,7 +17,7 @@ PATH = (0, 1, 2)  # coordinates that move the link, counted from 0
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
-    137 additions and multiplications, 4 sines, cosines and the like.
+    122 additions and multiplications, 4 sines, cosines and the like.
     """
     # inputs
     q2 = q[..., 1]
@@ -37,7 +37,6 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     x3_x = c2 * c3 - s2 * s3
     t1 = s2 * c3 + c2 * s3
     w3_y = qd2 + qd3
-    wd3_y = qdd2 + qdd3
     t2 = 0.15336231610144652 * t1
     s3_x = 0.15336231610144652 * x3_x
     s1_y = t2 + 0.9460264013229229 * c2
@@ -48,51 +47,67 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     v1_z = v2_z + qd2 * s1_y
     t5 = qd1 * s1_y
     v0_x = v1_x + 0.35952508674639105 * qd1
-    t6 = qd1 * t3
     sd3_y = qd1 * s3_x
-    t7 = v2_z + qd2 * t2
-    t8 = t4 + qd2 * s3_x
-    t9 = qdd2 * t3 + qd1 * t5 + 0.35952508674639105 * qdd1 + qd2 * v1_z + qd3 * t7
-    t10 = qdd3 * s3_x - t9
-    t11 = 21.49263315650272 + qd2 * v1_x - qdd2 * s1_y - qd3 * t8 - qdd3 * t2
-    t12 = x3_x * (0.06975 * t1) - t1 * (0.01625 * x3_x)
+    t6 = v2_z + qd2 * t2
+    t7 = t4 + qd2 * s3_x
+    t8 = x3_x * (0.06975 * t1) - t1 * (0.01625 * x3_x)
     n1_c2_z = 0.08225 - (t1 * (0.01625 * t1) + x3_x * (0.06975 * x3_x))
-    n1_c1_z = w3_y * t12
-    n2_c1_z = qd1 * t12
-    t13 = 0.086 * wd3_y - qd1 * n2_c1_z
-    t14 = s1_y * (qdd1 * s1_y - qd1 * v0_x - qd2 * t6 + qd3 * sd3_y) - 0.35952508674639105 * t10
-    t15 = s1_y * s1_y
+    n1_c1_z = w3_y * t8
+    n2_c1_z = qd1 * t8
+    t9 = 21.49263315650272 * s1_y
+    t10 = 3.29616 * t1
+    t11 = s1_y * s1_y
+    c2_1_1 = n1_c2_z + 0.129258288 + t11
+    c1_1_1 = n1_c1_z + 0.35952508674639105 * t5 - s1_y * v0_x
+    c1_2_1 = t3 * t5 - n2_c1_z
+    t12 = n2_c1_z + s3_x * t5
+    tau1_1 = qdd1 * c2_1_1 + qd1 * c1_1_1
+    tau2_1 = qd1 * c1_2_1 - t9
+    c2_1_2 = 0.35952508674639105 * t3
+    c1_1_2 = n2_c1_z + 0.35952508674639105 * v1_z - s1_y * (qd1 * t3)
+    c2_2_2 = 0.086 + t11 + t3 * t3
+    c1_2_2 = t3 * v1_z - s1_y * v1_x
+    t13 = s3_x * v1_z + t2 * v1_x
+    tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2
+    tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2
+    t14 = 0.0551376 * x3_x
+    c1_1_3 = n2_c1_z + 0.35952508674639105 * t6 + s1_y * sd3_y
+    c2_2_3 = 0.086 + t2 * s1_y - s3_x * t3
+    c1_2_3 = t3 * t6 + s1_y * t7
+    c2_3_3 = 0.086 + s3_x * s3_x + t2 * t2
+    c1_3_3 = t2 * t7 - s3_x * t6
+    t15 = qdd2 * c2_2_3 - (t10 + qd1 * t12 + qd2 * t13 + qdd1 * t14) + qdd3 * c2_3_3
 
     # outputs
     return (
         (
-            n1_c2_z + 0.129258288 + t15,  # c2(1, 3, 1)
-            0.35952508674639105 * t3,  # c2(1, 3, 2)
-            -0.0551376 * x3_x,  # c2(1, 3, 3)
-            0.086 + t15 + t3 * t3,  # c2(2, 3, 2)
-            0.086 + t2 * s1_y - s3_x * t3,  # c2(2, 3, 3)
-            0.086 + s3_x * s3_x + t2 * t2,  # c2(3, 3, 3)
+            c2_1_1,  # c2(1, 3, 1)
+            c2_1_2,  # c2(1, 3, 2)
+            -t14,  # c2(1, 3, 3)
+            c2_2_2,  # c2(2, 3, 2)
+            c2_2_3,  # c2(2, 3, 3)
+            c2_3_3,  # c2(3, 3, 3)
         ),
         (
-            n1_c1_z + 0.35952508674639105 * t5 - s1_y * v0_x,  # c1(1, 3, 1)
-            n2_c1_z + 0.35952508674639105 * v1_z - s1_y * t6,  # c1(1, 3, 2)
-            n2_c1_z + 0.35952508674639105 * t7 + s1_y * sd3_y,  # c1(1, 3, 3)
-            t3 * t5 - n2_c1_z,  # c1(2, 3, 1)
-            t3 * v1_z - s1_y * v1_x,  # c1(2, 3, 2)
-            t3 * t7 + s1_y * t8,  # c1(2, 3, 3)
-            -(n2_c1_z + s3_x * t5),  # c1(3, 3, 1)
-            -(s3_x * v1_z + t2 * v1_x),  # c1(3, 3, 2)
-            t2 * t8 - s3_x * t7,  # c1(3, 3, 3)
+            c1_1_1,  # c1(1, 3, 1)
+            c1_1_2,  # c1(1, 3, 2)
+            c1_1_3,  # c1(1, 3, 3)
+            c1_2_1,  # c1(2, 3, 1)
+            c1_2_2,  # c1(2, 3, 2)
+            c1_2_3,  # c1(2, 3, 3)
+            -t12,  # c1(3, 3, 1)
+            -t13,  # c1(3, 3, 2)
+            c1_3_3,  # c1(3, 3, 3)
         ),
         (
             0.0,  # g(1, 3)
-            -21.49263315650272 * s1_y,  # g(2, 3)
-            -3.29616 * t1,  # g(3, 3)
+            -t9,  # g(2, 3)
+            -t10,  # g(3, 3)
         ),
         (
-            (qd1 * qd2 + qd1 * qd3) * t12 + qdd1 * n1_c2_z + qd1 * n1_c1_z + t14,  # tau(1, 3)
-            t13 - (s1_y * t11 + t3 * t10),  # tau(2, 3)
-            t13 + s3_x * t10 - t2 * t11,  # tau(3, 3)
+            tau1_2 - qdd3 * t14 + qd3 * c1_1_3,  # tau(1, 3)
+            tau2_2 + qdd3 * c2_2_3 + qd3 * c1_2_3,  # tau(2, 3)
+            t15 + qd3 * c1_3_3,  # tau(3, 3)
         ),
     )
 
@@ -145,7 +160,7 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     # outputs
     return (
         t11 + t10 - 0.35952508674639105 * t6,  # tau(1, 3)
-        t9 - (s1_y * t7 + t3 * t6),  # tau(2, 3)
+        t9 - (t3 * t6 + s1_y * t7),  # tau(2, 3)
         t9 + s3_x * t6 - t2 * t7,  # tau(3, 3)
     )
 

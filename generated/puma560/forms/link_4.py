@@ -17,7 +17,7 @@ PATH = (0, 1, 2, 3)  # coordinates that move the link, counted from 0
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
-    259 additions and multiplications, 6 sines, cosines and the like.
+    224 additions and multiplications, 6 sines, cosines and the like.
     """
     # inputs
     q2 = q[..., 1]
@@ -43,14 +43,8 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     t1 = c2 * s3 + s2 * c3
     zd2_y = qd1 * t1
     t2 = qd1 * x1_x
-    wd2_y = qd2 * zd2_y - qdd1 * x1_x
     w3_z = qd2 + qd3
-    wd3_y = wd2_y + qd3 * zd2_y
-    wd3_z = qdd2 + qdd3
     t3 = qd4 + t2
-    wd4_x = qd4 * w3_z - (qdd1 * t1 + qd2 * t2 + qd3 * t2)
-    wd4_y = wd3_y - qdd4
-    wd4_z = wd3_z + qd4 * zd2_y
     t4 = 8.883332820512805 * t1
     t5 = 8.883332820512805 * x1_x
     t6 = 0.018382431830418957 - 0.39101153026477364 * c3
@@ -72,64 +66,83 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     sd3_z = 0.018382431830418957 * zd2_y + 0.3749834985702704 * t2
     sd3_x = v2_y + 0.018382431830418957 * qd2
     sd3_y = t8 + 0.3749834985702704 * qd2
-    t11 = qdd2 * s2_x + qd2 * v1_y - (qdd1 * t7 + t4 + qd1 * t10) + qd3 * sd3_x
-    t12 = 0.3749834985702704 * qdd3 + t11
-    t13 = qdd1 * s1_y + qd1 * sd1_y - t5 + qd2 * sd2_y - qdd2 * t6 + qd3 * sd3_y
-    t14 = t13 - 0.018382431830418957 * qdd3
-    t15 = 0.00065 * c4
-    t16 = 0.00065 * s4
-    t17 = c4 * t15 + s4 * t16
-    t18 = s4 * t15 - c4 * t16
-    n2_c2_z = 0.00245 - t17
-    t19 = t3 * t18
-    t20 = zd2_y * t18
-    t21 = t20 + w3_z * t17
-    t22 = t3 * t17
-    t23 = 0.00115 * w3_z
-    t24 = 0.00115 * zd2_y
-    t25 = w3_z * t18
-    t26 = zd2_y * t17 + t25
-    t27 = 0.0013 * wd4_y + zd2_y * t21 - w3_z * t26
-    t28 = wd4_z * n2_c2_z - wd4_x * t18 + zd2_y * t22 - t3 * t24 - w3_z * t19
-    t29 = t1 * (wd4_x * n2_c2_z - wd4_z * t18 + w3_z * t22 - (zd2_y * t19 + t3 * t23))
-    t30 = s1_y * t14 - t7 * t12 + s1_z * (qd1 * sd1_z + qdd1 * s1_z + qd2 * sd2_z + qd3 * sd3_z)
-    t31 = 0.0013 * x1_x
-    n1_c2_z = t1 * t18
-    n1_c1_y = t1 * t21
-    n1_c1_z = t1 * t22 - x1_x * t24
-    n2_c1_x = t22 - t2 * n2_c2_z
-    n2_c1_y = 0.0013 * zd2_y - t26
-    n2_c1_z = t2 * t18 - t19
-    t32 = t1 * n2_c1_x + x1_x * n2_c1_y
-    n4_c1_x = w3_z * n2_c2_z - t20 - t23
-    n4_c1_z = zd2_y * n2_c2_z - t25 - t24
+    t11 = 0.00065 * c4
+    t12 = 0.00065 * s4
+    t13 = c4 * t11 + s4 * t12
+    t14 = s4 * t11 - c4 * t12
+    n2_c2_z = 0.00245 - t13
+    t15 = t3 * t14
+    t16 = zd2_y * t14
+    t17 = t3 * t13
+    t18 = 0.00115 * w3_z
+    t19 = 0.00115 * zd2_y
+    t20 = w3_z * t14
+    g_1 = t4 * t7 - t5 * s1_y
+    g_2 = t5 * t6 - t4 * s2_x
+    g_3 = 0.16329726 * x1_x - 3.33110322 * t1
+    c2_1_4 = 0.0013 * x1_x
+    n1_c2_z = t1 * t14
+    n1_c1_y = t1 * (t16 + w3_z * t13)
+    n1_c1_z = t1 * t17 - x1_x * t19
+    c2_1_1 = t1 * (t1 * n2_c2_z) + x1_x * c2_1_4 + t7 * t7 + s1_y * s1_y + s1_z * s1_z
+    c1_1_1 = t1 * (t1 * t15 + x1_x * t18) - x1_x * n1_c1_y + t7 * t10 + s1_y * sd1_y + s1_z * sd1_z
+    c1_2_1 = n1_c1_z - (s2_x * t10 + t6 * sd1_y)
+    c1_3_1 = n1_c1_z - (0.3749834985702704 * t10 + 0.018382431830418957 * sd1_y)
+    tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
+    tau2_1 = g_2 + qd1 * c1_2_1
+    tau3_1 = g_3 + qd1 * c1_3_1
+    n2_c1_x = t17 - t2 * n2_c2_z
+    n2_c1_y = 0.0013 * zd2_y - (zd2_y * t13 + t20)
+    n2_c1_z = t2 * t14 - t15
+    c2_1_2 = n1_c2_z - (s2_x * t7 + t6 * s1_y)
+    t21 = t1 * n2_c1_x + x1_x * n2_c1_y
+    c1_1_2 = s1_y * sd2_y - t7 * v1_y + s1_z * sd2_z - t21
+    c2_2_2 = n2_c2_z + s2_x * s2_x + t6 * t6
+    c1_2_2 = n2_c1_z + s2_x * v1_y - t6 * sd2_y
+    c1_3_2 = n2_c1_z + 0.3749834985702704 * v1_y - 0.018382431830418957 * sd2_y
+    tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2
+    tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2
+    tau3_2 = tau3_1 + qd2 * c1_3_2
+    c2_1_3 = n1_c2_z - (0.0509682562 * x1_x + 0.0024985646 * t1)
+    c1_1_3 = s1_y * sd3_y - t7 * sd3_x + s1_z * sd3_z - t21
+    c2_2_3 = n2_c2_z + 0.3749834985702704 * s2_x + 0.018382431830418957 * t6
+    c1_2_3 = n2_c1_z + s2_x * sd3_x - t6 * sd3_y
+    c2_3_3 = n2_c2_z + 0.140950538
+    c1_3_3 = n2_c1_z + 0.3749834985702704 * sd3_x - 0.018382431830418957 * sd3_y
+    tau1_3 = tau1_2 + qdd3 * c2_1_3 + qd3 * c1_1_3
+    tau2_3 = tau2_2 + qdd3 * c2_2_3 + qd3 * c1_2_3
+    tau3_3 = tau3_2 + qdd1 * c2_1_3 + qdd2 * c2_2_3 + qdd3 * c2_3_3 + qd3 * c1_3_3
+    n4_c1_x = w3_z * n2_c2_z - t16 - t18
+    n4_c1_z = zd2_y * n2_c2_z - t20 - t19
+    t22 = t1 * n4_c1_x
+    t23 = qd4 * n4_c1_z
 
     # outputs
     return (
         (
-            t1 * (t1 * n2_c2_z) + x1_x * t31 + t7 * t7 + s1_y * s1_y + s1_z * s1_z,  # c2(1, 4, 1)
-            n1_c2_z - (s2_x * t7 + t6 * s1_y),  # c2(1, 4, 2)
-            n1_c2_z - (0.0509682562 * x1_x + 0.0024985646 * t1),  # c2(1, 4, 3)
-            t31,  # c2(1, 4, 4)
-            n2_c2_z + s2_x * s2_x + t6 * t6,  # c2(2, 4, 2)
-            n2_c2_z + 0.3749834985702704 * s2_x + 0.018382431830418957 * t6,  # c2(2, 4, 3)
+            c2_1_1,  # c2(1, 4, 1)
+            c2_1_2,  # c2(1, 4, 2)
+            c2_1_3,  # c2(1, 4, 3)
+            c2_1_4,  # c2(1, 4, 4)
+            c2_2_2,  # c2(2, 4, 2)
+            c2_2_3,  # c2(2, 4, 3)
             0.0,  # c2(2, 4, 4)
-            n2_c2_z + 0.140950538,  # c2(3, 4, 3)
+            c2_3_3,  # c2(3, 4, 3)
             0.0,  # c2(3, 4, 4)
             0.0013,  # c2(4, 4, 4)
         ),
         (
-            t1 * (t1 * t19 + x1_x * t23) - x1_x * n1_c1_y + t7 * t10 + s1_y * sd1_y + s1_z * sd1_z,  # c1(1, 4, 1)
-            s1_y * sd2_y - t7 * v1_y + s1_z * sd2_z - t32,  # c1(1, 4, 2)
-            s1_y * sd3_y - t7 * sd3_x + s1_z * sd3_z - t32,  # c1(1, 4, 3)
-            -t1 * n4_c1_x,  # c1(1, 4, 4)
-            n1_c1_z - (s2_x * t10 + t6 * sd1_y),  # c1(2, 4, 1)
-            n2_c1_z + s2_x * v1_y - t6 * sd2_y,  # c1(2, 4, 2)
-            n2_c1_z + s2_x * sd3_x - t6 * sd3_y,  # c1(2, 4, 3)
+            c1_1_1,  # c1(1, 4, 1)
+            c1_1_2,  # c1(1, 4, 2)
+            c1_1_3,  # c1(1, 4, 3)
+            -t22,  # c1(1, 4, 4)
+            c1_2_1,  # c1(2, 4, 1)
+            c1_2_2,  # c1(2, 4, 2)
+            c1_2_3,  # c1(2, 4, 3)
             n4_c1_z,  # c1(2, 4, 4)
-            n1_c1_z - (0.3749834985702704 * t10 + 0.018382431830418957 * sd1_y),  # c1(3, 4, 1)
-            n2_c1_z + 0.3749834985702704 * v1_y - 0.018382431830418957 * sd2_y,  # c1(3, 4, 2)
-            n2_c1_z + 0.3749834985702704 * sd3_x - 0.018382431830418957 * sd3_y,  # c1(3, 4, 3)
+            c1_3_1,  # c1(3, 4, 1)
+            c1_3_2,  # c1(3, 4, 2)
+            c1_3_3,  # c1(3, 4, 3)
             n4_c1_z,  # c1(3, 4, 4)
             -n1_c1_y,  # c1(4, 4, 1)
             -n2_c1_y,  # c1(4, 4, 2)
@@ -137,16 +150,16 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
             0.0,  # c1(4, 4, 4)
         ),
         (
-            t4 * t7 - t5 * s1_y,  # g(1, 4)
-            t5 * t6 - t4 * s2_x,  # g(2, 4)
-            0.16329726 * x1_x - 3.33110322 * t1,  # g(3, 4)
+            g_1,  # g(1, 4)
+            g_2,  # g(2, 4)
+            g_3,  # g(3, 4)
             0.0,  # g(4, 4)
         ),
         (
-            t30 - (t29 + x1_x * t27),  # tau(1, 4)
-            t28 + s2_x * t12 - t6 * t14,  # tau(2, 4)
-            t28 + 0.3749834985702704 * t12 - 0.018382431830418957 * t14,  # tau(3, 4)
-            -t27,  # tau(4, 4)
+            tau1_3 + qdd4 * c2_1_4 - qd4 * t22,  # tau(1, 4)
+            tau2_3 + t23,  # tau(2, 4)
+            tau3_3 + t23,  # tau(3, 4)
+            qdd1 * c2_1_4 - (qd1 * n1_c1_y + qd2 * n2_c1_y + qd3 * n2_c1_y) + 0.0013 * qdd4,  # tau(4, 4)
         ),
     )
 

@@ -17,7 +17,7 @@ PATH = (0, 1, 2, 3, 4, 5)  # coordinates that move the link, counted from 0
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
-    744 additions and multiplications, 10 sines, cosines and the like.
+    724 additions and multiplications, 10 sines, cosines and the like.
     """
     # inputs
     q2 = q[..., 1]
@@ -64,204 +64,255 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     t4 = qd1 * t2
     w1_y = qd1 * z1_y
     t5 = qd1 * t3
-    wd1_y = qdd1 * z1_y
     zd2_x = y1_z * w1_y + c4 * t5
     zd2_y = y1_z * t4 - y1_x * t5
-    t6 = c4 * t4 + y1_x * w1_y
     w2_x = qd2 * y1_x - t4
     w2_y = w1_y + qd2 * c4
     w2_z = qd2 * y1_z - t5
-    wd2_x = qd2 * zd2_x + qdd2 * y1_x - qdd1 * t2
-    wd2_y = qd2 * zd2_y + wd1_y + qdd2 * c4
-    wd2_z = qdd2 * y1_z - qdd1 * t3 - qd2 * t6
     zd3_x = y1_z * w2_y - c4 * w2_z
     zd3_y = y1_x * w2_z - y1_z * w2_x
     zd3_z = c4 * w2_x - y1_x * w2_y
     w3_x = w2_x + qd3 * y1_x
     w3_y = w2_y + qd3 * c4
     w3_z = w2_z + qd3 * y1_z
-    wd3_x = qd3 * zd3_x + wd2_x + qdd3 * y1_x
-    wd3_y = qd3 * zd3_y + wd2_y + qdd3 * c4
-    wd3_z = qd3 * zd3_z + wd2_z + qdd3 * y1_z
     zd4_x = c5 * w3_y
-    t7 = s5 * w3_z + c5 * w3_x
+    t6 = s5 * w3_z + c5 * w3_x
     zd4_z = s5 * w3_y
     w4_x = w3_x - qd4 * s5
     w4_z = w3_z + qd4 * c5
-    wd4_x = qd4 * zd4_x + wd3_x - qdd4 * s5
-    wd4_y = wd3_y - qd4 * t7
-    wd4_z = qd4 * zd4_z + wd3_z + qdd4 * c5
     w5_y = qd5 + w3_y
-    wd5_x = wd4_x - qd5 * w4_z
-    wd5_y = qdd5 + wd4_y
-    wd5_z = wd4_z + qd5 * w4_x
     w6_z = qd6 + w4_z
-    wd6_x = wd5_x + qd6 * w5_y
-    wd6_y = wd5_y - qd6 * w4_x
-    wd6_z = qdd6 + wd5_z
-    t8 = 2.943 * t2
-    t9 = 2.943 * z1_y
-    t10 = 2.943 * t3
-    t11 = 0.00609 * x3_x + 0.12993 * s5
-    t12 = 0.00609 * s4
-    t13 = -0.0096 - (0.12993 * c5 - 0.00609 * x3_z)
-    t14 = t11 - (0.12954 * x2_x - 0.02802 * y1_x)
-    t15 = 0.12954 * t1 + 0.02802 * c4 - t12
-    t16 = t13 - (0.12954 * x2_z - 0.02802 * y1_z)
-    t17 = t14 - 0.07305 * y1_x
-    t18 = t15 - 0.07305 * c4
-    t19 = t16 - 0.07305 * y1_z
-    t20 = t3 * t18 + z1_y * t19
-    s1_y = t3 * t17 - t2 * t19
-    s1_z = z1_y * t17 + t2 * t18
-    s2_x = y1_z * t15 - c4 * t16
-    s2_y = y1_x * t16 - y1_z * t14
-    s2_z = c4 * t14 - y1_x * t15
-    t21 = y1_z * t12 + c4 * t13
-    s3_y = y1_x * t13 - y1_z * t11
-    s3_z = c4 * t11 + y1_x * t12
+    t7 = 2.943 * t2
+    t8 = 2.943 * z1_y
+    t9 = 2.943 * t3
+    t10 = 0.00609 * x3_x + 0.12993 * s5
+    t11 = 0.00609 * s4
+    t12 = -0.0096 - (0.12993 * c5 - 0.00609 * x3_z)
+    t13 = t10 - (0.12954 * x2_x - 0.02802 * y1_x)
+    t14 = 0.12954 * t1 + 0.02802 * c4 - t11
+    t15 = t12 - (0.12954 * x2_z - 0.02802 * y1_z)
+    t16 = t13 - 0.07305 * y1_x
+    t17 = t14 - 0.07305 * c4
+    t18 = t15 - 0.07305 * y1_z
+    t19 = t3 * t17 + z1_y * t18
+    s1_y = t3 * t16 - t2 * t18
+    s1_z = z1_y * t16 + t2 * t17
+    s2_x = y1_z * t14 - c4 * t15
+    s2_y = y1_x * t15 - y1_z * t13
+    s2_z = c4 * t13 - y1_x * t14
+    t20 = y1_z * t11 + c4 * t12
+    s3_y = y1_x * t12 - y1_z * t10
+    s3_z = c4 * t10 + y1_x * t11
     s4_y = 0.0096 * s5
-    t22 = 0.0096 * qd5
-    t23 = qd4 * s4_y
-    t24 = qd3 * s3_z
-    v2_x = qd3 * t21 - t22
-    t25 = t23 + qd3 * s3_y
+    t21 = 0.0096 * qd5
+    t22 = qd4 * s4_y
+    t23 = qd3 * s3_z
+    v2_x = qd3 * t20 - t21
+    t24 = t22 + qd3 * s3_y
     v1_x = v2_x - qd2 * s2_x
-    t26 = t25 + qd2 * s2_y
-    t27 = t24 + qd2 * s2_z
-    v0_x = v1_x + qd1 * t20
-    t28 = t26 + qd1 * s1_y
-    t29 = t27 + qd1 * s1_z
-    sd1_x = t3 * t28 + z1_y * t29
-    sd1_y = t2 * t29 + t3 * v0_x
-    sd1_z = z1_y * v0_x - t2 * t28
-    sd2_x = w1_y * s2_z + t5 * s2_y + c4 * t27 - y1_z * t26
-    sd2_y = t4 * s2_z - t5 * s2_x - (y1_x * t27 + y1_z * v1_x)
-    sd2_z = c4 * v1_x + y1_x * t26 - (t4 * s2_y + w1_y * s2_x)
-    sd3_x = w2_y * s3_z - w2_z * s3_y + c4 * t24 - y1_z * t25
-    t30 = w2_z * t21 + w2_x * s3_z + y1_x * t24 + y1_z * v2_x
-    sd3_z = w2_x * s3_y + w2_y * t21 + c4 * v2_x + y1_x * t25
-    sd4_y = c5 * t22
-    t31 = w3_z * s4_y + c5 * t23
-    sd4_z = w3_x * s4_y - s5 * t23
+    t25 = t24 + qd2 * s2_y
+    t26 = t23 + qd2 * s2_z
+    v0_x = v1_x + qd1 * t19
+    t27 = t25 + qd1 * s1_y
+    t28 = t26 + qd1 * s1_z
+    sd1_x = t3 * t27 + z1_y * t28
+    sd1_y = t2 * t28 + t3 * v0_x
+    sd1_z = z1_y * v0_x - t2 * t27
+    sd2_x = w1_y * s2_z + t5 * s2_y + c4 * t26 - y1_z * t25
+    sd2_y = t4 * s2_z - t5 * s2_x - (y1_x * t26 + y1_z * v1_x)
+    sd2_z = c4 * v1_x + y1_x * t25 - (t4 * s2_y + w1_y * s2_x)
+    sd3_x = w2_y * s3_z - w2_z * s3_y + c4 * t23 - y1_z * t24
+    t29 = w2_z * t20 + w2_x * s3_z + y1_x * t23 + y1_z * v2_x
+    sd3_z = w2_x * s3_y + w2_y * t20 + c4 * v2_x + y1_x * t24
+    sd4_y = c5 * t21
+    t30 = w3_z * s4_y + c5 * t22
+    sd4_z = w3_x * s4_y - s5 * t22
     sd5_y = 0.0096 * w4_z
-    t32 = t22 + 0.0096 * w3_y
-    t33 = qdd2 * s2_x + qd1 * sd1_x - t8 - qdd1 * t20 + qd2 * sd2_x + qd3 * sd3_x - qdd3 * t21
-    t34 = qdd3 * s3_y + qdd2 * s2_y + qdd1 * s1_y + t9 + qd1 * sd1_y + qd2 * sd2_y - qd3 * t30
-    t35 = qdd3 * s3_z + qdd2 * s2_z + qdd1 * s1_z + qd1 * sd1_z - t10 + qd2 * sd2_z + qd3 * sd3_z
-    t36 = t33 - qd4 * t31 + 0.0096 * qdd5
-    t37 = qdd4 * s4_y + t34 + qd4 * sd4_y + qd5 * sd5_y
-    t38 = t35 + qd4 * sd4_z - qd5 * t32
-    t39 = 2e-05 * c6
-    t40 = 2e-05 * s6
-    t41 = c6 * t39 + s6 * t40
-    t42 = s6 * t39 - c6 * t40
-    n5_c2_y = 0.00017 - t41
-    t43 = w6_z * t42
-    t44 = w6_z * t41
-    t45 = w4_x * t42
-    t46 = w5_y * t41 - t45
-    t47 = w5_y * t42
-    t48 = t47 - w4_x * t41
-    t49 = 0.00013 * w5_y
-    t50 = 0.00013 * w4_x
-    t51 = wd6_x * n5_c2_y - wd6_y * t42 + w4_x * t43 + w5_y * t44 - w6_z * t49
-    t52 = wd6_y * n5_c2_y - wd6_x * t42 + w6_z * t50 - (w4_x * t44 + w5_y * t43)
-    t53 = 4e-05 * wd6_z + w4_x * t46 + w5_y * t48
-    n1_c2_y = t2 * t42 + z1_y * n5_c2_y
-    t54 = 4e-05 * t3
-    n1_c1_x = z1_y * t44 - t2 * t43 + t3 * t49
-    n1_c1_y = t2 * t44 - z1_y * t43 - t3 * t50
-    n1_c1_z = z1_y * t48 - t2 * t46
-    t55 = t2 * (t2 * n5_c2_y + z1_y * t42) + z1_y * n1_c2_y + t3 * t54
-    t56 = y1_x * n1_c1_x + c4 * n1_c1_y + y1_z * n1_c1_z
-    t57 = y1_x * t51 + c4 * t52 + y1_z * t53
-    n2_c2_x = y1_x * n5_c2_y - c4 * t42
-    n2_c2_y = c4 * n5_c2_y - y1_x * t42
+    t31 = t21 + 0.0096 * w3_y
+    t32 = 2e-05 * c6
+    t33 = 2e-05 * s6
+    t34 = c6 * t32 + s6 * t33
+    t35 = s6 * t32 - c6 * t33
+    n5_c2_y = 0.00017 - t34
+    t36 = w6_z * t35
+    t37 = w6_z * t34
+    t38 = w4_x * t35
+    t39 = w5_y * t34 - t38
+    t40 = w5_y * t35
+    t41 = t40 - w4_x * t34
+    t42 = 0.00013 * w5_y
+    t43 = 0.00013 * w4_x
+    g_1 = t7 * t19 + t8 * s1_y - t9 * s1_z
+    g_2 = t8 * s2_y - t7 * s2_x - t9 * s2_z
+    g_3 = t7 * t20 + t8 * s3_y - t9 * s3_z
+    g_4 = t8 * s4_y
+    t44 = 0.0282528 * t2
+    n1_c2_y = t2 * t35 + z1_y * n5_c2_y
+    t45 = 4e-05 * t3
+    n1_c1_x = z1_y * t37 - t2 * t36 + t3 * t42
+    n1_c1_y = t2 * t37 - z1_y * t36 - t3 * t43
+    n1_c1_z = z1_y * t41 - t2 * t39
+    t46 = t2 * (t2 * n5_c2_y + z1_y * t35) + z1_y * n1_c2_y + t3 * t45
+    c2_1_1 = t46 + t19 * t19 + s1_y * s1_y + s1_z * s1_z
+    c1_1_1 = z1_y * n1_c1_y - t2 * n1_c1_x - t3 * n1_c1_z + s1_y * sd1_y - t19 * sd1_x + s1_z * sd1_z
+    t47 = y1_x * n1_c1_x + c4 * n1_c1_y + y1_z * n1_c1_z
+    c1_2_1 = t47 + s2_x * sd1_x + s2_y * sd1_y + s2_z * sd1_z
+    c1_3_1 = t47 + s3_y * sd1_y - t20 * sd1_x + s3_z * sd1_z
+    c1_4_1 = c5 * n1_c1_z - s5 * n1_c1_x + s4_y * sd1_y
+    c1_5_1 = n1_c1_y + 0.0096 * sd1_x
+    tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
+    tau2_1 = g_2 + qd1 * c1_2_1
+    tau3_1 = g_3 + qd1 * c1_3_1
+    tau4_1 = g_4 + qd1 * c1_4_1
+    tau5_1 = qd1 * c1_5_1 - t44
+    tau6_1 = qd1 * n1_c1_z
+    n2_c2_x = y1_x * n5_c2_y - c4 * t35
+    n2_c2_y = c4 * n5_c2_y - y1_x * t35
     n2_c2_z = 4e-05 * y1_z
-    t58 = y1_x * t43 + c4 * t44 - y1_z * t49
-    t59 = y1_z * t50 - (y1_x * t44 + c4 * t43)
-    t60 = y1_x * t46 + c4 * t48
-    n2_c1_x = t58 + zd2_x * n5_c2_y - zd2_y * t42
-    n2_c1_y = t59 + zd2_y * n5_c2_y - zd2_x * t42
-    n2_c1_z = t60 - 4e-05 * t6
-    t61 = z1_y * n2_c2_y - t2 * n2_c2_x - t3 * n2_c2_z
-    t62 = y1_x * n2_c2_x + c4 * n2_c2_y + y1_z * n2_c2_z
-    t63 = y1_x * n2_c1_x + c4 * n2_c1_y + y1_z * n2_c1_z
-    n3_c1_x = t58 + zd3_x * n5_c2_y - zd3_y * t42
-    n3_c1_y = t59 + zd3_y * n5_c2_y - zd3_x * t42
-    n3_c1_z = t60 + 4e-05 * zd3_z
-    t64 = y1_x * n3_c1_x + c4 * n3_c1_y + y1_z * n3_c1_z
-    t65 = s5 * n5_c2_y
-    n4_c2_y = s5 * t42
+    t48 = y1_x * t36 + c4 * t37 - y1_z * t42
+    t49 = y1_z * t43 - (y1_x * t37 + c4 * t36)
+    t50 = y1_x * t39 + c4 * t41
+    n2_c1_x = t48 + zd2_x * n5_c2_y - zd2_y * t35
+    n2_c1_y = t49 + zd2_y * n5_c2_y - zd2_x * t35
+    n2_c1_z = t50 - 4e-05 * (c4 * t4 + y1_x * w1_y)
+    t51 = z1_y * n2_c2_y - t2 * n2_c2_x - t3 * n2_c2_z
+    c2_1_2 = t51 + s1_y * s2_y - t19 * s2_x + s1_z * s2_z
+    c1_1_2 = z1_y * n2_c1_y - t2 * n2_c1_x - t3 * n2_c1_z + s1_y * sd2_y - t19 * sd2_x + s1_z * sd2_z
+    t52 = y1_x * n2_c2_x + c4 * n2_c2_y + y1_z * n2_c2_z
+    c2_2_2 = t52 + s2_x * s2_x + s2_y * s2_y + s2_z * s2_z
+    t53 = y1_x * n2_c1_x + c4 * n2_c1_y + y1_z * n2_c1_z
+    c1_2_2 = t53 + s2_x * sd2_x + s2_y * sd2_y + s2_z * sd2_z
+    c1_3_2 = t53 + s3_y * sd2_y - t20 * sd2_x + s3_z * sd2_z
+    c1_4_2 = c5 * n2_c1_z - s5 * n2_c1_x + s4_y * sd2_y
+    c1_5_2 = n2_c1_y + 0.0096 * sd2_x
+    tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2
+    tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2
+    tau3_2 = tau3_1 + qd2 * c1_3_2
+    tau4_2 = tau4_1 + qd2 * c1_4_2
+    tau5_2 = tau5_1 + qd2 * c1_5_2
+    tau6_2 = tau6_1 + qd2 * n2_c1_z
+    n3_c1_x = t48 + zd3_x * n5_c2_y - zd3_y * t35
+    n3_c1_y = t49 + zd3_y * n5_c2_y - zd3_x * t35
+    n3_c1_z = t50 + 4e-05 * zd3_z
+    c2_1_3 = t51 + t19 * t20 + s1_y * s3_y + s1_z * s3_z
+    c1_1_3 = z1_y * n3_c1_y - t2 * n3_c1_x - t3 * n3_c1_z + s1_z * sd3_z - (t19 * sd3_x + s1_y * t29)
+    c2_2_3 = t52 + s2_y * s3_y - s2_x * t20 + s2_z * s3_z
+    t54 = y1_x * n3_c1_x + c4 * n3_c1_y + y1_z * n3_c1_z
+    c1_2_3 = t54 + s2_x * sd3_x - s2_y * t29 + s2_z * sd3_z
+    c2_3_3 = t52 + t20 * t20 + s3_y * s3_y + s3_z * s3_z
+    c1_3_3 = t54 + s3_z * sd3_z - (t20 * sd3_x + s3_y * t29)
+    c1_4_3 = c5 * n3_c1_z - s5 * n3_c1_x - s4_y * t29
+    c1_5_3 = n3_c1_y + 0.0096 * sd3_x
+    tau1_3 = tau1_2 + qdd3 * c2_1_3 + qd3 * c1_1_3
+    tau2_3 = tau2_2 + qdd3 * c2_2_3 + qd3 * c1_2_3
+    tau3_3 = tau3_2 + qdd1 * c2_1_3 + qdd2 * c2_2_3 + qdd3 * c2_3_3 + qd3 * c1_3_3
+    tau4_3 = tau4_2 + qd3 * c1_4_3
+    tau5_3 = tau5_2 + qd3 * c1_5_3
+    tau6_3 = tau6_2 + qd3 * n3_c1_z
+    t55 = s5 * n5_c2_y
+    n4_c2_y = s5 * t35
     n4_c2_z = 4e-05 * c5
-    n4_c1_x = zd4_x * n5_c2_y + t7 * t42 - (s5 * t43 + c5 * t49)
-    n4_c1_y = s5 * t44 + c5 * t50 - (zd4_x * t42 + t7 * n5_c2_y)
-    n4_c1_z = 4e-05 * zd4_z - s5 * t46
-    t66 = c4 * n4_c2_y - y1_x * t65 + y1_z * n4_c2_z
-    t67 = y1_x * n4_c1_x + c4 * n4_c1_y + y1_z * n4_c1_z
-    n5_c1_x = t44 - w4_z * n5_c2_y
-    n5_c1_y = w4_z * t42 - t43
-    n5_c1_z = t48 + 4e-05 * w4_x
-    t68 = y1_x * n5_c1_x + c4 * n5_c1_y + y1_z * n5_c1_z
-    n6_c1_x = t45 + w5_y * n5_c2_y - t49
-    n6_c1_y = t50 - (t47 + w4_x * n5_c2_y)
-    t69 = y1_x * n6_c1_x + c4 * n6_c1_y
+    n4_c1_x = zd4_x * n5_c2_y + t6 * t35 - (s5 * t36 + c5 * t42)
+    n4_c1_y = s5 * t37 + c5 * t43 - (zd4_x * t35 + t6 * n5_c2_y)
+    n4_c1_z = 4e-05 * zd4_z - s5 * t39
+    c2_1_4 = t2 * t55 + z1_y * n4_c2_y - t3 * n4_c2_z + s1_y * s4_y
+    c1_1_4 = z1_y * n4_c1_y - t2 * n4_c1_x - t3 * n4_c1_z + t19 * t30 + s1_y * sd4_y + s1_z * sd4_z
+    t56 = c4 * n4_c2_y - y1_x * t55 + y1_z * n4_c2_z
+    c2_2_4 = t56 + s2_y * s4_y
+    t57 = y1_x * n4_c1_x + c4 * n4_c1_y + y1_z * n4_c1_z
+    c1_2_4 = t57 + s2_y * sd4_y - s2_x * t30 + s2_z * sd4_z
+    c2_3_4 = t56 + s3_y * s4_y
+    c1_3_4 = t57 + t20 * t30 + s3_y * sd4_y + s3_z * sd4_z
+    c2_4_4 = s5 * t55 + c5 * n4_c2_z + s4_y * s4_y
+    c1_4_4 = c5 * n4_c1_z - s5 * n4_c1_x + s4_y * sd4_y
+    c1_5_4 = n4_c1_y - 0.0096 * t30
+    tau1_4 = tau1_3 + qdd4 * c2_1_4 + qd4 * c1_1_4
+    tau2_4 = tau2_3 + qdd4 * c2_2_4 + qd4 * c1_2_4
+    tau3_4 = tau3_3 + qdd4 * c2_3_4 + qd4 * c1_3_4
+    tau4_4 = tau4_3 + qdd1 * c2_1_4 + qdd2 * c2_2_4 + qdd3 * c2_3_4 + qdd4 * c2_4_4 + qd4 * c1_4_4
+    tau5_4 = tau5_3 + qd4 * c1_5_4
+    tau6_4 = tau6_3 + qd4 * n4_c1_z
+    n5_c1_x = t37 - w4_z * n5_c2_y
+    n5_c1_y = w4_z * t35 - t36
+    n5_c1_z = t41 + 4e-05 * w4_x
+    c2_1_5 = n1_c2_y - 0.0096 * t19
+    c1_1_5 = z1_y * n5_c1_y - t2 * n5_c1_x - t3 * n5_c1_z + s1_y * sd5_y - s1_z * t31
+    c2_2_5 = n2_c2_y + 0.0096 * s2_x
+    t58 = y1_x * n5_c1_x + c4 * n5_c1_y + y1_z * n5_c1_z
+    c1_2_5 = t58 + s2_y * sd5_y - s2_z * t31
+    c2_3_5 = n2_c2_y - 0.0096 * t20
+    c1_3_5 = t58 + s3_y * sd5_y - s3_z * t31
+    c1_4_5 = c5 * n5_c1_z - s5 * n5_c1_x + s4_y * sd5_y
+    c2_5_5 = n5_c2_y + 9.216e-05
+    tau1_5 = tau1_4 + qdd5 * c2_1_5 + qd5 * c1_1_5
+    tau2_5 = tau2_4 + qdd5 * c2_2_5 + qd5 * c1_2_5
+    tau3_5 = tau3_4 + qdd5 * c2_3_5 + qd5 * c1_3_5
+    tau4_5 = tau4_4 + qdd5 * n4_c2_y + qd5 * c1_4_5
+    t59 = tau5_4 + qdd1 * c2_1_5 + qdd2 * c2_2_5 + qdd3 * c2_3_5 + qdd4 * n4_c2_y + qdd5 * c2_5_5
+    tau5_5 = t59 + qd5 * n5_c1_y
+    tau6_5 = tau6_4 + qd5 * n5_c1_z
+    n6_c1_x = t38 + w5_y * n5_c2_y - t42
+    n6_c1_y = t43 - (t40 + w4_x * n5_c2_y)
+    c1_1_6 = z1_y * n6_c1_y - t2 * n6_c1_x
+    c1_2_6 = y1_x * n6_c1_x + c4 * n6_c1_y
+    t60 = s5 * n6_c1_x
+    t61 = qdd6 * n2_c2_z
+    t62 = qd6 * c1_2_6
 
     # outputs
     return (
         (
-            t55 + t20 * t20 + s1_y * s1_y + s1_z * s1_z,  # c2(1, 6, 1)
-            t61 + s1_y * s2_y - t20 * s2_x + s1_z * s2_z,  # c2(1, 6, 2)
-            t61 + t20 * t21 + s1_y * s3_y + s1_z * s3_z,  # c2(1, 6, 3)
-            t2 * t65 + z1_y * n4_c2_y - t3 * n4_c2_z + s1_y * s4_y,  # c2(1, 6, 4)
-            n1_c2_y - 0.0096 * t20,  # c2(1, 6, 5)
-            -t54,  # c2(1, 6, 6)
-            t62 + s2_x * s2_x + s2_y * s2_y + s2_z * s2_z,  # c2(2, 6, 2)
-            t62 + s2_y * s3_y - s2_x * t21 + s2_z * s3_z,  # c2(2, 6, 3)
-            t66 + s2_y * s4_y,  # c2(2, 6, 4)
-            n2_c2_y + 0.0096 * s2_x,  # c2(2, 6, 5)
+            c2_1_1,  # c2(1, 6, 1)
+            c2_1_2,  # c2(1, 6, 2)
+            c2_1_3,  # c2(1, 6, 3)
+            c2_1_4,  # c2(1, 6, 4)
+            c2_1_5,  # c2(1, 6, 5)
+            -t45,  # c2(1, 6, 6)
+            c2_2_2,  # c2(2, 6, 2)
+            c2_2_3,  # c2(2, 6, 3)
+            c2_2_4,  # c2(2, 6, 4)
+            c2_2_5,  # c2(2, 6, 5)
             n2_c2_z,  # c2(2, 6, 6)
-            t62 + t21 * t21 + s3_y * s3_y + s3_z * s3_z,  # c2(3, 6, 3)
-            t66 + s3_y * s4_y,  # c2(3, 6, 4)
-            n2_c2_y - 0.0096 * t21,  # c2(3, 6, 5)
+            c2_3_3,  # c2(3, 6, 3)
+            c2_3_4,  # c2(3, 6, 4)
+            c2_3_5,  # c2(3, 6, 5)
             n2_c2_z,  # c2(3, 6, 6)
-            s5 * t65 + c5 * n4_c2_z + s4_y * s4_y,  # c2(4, 6, 4)
+            c2_4_4,  # c2(4, 6, 4)
             n4_c2_y,  # c2(4, 6, 5)
             n4_c2_z,  # c2(4, 6, 6)
-            n5_c2_y + 9.216e-05,  # c2(5, 6, 5)
+            c2_5_5,  # c2(5, 6, 5)
             0.0,  # c2(5, 6, 6)
             4e-05,  # c2(6, 6, 6)
         ),
         (
-            z1_y * n1_c1_y - t2 * n1_c1_x - t3 * n1_c1_z + s1_y * sd1_y - t20 * sd1_x + s1_z * sd1_z,  # c1(1, 6, 1)
-            z1_y * n2_c1_y - t2 * n2_c1_x - t3 * n2_c1_z + s1_y * sd2_y - t20 * sd2_x + s1_z * sd2_z,  # c1(1, 6, 2)
-            z1_y * n3_c1_y - t2 * n3_c1_x - t3 * n3_c1_z + s1_z * sd3_z - (t20 * sd3_x + s1_y * t30),  # c1(1, 6, 3)
-            z1_y * n4_c1_y - t2 * n4_c1_x - t3 * n4_c1_z + t20 * t31 + s1_y * sd4_y + s1_z * sd4_z,  # c1(1, 6, 4)
-            z1_y * n5_c1_y - t2 * n5_c1_x - t3 * n5_c1_z + s1_y * sd5_y - s1_z * t32,  # c1(1, 6, 5)
-            z1_y * n6_c1_y - t2 * n6_c1_x,  # c1(1, 6, 6)
-            t56 + s2_x * sd1_x + s2_y * sd1_y + s2_z * sd1_z,  # c1(2, 6, 1)
-            t63 + s2_x * sd2_x + s2_y * sd2_y + s2_z * sd2_z,  # c1(2, 6, 2)
-            t64 + s2_x * sd3_x - s2_y * t30 + s2_z * sd3_z,  # c1(2, 6, 3)
-            t67 + s2_y * sd4_y - s2_x * t31 + s2_z * sd4_z,  # c1(2, 6, 4)
-            t68 + s2_y * sd5_y - s2_z * t32,  # c1(2, 6, 5)
-            t69,  # c1(2, 6, 6)
-            t56 + s3_y * sd1_y - t21 * sd1_x + s3_z * sd1_z,  # c1(3, 6, 1)
-            t63 + s3_y * sd2_y - t21 * sd2_x + s3_z * sd2_z,  # c1(3, 6, 2)
-            t64 + s3_z * sd3_z - (t21 * sd3_x + s3_y * t30),  # c1(3, 6, 3)
-            t67 + t21 * t31 + s3_y * sd4_y + s3_z * sd4_z,  # c1(3, 6, 4)
-            t68 + s3_y * sd5_y - s3_z * t32,  # c1(3, 6, 5)
-            t69,  # c1(3, 6, 6)
-            c5 * n1_c1_z - s5 * n1_c1_x + s4_y * sd1_y,  # c1(4, 6, 1)
-            c5 * n2_c1_z - s5 * n2_c1_x + s4_y * sd2_y,  # c1(4, 6, 2)
-            c5 * n3_c1_z - s5 * n3_c1_x - s4_y * t30,  # c1(4, 6, 3)
-            c5 * n4_c1_z - s5 * n4_c1_x + s4_y * sd4_y,  # c1(4, 6, 4)
-            c5 * n5_c1_z - s5 * n5_c1_x + s4_y * sd5_y,  # c1(4, 6, 5)
-            -s5 * n6_c1_x,  # c1(4, 6, 6)
-            n1_c1_y + 0.0096 * sd1_x,  # c1(5, 6, 1)
-            n2_c1_y + 0.0096 * sd2_x,  # c1(5, 6, 2)
-            n3_c1_y + 0.0096 * sd3_x,  # c1(5, 6, 3)
-            n4_c1_y - 0.0096 * t31,  # c1(5, 6, 4)
+            c1_1_1,  # c1(1, 6, 1)
+            c1_1_2,  # c1(1, 6, 2)
+            c1_1_3,  # c1(1, 6, 3)
+            c1_1_4,  # c1(1, 6, 4)
+            c1_1_5,  # c1(1, 6, 5)
+            c1_1_6,  # c1(1, 6, 6)
+            c1_2_1,  # c1(2, 6, 1)
+            c1_2_2,  # c1(2, 6, 2)
+            c1_2_3,  # c1(2, 6, 3)
+            c1_2_4,  # c1(2, 6, 4)
+            c1_2_5,  # c1(2, 6, 5)
+            c1_2_6,  # c1(2, 6, 6)
+            c1_3_1,  # c1(3, 6, 1)
+            c1_3_2,  # c1(3, 6, 2)
+            c1_3_3,  # c1(3, 6, 3)
+            c1_3_4,  # c1(3, 6, 4)
+            c1_3_5,  # c1(3, 6, 5)
+            c1_2_6,  # c1(3, 6, 6)
+            c1_4_1,  # c1(4, 6, 1)
+            c1_4_2,  # c1(4, 6, 2)
+            c1_4_3,  # c1(4, 6, 3)
+            c1_4_4,  # c1(4, 6, 4)
+            c1_4_5,  # c1(4, 6, 5)
+            -t60,  # c1(4, 6, 6)
+            c1_5_1,  # c1(5, 6, 1)
+            c1_5_2,  # c1(5, 6, 2)
+            c1_5_3,  # c1(5, 6, 3)
+            c1_5_4,  # c1(5, 6, 4)
             n5_c1_y,  # c1(5, 6, 5)
             n6_c1_y,  # c1(5, 6, 6)
             n1_c1_z,  # c1(6, 6, 1)
@@ -272,20 +323,20 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
             0.0,  # c1(6, 6, 6)
         ),
         (
-            t8 * t20 + t9 * s1_y - t10 * s1_z,  # g(1, 6)
-            t9 * s2_y - t8 * s2_x - t10 * s2_z,  # g(2, 6)
-            t8 * t21 + t9 * s3_y - t10 * s3_z,  # g(3, 6)
-            t9 * s4_y,  # g(4, 6)
-            -0.0282528 * t2,  # g(5, 6)
+            g_1,  # g(1, 6)
+            g_2,  # g(2, 6)
+            g_3,  # g(3, 6)
+            g_4,  # g(4, 6)
+            -t44,  # g(5, 6)
             0.0,  # g(6, 6)
         ),
         (
-            z1_y * t52 - t2 * t51 - t3 * t53 + s1_y * t37 - t20 * t36 + s1_z * t38,  # tau(1, 6)
-            t57 + s2_x * t36 + s2_y * t37 + s2_z * t38,  # tau(2, 6)
-            t57 + s3_y * t37 - t21 * t36 + s3_z * t38,  # tau(3, 6)
-            c5 * t53 - s5 * t51 + s4_y * t37,  # tau(4, 6)
-            t52 + 0.0096 * t36,  # tau(5, 6)
-            t53,  # tau(6, 6)
+            tau1_5 - qdd6 * t45 + qd6 * c1_1_6,  # tau(1, 6)
+            tau2_5 + t61 + t62,  # tau(2, 6)
+            t62 + tau3_5 + t61,  # tau(3, 6)
+            tau4_5 + qdd6 * n4_c2_z - qd6 * t60,  # tau(4, 6)
+            tau5_5 + qd6 * n6_c1_y,  # tau(5, 6)
+            tau6_5 - qdd1 * t45 + qdd2 * n2_c2_z + qdd3 * n2_c2_z + qdd4 * n4_c2_z + 4e-05 * qdd6,  # tau(6, 6)
         ),
     )
 

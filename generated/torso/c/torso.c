@@ -184,22 +184,48 @@ SHARED void API(dense_one)(const real *q, const real *qd, const real *qdd, const
 #include "stream.h"
 #include "dense_rows.h"
 
+/* Blocks in a tile: each kernel works on all of them before the next one does, so that its code stays in the cache. */
+enum { TILE = 8 };
+
 struct block {
     ALIGNED real q[N * BLOCK], qd[N * BLOCK], qdd[N * BLOCK], sine[N * BLOCK], cosine[N * BLOCK];
 };
 
-/* Up to BLOCK rows of a motion to a block, with sines and cosines. */
-static void load(size_t samples, const real *q, const real *qd, const real *qdd, struct block *x)
+/* Samples of the next tile where `count` are left, its blocks, and the samples in block t of it. */
+static size_t tile_of(size_t count)
 {
-    gather(samples, N, q, x->q);
-    gather(samples, N, qd, x->qd);
-    gather(samples, N, qdd, x->qdd);
-    API(sines)(N * BLOCK, x->q, x->sine, x->cosine);
+    return count < TILE * BLOCK ? count : TILE * BLOCK;
+}
+
+static size_t blocks_of(size_t count)
+{
+    return (tile_of(count) + BLOCK - 1) / BLOCK;
+}
+
+static size_t samples_of(size_t count, size_t t)
+{
+    return count - t * BLOCK < BLOCK ? count - t * BLOCK : BLOCK;
+}
+
+/* Up to a tile of rows to blocks, with sines and cosines; returns the number of blocks. */
+static size_t load(size_t count, const real *q, const real *qd, const real *qdd, struct block *x, struct inputs *m)
+{
+    const size_t blocks = blocks_of(count);
+    for (size_t t = 0; t < blocks; ++t) {
+        const size_t samples = samples_of(count, t), at = t * N * BLOCK;
+        const struct inputs here = {x[t].q, x[t].qd, x[t].qdd, x[t].sine, x[t].cosine};
+        gather(samples, N, q + at, x[t].q);
+        gather(samples, N, qd + at, x[t].qd);
+        gather(samples, N, qdd + at, x[t].qdd);
+        API(sines)(N * BLOCK, x[t].q, x[t].sine, x[t].cosine);
+        m[t] = here;
+    }
+    return blocks;
 }
 #endif
 
 #if PART(BLOCKS)
-#include "links_together.h"
+#define WANT_DECOMPOSITION
 #define WANT_TORQUE
 #include "link_1.h"
 #include "link_2.h"
@@ -209,15 +235,47 @@ static void load(size_t samples, const real *q, const real *qd, const real *qdd,
 #undef WANT_DECOMPOSITION
 #undef WANT_TORQUE
 
+/* Where the results of a tile wait. */
+struct waiting {
+    ALIGNED real c2[TILE][56 * BLOCK], c1[TILE][91 * BLOCK], g[TILE][21 * BLOCK], tau[TILE][21 * BLOCK];
+};
+
+static void let_wait(struct waiting *room, struct results *r)
+{
+    for (size_t t = 0; t < TILE; ++t) {
+        const struct results here = {room->c2[t], room->c1[t], room->g[t], room->tau[t]};
+        r[t] = here;
+    }
+}
 
 /* Links 1 to 5: results begin where r says. */
-static void links_1_to_5(const struct inputs *m, const real *shared, const struct results *r)
+static void links_1_to_5(size_t blocks, const struct inputs *m, const struct results *r)
 {
-    link_1_rest_block(m->qd, m->sine, m->cosine, shared, r->c2, r->c1, r->g, r->tau);
-    link_2_rest_block(m->qd, m->sine, m->cosine, shared, r->c2 + 6 * W, r->c1 + 9 * W, r->g + 3 * W, r->tau + 3 * W);
-    link_3_rest_block(m->qd, m->qdd, m->sine, m->cosine, shared, r->c2 + 16 * W, r->c1 + 25 * W, r->g + 7 * W, r->tau + 7 * W);
-    link_4_rest_block(m->qd, m->sine, m->cosine, shared, r->c2 + 31 * W, r->c1 + 50 * W, r->g + 12 * W, r->tau + 12 * W);
-    link_5_rest_block(m->qd, m->qdd, m->sine, m->cosine, shared, r->c2 + 41 * W, r->c1 + 66 * W, r->g + 16 * W, r->tau + 16 * W);
+    for (size_t t = 0; t < blocks; ++t)
+        link_1_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2, r[t].c1, r[t].g, r[t].tau);
+    for (size_t t = 0; t < blocks; ++t)
+        link_2_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2 + 6 * W, r[t].c1 + 9 * W, r[t].g + 3 * W, r[t].tau + 3 * W);
+    for (size_t t = 0; t < blocks; ++t)
+        link_3_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2 + 16 * W, r[t].c1 + 25 * W, r[t].g + 7 * W, r[t].tau + 7 * W);
+    for (size_t t = 0; t < blocks; ++t)
+        link_4_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2 + 31 * W, r[t].c1 + 50 * W, r[t].g + 12 * W, r[t].tau + 12 * W);
+    for (size_t t = 0; t < blocks; ++t)
+        link_5_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2 + 41 * W, r[t].c1 + 66 * W, r[t].g + 16 * W, r[t].tau + 16 * W);
+}
+
+/* Their torques alone. */
+static void links_1_to_5_torque(size_t blocks, const struct inputs *m, const struct results *r)
+{
+    for (size_t t = 0; t < blocks; ++t)
+        link_1_torque_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].tau);
+    for (size_t t = 0; t < blocks; ++t)
+        link_2_torque_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].tau + 3 * W);
+    for (size_t t = 0; t < blocks; ++t)
+        link_3_torque_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].tau + 7 * W);
+    for (size_t t = 0; t < blocks; ++t)
+        link_4_torque_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].tau + 12 * W);
+    for (size_t t = 0; t < blocks; ++t)
+        link_5_torque_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].tau + 16 * W);
 }
 
 void API(decomposition)(size_t count, const real *q, const real *qd, const real *qdd,
@@ -227,32 +285,30 @@ void API(decomposition)(size_t count, const real *q, const real *qd, const real 
         API(decomposition_one)(q, qd, qdd, c2, c1, g, tau);
         return;
     }
-    struct block x;
-    const struct inputs m = {x.q, x.qd, x.qdd, x.sine, x.cosine};
-    ALIGNED real shared[69 * BLOCK];
-    ALIGNED real c2_block[56 * BLOCK];
-    ALIGNED real c1_block[91 * BLOCK];
-    ALIGNED real g_block[21 * BLOCK];
-    ALIGNED real tau_block[21 * BLOCK];
-    const struct results r = {c2_block, c1_block, g_block, tau_block};
+    struct block x[TILE];
+    struct inputs m[TILE];
+    struct results r[TILE];
+    struct waiting room;
+    let_wait(&room, r);
     ALIGNED real scratch[91 * BLOCK];
     const int large = count > LARGE / (189 * sizeof(real));
-    for (size_t s = 0; s < count; s += BLOCK) {
-        const size_t samples = count - s < BLOCK ? count - s : BLOCK;
-        load(samples, q + s * N, qd + s * N, qdd + s * N, &x);
-        shared_part_block(m.qd, m.qdd, m.sine, m.cosine, shared);
-        links_1_to_5(&m, shared, &r);
-        if (large && samples == BLOCK) {
-            stream_rows(C2, c2_block, c2 + s * C2, scratch);
-            stream_rows(C1, c1_block, c1 + s * C1, scratch);
-            stream_rows(G, g_block, g + s * G, scratch);
-            stream_rows(G, tau_block, tau + s * G, scratch);
-            continue;
+    for (size_t s = 0; s < count; s += TILE * BLOCK) {
+        const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
+        links_1_to_5(blocks, m, r);
+        for (size_t t = 0; t < blocks; ++t) {
+            const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
+            if (large && samples == BLOCK) {
+                stream_rows(C2, r[t].c2, c2 + at * C2, scratch);
+                stream_rows(C1, r[t].c1, c1 + at * C1, scratch);
+                stream_rows(G, r[t].g, g + at * G, scratch);
+                stream_rows(G, r[t].tau, tau + at * G, scratch);
+                continue;
+            }
+            scatter(samples, 56, C2, r[t].c2, c2 + at * C2);
+            scatter(samples, 91, C1, r[t].c1, c1 + at * C1);
+            scatter(samples, 21, G, r[t].g, g + at * G);
+            scatter(samples, 21, G, r[t].tau, tau + at * G);
         }
-        scatter(samples, 56, C2, c2_block, c2 + s * C2);
-        scatter(samples, 91, C1, c1_block, c1 + s * C1);
-        scatter(samples, 21, G, g_block, g + s * G);
-        scatter(samples, 21, G, tau_block, tau + s * G);
     }
     if (large)
         stream_end();
@@ -261,33 +317,38 @@ void API(decomposition)(size_t count, const real *q, const real *qd, const real 
 void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, const real *qdd,
     real *c2, real *c1, real *g, real *tau)
 {
-    ALIGNED real sine[N * BLOCK], cosine[N * BLOCK];
-    ALIGNED real shared[69 * BLOCK];
-    ALIGNED real c2_block[56 * BLOCK];
-    ALIGNED real c1_block[91 * BLOCK];
-    ALIGNED real g_block[21 * BLOCK];
-    ALIGNED real tau_block[21 * BLOCK];
-    const struct results r = {c2_block, c1_block, g_block, tau_block};
+    ALIGNED real sine[TILE][N * BLOCK], cosine[TILE][N * BLOCK];
+    struct inputs m[TILE];
+    struct results places[TILE];
+    struct results r[TILE];
+    struct waiting room;
+    let_wait(&room, r);
     const int large = blocks * BLOCK > LARGE / (189 * sizeof(real));
-    for (size_t s = 0; s < blocks; ++s) {
-        const size_t at = s * N * BLOCK;
-        const struct inputs m = {q + at, qd + at, qdd + at, sine, cosine};
-        API(sines)(N * BLOCK, m.q, sine, cosine);
-        shared_part_block(m.qd, m.qdd, m.sine, m.cosine, shared);
-        if (large) {
-            links_1_to_5(&m, shared, &r);
-            stream(56 * BLOCK, c2_block, c2 + s * C2 * BLOCK);
-            stream(91 * BLOCK, c1_block, c1 + s * C1 * BLOCK);
-            stream(21 * BLOCK, g_block, g + s * G * BLOCK);
-            stream(21 * BLOCK, tau_block, tau + s * G * BLOCK);
-        } else {
+    for (size_t s = 0; s < blocks; s += TILE) {
+        const size_t here = blocks_of((blocks - s) * BLOCK);
+        for (size_t t = 0; t < here; ++t) {
+            const size_t at = (s + t) * N * BLOCK;
+            const struct inputs from = {q + at, qd + at, qdd + at, sine[t], cosine[t]};
+            API(sines)(N * BLOCK, from.q, sine[t], cosine[t]);
+            m[t] = from;
+        }
+        for (size_t t = 0; t < here; ++t) {
+            const size_t at = s + t;
             const struct results there = {
-                c2 + s * C2 * BLOCK,
-                c1 + s * C1 * BLOCK,
-                g + s * G * BLOCK,
-                tau + s * G * BLOCK,
+                c2 + at * C2 * BLOCK,
+                c1 + at * C1 * BLOCK,
+                g + at * G * BLOCK,
+                tau + at * G * BLOCK,
             };
-            links_1_to_5(&m, shared, &there);
+            places[t] = there;
+        }
+        links_1_to_5(here, m, large ? r : places);
+        for (size_t t = 0; large && t < here; ++t) {
+            const size_t at = s + t;
+            stream(56 * BLOCK, r[t].c2, c2 + at * C2 * BLOCK);
+            stream(91 * BLOCK, r[t].c1, c1 + at * C1 * BLOCK);
+            stream(21 * BLOCK, r[t].g, g + at * G * BLOCK);
+            stream(21 * BLOCK, r[t].tau, tau + at * G * BLOCK);
         }
     }
     if (large)
@@ -298,26 +359,25 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
 static void torque_rows(size_t count, const real *q, const real *qd, const real *qdd, enum torques kind, real *tau)
 {
     const size_t rows_of[] = {G, SQUARE, N}, row = rows_of[kind];
-    struct block x;
-    const struct inputs m = {x.q, x.qd, x.qdd, x.sine, x.cosine};
-    ALIGNED real tau_block[21 * BLOCK];
-    for (size_t s = 0; s < count; s += BLOCK) {
-        const size_t samples = count - s < BLOCK ? count - s : BLOCK;
-        real *const rows = tau + s * row;
-        load(samples, q + s * N, qd + s * N, qdd + s * N, &x);
+    struct block x[TILE];
+    struct inputs m[TILE];
+    struct results r[TILE];
+    struct waiting room;
+    let_wait(&room, r);
+    for (size_t s = 0; s < count; s += TILE * BLOCK) {
+        const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
         if (kind != PACKED)
-            memset(rows, 0, samples * row * sizeof(real));
-        link_1_torque_block(m.qd, m.qdd, m.sine, m.cosine, tau_block);
-        link_2_torque_block(m.qd, m.qdd, m.sine, m.cosine, tau_block + 3 * W);
-        link_3_torque_block(m.qd, m.qdd, m.sine, m.cosine, tau_block + 7 * W);
-        link_4_torque_block(m.qd, m.qdd, m.sine, m.cosine, tau_block + 12 * W);
-        link_5_torque_block(m.qd, m.qdd, m.sine, m.cosine, tau_block + 16 * W);
-        if (kind == PACKED)
-            scatter(samples, 21, G, tau_block, tau + s * G);
-        else if (kind == DENSE)
-            to_squares_block(0, 5, tau_block, samples, rows);
-        else
-            to_sums_block(0, 5, tau_block, samples, rows);
+            memset(tau + s * row, 0, tile_of(count - s) * row * sizeof(real));
+        links_1_to_5_torque(blocks, m, r);
+        for (size_t t = 0; t < blocks; ++t) {
+            const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
+            if (kind == PACKED)
+                scatter(samples, 21, G, r[t].tau, tau + at * G);
+            else if (kind == DENSE)
+                to_squares_block(0, 5, r[t].tau, samples, tau + at * row);
+            else
+                to_sums_block(0, 5, r[t].tau, samples, tau + at * row);
+        }
     }
 }
 
@@ -338,28 +398,23 @@ static void dense_rows(size_t count, const real *q, const real *qd, const real *
         API(dense_one)(q, qd, qdd, to);
         return;
     }
-    struct block x;
-    const struct inputs m = {x.q, x.qd, x.qdd, x.sine, x.cosine};
-    ALIGNED real shared[69 * BLOCK];
-    ALIGNED real c2_block[56 * BLOCK];
-    ALIGNED real c1_block[91 * BLOCK];
-    ALIGNED real g_block[21 * BLOCK];
-    ALIGNED real tau_block[21 * BLOCK];
-    const struct results r = {c2_block, c1_block, g_block, tau_block};
+    struct block x[TILE];
+    struct inputs m[TILE];
+    struct results r[TILE];
+    struct waiting room;
+    let_wait(&room, r);
     struct waiting_cubes wait;
     begin_cubes(&wait, count, (2 * CUBE + SQUARE) * sizeof(real));
-    for (size_t s = 0; s < count; s += BLOCK) {
-        const size_t samples = count - s < BLOCK ? count - s : BLOCK;
-        load(samples, q + s * N, qd + s * N, qdd + s * N, &x);
-        memset(to->gravity + s * SQUARE, 0, samples * SQUARE * sizeof(real));
-        shared_part_block(m.qd, m.qdd, m.sine, m.cosine, shared);
-        links_1_to_5(&m, shared, &r);
-        to_dense(0, 5, &m, &r, s, samples, &wait, to);
+    for (size_t s = 0; s < count; s += TILE * BLOCK) {
+        const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
+        memset(to->gravity + s * SQUARE, 0, tile_of(count - s) * SQUARE * sizeof(real));
+        links_1_to_5(blocks, m, r);
+        for (size_t t = 0; t < blocks; ++t)
+            to_dense(0, 5, &m[t], &r[t], s + t * BLOCK, samples_of(count - s, t), &wait, to);
     }
     if (wait.large)
         stream_end();
 }
-
 #endif
 
 /* ---- Position gradients of rows ---- */
@@ -374,41 +429,53 @@ static void dense_rows(size_t count, const real *q, const real *qd, const real *
 /* Packed, or with its zeros. */
 static void gradient_rows(size_t count, const real *q, const real *qd, const real *qdd, int dense, real *c0)
 {
-    const size_t row = dense ? (size_t)CUBE : (size_t)C1;
-    struct block x;
-    const struct inputs m = {x.q, x.qd, x.qdd, x.sine, x.cosine};
+    struct block x[TILE];
+    struct inputs m[TILE];
     ALIGNED real c0_block[25 * BLOCK];
     struct waiting_cubes wait;
     begin_cubes(&wait, 0, 1);
-    for (size_t s = 0; s < count; s += BLOCK) {
-        const size_t samples = count - s < BLOCK ? count - s : BLOCK;
-        real *const rows = c0 + s * row;
-        load(samples, q + s * N, qd + s * N, qdd + s * N, &x);
-        link_1_position_gradient_block(m.qd, m.qdd, m.sine, m.cosine, c0_block);
-        if (dense)
-            to_cubes(0, 1, 0, c0_block, wait.ones, samples, &wait, rows);
-        else
-            scatter(samples, 9, C1, c0_block, c0 + s * C1);
-        link_2_position_gradient_block(m.qd, m.qdd, m.sine, m.cosine, c0_block);
-        if (dense)
-            to_cubes(1, 2, 0, c0_block, wait.ones, samples, &wait, rows);
-        else
-            scatter(samples, 16, C1, c0_block, c0 + s * C1 + 9);
-        link_3_position_gradient_block(m.qd, m.qdd, m.sine, m.cosine, c0_block);
-        if (dense)
-            to_cubes(2, 3, 0, c0_block, wait.ones, samples, &wait, rows);
-        else
-            scatter(samples, 25, C1, c0_block, c0 + s * C1 + 25);
-        link_4_position_gradient_block(m.qd, m.qdd, m.sine, m.cosine, c0_block);
-        if (dense)
-            to_cubes(3, 4, 0, c0_block, wait.ones, samples, &wait, rows);
-        else
-            scatter(samples, 16, C1, c0_block, c0 + s * C1 + 50);
-        link_5_position_gradient_block(m.qd, m.qdd, m.sine, m.cosine, c0_block);
-        if (dense)
-            to_cubes(4, 5, 0, c0_block, wait.ones, samples, &wait, rows);
-        else
-            scatter(samples, 25, C1, c0_block, c0 + s * C1 + 66);
+    for (size_t s = 0; s < count; s += TILE * BLOCK) {
+        const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
+        for (size_t t = 0; t < blocks; ++t) {
+            const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
+            link_1_position_gradient_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
+            if (dense)
+                to_cubes(0, 1, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
+            else
+                scatter(samples, 9, C1, c0_block, c0 + at * C1);
+        }
+        for (size_t t = 0; t < blocks; ++t) {
+            const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
+            link_2_position_gradient_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
+            if (dense)
+                to_cubes(1, 2, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
+            else
+                scatter(samples, 16, C1, c0_block, c0 + at * C1 + 9);
+        }
+        for (size_t t = 0; t < blocks; ++t) {
+            const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
+            link_3_position_gradient_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
+            if (dense)
+                to_cubes(2, 3, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
+            else
+                scatter(samples, 25, C1, c0_block, c0 + at * C1 + 25);
+        }
+        for (size_t t = 0; t < blocks; ++t) {
+            const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
+            link_4_position_gradient_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
+            if (dense)
+                to_cubes(3, 4, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
+            else
+                scatter(samples, 16, C1, c0_block, c0 + at * C1 + 50);
+        }
+        for (size_t t = 0; t < blocks; ++t) {
+            const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
+            link_5_position_gradient_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
+            if (dense)
+                to_cubes(4, 5, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
+            else
+                scatter(samples, 25, C1, c0_block, c0 + at * C1 + 66);
+        }
     }
 }
 #endif

@@ -71,7 +71,7 @@ enum {
 
 /* ---- All links, many samples, in double ---- */
 
-/* All quantities but c0: 1649 operations.
+/* All quantities but c0: 1690 operations.
    Reads q, qd, qdd (count, JOINTS);
    writes c2 (count, C2), c1 (count, C1), g, tau (count, G). */
 void torso_decomposition(size_t count, const double *q, const double *qd, const double *qdd,
@@ -83,7 +83,7 @@ void torso_decomposition(size_t count, const double *q, const double *qd, const 
 void torso_decomposition_blocks(size_t blocks, const double *q, const double *qd, const double *qdd,
     double *c2, double *c1, double *g, double *tau);
 
-/* Torques alone: 1103 operations.
+/* Torques alone: 1113 operations.
    Reads q, qd, qdd (count, JOINTS); writes tau (count, G). */
 void torso_torque(size_t count, const double *q, const double *qd, const double *qdd, double *tau);
 
@@ -113,7 +113,7 @@ void torso_propagation(size_t count, const double *q, const double *qd, const do
 void torso_gradient_propagation(size_t count, const double *q, const double *qd, const double *qdd,
     double *acceleration, double *velocity, double *gravity);
 
-/* Position gradient: 2268 operations.
+/* Position gradient: 2334 operations.
    Reads q, qd, qdd (count, JOINTS); writes c0 (count, C1). */
 void torso_position_gradient(size_t count, const double *q, const double *qd, const double *qdd, double *c0);
 
@@ -144,7 +144,7 @@ void torso_link_5(const double *q, const double *qd, const double *qdd,
 
 /* ---- All links, many samples, in float ---- */
 
-/* All quantities but c0: 1649 operations.
+/* All quantities but c0: 1690 operations.
    Reads q, qd, qdd (count, JOINTS);
    writes c2 (count, C2), c1 (count, C1), g, tau (count, G). */
 void torso_decompositionf(size_t count, const float *q, const float *qd, const float *qdd,
@@ -156,7 +156,7 @@ void torso_decompositionf(size_t count, const float *q, const float *qd, const f
 void torso_decomposition_blocksf(size_t blocks, const float *q, const float *qd, const float *qdd,
     float *c2, float *c1, float *g, float *tau);
 
-/* Torques alone: 1103 operations.
+/* Torques alone: 1113 operations.
    Reads q, qd, qdd (count, JOINTS); writes tau (count, G). */
 void torso_torquef(size_t count, const float *q, const float *qd, const float *qdd, float *tau);
 
@@ -186,7 +186,7 @@ void torso_propagationf(size_t count, const float *q, const float *qd, const flo
 void torso_gradient_propagationf(size_t count, const float *q, const float *qd, const float *qdd,
     float *acceleration, float *velocity, float *gravity);
 
-/* Position gradient: 2268 operations.
+/* Position gradient: 2334 operations.
    Reads q, qd, qdd (count, JOINTS); writes c0 (count, C1). */
 void torso_position_gradientf(size_t count, const float *q, const float *qd, const float *qdd, float *c0);
 

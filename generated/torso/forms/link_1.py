@@ -17,7 +17,7 @@ PATH = (0, 1, 2)  # coordinates that move the link, counted from 0
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
-    186 additions and multiplications, 4 sines, cosines and the like.
+    164 additions and multiplications, 4 sines, cosines and the like.
     """
     # inputs
     q2 = q[..., 1]
@@ -34,83 +34,75 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     c2 = xp.cos(q2)
     s3 = xp.sin(q3)
     c3 = xp.cos(q3)
-    t1 = 9.81 * s2
     w1_x = qd1 * s2
     w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
-    wd2_x = wd1_x + qd2 * w1_y
-    wd2_y = wd1_y - qd2 * w1_x
     w3_x = qd3 + w1_x
-    wd3_x = qdd3 + wd2_x
-    wd3_y = wd2_y + qd2 * qd3
-    wd3_z = qdd2 - qd3 * w1_y
-    t2 = 0.21 * c3 - 0.012 * s3
-    t3 = 0.21 * s3 + 0.012 * c3
-    f3_c2_z = 12.5 * t2
-    t4 = 12.5 * t3
-    t5 = 0.009 * s3
-    t6 = 0.155 * c3 + t5
-    t7 = 0.009 * c3
-    t8 = t7 + 0.032 * s3
-    t9 = 0.003 * c3 + 0.002 * s3 + 0.0375 * t2
-    t10 = 0.003 * s3 - 0.002 * c3 + 0.0375 * t3
-    t11 = t2 * f3_c2_z
-    t12 = c3 * t6 + s3 * t8 + t11
-    t13 = s3 * t6 - c3 * t8 + t3 * f3_c2_z
-    t14 = t3 * t4
-    t15 = s3 * (0.155 * s3 - t7) + c3 * (0.032 * c3 - t5) + t14
-    t16 = 0.273 + t14 + 0.0001125 + t11
-    n3_c2_x = t16 - 0.0861125
-    t17 = t16 - t12
-    n2_c2_z = t16 - t15
-    t18 = qd2 * t9
-    t19 = w1_y * t10
-    t20 = t18 - t19
-    t21 = w3_x * t10 - 0.0861125 * qd2
-    t22 = 0.0861125 * w1_y - w3_x * t9
-    t23 = w1_y * t13
-    t24 = qd2 * t12 - t23
-    t25 = w3_x * t13
-    t26 = t25 - t18
-    t27 = w1_y * t9
-    t28 = t27 - w3_x * t12
-    t29 = qd2 * t13
-    t30 = t29 - w1_y * t15
-    t31 = w3_x * t15 - qd2 * t10
-    t32 = t19 - t25
-    t33 = 122.625 * s2
-    t34 = t3 * (122.625 * c2)
-    t35 = 0.367875 * c2
-    t36 = wd3_x * n3_c2_x - wd3_y * t9 - wd3_z * t10 - 9.81 * c2 * t4
-    t37 = t36 + w3_x * t20 + w1_y * t24 + qd2 * t30
-    t38 = t35 - t1 * f3_c2_z + wd3_z * n2_c2_z - (wd3_x * t10 + wd3_y * t13)
-    t39 = t1 * t4 + wd3_y * t17 - wd3_x * t9 - wd3_z * t13 + w3_x * t21 + w1_y * t26 + qd2 * t31
-    n1_c2_x = s2 * n3_c2_x - c2 * t9
-    n1_c2_y = c2 * t17 - s2 * t9
-    n1_c1_x = s2 * t20 + c2 * t24
-    n1_c1_y = s2 * t21 + c2 * t26
-    n1_c1_z = s2 * t22 + c2 * t28
-    n2_c1_x = t30 + w1_y * n3_c2_x + w1_x * t9
-    n2_c1_y = t31 - (t27 + w1_x * t17)
-    n2_c1_z = t32 + w1_x * t13 - t19
-    n3_c1_y = t21 + t23 + qd2 * t17
-    n3_c1_z = t22 - (t29 + w1_y * n2_c2_z)
+    t1 = 0.21 * c3 - 0.012 * s3
+    t2 = 0.21 * s3 + 0.012 * c3
+    f3_c2_z = 12.5 * t1
+    t3 = 0.009 * s3
+    t4 = 0.155 * c3 + t3
+    t5 = 0.009 * c3
+    t6 = t5 + 0.032 * s3
+    t7 = 0.003 * c3 + 0.002 * s3 + 0.0375 * t1
+    t8 = 0.003 * s3 - 0.002 * c3 + 0.0375 * t2
+    t9 = t1 * f3_c2_z
+    t10 = c3 * t4 + s3 * t6 + t9
+    t11 = s3 * t4 - c3 * t6 + t2 * f3_c2_z
+    t12 = t2 * (12.5 * t2)
+    t13 = s3 * (0.155 * s3 - t5) + c3 * (0.032 * c3 - t3) + t12
+    t14 = 0.273 + t12 + 0.0001125 + t9
+    n3_c2_x = t14 - 0.0861125
+    t15 = t14 - t10
+    n2_c2_z = t14 - t13
+    t16 = qd2 * t7
+    t17 = w1_y * t8
+    t18 = w3_x * t8 - 0.0861125 * qd2
+    t19 = 0.0861125 * w1_y - w3_x * t7
+    t20 = w1_y * t11
+    t21 = w3_x * t11
+    t22 = w1_y * t7
+    t23 = qd2 * t11
+    t24 = 122.625 * s2
+    t25 = t2 * (122.625 * c2)
+    g_2 = 0.367875 * c2 - t1 * t24
+    g_1 = c2 * (t2 * t24) - s2 * t25
+    n1_c2_x = s2 * n3_c2_x - c2 * t7
+    n1_c2_y = c2 * t15 - s2 * t7
+    t26 = s2 * t8 + c2 * t11
+    n1_c1_x = s2 * (t16 - t17) + c2 * (qd2 * t10 - t20)
+    n1_c1_y = s2 * t18 + c2 * (t21 - t16)
+    n1_c1_z = s2 * t19 + c2 * (t22 - w3_x * t10)
+    c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y
+    c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y
+    tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
+    tau2_1 = g_2 + qd1 * n1_c1_z
+    tau3_1 = qd1 * n1_c1_x - t25
+    n2_c1_x = t23 - w1_y * t13 + w1_y * n3_c2_x + w1_x * t7
+    n2_c1_y = w3_x * t13 - qd2 * t8 - (t22 + w1_x * t15)
+    n2_c1_z = t17 - t21 + w1_x * t11 - t17
+    c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y
+    tau1_2 = tau1_1 - qdd2 * t26 + qd2 * c1_1_2
+    tau2_2 = tau2_1 - qdd1 * t26 + qdd2 * n2_c2_z + qd2 * n2_c1_z
+    tau3_2 = tau3_1 + qd2 * n2_c1_x
+    n3_c1_y = t18 + t20 + qd2 * t15
+    n3_c1_z = t19 - (t23 + w1_y * n2_c2_z)
+    c1_1_3 = c2 * n3_c1_y
 
     # outputs
     return (
         (
-            s2 * n1_c2_x + c2 * n1_c2_y,  # c2(1, 1, 1)
-            -(s2 * t10 + c2 * t13),  # c2(1, 1, 2)
+            c2_1_1,  # c2(1, 1, 1)
+            -t26,  # c2(1, 1, 2)
             n1_c2_x,  # c2(1, 1, 3)
             n2_c2_z,  # c2(2, 1, 2)
-            -t10,  # c2(2, 1, 3)
+            -t8,  # c2(2, 1, 3)
             n3_c2_x,  # c2(3, 1, 3)
         ),
         (
-            s2 * n1_c1_x + c2 * n1_c1_y,  # c1(1, 1, 1)
-            s2 * n2_c1_x + c2 * n2_c1_y,  # c1(1, 1, 2)
-            c2 * n3_c1_y,  # c1(1, 1, 3)
+            c1_1_1,  # c1(1, 1, 1)
+            c1_1_2,  # c1(1, 1, 2)
+            c1_1_3,  # c1(1, 1, 3)
             n1_c1_z,  # c1(2, 1, 1)
             n2_c1_z,  # c1(2, 1, 2)
             n3_c1_z,  # c1(2, 1, 3)
@@ -119,14 +111,14 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
             0.0,  # c1(3, 1, 3)
         ),
         (
-            c2 * (t3 * t33) - s2 * t34,  # g(1, 1)
-            t35 - t2 * t33,  # g(2, 1)
-            -t34,  # g(3, 1)
+            g_1,  # g(1, 1)
+            g_2,  # g(2, 1)
+            -t25,  # g(3, 1)
         ),
         (
-            s2 * t37 + c2 * t39,  # tau(1, 1)
-            t38 + w3_x * t22 + w1_y * t28 + qd2 * t32,  # tau(2, 1)
-            t37,  # tau(3, 1)
+            tau1_2 + qdd3 * n1_c2_x + qd3 * c1_1_3,  # tau(1, 1)
+            tau2_2 - qdd3 * t8 + qd3 * n3_c1_z,  # tau(2, 1)
+            tau3_2 + qdd1 * n1_c2_x - qdd2 * t8 + qdd3 * n3_c2_x,  # tau(3, 1)
         ),
     )
 

@@ -17,7 +17,7 @@ PATH = (0, 1, 2, 3)  # coordinates that move the link, counted from 0
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
-    348 additions and multiplications, 6 sines, cosines and the like.
+    315 additions and multiplications, 6 sines, cosines and the like.
     """
     # inputs
     q2 = q[..., 1]
@@ -43,18 +43,8 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     x4_z = s3 * c4 + c3 * s4
     w1_x = qd1 * s2
     w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
-    wd2_x = wd1_x + qd2 * w1_y
-    wd2_y = wd1_y - qd2 * w1_x
     w3_x = qd3 + w1_x
-    wd3_x = qdd3 + wd2_x
-    wd3_y = wd2_y + qd2 * qd3
-    wd3_z = qdd2 - qd3 * w1_y
     w4_x = qd4 + w3_x
-    wd4_x = qdd4 + wd3_x
-    wd4_y = wd3_y + qd2 * qd4
-    wd4_z = wd3_z - qd4 * w1_y
     t1 = 0.37 * c3
     s4_y = 0.37 * s3
     t2 = t1 - (0.125 * x4_y + 0.008 * x4_z)
@@ -64,106 +54,119 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     t5 = w1_y * t1 + qd2 * s4_y
     sd4_y = w3_x * t1
     sd4_z = w3_x * s4_y
-    t6 = 9.81 * s2 - qd4 * t5
-    t7 = qdd4 * s4_y + 9.81 * c2 + qd4 * sd4_y
-    t8 = qd4 * sd4_z - qdd4 * t1
     f3_c2_z = 2.1 * t2
-    t9 = 2.1 * t3
-    t10 = 0.0006 * x4_z
-    t11 = 0.0125 * x4_y + t10
-    t12 = 0.0006 * x4_y
-    t13 = t12 + 0.0014 * x4_z
-    t14 = 0.0009 * x4_y + 0.0002 * x4_z + 0.4536 * t2
-    t15 = 0.0009 * x4_z - 0.0002 * x4_y + 0.4536 * t3
-    t16 = t2 * f3_c2_z
-    t17 = x4_y * t11 + x4_z * t13 + t16
-    t18 = x4_z * t11 - x4_y * t13 + t3 * f3_c2_z
-    t19 = t3 * t9
-    t20 = x4_z * (0.0125 * x4_z - t12) + x4_y * (0.0014 * x4_y - t10) + t19
-    t21 = 0.0156 + t19 + 0.0979776 + t16
-    n3_c2_x = t21 - 0.0996776
-    t22 = t21 - t17
-    n2_c2_z = t21 - t20
-    t23 = w1_y * t9
-    t24 = t23 - qd2 * f3_c2_z
-    t25 = 0.4536 * qd2
-    t26 = 0.4536 * w1_y
-    t27 = 2.1 * v4_y + t25 - w4_x * t9
-    t28 = w4_x * f3_c2_z - t26 - 2.1 * t4
-    t29 = v4_y * f3_c2_z
-    t30 = t4 * t9
+    t6 = 2.1 * t3
+    t7 = 0.0006 * x4_z
+    t8 = 0.0125 * x4_y + t7
+    t9 = 0.0006 * x4_y
+    t10 = t9 + 0.0014 * x4_z
+    t11 = 0.0009 * x4_y + 0.0002 * x4_z + 0.4536 * t2
+    t12 = 0.0009 * x4_z - 0.0002 * x4_y + 0.4536 * t3
+    t13 = t2 * f3_c2_z
+    t14 = x4_y * t8 + x4_z * t10 + t13
+    t15 = x4_z * t8 - x4_y * t10 + t3 * f3_c2_z
+    t16 = t3 * t6
+    t17 = x4_z * (0.0125 * x4_z - t9) + x4_y * (0.0014 * x4_y - t7) + t16
+    t18 = 0.0156 + t16 + 0.0979776 + t13
+    n3_c2_x = t18 - 0.0996776
+    t19 = t18 - t14
+    n2_c2_z = t18 - t17
+    t20 = w1_y * t6
+    t21 = t20 - qd2 * f3_c2_z
+    t22 = 0.4536 * qd2
+    t23 = 0.4536 * w1_y
+    t24 = 2.1 * v4_y + t22 - w4_x * t6
+    t25 = w4_x * f3_c2_z - t23 - 2.1 * t4
+    t26 = v4_y * f3_c2_z
+    t27 = t4 * t6
+    t28 = t26 - t27
+    t29 = qd2 * t11
+    t30 = w1_y * t12
     t31 = t29 - t30
-    t32 = qd2 * t14
-    t33 = w1_y * t15
-    t34 = t32 - t33
-    t35 = w1_y * t18
-    t36 = qd2 * t17 - t35
-    t37 = w4_x * t18
-    t38 = w1_y * t14
-    t39 = qd2 * t18
-    t40 = t39 - w1_y * t20
-    t41 = t31 + t34
-    t42 = w4_x * t15 - 0.0996776 * qd2 - 0.4536 * v4_y
-    t43 = t37 - t32 + t31 - t29
-    t44 = w4_x * t20 - qd2 * t15 - v4_y * t9
-    t45 = 0.0996776 * w1_y - w4_x * t14 + 0.4536 * t4
-    t46 = t38 - w4_x * t17 + t4 * f3_c2_z
-    t47 = t33 - t37 + t30 + t31
-    t48 = 20.601 * s2
-    t49 = 20.601 * c2
-    t50 = t3 * t49
-    t51 = t8 * f3_c2_z - t7 * t9 + wd4_x * n3_c2_x - wd4_y * t14 - wd4_z * t15
-    t52 = t51 + w4_x * t41 + w1_y * t36 + qd2 * t40
-    t53 = t6 * t9 - 0.4536 * t8 + wd4_y * t22 - wd4_x * t14 - wd4_z * t18
-    t54 = 0.4536 * t7 - t6 * f3_c2_z + wd4_z * n2_c2_z - (wd4_x * t15 + wd4_y * t18)
-    n1_c2_x = s2 * n3_c2_x - c2 * t14
-    n1_c2_y = c2 * t22 - s2 * t14
-    n1_c1_x = s2 * t41 + c2 * t36
-    n1_c1_y = s2 * t42 + c2 * t43
-    n1_c1_z = s2 * t45 + c2 * t46
-    f1_c1_z = s2 * t27 - c2 * t24
+    t32 = w1_y * t15
+    t33 = w4_x * t15
+    t34 = w1_y * t11
+    t35 = qd2 * t15
+    t36 = t28 + t31
+    t37 = w4_x * t12 - 0.0996776 * qd2 - 0.4536 * v4_y
+    t38 = 0.0996776 * w1_y - w4_x * t11 + 0.4536 * t4
+    t39 = 20.601 * s2
+    t40 = 20.601 * c2
+    t41 = t3 * t40
+    g_2 = 4.449816 * c2 - t2 * t39
+    g_1 = c2 * (t3 * t39) - s2 * t41
+    g_4 = s4_y * t40 - t41
+    n1_c2_x = s2 * n3_c2_x - c2 * t11
+    n1_c2_y = c2 * t19 - s2 * t11
+    t42 = s2 * t12 + c2 * t15
+    n1_c1_x = s2 * t36 + c2 * (qd2 * t14 - t32)
+    n1_c1_y = s2 * t37 + c2 * (t33 - t29 + t28 - t26)
+    n1_c1_z = s2 * t38 + c2 * (t34 - w4_x * t14 + t4 * f3_c2_z)
+    f1_c1_z = s2 * t24 - c2 * t21
+    c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y
+    c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y
+    c1_4_1 = n1_c1_x - (s4_y * (s2 * t25) + t1 * f1_c1_z)
+    tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
+    tau2_1 = g_2 + qd1 * n1_c1_z
+    tau3_1 = qd1 * n1_c1_x - t41
+    tau4_1 = g_4 + qd1 * c1_4_1
     f2_c1_z = w1_y * f3_c2_z + 0.4536 * w1_x
-    n2_c1_x = t40 + w1_y * n3_c2_x + w1_x * t14
-    n2_c1_y = t44 - (t38 + w1_x * t22)
-    n2_c1_z = t47 + w1_x * t18 - t33
-    f2_c1_y = t24 - t23
-    t55 = t35 + qd2 * t22
-    t56 = t39 + w1_y * n2_c2_z
-    n3_c1_x = t41 - t34
-    n3_c1_y = t42 + t55
-    n3_c1_z = t45 - t56
-    f3_c1_z = t27 - t25
-    t57 = t1 * (2.1 * t8 + wd4_x * f3_c2_z - 0.4536 * wd4_y + w4_x * t27 - w1_y * t24)
-    n4_c2_x = n3_c2_x - (t1 * f3_c2_z + s4_y * t9)
-    n4_c2_y = 0.167832 * c3 - t14
-    n4_c2_z = 0.167832 * s3 - t15
-    f4_c2_y = 0.777 * s3 - t9
+    n2_c1_x = t35 - w1_y * t17 + w1_y * n3_c2_x + w1_x * t11
+    n2_c1_y = w4_x * t17 - qd2 * t12 - v4_y * t6 - (t34 + w1_x * t19)
+    n2_c1_z = t30 - t33 + t27 + t28 + w1_x * t15 - t30
+    f2_c1_y = t21 - t20
+    c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y
+    c1_4_2 = n2_c1_x + s4_y * f2_c1_y - t1 * f2_c1_z
+    tau1_2 = tau1_1 - qdd2 * t42 + qd2 * c1_1_2
+    tau2_2 = tau2_1 - qdd1 * t42 + qdd2 * n2_c2_z + qd2 * n2_c1_z
+    tau3_2 = tau3_1 + qd2 * n2_c1_x
+    tau4_2 = tau4_1 + qd2 * c1_4_2
+    t43 = t32 + qd2 * t19
+    t44 = t35 + w1_y * n2_c2_z
+    n3_c1_x = t36 - t31
+    n3_c1_y = t37 + t43
+    n3_c1_z = t38 - t44
+    f3_c1_z = t24 - t22
+    c1_1_3 = s2 * n3_c1_x + c2 * n3_c1_y
+    c1_4_3 = n3_c1_x - (s4_y * (t23 + t25) + t1 * f3_c1_z)
+    tau1_3 = tau1_2 + qdd3 * n1_c2_x + qd3 * c1_1_3
+    tau2_3 = tau2_2 - qdd3 * t12 + qd3 * n3_c1_z
+    tau3_3 = tau3_2 + qdd1 * n1_c2_x - qdd2 * t12 + qdd3 * n3_c2_x + qd3 * n3_c1_x
+    tau4_3 = tau4_2 + qd3 * c1_4_3
+    n4_c2_x = n3_c2_x - (t1 * f3_c2_z + s4_y * t6)
+    n4_c2_y = 0.167832 * c3 - t11
+    n4_c2_z = 0.167832 * s3 - t12
+    f4_c2_y = 0.777 * s3 - t6
     f4_c2_z = f3_c2_z - 0.777 * c3
-    n4_c1_x = t41 + sd4_z * f3_c2_z - sd4_y * t9 - t34
-    n4_c1_y = t42 + t55 - (t5 * t9 + 0.4536 * sd4_z)
-    n4_c1_z = t45 + 0.4536 * sd4_y + t5 * f3_c2_z - t56
-    f4_c1_y = 2.1 * sd4_y - t26 - t28
-    f4_c1_z = t27 + 2.1 * sd4_z - t25
+    n4_c1_x = t36 + sd4_z * f3_c2_z - sd4_y * t6 - t31
+    n4_c1_y = t37 + t43 - (t5 * t6 + 0.4536 * sd4_z)
+    n4_c1_z = t38 + 0.4536 * sd4_y + t5 * f3_c2_z - t44
+    f4_c1_y = 2.1 * sd4_y - t23 - t25
+    f4_c1_z = t24 + 2.1 * sd4_z - t22
+    c2_1_4 = s2 * n4_c2_x + c2 * n4_c2_y
+    c1_1_4 = s2 * n4_c1_x + c2 * n4_c1_y
+    c2_4_4 = n4_c2_x + s4_y * f4_c2_y - t1 * f4_c2_z
+    c1_4_4 = n4_c1_x + s4_y * f4_c1_y - t1 * f4_c1_z
 
     # outputs
     return (
         (
-            s2 * n1_c2_x + c2 * n1_c2_y,  # c2(1, 2, 1)
-            -(s2 * t15 + c2 * t18),  # c2(1, 2, 2)
+            c2_1_1,  # c2(1, 2, 1)
+            -t42,  # c2(1, 2, 2)
             n1_c2_x,  # c2(1, 2, 3)
-            s2 * n4_c2_x + c2 * n4_c2_y,  # c2(1, 2, 4)
+            c2_1_4,  # c2(1, 2, 4)
             n2_c2_z,  # c2(2, 2, 2)
-            -t15,  # c2(2, 2, 3)
+            -t12,  # c2(2, 2, 3)
             n4_c2_z,  # c2(2, 2, 4)
             n3_c2_x,  # c2(3, 2, 3)
             n4_c2_x,  # c2(3, 2, 4)
-            n4_c2_x + s4_y * f4_c2_y - t1 * f4_c2_z,  # c2(4, 2, 4)
+            c2_4_4,  # c2(4, 2, 4)
         ),
         (
-            s2 * n1_c1_x + c2 * n1_c1_y,  # c1(1, 2, 1)
-            s2 * n2_c1_x + c2 * n2_c1_y,  # c1(1, 2, 2)
-            s2 * n3_c1_x + c2 * n3_c1_y,  # c1(1, 2, 3)
-            s2 * n4_c1_x + c2 * n4_c1_y,  # c1(1, 2, 4)
+            c1_1_1,  # c1(1, 2, 1)
+            c1_1_2,  # c1(1, 2, 2)
+            c1_1_3,  # c1(1, 2, 3)
+            c1_1_4,  # c1(1, 2, 4)
             n1_c1_z,  # c1(2, 2, 1)
             n2_c1_z,  # c1(2, 2, 2)
             n3_c1_z,  # c1(2, 2, 3)
@@ -172,22 +175,22 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
             n2_c1_x,  # c1(3, 2, 2)
             n3_c1_x,  # c1(3, 2, 3)
             n4_c1_x,  # c1(3, 2, 4)
-            n1_c1_x - (s4_y * (s2 * t28) + t1 * f1_c1_z),  # c1(4, 2, 1)
-            n2_c1_x + s4_y * f2_c1_y - t1 * f2_c1_z,  # c1(4, 2, 2)
-            n3_c1_x - (s4_y * (t26 + t28) + t1 * f3_c1_z),  # c1(4, 2, 3)
-            n4_c1_x + s4_y * f4_c1_y - t1 * f4_c1_z,  # c1(4, 2, 4)
+            c1_4_1,  # c1(4, 2, 1)
+            c1_4_2,  # c1(4, 2, 2)
+            c1_4_3,  # c1(4, 2, 3)
+            c1_4_4,  # c1(4, 2, 4)
         ),
         (
-            c2 * (t3 * t48) - s2 * t50,  # g(1, 2)
-            4.449816 * c2 - t2 * t48,  # g(2, 2)
-            -t50,  # g(3, 2)
-            s4_y * t49 - t50,  # g(4, 2)
+            g_1,  # g(1, 2)
+            g_2,  # g(2, 2)
+            -t41,  # g(3, 2)
+            g_4,  # g(4, 2)
         ),
         (
-            s2 * t52 + c2 * (t53 + w4_x * t42 + w1_y * t43 + qd2 * t44),  # tau(1, 2)
-            t54 + w4_x * t45 + w1_y * t46 + qd2 * t47,  # tau(2, 2)
-            t52,  # tau(3, 2)
-            t52 + s4_y * (2.1 * t7 + 0.4536 * wd4_z - wd4_x * t9 + qd2 * t24 - w4_x * t28) - t57,  # tau(4, 2)
+            tau1_3 + qdd4 * c2_1_4 + qd4 * c1_1_4,  # tau(1, 2)
+            tau2_3 + qdd4 * n4_c2_z + qd4 * n4_c1_z,  # tau(2, 2)
+            tau3_3 + qdd4 * n4_c2_x + qd4 * n4_c1_x,  # tau(3, 2)
+            tau4_3 + qdd1 * c2_1_4 + qdd2 * n4_c2_z + qdd3 * n4_c2_x + qdd4 * c2_4_4 + qd4 * c1_4_4,  # tau(4, 2)
         ),
     )
 

@@ -17,7 +17,7 @@ PATH = (0, 1, 2, 5)  # coordinates that move the link, counted from 0
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return c2 (for i <= k: it is symmetric), c1, g and tau.
 
-    348 additions and multiplications, 6 sines, cosines and the like.
+    315 additions and multiplications, 6 sines, cosines and the like.
     """
     # inputs
     q2 = q[..., 1]
@@ -43,18 +43,8 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     x6_z = s3 * c6 + c3 * s6
     w1_x = qd1 * s2
     w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
-    wd2_x = wd1_x + qd2 * w1_y
-    wd2_y = wd1_y - qd2 * w1_x
     w3_x = qd3 + w1_x
-    wd3_x = qdd3 + wd2_x
-    wd3_y = wd2_y + qd2 * qd3
-    wd3_z = qdd2 - qd3 * w1_y
     w6_x = qd6 + w3_x
-    wd6_x = qdd6 + wd3_x
-    wd6_y = wd3_y + qd2 * qd6
-    wd6_z = wd3_z - qd6 * w1_y
     t1 = 0.37 * c3
     s6_y = 0.37 * s3
     t2 = t1 - (0.125 * x6_y + 0.008 * x6_z)
@@ -64,106 +54,120 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     t5 = w1_y * t1 + qd2 * s6_y
     sd6_y = w3_x * t1
     sd6_z = w3_x * s6_y
-    t6 = 9.81 * s2 - qd6 * t5
-    t7 = qdd6 * s6_y + 9.81 * c2 + qd6 * sd6_y
-    t8 = qd6 * sd6_z - qdd6 * t1
     f3_c2_z = 2.1 * t2
-    t9 = 2.1 * t3
-    t10 = 0.0006 * x6_z
-    t11 = 0.0125 * x6_y + t10
-    t12 = 0.0006 * x6_y
-    t13 = t12 + 0.0014 * x6_z
+    t6 = 2.1 * t3
+    t7 = 0.0006 * x6_z
+    t8 = 0.0125 * x6_y + t7
+    t9 = 0.0006 * x6_y
+    t10 = t9 + 0.0014 * x6_z
     n3_c2_y = 0.0009 * x6_y + 0.0002 * x6_z + 0.4536 * t2
-    t14 = 0.0002 * x6_y - 0.0009 * x6_z - 0.4536 * t3
-    t15 = t2 * f3_c2_z
-    t16 = x6_y * t11 + x6_z * t13 + t15
-    t17 = x6_z * t11 - x6_y * t13 + t3 * f3_c2_z
-    t18 = t3 * t9
-    t19 = x6_z * (0.0125 * x6_z - t12) + x6_y * (0.0014 * x6_y - t10) + t18
-    t20 = 0.0156 + t18 + 0.0979776 + t15
-    n3_c2_x = t20 - 0.0996776
-    t21 = t20 - t16
-    n2_c2_z = t20 - t19
-    t22 = w1_y * t9
-    t23 = t22 - qd2 * f3_c2_z
-    t24 = 0.4536 * qd2
-    t25 = 0.4536 * w1_y
-    t26 = 2.1 * v6_y - (t24 + w6_x * t9)
-    t27 = w6_x * f3_c2_z + t25 - 2.1 * t4
-    t28 = v6_y * f3_c2_z
-    t29 = t4 * t9
-    t30 = t28 - t29
-    t31 = qd2 * n3_c2_y
-    t32 = w1_y * t14
-    t33 = t31 + t32
-    t34 = w1_y * t17
-    t35 = qd2 * t16 - t34
-    t36 = w6_x * t17
-    t37 = w1_y * n3_c2_y
-    t38 = qd2 * t17
-    t39 = t38 - w1_y * t19
-    t40 = t30 - t33
-    t41 = w6_x * t14 - 0.0996776 * qd2 + 0.4536 * v6_y
-    t42 = t31 + t36 + t30 - t28
-    t43 = w6_x * t19 - qd2 * t14 - v6_y * t9
-    t44 = 0.0996776 * w1_y + w6_x * n3_c2_y - 0.4536 * t4
-    t45 = t4 * f3_c2_z - (t37 + w6_x * t16)
-    t46 = t32 - t36 + t29 + t30
-    t47 = 20.601 * s2
-    t48 = 20.601 * c2
-    t49 = t3 * t48
-    t50 = t8 * f3_c2_z - t7 * t9 + wd6_x * n3_c2_x + wd6_y * n3_c2_y - wd6_z * t14
-    t51 = t50 + w6_x * t40 + w1_y * t35 + qd2 * t39
-    t52 = t6 * t9 + 0.4536 * t8 + wd6_x * n3_c2_y + wd6_y * t21 - wd6_z * t17
-    t53 = wd6_z * n2_c2_z - (wd6_x * t14 + wd6_y * t17) - (0.4536 * t7 + t6 * f3_c2_z)
+    t11 = 0.0002 * x6_y - 0.0009 * x6_z - 0.4536 * t3
+    t12 = t2 * f3_c2_z
+    t13 = x6_y * t8 + x6_z * t10 + t12
+    t14 = x6_z * t8 - x6_y * t10 + t3 * f3_c2_z
+    t15 = t3 * t6
+    t16 = x6_z * (0.0125 * x6_z - t9) + x6_y * (0.0014 * x6_y - t7) + t15
+    t17 = 0.0156 + t15 + 0.0979776 + t12
+    n3_c2_x = t17 - 0.0996776
+    t18 = t17 - t13
+    n2_c2_z = t17 - t16
+    t19 = w1_y * t6
+    t20 = t19 - qd2 * f3_c2_z
+    t21 = 0.4536 * qd2
+    t22 = 0.4536 * w1_y
+    t23 = 2.1 * v6_y - (t21 + w6_x * t6)
+    t24 = w6_x * f3_c2_z + t22 - 2.1 * t4
+    t25 = v6_y * f3_c2_z
+    t26 = t4 * t6
+    t27 = t25 - t26
+    t28 = qd2 * n3_c2_y
+    t29 = w1_y * t11
+    t30 = t28 + t29
+    t31 = w1_y * t14
+    t32 = w6_x * t14
+    t33 = w1_y * n3_c2_y
+    t34 = qd2 * t14
+    t35 = t27 - t30
+    t36 = w6_x * t11 - 0.0996776 * qd2 + 0.4536 * v6_y
+    t37 = 0.0996776 * w1_y + w6_x * n3_c2_y - 0.4536 * t4
+    t38 = 20.601 * s2
+    t39 = 20.601 * c2
+    t40 = t3 * t39
+    t41 = 4.449816 * c2 + t2 * t38
+    g_1 = c2 * (t3 * t38) - s2 * t40
+    g_6 = s6_y * t39 - t40
     n1_c2_x = s2 * n3_c2_x + c2 * n3_c2_y
-    n1_c2_y = s2 * n3_c2_y + c2 * t21
-    n1_c1_x = s2 * t40 + c2 * t35
-    n1_c1_y = s2 * t41 + c2 * t42
-    n1_c1_z = s2 * t44 + c2 * t45
-    f1_c1_z = s2 * t26 - c2 * t23
+    n1_c2_y = s2 * n3_c2_y + c2 * t18
+    t42 = s2 * t11 + c2 * t14
+    n1_c1_x = s2 * t35 + c2 * (qd2 * t13 - t31)
+    n1_c1_y = s2 * t36 + c2 * (t28 + t32 + t27 - t25)
+    n1_c1_z = s2 * t37 + c2 * (t4 * f3_c2_z - (t33 + w6_x * t13))
+    f1_c1_z = s2 * t23 - c2 * t20
+    c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y
+    c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y
+    c1_6_1 = n1_c1_x - (s6_y * (s2 * t24) + t1 * f1_c1_z)
+    tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
+    tau2_1 = qd1 * n1_c1_z - t41
+    tau3_1 = qd1 * n1_c1_x - t40
+    tau6_1 = g_6 + qd1 * c1_6_1
     f2_c1_z = w1_y * f3_c2_z - 0.4536 * w1_x
-    n2_c1_x = t39 + w1_y * n3_c2_x - w1_x * n3_c2_y
-    n2_c1_y = t43 + t37 - w1_x * t21
-    n2_c1_z = t46 + w1_x * t17 - t32
-    f2_c1_y = t23 - t22
-    t54 = t34 + qd2 * t21
-    t55 = t38 + w1_y * n2_c2_z
-    n3_c1_x = t33 + t40
-    n3_c1_y = t41 + t54
-    n3_c1_z = t44 - t55
-    f3_c1_y = t25 - t27
-    f3_c1_z = t24 + t26
-    t56 = t1 * (2.1 * t8 + wd6_x * f3_c2_z + 0.4536 * wd6_y + w6_x * t26 - w1_y * t23)
-    n6_c2_x = n3_c2_x - (t1 * f3_c2_z + s6_y * t9)
+    n2_c1_x = t34 - w1_y * t16 + w1_y * n3_c2_x - w1_x * n3_c2_y
+    n2_c1_y = w6_x * t16 - qd2 * t11 - v6_y * t6 + t33 - w1_x * t18
+    n2_c1_z = t29 - t32 + t26 + t27 + w1_x * t14 - t29
+    f2_c1_y = t20 - t19
+    c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y
+    c1_6_2 = n2_c1_x + s6_y * f2_c1_y - t1 * f2_c1_z
+    tau1_2 = tau1_1 - qdd2 * t42 + qd2 * c1_1_2
+    tau2_2 = tau2_1 - qdd1 * t42 + qdd2 * n2_c2_z + qd2 * n2_c1_z
+    tau3_2 = tau3_1 + qd2 * n2_c1_x
+    tau6_2 = tau6_1 + qd2 * c1_6_2
+    t43 = t31 + qd2 * t18
+    t44 = t34 + w1_y * n2_c2_z
+    n3_c1_x = t30 + t35
+    n3_c1_y = t36 + t43
+    n3_c1_z = t37 - t44
+    f3_c1_y = t22 - t24
+    f3_c1_z = t21 + t23
+    c1_1_3 = s2 * n3_c1_x + c2 * n3_c1_y
+    c1_6_3 = n3_c1_x + s6_y * f3_c1_y - t1 * f3_c1_z
+    tau1_3 = tau1_2 + qdd3 * n1_c2_x + qd3 * c1_1_3
+    tau2_3 = tau2_2 - qdd3 * t11 + qd3 * n3_c1_z
+    tau3_3 = tau3_2 + qdd1 * n1_c2_x - qdd2 * t11 + qdd3 * n3_c2_x + qd3 * n3_c1_x
+    tau6_3 = tau6_2 + qd3 * c1_6_3
+    n6_c2_x = n3_c2_x - (t1 * f3_c2_z + s6_y * t6)
     n6_c2_y = n3_c2_y - 0.167832 * c3
-    f6_c2_y = 0.777 * s3 - t9
+    t45 = t11 + 0.167832 * s3
+    f6_c2_y = 0.777 * s3 - t6
     f6_c2_z = f3_c2_z - 0.777 * c3
-    n6_c1_x = t40 + t33 + sd6_z * f3_c2_z - sd6_y * t9
-    n6_c1_y = t41 + t54 + 0.4536 * sd6_z - t5 * t9
-    n6_c1_z = t44 + t5 * f3_c2_z - 0.4536 * sd6_y - t55
-    f6_c1_y = t25 + 2.1 * sd6_y - t27
-    f6_c1_z = t26 + t24 + 2.1 * sd6_z
+    n6_c1_x = t35 + t30 + sd6_z * f3_c2_z - sd6_y * t6
+    n6_c1_y = t36 + t43 + 0.4536 * sd6_z - t5 * t6
+    n6_c1_z = t37 + t5 * f3_c2_z - 0.4536 * sd6_y - t44
+    f6_c1_y = t22 + 2.1 * sd6_y - t24
+    f6_c1_z = t23 + t21 + 2.1 * sd6_z
+    c2_1_6 = s2 * n6_c2_x + c2 * n6_c2_y
+    c1_1_6 = s2 * n6_c1_x + c2 * n6_c1_y
+    c2_6_6 = n6_c2_x + s6_y * f6_c2_y - t1 * f6_c2_z
+    c1_6_6 = n6_c1_x + s6_y * f6_c1_y - t1 * f6_c1_z
 
     # outputs
     return (
         (
-            s2 * n1_c2_x + c2 * n1_c2_y,  # c2(1, 4, 1)
-            -(s2 * t14 + c2 * t17),  # c2(1, 4, 2)
+            c2_1_1,  # c2(1, 4, 1)
+            -t42,  # c2(1, 4, 2)
             n1_c2_x,  # c2(1, 4, 3)
-            s2 * n6_c2_x + c2 * n6_c2_y,  # c2(1, 4, 6)
+            c2_1_6,  # c2(1, 4, 6)
             n2_c2_z,  # c2(2, 4, 2)
-            -t14,  # c2(2, 4, 3)
-            -(t14 + 0.167832 * s3),  # c2(2, 4, 6)
+            -t11,  # c2(2, 4, 3)
+            -t45,  # c2(2, 4, 6)
             n3_c2_x,  # c2(3, 4, 3)
             n6_c2_x,  # c2(3, 4, 6)
-            n6_c2_x + s6_y * f6_c2_y - t1 * f6_c2_z,  # c2(6, 4, 6)
+            c2_6_6,  # c2(6, 4, 6)
         ),
         (
-            s2 * n1_c1_x + c2 * n1_c1_y,  # c1(1, 4, 1)
-            s2 * n2_c1_x + c2 * n2_c1_y,  # c1(1, 4, 2)
-            s2 * n3_c1_x + c2 * n3_c1_y,  # c1(1, 4, 3)
-            s2 * n6_c1_x + c2 * n6_c1_y,  # c1(1, 4, 6)
+            c1_1_1,  # c1(1, 4, 1)
+            c1_1_2,  # c1(1, 4, 2)
+            c1_1_3,  # c1(1, 4, 3)
+            c1_1_6,  # c1(1, 4, 6)
             n1_c1_z,  # c1(2, 4, 1)
             n2_c1_z,  # c1(2, 4, 2)
             n3_c1_z,  # c1(2, 4, 3)
@@ -172,22 +176,22 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
             n2_c1_x,  # c1(3, 4, 2)
             n3_c1_x,  # c1(3, 4, 3)
             n6_c1_x,  # c1(3, 4, 6)
-            n1_c1_x - (s6_y * (s2 * t27) + t1 * f1_c1_z),  # c1(6, 4, 1)
-            n2_c1_x + s6_y * f2_c1_y - t1 * f2_c1_z,  # c1(6, 4, 2)
-            n3_c1_x + s6_y * f3_c1_y - t1 * f3_c1_z,  # c1(6, 4, 3)
-            n6_c1_x + s6_y * f6_c1_y - t1 * f6_c1_z,  # c1(6, 4, 6)
+            c1_6_1,  # c1(6, 4, 1)
+            c1_6_2,  # c1(6, 4, 2)
+            c1_6_3,  # c1(6, 4, 3)
+            c1_6_6,  # c1(6, 4, 6)
         ),
         (
-            c2 * (t3 * t47) - s2 * t49,  # g(1, 4)
-            -(4.449816 * c2 + t2 * t47),  # g(2, 4)
-            -t49,  # g(3, 4)
-            s6_y * t48 - t49,  # g(6, 4)
+            g_1,  # g(1, 4)
+            -t41,  # g(2, 4)
+            -t40,  # g(3, 4)
+            g_6,  # g(6, 4)
         ),
         (
-            s2 * t51 + c2 * (t52 + w6_x * t41 + w1_y * t42 + qd2 * t43),  # tau(1, 4)
-            t53 + w6_x * t44 + w1_y * t45 + qd2 * t46,  # tau(2, 4)
-            t51,  # tau(3, 4)
-            t51 + s6_y * (2.1 * t7 - (0.4536 * wd6_z + wd6_x * t9) + qd2 * t23 - w6_x * t27) - t56,  # tau(6, 4)
+            tau1_3 + qdd6 * c2_1_6 + qd6 * c1_1_6,  # tau(1, 4)
+            tau2_3 - qdd6 * t45 + qd6 * n6_c1_z,  # tau(2, 4)
+            tau3_3 + qdd6 * n6_c2_x + qd6 * n6_c1_x,  # tau(3, 4)
+            tau6_3 + qdd1 * c2_1_6 - qdd2 * t45 + qdd3 * n6_c2_x + qdd6 * c2_6_6 + qd6 * c1_6_6,  # tau(6, 4)
         ),
     )
 

@@ -23,6 +23,7 @@ class LinkForms:
     velocity: c1_ijk, of the closing convention
     velocity_linear: the part ∂h1/∂q̇ of c1 that stems from energy terms linear in q̇; empty without such
     gravity: g_ij                         torque: τ_ij
+    decomposed_torque: τ_ij where the coefficients are computed too, the same value in the cheaper of two ways
     position_gradient: c0_ijk = ∂τ_ij/∂q_k
     """
 
@@ -31,6 +32,7 @@ class LinkForms:
     velocity: dict[tuple[int, int], Node]
     gravity: dict[int, Node]
     torque: dict[int, Node]
+    decomposed_torque: dict[int, Node]
     position_gradient: dict[tuple[int, int], Node]
     velocity_linear: dict[tuple[int, int], Node] = field(default_factory=dict)
 
@@ -45,7 +47,7 @@ class LinkForms:
         yield from self.acceleration.values()
         yield from self.velocity.values()
         yield from self.gravity.values()
-        yield from self.torque.values()
+        yield from self.decomposed_torque.values()
 
 
 def inputs(graph: Graph, n: int) -> Inputs:

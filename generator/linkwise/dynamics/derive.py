@@ -1,17 +1,13 @@
-"""From a system to kernels: the closed forms of each link, and of all links together."""
+"""From a system to kernels: the closed forms of each link."""
 
-from collections.abc import Sequence
 from operator import itemgetter
 
 from linkwise.dynamics.euler_lagrange import euler_lagrange
 from linkwise.dynamics.frame_search import MAX_AXES, FrameSearch
-from linkwise.dynamics.kernel import Kernel, decomposition_cost, lowering, parameter_nodes
+from linkwise.dynamics.kernel import Kernel, lowering, parameter_nodes
 from linkwise.errors import within
 from linkwise.progress import Progress, silent
 from linkwise.symbolic.system import EnergySystem, System
-
-MAX_SHARED = 4000
-"""Largest sum of squared path lengths for a kernel of all links together."""
 
 
 def link_kernel(system: System, link: int) -> Kernel:
@@ -24,24 +20,6 @@ def link_kernel(system: System, link: int) -> Kernel:
         search = FrameSearch(system, [link], tree, [range(len(tree))])
         _, axes, origin = min([*search.central(MAX_AXES), *search.framed(MAX_AXES)], key=itemgetter(0))
         return search.build(axes, origin)
-
-
-def shared_kernel(system: System, kernels: Sequence[Kernel]) -> Kernel | None:
-    """Decomposition of every link of a rigid robot on one graph, in one common frame, where they share work.
-
-    None where the links' own `kernels` cost no more, for energies of a user's own, and for a robot so large
-    that finding the frame takes too long.
-    """
-    if isinstance(system, EnergySystem) or len(system.links) < 2:
-        return None
-    chains = [link.chain for link in system.links]
-    if sum(len(chain) ** 2 for chain in chains) > MAX_SHARED:
-        return None
-    tree = [(-1 if k.parent is None else k.parent, k.joint) for k in system.robot.links]
-    search = FrameSearch(system, range(len(chains)), tree, chains)
-    _, axes, origin = min(search.framed(MAX_AXES - 1), key=itemgetter(0))
-    kernel = search.build(axes, origin, gradient=False)
-    return kernel if decomposition_cost([kernel]) < decomposition_cost(kernels) else None
 
 
 def _energy_kernel(system: EnergySystem, link: int) -> Kernel:

@@ -33,4 +33,4 @@ def euler_lagrange(graph: Graph, lagrangian: Node, path: tuple[int, ...], x: Inp
     gravity = {i: substitute(g, h[i], rest) for i in path}
     tau = {i: g.add(h[i], g.sum(g.mul(c2[min(i, k), max(i, k)], x.qdd[k]) for k in path)) for i in path}
     c0 = {(i, k): derivative(g, tau[i], x.q[k]) for i in path for k in path}
-    return LinkForms(path, c2, c1, gravity, tau, c0, linear)
+    return LinkForms(path, c2, c1, gravity, tau, tau, c0, linear)

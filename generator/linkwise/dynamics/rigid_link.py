@@ -13,7 +13,8 @@ k one wrench (N, f) gives a column of coefficients, c_ijk = z_i · N + s_i · f:
 
     c2_k:  N = h × s_k + I z_k                f = m s_k + z_k × h
     c1_k:  N = h × ṡ_k + I ż_k + B z_k        f = m ṡ_k + ż_k × h + z_k × P
-    τ:     the same two with the acceleration and twist of the link, minus gravity (g: gravity alone)
+    τ:     the same two with the acceleration and twist of the link, minus gravity (g: gravity alone); where
+           the coefficients are computed too, their sum is often cheaper (`torque_sums`)
 
 The position gradient follows from how a link's wrench F turns with joint k:
     c0_ijk = S_i · (I S̈_k + 2 B Ṡ_k) + [k at or after i] S_i · (S_k ×* F)
@@ -25,10 +26,12 @@ where it is a number. Which is cheaper is found by counting (`frame_search`).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 from linkwise.dynamics.coefficients import LinkForms
 from linkwise.dynamics.link_motion import LinkMotion, Origin, Screw, link_motion
 from linkwise.dynamics.screws import Orientation, Spatial, force_cross, pair_product, spatial_add
+from linkwise.dynamics.torque_sums import TorqueSums
 from linkwise.expression import vector as vec
 from linkwise.expression.graph import Graph, Matrix, Node, Vector
 from linkwise.symbolic.system import RigidLink
@@ -52,21 +55,26 @@ def rigid_forms(
     c2 = {pair: g.zero for pair in pairs if pair[0] <= pair[1]}
     c1, c0 = dict.fromkeys(pairs, g.zero), dict.fromkeys(pairs, g.zero)
     gravity, torque = dict.fromkeys(path, g.zero), dict.fromkeys(path, g.zero)
-    for at, screw in enumerate(motion.screws):
-        k = screw.coordinate
-        gravity[k] = g.add(gravity[k], pair_product(g, screw.s, weight))
-        torque[k] = g.add(torque[k], pair_product(g, screw.s, wrench))
-        inertial, coriolis = moments.inertial(g, screw), moments.coriolis(g, screw)
-        after, before = moments.turned(g, screw, wrench) if gradient else (None, None)
-        for number, other in enumerate(motion.screws):
-            i = other.coordinate
-            if i <= k:
-                c2[i, k] = g.add(c2[i, k], pair_product(g, other.s, inertial))
-            c1[i, k] = g.add(c1[i, k], pair_product(g, other.s, coriolis))
-            row = before if number <= at else after
-            if row is not None:
-                c0[i, k] = g.add(c0[i, k], pair_product(g, other.s, row))
-    return LinkForms(path, c2, c1, gravity, torque, c0)
+    for screw in motion.screws:
+        i = screw.coordinate
+        gravity[i] = g.add(gravity[i], pair_product(g, screw.s, weight))
+        torque[i] = g.add(torque[i], pair_product(g, screw.s, wrench))
+    sums = TorqueSums(g, turn.x, gravity)
+    ordered = sorted(enumerate(motion.screws), key=lambda numbered: numbered[1].coordinate)
+    for k, columns in groupby(ordered, key=lambda numbered: numbered[1].coordinate):
+        for at, screw in columns:
+            inertial, coriolis = moments.inertial(g, screw), moments.coriolis(g, screw)
+            after, before = moments.turned(g, screw, wrench) if gradient else (None, None)
+            for number, other in enumerate(motion.screws):
+                i = other.coordinate
+                if i <= k:
+                    c2[i, k] = g.add(c2[i, k], pair_product(g, other.s, inertial))
+                c1[i, k] = g.add(c1[i, k], pair_product(g, other.s, coriolis))
+                row = before if number <= at else after
+                if row is not None:
+                    c0[i, k] = g.add(c0[i, k], pair_product(g, other.s, row))
+        sums.add(k, c2, c1)
+    return LinkForms(path, c2, c1, gravity, torque, sums.if_cheaper(torque, c2, c1), c0)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from importlib import resources
 import sympy as sp
 
 from linkwise import runtime
-from linkwise.dynamics.kernel import Kernel, decomposition_cost
+from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
 from linkwise.emit.c import loop_costs
@@ -52,8 +52,7 @@ def package_files(
         files.update(emitter(derivation))
     progress("emit", len(emitters), len(emitters))
     files.update(shared_files(derivation, backends))
-    shared = derivation.shared if any(backend.shares_work for backend in backends) else None
-    files[FILE] = manifest(derivation, shared, files).text()
+    files[FILE] = manifest(derivation, files).text()
     return files
 
 
@@ -109,10 +108,10 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
         yield f"runtime/{name}", resources.files(runtime).joinpath(name).read_text(encoding="utf-8")
 
 
-def manifest(derivation: Derivation, shared: Kernel | None, files: Mapping[str, str]) -> Manifest:
+def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
     """What was generated, from what, what it costs, and the SHA-256 of every file."""
     system = derivation.system
-    costs, together = _costs(derivation, shared)
+    costs, operations = _costs(derivation)
     return Manifest(
         derivation.package,
         system.name,
@@ -124,7 +123,7 @@ def manifest(derivation: Derivation, shared: Kernel | None, files: Mapping[str, 
             LinkEntry(name, system.path(j), cost)
             for j, (name, cost) in enumerate(zip(system.link_names, costs, strict=True))
         ),
-        together,
+        operations,
         {s.name: float(v) for s, v in system.parameters.items()},
         rigid_tree(system),
         energies(system),
@@ -132,10 +131,10 @@ def manifest(derivation: Derivation, shared: Kernel | None, files: Mapping[str, 
     )
 
 
-def _costs(derivation: Derivation, shared: Kernel | None) -> tuple[list[int], int | None]:
-    """Operations of each link's decomposition by itself, and of all links where they share work."""
+def _costs(derivation: Derivation) -> tuple[list[int], int]:
+    """Operations of each link's decomposition by itself, and of all: loops move the robot once for them."""
     system = derivation.system
     if derivation.kernel == "loops" and isinstance(system, RigidSystem):
         return loop_costs.link_costs(system), loop_costs.decomposition_cost(system)
-    alone = [decomposition_cost([kernel]) for kernel in derivation.kernels]
-    return alone, decomposition_cost([shared]) if shared else None
+    costs = [decomposition_cost([kernel]) for kernel in derivation.kernels]
+    return costs, sum(costs)

@@ -53,8 +53,6 @@ class BackendFiles:
     """None where nothing loads."""
     needs: tuple[str, ...] = ()
     """Other back ends without which it cannot be."""
-    shares_work: bool = False
-    """Whether it has a kernel of all links where they share work."""
 
 
 def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
@@ -198,7 +196,6 @@ BACKENDS: dict[str, BackendFiles] = {
             "c",
             "closed forms in C99 and C++17, to compile into a program of your own",
             emits=(_c,),
-            shares_work=True,
         ),
         BackendFiles("formulas", "closed forms to read, for small robots", emits=(_formulas,)),
     )

@@ -54,7 +54,7 @@ def _functions(system: System, kernel: Kernel, j: int) -> Iterator[FormFunction]
     if groups["h1"]:
         doc += ", and h1, c1's part by energy terms linear in qd"
     yield _function(system, kernel, "decomposition", doc, whole)
-    yield _function(system, kernel, "torque", "Return tau", [groups["tau"]])
+    yield _function(system, kernel, "torque", "Return tau", [groups["torque"]])
     yield _function(system, kernel, "position_gradient", "Return c0 = d(tau)/d(q)", [groups["c0"]])
 
 
@@ -72,7 +72,8 @@ def labelled(kernel: Kernel, forms: LinkForms, j: int) -> dict[str, Rows]:
         "c2": triples("c2", forms.acceleration),
         "c1": triples("c1", forms.velocity),
         "g": pairs("g", forms.gravity),
-        "tau": pairs("tau", forms.torque),
+        "tau": pairs("tau", forms.decomposed_torque),
+        "torque": pairs("tau", forms.torque),
         "h1": triples("h1", linear),
         "c0": triples("c0", forms.position_gradient),
     }

@@ -2,10 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
-from linkwise.dynamics.derive import shared_kernel
 from linkwise.dynamics.kernel import Kernel
 from linkwise.package.entries import KernelKind
 from linkwise.symbolic.system import System
@@ -22,11 +20,6 @@ class Derivation:
     kernels: tuple[Kernel, ...]
     package: str
     request: Mapping[str, Any]
-
-    @cached_property
-    def shared(self) -> Kernel | None:
-        """Kernel of all links together, None where they share no work; found when first asked for."""
-        return shared_kernel(self.system, self.kernels) if self.kernels else None
 
     @property
     def linear(self) -> frozenset[int]:

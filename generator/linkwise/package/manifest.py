@@ -22,7 +22,7 @@ from linkwise.package.entries import (
     check_tree,
 )
 
-SCHEMA = 5
+SCHEMA = 6
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [
@@ -53,7 +53,7 @@ class Manifest:
 
     request: the options of `generate`; kernel: which kind its C is
     files: the SHA-256 of every other file, by its path in the package
-    shared_operations: those of the kernel in which links share work; None without such a kernel
+    operations: those of a full decomposition
     """
 
     name: str
@@ -63,7 +63,7 @@ class Manifest:
     kernel: KernelKind
     joints: tuple[JointEntry, ...]
     links: tuple[LinkEntry, ...]
-    shared_operations: int | None
+    operations: int
     parameters: Mapping[str, float]
     tree: RigidTree | None
     energies: tuple[EnergyEntry, ...] | None

@@ -11,7 +11,7 @@ from speed.package import PEERS, Package, build_flags, compiler, pairs, run
 
 MIX = 32
 """Instructions of arithmetic in one round of peers/limits.c."""
-KERNEL = re.compile(r"<(link_\d+_(rest|decomposition)|shared_part)_block\w*>:")
+KERNEL = re.compile(r"<link_\d+_decomposition_block\w*>:")
 """Functions that compute the decomposition of blocks, in straight lines."""
 
 

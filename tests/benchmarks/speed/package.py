@@ -34,9 +34,8 @@ class Package:
 
     @property
     def operations(self) -> int:
-        """Additions and multiplications of all links."""
-        links = sum(link["operations"] for link in self.manifest["links"])
-        return int(self.manifest["shared_operations"] or links)
+        """Additions and multiplications of a full decomposition."""
+        return int(self.manifest["operations"])
 
     @property
     def outputs(self) -> int:

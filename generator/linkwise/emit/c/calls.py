@@ -10,32 +10,29 @@ from linkwise.emit.c.sizes import EntryCounts, Span, whole
 
 @dataclass(frozen=True)
 class LinkKernels:
-    """The kernels of one link; `rest` is what a shared part leaves of its decomposition, if there is one."""
+    """The kernels of one link."""
 
     decomposition: KernelFunction
     torque: KernelFunction
     position_gradient: KernelFunction
-    rest: KernelFunction | None
-
-    @property
-    def blocks(self) -> KernelFunction:
-        """Decomposition of blocks of samples."""
-        return self.rest or self.decomposition
 
 
 @dataclass(frozen=True)
 class Motions:
-    """The struct of what kernels read: its fields, and its values for a sample, a block x, the block `at`."""
+    """The struct of what kernels read: its fields, and its values.
+
+    These are of one sample, of block t of a tile whose rows were gathered, of block t of a tile in blocks.
+    """
 
     fields: str
     sample: str
-    block: str
+    gathered: str
     blocks: str
 
 
 @dataclass(frozen=True)
 class Moves:
-    """How values of some links in one array leave their block: calls, and their place in block s."""
+    """How values of some links in one array leave block t of a tile: calls, and their place in block `at`."""
 
     scatter: str
     stream_rows: str
@@ -63,16 +60,14 @@ class LinkCalls:
 
 @dataclass(frozen=True)
 class GroupCalls:
-    """The function of a group of links for one block: its text, its calls, and how results leave.
+    """The function of a group of links for a tile of blocks: its name and calls, and how results leave.
 
-    `waits` has results wait in blocks, `places` puts them into every array of the robot, for block s.
+    `places` puts them into every array of the robot, for block `at`.
     """
 
     what: str
-    signature: str
+    name: str
     decomposition: tuple[str, ...]
-    waits: str
-    straight: str
     moves: tuple[Moves, ...]
     places: tuple[str, ...]
     torque: tuple[str, ...]
@@ -87,8 +82,8 @@ def motions(inputs: Sequence[str]) -> Motions:
     return Motions(
         ", ".join(f"*{array}" for array in (*motion, *turned, *parameters)),
         _braces([*motion, *turned, *parameters]),
-        _braces([*(f"x.{array}" for array in (*motion, *turned)), *parameters]),
-        _braces([*(f"{array} + at" for array in motion), *turned, *parameters]),
+        _braces([*(f"x[t].{array}" for array in (*motion, *turned)), *parameters]),
+        _braces([*(f"{array} + at" for array in motion), "sine[t]", "cosine[t]", *parameters]),
     )
 
 
@@ -101,7 +96,7 @@ def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
         call(kernels.decomposition, "one", "m.", arrays),
         call(kernels.decomposition, "one", "m.", arrays, link.start),
         call(kernels.torque, "one", "m.", {"tau": "tau"}, link.start),
-        call(kernels.position_gradient, "block", "m.", {"c0": "c0_block"}),
+        call(kernels.position_gradient, "block", "m[t].", {"c0": "c0_block"}),
         _moves("c0", link).scatter,
         _counted_from_0(link),
         f"to_dense_one({link.first - 1}, &m, &r, to)",
@@ -111,23 +106,16 @@ def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
 def group_calls(links: Sequence[Span], kernels: Sequence[LinkKernels], arrays: Sequence[str]) -> GroupCalls:
     """Calls of the kernels of `links`; `arrays` are those of the robot."""
     group = whole(links)
-    into = {array: f"r->{array}" for array in arrays}
+    into = {array: f"r[t].{array}" for array in arrays}
     mine = [(kernels[link.first - 1], link.start - group.start) for link in links]
     one = group.first == group.last
-    name = f"link_{group.first}" if one else f"links_{group.first}_to_{group.last}"
-    shared = any("shared" in k.blocks.reads for k, _ in mine)
-    calls = tuple(call(k.blocks, "block", "m->", into, start) for k, start in mine)
-    passed = f"{name}(&m, shared, " if shared else f"{name}(&m, "
-    values = "const real *shared, " if shared else ""
     return GroupCalls(
         f"Link {group.first}" if one else f"Links {group.first} to {group.last}",
-        f"{name}(const struct inputs *m, {values}const struct results *r)",
-        (*idle(calls), *calls),
-        f"{passed}&r)",
-        f"{passed}&there)",
+        f"link_{group.first}" if one else f"links_{group.first}_to_{group.last}",
+        tuple(call(k.decomposition, "block", "m[t].", into, start) for k, start in mine),
         tuple(_moves(array, group) for array in group.size.arrays),
         tuple(_moves(array, group).place for array in arrays),
-        tuple(call(k.torque, "block", "m.", {"tau": "tau_block"}, start) for k, start in mine),
+        tuple(call(k.torque, "block", "m[t].", {"tau": "r[t].tau"}, start) for k, start in mine),
         _moves("tau", group).scatter,
         _counted_from_0(group),
     )
@@ -141,14 +129,14 @@ def call(
     start: EntryCounts | None = None,
 ) -> str:
     """Call of a kernel for one sample or a block; outputs begin at their pointers, or `start` entries on."""
-    reads = [array if array == "shared" else f"{motion}{array}" for array in function.reads]
+    reads = [f"{motion}{array}" for array in function.reads]
     writes = [_at(into[array], start.of(array) if start else 0) for array in function.writes]
     return f"{function.name}_{width}({', '.join([*reads, *writes])})"
 
 
 def idle(calls: Iterable[str]) -> tuple[str, ...]:
     """What tells a compiler that no call reads the motion: that of a slide, say, has a constant gradient."""
-    return () if any("m." in text or "m->" in text for text in calls) else ("(void)m",)
+    return () if any("m." in text or "m[" in text for text in calls) else ("(void)m",)
 
 
 def total(array: str) -> str:
@@ -158,12 +146,13 @@ def total(array: str) -> str:
 
 def _moves(array: str, links: Span) -> Moves:
     start, every, count = links.start.of(array), total(array), links.size.of(array)
-    rows = f"{array} + s * {every}" + (f" + {start}" if start else "")
-    place = f"{array} + " + (f"(s * {every} + {start}) * BLOCK" if start else f"s * {every} * BLOCK")
+    rows = f"{array} + at * {every}" + (f" + {start}" if start else "")
+    place = f"{array} + " + (f"(at * {every} + {start}) * BLOCK" if start else f"at * {every} * BLOCK")
+    waiting = "c0_block" if array == "c0" else f"r[t].{array}"
     return Moves(
-        f"scatter(samples, {count}, {every}, {array}_block, {rows})",
-        f"stream_rows({every}, {array}_block, {rows}, scratch)",
-        f"stream({count} * BLOCK, {array}_block, {place})",
+        f"scatter(samples, {count}, {every}, {waiting}, {rows})",
+        f"stream_rows({every}, {waiting}, {rows}, scratch)",
+        f"stream({count} * BLOCK, {waiting}, {place})",
         place,
     )
 

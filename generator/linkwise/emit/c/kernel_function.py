@@ -11,7 +11,7 @@ from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Node
 from linkwise.symbolic.system import System
 
-READS = ("q", "qd", "qdd", "sine", "cosine", "p", "shared")
+READS = ("q", "qd", "qdd", "sine", "cosine", "p")
 """Arrays that a kernel may read, in the order of its parameters."""
 
 
@@ -63,7 +63,7 @@ def decomposition_outputs(kernel: Kernel, forms: LinkForms, number: int) -> list
         *outputs("c2", forms.acceleration, number),
         *outputs("c1", forms.velocity, number),
         *outputs("g", forms.gravity, number),
-        *outputs("tau", forms.torque, number),
+        *outputs("tau", forms.decomposed_torque, number),
         *outputs("h1", linear, number),
     ]
 
@@ -84,16 +84,12 @@ def kernel_function(
     name: str,
     what: str,
     results: Sequence[Output],
-    shared: Mapping[Node, str] | None = None,
 ) -> KernelFunction:
-    """C function that stores `results`; sines, cosines and what is `shared` are inputs."""
-    given = turned(kernel) | dict(shared or {})
+    """C function that stores `results`; sines and cosines are inputs."""
+    given = turned(kernel)
     nodes = [output.node for output in results]
     code = straight_line(kernel.graph, nodes, CPrinter(), given)
-    sources = symbols(system) | {
-        name: f"shared[{at} * W + b]" for at, name in enumerate((shared or {}).values())
-    }
-    inputs = tuple((symbol, source) for symbol, source in sources.items() if symbol in code.symbols)
+    inputs = tuple((symbol, source) for symbol, source in symbols(system).items() if symbol in code.symbols)
     used = {source.split("[")[0] for _, source in inputs}
     sines = sum(source.startswith(("sine", "cosine")) for _, source in inputs)
     count = count_operations(kernel.graph, nodes, given)

@@ -6,17 +6,14 @@ from typing import Any
 
 from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
-from linkwise.emit.c.calls import LinkKernels, call, group_calls, idle, link_calls, motions, total
+from linkwise.emit.c.calls import LinkKernels, group_calls, idle, link_calls, motions, total
 from linkwise.emit.c.prototypes import cost, functions, pointers
 from linkwise.emit.c.quantity_table import causes, quantity_lines
-from linkwise.emit.c.shared_part import SHARED_FILE, SharedWork
-from linkwise.emit.c.sizes import EntryCounts, Span, groups, whole
+from linkwise.emit.c.sizes import EntryCounts, Span, groups, tile, whole
 from linkwise.symbolic.system import System
 
 
-def robot_view(
-    system: System, links: Sequence[Span], kernels: Sequence[LinkKernels], together: SharedWork | None
-) -> dict[str, Any]:
+def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKernels]) -> dict[str, Any]:
     """Fields of NAME.c but for its name."""
     robot = whole(links)
     arrays = robot.size.arrays
@@ -27,7 +24,6 @@ def robot_view(
     waiting = _most([whole(part).size for part in parts])
     names = list(parameter_names(system).values())
     motion = given(system)
-    shared = [("shared", together.values)] if together else []
     calls = [link_calls(link, k) for link, k in zip(links, kernels, strict=True)]
     return {
         "n": n,
@@ -44,23 +40,23 @@ def robot_view(
         "pointers": ", ".join(f"*{array}" for array in arrays),
         "passed": ", ".join((*motion, *arrays)),
         "passed_motion": ", ".join(motion),
+        "rows_from_s": ", ".join(array if array == "p" else f"{array} + s * N" for array in motion),
         "inputs_at_rest": pointers("const real", (array for array in motion if array != "qdd")),
         "passed_at_rest": ", ".join("qd" if array == "qdd" else array for array in motion),
         "links": calls,
         "groups": [group_calls(part, kernels, arrays) for part in parts],
         "idle_torque": idle(link.torque for link in calls),
         "idle_gradient": idle(link.position_gradient for link in calls),
-        "room": [*shared, *((f"{array}_block", waiting.of(array)) for array in arrays)],
+        "tile": tile(waiting),
+        "room": [(array, waiting.of(array)) for array in arrays],
         "room_of_one": [(array, one.of(array)) for array in arrays],
         "results_of_one": ", ".join(arrays),
-        "waiting": ", ".join(f"{array}_block" for array in arrays),
+        "waiting": ", ".join(f"room->{array}[t]" for array in arrays),
         "streams": len(parts) == 1,
         "slopes": "r->h1" if robot.size.h1 else "NULL",
         "largest": max(waiting.of(array) for array in arrays),
         "waiting_torques": waiting.g,
         "largest_gradient": max(link.size.c1 for link in links),
-        "shared_calls": [call(together.part, "block", "m.", {"shared": "shared"})] if together else [],
-        "decomposition_kernels": f'#include "{SHARED_FILE}"' if together else "#define WANT_DECOMPOSITION",
     }
 
 
@@ -86,11 +82,10 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
     }
 
 
-def costs(kernels: Sequence[LinkKernels], together: SharedWork | None) -> dict[str, int]:
-    """Arithmetic operations of a sample in NAME.h, of samples that go through blocks."""
-    shared = [together.part] if together else []
+def costs(kernels: Sequence[LinkKernels]) -> dict[str, int]:
+    """Arithmetic operations of a sample in NAME.h."""
     return {
-        "decomposition_cost": cost([*shared, *(k.blocks for k in kernels)]),
+        "decomposition_cost": cost(k.decomposition for k in kernels),
         "torque_cost": cost(k.torque for k in kernels),
         "gradient_cost": cost(k.position_gradient for k in kernels),
     }

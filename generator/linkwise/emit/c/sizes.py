@@ -9,7 +9,14 @@ ARRAYS = ("c2", "c1", "g", "tau", "h1")
 """Arrays of the decomposition in the order of the API; c0 has as many values as c1."""
 
 GROUP = 384
-"""Values that wait in blocks at a time: 24 KiB, half of a usual first-level cache."""
+"""Values of a sample that wait in blocks at a time."""
+
+TILE = 8
+"""Blocks that one kernel works on before the next does.
+
+The kernels of a robot of seven joints are some 40 kB of code, more than a first-level cache holds: so they
+come from the second-level cache once a tile, in which its results, 192 KiB at most, wait too.
+"""
 
 
 @dataclass(frozen=True)
@@ -75,6 +82,11 @@ def link_spans(kernels: Sequence[Kernel]) -> tuple[Span, ...]:
 def whole(links: Sequence[Span]) -> Span:
     """Return consecutive links as one."""
     return Span(links[0].first, links[-1].last, sum((k.size for k in links), EntryCounts()), links[0].start)
+
+
+def tile(waiting: EntryCounts) -> int:
+    """Return how many blocks are worked on at a time; fewer where a link has more than GROUP values."""
+    return max(1, min(TILE, TILE * GROUP // max(waiting.total, 1)))
 
 
 def groups(links: Sequence[Span]) -> Iterator[tuple[Span, ...]]:

@@ -12,13 +12,11 @@ from linkwise.dynamics.kernel import Kernel
 from linkwise.emit.c import header
 from linkwise.emit.c.calls import LinkKernels
 from linkwise.emit.c.kernel_function import (
-    KernelFunction,
     decomposition_outputs,
     kernel_function,
     outputs,
 )
 from linkwise.emit.c.robot_files import costs, header_view, robot_view
-from linkwise.emit.c.shared_part import SHARED_FILE, SharedWork, shared_work
 from linkwise.emit.c.sizes import link_spans
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
@@ -33,23 +31,19 @@ FIXED = ("numbers.h", "sines.h", "rows.h", "dense.h", "stream.h", "dense_rows.h"
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     """Paths inside the package and texts."""
     system, name = derivation.system, derivation.package
-    together = shared_work(system, derivation.shared) if derivation.shared else None
     kernels = []
     for number, kernel in enumerate(derivation.kernels, 1):
-        rest = together.rests[number - 1] if together else None
-        kernels.append(_link_kernels(system, kernel, number, rest))
+        kernels.append(_link_kernels(system, kernel, number))
         yield f"c/link_{number}.h", _kernel_file(_link_view(system, number, kernels[-1], kernel.frame))
-    if together:
-        yield f"c/{SHARED_FILE}", _kernel_file(_shared_view(together))
     links = link_spans(derivation.kernels)
     common = {"version": VERSION, "name": name}
-    robot = common | robot_view(system, links, kernels, together)
+    robot = common | robot_view(system, links, kernels)
     yield f"c/{name}.c", render("c/robot.c.j2", robot)
     yield f"c/{name}f.c", render("c/robotf.c.j2", common)
     names = common | {"upper": name.upper()}
     yield (
         f"c/{name}.h",
-        render("c/robot.h.j2", names | header_view(system, links, name) | costs(kernels, together)),
+        render("c/robot.h.j2", names | header_view(system, links, name) | costs(kernels)),
     )
     tables = {"tables": list(header.index_tables(system, links))}
     yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)
@@ -57,17 +51,16 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
         yield f"c/{file}", files("linkwise.runtime").joinpath("c", file).read_text(encoding="utf-8")
 
 
-def _link_kernels(system: System, kernel: Kernel, number: int, rest: KernelFunction | None) -> LinkKernels:
+def _link_kernels(system: System, kernel: Kernel, number: int) -> LinkKernels:
     forms = kernel.forms[0]
     stem = f"link_{number}"
     results = decomposition_outputs(kernel, forms, number)
-    torques = [output for output in results if output.array == "tau"]
+    torques = list(outputs("tau", forms.torque, number))
     gradients = list(outputs("c0", forms.position_gradient, number))
     return LinkKernels(
         kernel_function(system, kernel, f"{stem}_decomposition", "Decomposition", results),
         kernel_function(system, kernel, f"{stem}_torque", "Torques alone", torques),
         kernel_function(system, kernel, f"{stem}_position_gradient", "Position gradient", gradients),
-        rest,
     )
 
 
@@ -84,19 +77,6 @@ def _link_view(system: System, number: int, kernels: LinkKernels, frame: tuple[s
             ("WANT_TORQUE", kernels.torque),
             ("WANT_POSITION_GRADIENT", kernels.position_gradient),
         ),
-    }
-
-
-def _shared_view(together: SharedWork) -> dict[str, Any]:
-    return {
-        "frame": together.frame,
-        "title": "All links together, where they share work",
-        "about": (
-            "shared_part computes what several links need, link_1_rest what is then left of link 1. The file",
-            "that includes this one says how many samples W they take; KERNEL completes their names.",
-            "Where a shared value has no name of its own, shared_30, say, is entry 30 of the array `shared`.",
-        ),
-        "functions": tuple(("", function) for function in (together.part, *together.rests)),
     }
 
 

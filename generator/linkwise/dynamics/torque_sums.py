@@ -1,0 +1,58 @@
+"""Torques from their own coefficients: τ_ij = g_ij + Σ_k (c2_ijk q̈_k + c1_ijk q̇_k).
+
+A decomposition has the coefficients at hand, so that short paths get τ cheaper by this sum, two products for
+each (i, k), than by the link's wrench, which long paths pay for once. It is taken column by column: what is
+known of τ after joint k is one value for each joint i, however many coefficients there are.
+"""
+
+from collections.abc import Mapping
+
+from linkwise.dynamics.coefficients import Inputs
+from linkwise.expression.count import count_operations
+from linkwise.expression.graph import Graph, Node
+
+Pairs = Mapping[tuple[int, int], Node]
+
+
+class TorqueSums:
+    """Growing sums: `tau`[i] is what gravity and the joints added so far ask of joint i.
+
+    gravity: g_ij, by joint, coordinates ascending
+    """
+
+    def __init__(self, g: Graph, x: Inputs, gravity: Mapping[int, Node]) -> None:
+        self.g, self.x, self._gravity = g, x, gravity
+        self.tau = dict(gravity)
+        self._steps = [(node, f"g_{i + 1}") for i, node in gravity.items()]
+
+    def add(self, k: int, c2: Pairs, c1: Pairs) -> None:
+        """Add column k; c2 (i, k) for i ≤ k and c1 (i, k) of it must be whole, and columns come in order."""
+        for i in self.tau:
+            if i <= k:
+                self._add(i, c2[i, k], self.x.qdd[k])
+            if i < k:  # by symmetry: c2 (k, i)
+                self._add(k, c2[i, k], self.x.qdd[i])
+            self._add(i, c1[i, k], self.x.qd[k])
+        self._steps += [(node, f"tau{i + 1}_{k + 1}") for i, node in self.tau.items()]
+
+    def if_cheaper(self, torque: dict[int, Node], c2: Pairs, c1: Pairs) -> dict[int, Node]:
+        """Return the sums if they cost less than `torque` beside the coefficients, else `torque`."""
+        known = [*c2.values(), *c1.values(), *self._gravity.values()]
+        summed, other = (count_operations(self.g, [*known, *t.values()]) for t in (self.tau, torque))
+        if summed.arithmetic >= other.arithmetic:
+            return torque
+        self._name(c2, c1)
+        return self.tau
+
+    def _name(self, c2: Pairs, c1: Pairs) -> None:
+        """Suggest names for the coefficients and for each joint's sums, but the last: c1_3_4, tau3_4."""
+        for prefix, pairs in (("c2", c2), ("c1", c1)):
+            for (i, k), node in pairs.items():
+                self.g.name(node, f"{prefix}_{i + 1}_{k + 1}")
+        whole = set(self.tau.values())
+        for node, name in self._steps:
+            if node not in whole:
+                self.g.name(node, name)
+
+    def _add(self, i: int, coefficient: Node, motion: Node) -> None:
+        self.tau[i] = self.g.add(self.tau[i], self.g.mul(coefficient, motion))
