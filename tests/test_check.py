@@ -198,9 +198,8 @@ def test_a_result_given_twice_is_computed_once(tmp_path: Path) -> None:
 def test_c_that_ends_the_process_fails(tmp_path: Path) -> None:
     package = tmp_path / "planar2"
     write_package(generate(read_system("planar2"), ["c"]), package)
-    change_file(
-        package, "c/planar2.c", "    struct waiting room;\n", "    struct waiting room;\n    *(volatile int *)0 = 0;\n"
-    )
+    room = "    struct waiting room;\n"
+    change_file(package, "c/planar2.c", room, room + "    *(volatile int *)0 = 0;\n")
     failing = {result.name: result.detail for result in check_package(package, 10) if not result.passed}
     assert failing == {"c: runs to its end": "it ended the process by SIGSEGV"}
 
