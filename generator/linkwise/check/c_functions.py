@@ -18,8 +18,8 @@ from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
-ROWS, BLOCKS = (0, 1, 7, 8, 9, 17, 107), (1, 2, 8)
-"""Numbers of samples, and of blocks: none, one, some that fill no block, some that do, many."""
+ROWS, BLOCKS = (0, 1, 7, 8, 9, 17, 139), (1, 2, 11)
+"""Numbers of samples, and of blocks: none, one, some that fill no block, some that do, more than a tile."""
 
 OUTPUTS = ("c2", "c1", "g", "tau", "h1")
 """Arrays of a decomposition, in the order of the arguments."""
