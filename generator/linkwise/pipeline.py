@@ -5,8 +5,7 @@
                                                                 ▼
     derive         closed forms, one kernel per link: by the rigid-link rule, which differentiates nothing, or
                    by Euler–Lagrange from energies that a user wrote; left out where the kernel is in loops
-    package_files  their text in each back end (C also asks for one kernel of all links, where they share
-                   work), the runtime, the manifest
+    package_files  their text in each back end, the runtime, the manifest
 
 SymPy energies of rigid links take no part in this: they are worked out for what shows or differentiates them,
 the autograd back end, formulas and reports.
