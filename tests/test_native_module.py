@@ -1,6 +1,8 @@
 """The compiled module that calls C says to the bit what ctypes says, and takes nothing that it should not."""
 
 import gc
+import inspect
+import pickle
 import sys
 import weakref
 from collections.abc import Callable, Iterator
@@ -46,7 +48,7 @@ def without(package: ModuleType, **instead: Any) -> Iterator[None]:
 
 
 def is_compiled(robot: Any) -> bool:
-    return type(robot._answers.of_arrays).__name__ == "Calls"
+    return "partial_torque" in vars(robot)
 
 
 def parts(answer: Any) -> tuple[np.ndarray, ...]:
@@ -110,6 +112,62 @@ def test_without_it_ctypes_answers_silently(
     assert not is_compiled(robot)
     robot.partial_torque(*np.ones((3, 3)))
     assert capfd.readouterr() == ("", "")
+
+
+def test_no_line_of_python_runs_for_plain_arrays(planar3: ModuleType) -> None:
+    robot, motion = planar3.load("native"), np.ones((3, 5, 3))
+    lines: list[str] = []
+    for name, call in CALLS.items():
+        call(robot, *motion)  # what is compiled at the first call is called otherwise from then on
+        sys.setprofile(
+            lambda frame, event, _: lines.append(frame.f_code.co_name) if event == "call" else None
+        )
+        try:
+            call(robot, *motion)
+        finally:
+            sys.setprofile(None)
+        assert lines == ["<lambda>"], name
+        lines.clear()
+
+
+def test_arguments_are_taken_by_name_as_by_order(planar3: ModuleType) -> None:
+    robot = planar3.load("native")
+    q, qd, qdd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 5, 3))
+    expected = robot.propagation(q, qd, qdd, "gradient")
+    out = tuple(np.full_like(a, np.nan) for a in expected)
+    answer = robot.propagation(q, convention="gradient", out=out, qdd=qdd, qd=qd)
+    for given, place, value in zip(answer, out, expected, strict=True):
+        assert given is place
+        np.testing.assert_array_equal(given, value)
+    for name in CALLS.keys() - {"gradient"}:
+        words = inspect.signature(getattr(robot, name)).parameters
+        own = inspect.signature(getattr(planar3.Dynamics, name)).parameters
+        assert {w: p.default for w, p in own.items() if w != "self"} == {
+            w: p.default for w, p in words.items()
+        }
+
+
+@pytest.mark.parametrize(
+    ("count", "named", "message"),
+    [
+        (2, {}, r"^Dynamics\.partial_torque\(\) missing 1 required positional argument: 'qdd'$"),
+        (3, {"q": None}, r"^Dynamics\.partial_torque\(\) got multiple values for argument 'q'$"),
+        (3, {"convention": "closing"}, r"got an unexpected keyword argument 'convention'$"),
+        (5, {}, r"^Dynamics\.partial_torque\(\) takes from 4 to 5 positional arguments but 6 were given$"),
+        (2, {"qdd": None}, r"^qdd is None; give an array"),
+    ],
+)
+def test_wrong_arguments_are_told_as_python_tells_them(
+    count: int, named: dict[str, Any], message: str, planar3: ModuleType
+) -> None:
+    with pytest.raises(TypeError, match=message):
+        planar3.load("native").partial_torque(*[np.ones(3)] * count, **named)
+
+
+def test_a_call_is_pickled_with_its_robot(planar3: ModuleType) -> None:
+    call = planar3.load("native").partial_torque
+    motion = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 3))
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(call))(*motion), call(*motion))
 
 
 def test_what_is_not_plain_is_read_as_by_the_other_back_ends(planar3: ModuleType) -> None:
