@@ -170,27 +170,48 @@ def test_a_call_is_pickled_with_its_robot(planar3: ModuleType) -> None:
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(call))(*motion), call(*motion))
 
 
-def test_what_is_not_plain_is_read_as_by_the_other_back_ends(planar3: ModuleType) -> None:
-    robot, reference = planar3.load("native"), planar3.load("numpy")
-    q, qd, qdd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 6, 3))
+@pytest.mark.parametrize("batch", [(6,), (1,), ()])
+@pytest.mark.parametrize("binding", ["compiled", "ctypes"])
+def test_what_is_not_plain_is_read_as_by_the_other_back_ends(
+    binding: str, batch: tuple[int, ...], planar3: ModuleType
+) -> None:
+    if binding == "compiled":
+        robot = planar3.load("native")
+    else:
+        with without(planar3, headers=lambda: ()):
+            robot = planar3.load("native")
+    assert is_compiled(robot) == (binding == "compiled")
+    reference = planar3.load("numpy")
+    q, qd, qdd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, *batch, 3))
+    robot.partial_torque(q, qd, qdd)
     frozen = q.copy()
     frozen.flags.writeable = False
     unusual = {
-        "strides": (np.asfortranarray(q), qd[::-1][::-1], qdd),
+        "strides": (np.asfortranarray(q), qd[..., ::-1][..., ::-1], qdd),
+        "gaps": (q, np.stack([qd, qdd], -1)[..., 0], qdd),
         "bytes": (q.astype(">f8"), qd, qdd),
-        "offset": (np.frombuffer(b"x" + q.tobytes(), np.uint8)[1:].view("f8").reshape(6, 3), qd, qdd),
+        "offset": (np.frombuffer(b"x" + q.tobytes(), np.uint8)[1:].view("f8").reshape(q.shape), qd, qdd),
         "lists": (q, qd.tolist(), qdd),
-        "shapes": (q, qd[0], qdd),
+        "shapes": (q, qd.reshape(-1, 3)[0], qdd),
         "dtypes": (q, qd.astype("f4"), qdd),
-        "subclass": (q.view(np.matrix), qd, qdd),
         "read-only": (frozen, qd, qdd),
+        "whole numbers": (q, np.ones(3, int), qdd),
     }
+    if batch:
+        unusual["subclass"] = (q.view(np.matrix), qd, qdd)
     for name, motion in unusual.items():
         given = [np.asarray(m) if name == "subclass" else m for m in motion]
         expected = reference.partial_torque(*given)
         np.testing.assert_allclose(
             robot.partial_torque(*motion), expected, rtol=1e-12, atol=1e-12, err_msg=name
         )
+    for wrong, message in (
+        (np.ma.masked_invalid(qd), "qd is a masked array"),
+        (qd[..., :2], "qd has shape"),
+        (qd.astype(complex), "qd has dtype complex128"),
+    ):
+        with pytest.raises((TypeError, ValueError), match=message):
+            robot.partial_torque(q, wrong, qdd)
 
 
 def test_nothing_is_leaked_or_freed_twice(planar3: ModuleType) -> None:
@@ -231,6 +252,17 @@ def test_threads_call_side_by_side(planar3: ModuleType) -> None:
     with ThreadPoolExecutor(4) as pool:
         for answer in pool.map(lambda _: robot.propagation(*motion), range(50)):
             for a, b in zip(answer, expected, strict=True):
+                np.testing.assert_array_equal(a, b)
+
+
+def test_threads_through_ctypes_keep_their_samples_apart(planar3: ModuleType) -> None:
+    with without(planar3, headers=lambda: ()):
+        robot = planar3.load("native")
+    many = np.random.default_rng(0).uniform(-2.0, 2.0, (400, 3, 3))
+    expected = [robot.propagation(*motion) for motion in many]
+    with ThreadPoolExecutor(4) as pool:
+        for answer, right in zip(pool.map(lambda m: robot.propagation(*m), many), expected, strict=True):
+            for a, b in zip(answer, right, strict=True):
                 np.testing.assert_array_equal(a, b)
 
 

@@ -54,6 +54,14 @@ class NativeAnswers(Answers):
         answers = {call: (KINDS.get(call), shapes) for call, shapes in self._shapes.items()}
         return made(self._structure.n, LARGE - 1, *constants, answers)
 
+    def _answer(self, call: str, given: Sequence[Any], out: Any) -> Any:
+        if out is None and not self._check_finite:
+            values = self._calls.desks.at_once(call, given)
+            if values is not None:
+                kind = KINDS.get(call)
+                return kind(*values) if kind else values[0]
+        return super()._answer(call, given, out)
+
     def _computed(self, call: str, motion: Sequence[Any]) -> Any:
         if type(motion[0]) is np.ndarray or not has_tensors(motion):
             return self._run(call, motion)

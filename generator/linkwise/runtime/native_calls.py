@@ -5,7 +5,6 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 from .answers import answer_shapes
 from .arguments import has_tensors
 from .native_build import Sources
+from .native_desk import Desk, Desks, new_desk
 from .native_library import NumberArray, address, function, memory, place
 from .structure import Structure
 
@@ -51,16 +51,6 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=pool.cache_clear)
 
 
-@dataclass(frozen=True)
-class Desk:
-    """Memory for one sample's motion and results, and where a C function finds it."""
-
-    compute: Any
-    motion: list[NumberArray]
-    results: list[NumberArray]
-    addresses: tuple[int, ...]
-
-
 class NativeCalls:
     """The C functions of a package for given parameters; each parameter is one number for all samples.
 
@@ -78,7 +68,7 @@ class NativeCalls:
         self._widths = {call: sum(sizes) for call, sizes in self.sizes.items()}
         self.learned = has_tensors(parameters.values())
         self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
-        self._desks: dict[tuple[str, np.dtype[Any]], list[Desk]] = {}
+        self.desks = Desks(structure.n, self._desk)
         self._functions: dict[tuple[str, np.dtype[Any]], Any] = {}
         self._function("packed", np.dtype("f8"))
 
@@ -90,7 +80,8 @@ class NativeCalls:
         kind, batch = q.dtype, q.shape[:-1]
         count = q.size // q.shape[-1]
         if count == 1 and into is None and not self.learned:
-            return self._one(call, motion, kind, batch)
+            results = self.desks.results(call, motion)
+            return [a.reshape(*batch, *a.shape) for a in results] if batch else results
         shapes = self.shapes[call]
         if into is None:
             into = [memory((*batch, *shape), kind) for shape in shapes]
@@ -116,29 +107,12 @@ class NativeCalls:
         self._share(compute, count, arrays, parts, (read, into))
         return into
 
-    def _one(
-        self, call: str, motion: Sequence[NumberArray], kind: "np.dtype[Any]", batch: tuple[int, ...]
-    ) -> Sequence[NumberArray]:
-        """Results for one sample; copies to and from a desk cost less than to find out where arrays lie."""
-        desks = self._desks.setdefault((call, kind), [])
-        try:
-            desk = desks.pop()  # so that neither a thread nor a signal's handler finds it in use
-        except IndexError:
-            desk = self._new_desk(call, kind)
-        for to, a in zip(desk.motion, motion, strict=True):
-            to[...] = a
-        desk.compute(1, *desk.addresses)
-        results = [a.copy() for a in desk.results]
-        desks.append(desk)
-        return [a.reshape(*batch, *a.shape) for a in results] if batch else results
-
-    def _new_desk(self, call: str, kind: "np.dtype[Any]") -> "Desk":
+    def _desk(self, call: str, kind: "np.dtype[Any]") -> Desk:
+        """Memory for one sample of a call."""
         compute = self._functions.get((call, kind)) or self._function(call, kind)
-        motion = [np.empty(self.structure.n, kind) for _ in range(2 if call == "coefficients" else 3)]
-        results = [np.empty(shape, kind) for shape in self.shapes[call]]
+        motion = np.empty((2 if call == "coefficients" else 3, self.structure.n), kind)
         constants = [self._constants[kind]] if self.parameters else []
-        arrays = [*motion, *constants, *(a for a in results if a.size)]
-        return Desk(compute, motion, results, tuple(map(address, arrays)))
+        return new_desk(compute, motion, constants, [np.empty(shape, kind) for shape in self.shapes[call]])
 
     def constants(self, kind: "np.dtype[Any]") -> NumberArray:
         """Values of parameters that stay as they are, in the order of the structure."""
