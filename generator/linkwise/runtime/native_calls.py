@@ -13,7 +13,7 @@ import numpy as np
 
 from .answers import answer_shapes
 from .arguments import has_tensors
-from .native_build import Sources
+from .native_build import loaded
 from .native_desk import Desk, Desks, new_desk
 from .native_library import NumberArray, address, function, memory, place
 from .structure import Structure
@@ -60,7 +60,7 @@ class NativeCalls:
     def __init__(self, structure: Structure, sources: Path, parameters: Mapping[str, Any]) -> None:
         """Compile at the first call for this package; raises RuntimeError where that cannot be."""
         self.structure, self.parameters = structure, dict(parameters)
-        self.sources = Sources(structure.name, sources)
+        self.sources = loaded(structure.name, sources)
         self.threads = os.cpu_count() or 1
         self.shapes = answer_shapes(structure)
         self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
