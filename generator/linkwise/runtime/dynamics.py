@@ -84,8 +84,13 @@ class Dynamics:
         return f"<{self.name} on {self.backend.name}: {', '.join(parts)}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled, copied or sent to another process, it is loaded again there."""
-        return self._load, self._asked
+        """Pickled, copied or sent to another process, it is loaded again there; threads set here stay."""
+        return self._load, self._asked, getattr(self.backend, "threads_set", None)
+
+    def __setstate__(self, threads: int) -> None:
+        """Set threads as they were set of the robot that this one is a copy of."""
+        backend: Any = self.backend
+        backend.threads = threads
 
     def packed(self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None) -> Packed[Array]:
         """Full decomposition without the zeros: c2, c1 (closing), g, tau, h1, (..., count) each."""

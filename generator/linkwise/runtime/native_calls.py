@@ -51,17 +51,31 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=pool.cache_clear)
 
 
+def checked_threads(count: Any) -> int:
+    """How many threads a large batch may use; raises TypeError or ValueError for what is no such number."""
+    if isinstance(count, bool) or not isinstance(count, int | np.integer):
+        raise TypeError(f"threads is a {type(count).__name__}; give a whole number from 1 on")
+    if count < 1:
+        raise ValueError(f"threads is {count}; give a whole number from 1 on")
+    return int(count)
+
+
 class NativeCalls:
     """The C functions of a package for given parameters; each parameter is one number for all samples.
 
     `threads` is how many a large batch may use.
     """
 
-    def __init__(self, structure: Structure, sources: Path, parameters: Mapping[str, Any]) -> None:
-        """Compile at the first call for this package; raises RuntimeError where that cannot be."""
+    def __init__(
+        self, structure: Structure, sources: Path, parameters: Mapping[str, Any], threads: int | None = None
+    ) -> None:
+        """Compile at the first call for this package; raises RuntimeError where that cannot be.
+
+        threads: as many as there are cores unless given
+        """
         self.structure, self.parameters = structure, dict(parameters)
         self.sources = loaded(structure.name, sources)
-        self.threads = os.cpu_count() or 1
+        self.threads_set, self._cores = threads, os.cpu_count() or 1
         self.shapes = answer_shapes(structure)
         self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
         self._complete = {call: all(sizes) for call, sizes in self.sizes.items()}
@@ -71,6 +85,11 @@ class NativeCalls:
         self.desks = Desks(structure.n, self._desk)
         self._functions: dict[tuple[str, np.dtype[Any]], Any] = {}
         self._function("packed", np.dtype("f8"))
+
+    @property
+    def threads(self) -> int:
+        """How many threads a large batch may use."""
+        return self.threads_set or self._cores
 
     def run(
         self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
