@@ -96,15 +96,14 @@ class Answers:
 
     def masked(self, q: Any, qd: Any, qdd: Any, mask: Any, out: Any = None) -> Any:
         """See `Dynamics.masked`."""
-        n = self._structure.n
-        if np.shape(mask) != (3, n):
-            raise ValueError(
-                f"the mask has shape {tuple(np.shape(mask))}; it must be (3, {n}): order, coordinate"
-            )
-        motion = self._motion((q, qd, qdd))
+        n, motion = self._structure.n, self._motion((q, qd, qdd))
         into = self._accepted("masked", motion, out)
         q, qd, qdd = motion
-        weights = self._backend.asarray(mask, q)
+        weights = self._backend.weights("the mask", mask, q)
+        if tuple(weights.shape) != (3, n):
+            raise ValueError(
+                f"the mask has shape {tuple(weights.shape)}; it must be (3, {n}): order, coordinate"
+            )
         acceleration, velocity, _ = self._computed("coefficients", [q, qd])
         total = velocity @ (weights[1] * qd)[..., None, :, None]
         total = total + acceleration @ (weights[2] * qdd)[..., None, :, None]

@@ -98,9 +98,13 @@ class NativeBackend(NumpyBackend):
         """A table of positions, to take from `like`."""
         return self.on_torch().index(values, like) if has_tensors([like]) else super().index(values, like)
 
-    def asarray(self, value: Any, like: Any) -> Any:
-        """Anything array-like, of the kind and dtype of `like`."""
-        return self.on_torch().asarray(value, like) if has_tensors([like]) else super().asarray(value, like)
+    def weights(self, name: str, value: Any, like: Any) -> Any:
+        """Real numbers in anything array-like, of the kind and dtype of `like`; errors name the argument."""
+        return (
+            self.on_torch().weights(name, value, like)
+            if has_tensors([like])
+            else super().weights(name, value, like)
+        )
 
     def zeros(self, like: Any, count: int) -> Any:
         """Zeros of shape (..., count) for `like` of shape (..., m)."""
