@@ -197,6 +197,7 @@ def test_what_is_not_plain_is_read_as_by_the_other_back_ends(
         "read-only": (frozen, qd, qdd),
         "whole numbers": (q, np.ones(3, int), qdd),
     }
+    unusual["broadcast"] = (*np.broadcast_arrays(np.stack([q, q]), qd, qdd[..., :1]),)
     if batch:
         unusual["subclass"] = (q.view(np.matrix), qd, qdd)
     for name, motion in unusual.items():

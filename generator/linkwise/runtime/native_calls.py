@@ -107,7 +107,7 @@ class NativeCalls:
         if not count:
             return into
         compute = self._functions.get((call, kind)) or self._function(call, kind)
-        read = [a if a.flags.carray else plain(a) for a in motion]
+        read = [plain(a) for a in motion]
         if self.parameters:
             read.append(self._numbers(kind) if self.learned else self._constants[kind])
         sizes = self.sizes[call]
