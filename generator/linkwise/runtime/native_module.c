@@ -438,7 +438,7 @@ static void calls_dealloc(PyObject *object)
 /* Python reads signatures from the first lines. */
 #define FAST(name, told)                                                                                                \
     {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL | METH_KEYWORDS,                                           \
-     #name "($self, owner, /, " told "out=None)\n--\n\nSee the owner's class."}
+     #name "($self, owner, /, " told "out=None)\n--\n\nSee `Dynamics." #name "`."}
 static PyMethodDef methods[] = {
     FAST(packed, "q, qd, qdd, "), FAST(packed_torque, "q, qd, qdd, "), FAST(partial_torque, "q, qd, qdd, "),
     FAST(inverse_dynamics, "q, qd, qdd, "), FAST(coefficients, "q, qd, "),
