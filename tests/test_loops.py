@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
@@ -15,10 +16,12 @@ from conftest import DATA, needs_compiler
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
 from linkwise.check import check_package
 from linkwise.cli.app import app
+from linkwise.emit.kernel_choice import chosen_kernel
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 from test_emitted_c import COMPILERS, PARTS, strict
 from typer.testing import CliRunner
+from urdf_text import joint, link, robot
 
 CRANE, LEG, TURNTABLE = str(DATA / "crane.urdf"), str(DATA / "leg.toml"), str(DATA / "turntable.py")
 FIELDS = ("acceleration", "velocity", "gravity", "torque")
@@ -152,6 +155,16 @@ def test_the_manifest_says_which_kernel_was_chosen(robot: str, choice: str, kern
     manifest = json.loads(generate(read_system(robot), ["c"], kernel=choice)["manifest.json"])
     assert manifest["kernel"] == kernel
     assert all(link["operations"] > 0 for link in manifest["links"])
+
+
+@pytest.mark.parametrize(("turn", "kernel"), [("0 0 0", "straight"), ("1.5707963267948966 0 0", "loops")])
+def test_what_parallel_axes_save_is_seen(turn: str, kernel: str, tmp_path: Path) -> None:
+    """Fourteen joints, whose axes are parallel or at right angles: as many results, and another choice."""
+    names = "abcdefghijklmno"
+    arm = [joint(a + b, a, b, rpy=turn, axis="0 0 1") for a, b in pairwise(names)]
+    path = tmp_path / "arm.urdf"
+    path.write_text(robot(*map(link, names), *arm), encoding="utf-8")
+    assert chosen_kernel(read_system(path), "auto", None) == kernel
 
 
 def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch) -> None:
