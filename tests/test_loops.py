@@ -1,5 +1,6 @@
 """A kernel in loops: it answers as the closed forms do, for robots of every kind, and is chosen by size."""
 
+import ctypes
 import json
 import re
 import shutil
@@ -9,6 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 from answers import random_states, relative_error
 from compiled import STRICT, Compiled, compile_library, name_of
@@ -19,7 +21,7 @@ from linkwise.cli.app import app
 from linkwise.emit.kernel_choice import chosen_kernel
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
-from test_emitted_c import COMPILERS, PARTS, strict
+from test_emitted_c import COMPILERS, PARTS, aligned, counting, strict
 from typer.testing import CliRunner
 from urdf_text import joint, link, robot
 
@@ -85,6 +87,34 @@ def test_it_compiles_without_a_warning_whole_and_in_parts(
         subprocess.run([*command, f"-DLINKWISE_PART={part}", "-c", str(source), "-o", made], check=True)
     linked = [compiler, "-shared", "-Wl,--no-undefined", *objects, "-lm", "-o", str(tmp_path / "all.so")]
     subprocess.run(linked, check=True)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+@pytest.mark.parametrize("behind", [0, 16], ids=["on a line", "off a line"])
+def test_large_blocks_go_past_the_cache_where_lines_are_whole(
+    behind: int, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """c2 and c1, and not the few values of g and tau; the numbers are those of few blocks."""
+    compiler = ("gcc", "-std=c99", "-O1", "-mavx", "-DLARGE=(size_t)16384", *counting(tmp_path, 32))
+    compile_library(directory_of("puma560 loops"), tmp_path / "library.so", compiler)
+    library = ctypes.CDLL(str(tmp_path / "library.so"))
+    sizes, few, many = (56, 91, 21, 21), 1, 12
+    motion = [rows.reshape(many, 8, 6).swapaxes(1, 2).copy() for rows in random_states(6, many * 8)]
+
+    def computed(blocks: int) -> list[np.ndarray]:
+        results = [aligned(blocks * 8 * size, np.float64, behind) for size in sizes]
+        arrays = [ctypes.c_void_p(a.ctypes.data) for a in (*motion, *results)]
+        library.puma560_decomposition_blocks(ctypes.c_size_t(blocks), *arrays)
+        return results
+
+    expected = computed(few)
+    streamed, unfenced = (ctypes.c_long.in_dll(library, name) for name in ("streamed", "unfenced"))
+    assert streamed.value == 0
+    results = computed(many)
+    assert streamed.value == (0 if behind else results[0].nbytes + results[1].nbytes)
+    assert unfenced.value == 0
+    for a, b in zip(results, expected, strict=True):
+        assert (a[: b.size] == b).all()
 
 
 @needs_compiler

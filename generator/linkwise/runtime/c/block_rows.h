@@ -14,7 +14,7 @@ enum { SOON = 64 };
 static inline int may_pass(const real *at)
 {
 #if defined(STREAM)
-    return (size_t)at % STREAMED_BYTES == 0;
+    return (size_t)at % STREAM_BYTES == 0;
 #else
     return (void)at, 0;
 #endif
@@ -23,7 +23,7 @@ static inline int may_pass(const real *at)
 INLINE void pass(real *at, lanes value)
 {
 #if defined(STREAM)
-    STREAM(at, value);
+    STREAM((stream_vector *)at, (stream_vector)value);
 #else
     PUT(at, value);
 #endif

@@ -8,32 +8,33 @@
 #define LARGE ((size_t)20 << 20)
 #endif
 
-/* A vector past the cache, to where such a vector may start. The compilers' own functions do for gcc and clang, as reading
-   <immintrin.h> alone takes them half a second. */
+/* A vector past the cache, to where such a vector may start, and the end of it. The compilers' own functions do for gcc and
+   clang, as reading <immintrin.h> takes them longer than most kernels here. A build may bring its own. */
+#if !defined(STREAM) && defined(__GNUC__) && (defined(__AVX__) || defined(__AVX512F__))
 #if defined(__AVX512F__)
-#define STREAMED_BYTES 64
-#elif defined(__AVX__)
-#define STREAMED_BYTES 32
-#endif
-#if defined(STREAMED_BYTES) && defined(__GNUC__)
-typedef long long streamed __attribute__((vector_size(STREAMED_BYTES), may_alias));
-typedef long long streamed_from __attribute__((vector_size(STREAMED_BYTES), aligned(1), may_alias));
-#if defined(__clang__)
-#define STREAM(to, value) __builtin_nontemporal_store((streamed)(value), (streamed *)(to))
-#elif defined(__AVX512F__)
-#define STREAM(to, value) __builtin_ia32_movntdq512((streamed *)(to), (streamed)(value))
+#define STREAM_BYTES 64
+#define STREAM_BUILTIN __builtin_ia32_movntdq512
 #else
-#define STREAM(to, value) __builtin_ia32_movntdq256((streamed *)(to), (streamed)(value))
+#define STREAM_BYTES 32
+#define STREAM_BUILTIN __builtin_ia32_movntdq256
+#endif
+#if defined(__clang__)
+#define STREAM(to, value) __builtin_nontemporal_store(value, to)
+#else
+#define STREAM(to, value) STREAM_BUILTIN(to, value)
 #endif
 #define STREAM_END() __builtin_ia32_sfence()
 #endif
 
-/* One cache line past the cache; `to` starts on one. */
 #if defined(STREAM)
-static inline void stream_line(const void *from, void *to)
+typedef long long stream_vector __attribute__((vector_size(STREAM_BYTES), may_alias));
+typedef long long stream_vector_anywhere __attribute__((vector_size(STREAM_BYTES), aligned(sizeof(real)), may_alias));
+
+/* One cache line past the cache; `to` starts on one. */
+static inline void stream_line(const real *from, real *to)
 {
-    for (int v = 0; v < 64 / STREAMED_BYTES; ++v)
-        STREAM((streamed *)to + v, ((const streamed_from *)from)[v]);
+    for (size_t v = 0; v < 64 / STREAM_BYTES; ++v)
+        STREAM((stream_vector *)to + v, ((const stream_vector_anywhere *)from)[v]);
 }
 #endif
 
