@@ -1,7 +1,7 @@
 /* Packed results of blocks to rows of samples. The same in every package of linkwise. It needs rows.h. */
 
-/* Consecutive results that wait in the cache for their places in rows. */
-enum { ROOM = 4 * LONGEST > 384 ? 4 * LONGEST : 384 };
+/* Consecutive results that wait in the first-level cache for their places in rows: those of a link's row at least. */
+enum { ROOM = LONGEST > 96 ? LONGEST : 96 };
 
 /* Values of one kind in a block, on their way to rows that are `every` values apart: how many of each sample wait. */
 struct waiting {
