@@ -89,7 +89,8 @@ def main() -> None:
             make, options = ROBOTS[name]
             directory = Path(folder) / name
             write_package(
-                generate(read_system(make(Path(folder)), options), ["numpy", "torch"], name), directory
+                generate(read_system(make(Path(folder)), options), ["numpy", "torch"], name, kernel="straight"),
+                directory,
             )
             package = import_package(directory)
             numbers = sum(package.load("numpy").backend.structure.sizes)

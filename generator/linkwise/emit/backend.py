@@ -104,6 +104,8 @@ RULE_FILES = (
     "rule_layout.py",
     "rule_products.py",
     "rule_tables.py",
+    "spatial_rule.py",
+    "spatial_tables.py",
     "tree_arrays.py",
 )
 """Of linkwise/runtime: the vectorised rule."""

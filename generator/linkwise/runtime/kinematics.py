@@ -92,7 +92,7 @@ def kinematic_tables(tree: JointTree) -> KinematicTables:
         np.stack([y, -x, none], 1),
         z,
         parents,
-        tuple(_doubled(parents)),
+        tuple(doubled(parents)),
         before,
         _reach(tree, before),
     )
@@ -100,12 +100,17 @@ def kinematic_tables(tree: JointTree) -> KinematicTables:
 
 def _reach(tree: JointTree, before: Any) -> Any:
     """Joints whose steps lie between the first hinge of a path and each frame: those with a hinge before."""
-    turns = np.array([*(joint.kind == "revolute" for joint in tree.joints), False])
-    behind = (before @ turns > 0.0)[None]
+    behind = np.array([*hinge_before(tree), False])[None]
     return np.where(behind, before + np.eye(len(before)), 0.0)
 
 
-def _doubled(parents: Any) -> Any:
+def hinge_before(tree: JointTree) -> list[bool]:
+    """Whether each joint's path has a hinge before it."""
+    hinges = [joint.kind == "revolute" for joint in tree.joints]
+    return [any(hinges[f] for f in tree.chain(joint.parent)) for joint in tree.joints]
+
+
+def doubled(parents: Any) -> Any:
     """Frames 1, 2, 4, ... joints before each; the ground, the last one, stays where it is."""
     while (parents != len(parents) - 1).any():
         yield parents
@@ -154,12 +159,12 @@ def twists(
 
 
 def taken(a: Any, index: Any, axis: int = -2) -> Any:
-    """Some entries of an axis, here the joints of (..., joints, samples), or of the last one: -1.
+    """Some entries of an axis, counted from the end: -2 is that of the joints in (..., joints, samples).
 
     index: a slice, or a table of positions
     """
     if isinstance(index, slice):
-        return a[..., index, :] if axis == -2 else a[..., index]
+        return a[(..., index) + (slice(None),) * (-1 - axis)]
     return a.take(index, axis) if isinstance(a, np.ndarray) else a.index_select(axis, index)
 
 

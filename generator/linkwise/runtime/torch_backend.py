@@ -11,7 +11,7 @@ from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
 from .answers import Answers
 from .arguments import as_array, check_axes, no_common_shape, precision
-from .array_kernels import Crossing, known_kernel, rule_is_quicker
+from .array_kernels import Crossing, Rows, known_kernel, largest_batch, operations
 from .interface import ClosedForms
 from .joint_tree import Bodies
 from .parameter_values import fits
@@ -20,12 +20,14 @@ from .structure import Structure
 from .tree_arrays import checked_bodies
 
 FLOATS = ({torch.float32}, {torch.float64})
-CROSSINGS: dict[str, Crossing] = {
-    "decomposition": ((70, 64), (189, 256)),
-    "torque": ((70, 16), (189, 64), (280, 256)),
-    "position_gradient": ((70, 64), (189, 256)),
+CROSSINGS = {
+    "decomposition": Crossing(2000, ((100, 64),)),
+    "torque": Crossing(2000, ((100, 64),)),
+    "position_gradient": Crossing(2000, ((100, 64),)),
 }
 """Where the rule is quicker on a processor, see `array_kernels`; elsewhere it always is."""
+MATRICES: Rows = ((0, 32),)
+"""Where the rule is quicker in spatial matrices than with its samples innermost, by links."""
 
 
 class TorchBackend:
@@ -50,6 +52,7 @@ class TorchBackend:
         """
         self.structure = structure
         self.links = links or ()
+        self.operations = operations(links)
         self.rule = rule
         self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
         self.parameters: dict[str, Any] = {
@@ -134,6 +137,10 @@ class TorchBackend:
         """Whether a compiler makes one loop of many operations, to which a matrix product is a wall."""
         return torch.compiler.is_dynamo_compiling()
 
+    def few(self, samples: int, links: int) -> bool:
+        """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
+        return not _watched() and samples <= largest_batch(MATRICES, links)
+
     def chunk(self, motion: Sequence[Tensor], most: int) -> int | None:
         """Samples to compute at once: all, but on a CPU, with nothing recorded, what stays in its cache."""
         given = (*motion, *self.parameters.values(), *filter(torch.is_tensor, self.bodies or ()))
@@ -145,8 +152,7 @@ class TorchBackend:
     def _rule(self, call: str, q: Tensor) -> RigidRule | None:
         """The rule where it is to be taken, None for closed forms."""
         if self.kernel == "auto" and not _watched() and q.device.type == "cpu":
-            samples = q.numel() // q.shape[-1]
-            quicker = rule_is_quicker(CROSSINGS, call, sum(self.structure.sizes), samples)
+            quicker = CROSSINGS[call].rule_is_quicker(self.operations[call], tuple(q.shape[:-1]))
             return self.rule if quicker else None
         return None if self.kernel == "straight" else self.rule
 
