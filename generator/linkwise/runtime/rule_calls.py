@@ -120,7 +120,7 @@ class RigidRule:
             own = [a[:, piece] for a in flat]
             some = TreeArrays(*(_samples(a, piece) for a in numbers))
             carried = LinkNumbers(*(_samples(a, piece) for a in links))
-            part = answer(_moment(space, tables, own, some, carried))
+            part: list[Any] = answer(_moment(space, tables, own, some, carried))
             if piece == slice(None):
                 return part
             joined = joined or [xp.empty((samples, a.shape[1]), dtype=a.dtype) for a in part]
