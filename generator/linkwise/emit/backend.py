@@ -98,6 +98,7 @@ def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
 RULE_FILES = (
     "joint_tree.py",
     "array_kernels.py",
+    "fused_products.py",
     "kinematics.py",
     "rigid_rule.py",
     "rule_calls.py",

@@ -3,18 +3,19 @@
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .fused_products import FusedMoment
 from .joint_tree import Bodies, JointTree
 from .kinematics import poses, taken, twists
 from .rigid_rule import LinkNumbers, link_numbers, link_states
 from .rule_layout import RuleLayout, rule_layout
 from .rule_products import Moment
 from .rule_tables import RuleTables, Space, converted, listed_tables
-from .spatial_rule import SpatialMoment, spatial_moment
+from .spatial_rule import spatial_moment
 from .spatial_tables import spatial_numbers
 from .tree_arrays import TreeArrays, with_bodies, with_formulas
 
@@ -22,6 +23,19 @@ CACHE = 1 << 22
 """Bytes of the arrays of one chunk of samples, which are to stay in the processor's cache."""
 LINK_NUMBERS = 200
 """Numbers that a link and its joint have of one sample, beside the products."""
+
+
+class Answering(Protocol):
+    """Joints and links in motion, which packed numbers are made of."""
+
+    def coefficients(self) -> list[Any]:
+        """Packed c2 and c1."""
+
+    def gradient(self) -> list[Any]:
+        """Packed c0."""
+
+    def singles(self, fields: Sequence[int]) -> list[Any]:
+        """Packed g (field 3) or tau (field 4), or both."""
 
 
 class RigidRule:
@@ -61,7 +75,7 @@ class RigidRule:
     ) -> list[Any]:
         """c2, c1, g and tau, (..., count) each."""
 
-        def answer(at: Moment | SpatialMoment) -> list[Any]:
+        def answer(at: Answering) -> list[Any]:
             return [*at.coefficients(), *at.singles((3, 4))]
 
         return self._answers(space, motion, p, bodies, answer)
@@ -71,7 +85,7 @@ class RigidRule:
     ) -> Any:
         """tau (..., count)."""
 
-        def answer(at: Moment | SpatialMoment) -> list[Any]:
+        def answer(at: Answering) -> list[Any]:
             return at.singles((4,))
 
         return self._answers(space, motion, p, bodies, answer)[0]
@@ -81,7 +95,7 @@ class RigidRule:
     ) -> Any:
         """c0 (..., count)."""
 
-        def answer(at: Moment | SpatialMoment) -> list[Any]:
+        def answer(at: Answering) -> list[Any]:
             return at.gradient()
 
         return self._answers(space, motion, p, bodies, answer)[0]
@@ -113,9 +127,10 @@ class RigidRule:
     ) -> list[Any]:
         """What `answer` gives with the samples innermost, as many at once as the back end wants."""
         xp, tables, n = space.xp, self.tables(space, motion[0]), motion[0].shape[-1]
-        flat = [xp.swapaxes(a.reshape(-1, n), 0, 1) for a in motion]
+        # A copy: with views a compiler would gather from rows of samples in every loop.
+        flat = xp.stack([xp.swapaxes(a.reshape(-1, n), 0, 1) for a in motion], 0)
         joined: list[Any] = []
-        samples = flat[0].shape[1]
+        samples = flat.shape[2]
         for piece in self._pieces(space, motion, samples):
             own = [a[:, piece] for a in flat]
             some = TreeArrays(*(_samples(a, piece) for a in numbers))
@@ -140,15 +155,16 @@ class RigidRule:
 
 def _moment(
     space: Space, tables: RuleTables, motion: Sequence[Any], numbers: TreeArrays, links: LinkNumbers
-) -> Moment:
+) -> Moment | FusedMoment:
     """Motion of joints and links for q, qd and qdd (n, samples)."""
     xp, frames = space.xp, tables.frames
     position, velocity, acceleration = (taken(a, frames.coordinates) for a in motion)
     placed = poses(xp, frames, numbers.translations, position)
     moved = twists(xp, frames, placed, numbers.gravity, velocity, acceleration)
-    own = velocity, acceleration
-    states = link_states(xp, tables.links, links, placed, moved, own, numbers.gravity)
-    return Moment(space, tables, links, moved, states)
+    states = link_states(xp, tables.links, links, placed, moved, numbers.gravity)
+    if space.fuses:
+        return FusedMoment(xp, tables, moved, states)
+    return Moment(xp, tables, links, moved, states)
 
 
 def _samples(a: Any, piece: slice) -> Any:

@@ -1,7 +1,6 @@
 """Parts of wrenches on joints: every packed number, from joints and links in motion.
 
-Eager operations take matrix products, of whole groups of links and joints, and pick what is packed; where a
-compiler makes one loop of many operations, every pair of a link and a joint has its own wrenches instead.
+Matrix products answer for whole groups of links and joints; what is packed is picked from them.
 """
 
 import math
@@ -12,23 +11,20 @@ import numpy as np
 
 from .kinematics import Twists, taken
 from .rigid_rule import (
-    LinkMoments,
     LinkNumbers,
     LinkStates,
     decomposition_columns,
-    decomposition_wrenches,
     gradient_columns,
     gradient_matrices,
-    gradient_wrenches,
     link_matrices,
 )
-from .rule_tables import RuleTables, Space
+from .rule_tables import RuleTables
 
 
 class Moment(NamedTuple):
     """Samples side by side: how joints and links move, and with which numbers."""
 
-    space: Space
+    xp: Any
     tables: RuleTables
     numbers: LinkNumbers
     moved: Twists
@@ -36,56 +32,27 @@ class Moment(NamedTuple):
 
     def coefficients(self) -> list[Any]:
         """Packed c2 and c1."""
-        xp, tables, moments = self.space.xp, self.tables, self.states.moments
-        if self.space.fuses:
-            links, joints = tables.pairs
-            wrenches = decomposition_wrenches(xp, _of_pairs(moments, links), joints, self.moved)
-            return [_gathered(self, w, rows) for w, rows in zip(wrenches, tables.entries[:2], strict=True)]
-        matrices = link_matrices(xp, tables.links, self.numbers, moments)
-        dense = _products(xp, self, matrices, decomposition_columns(xp, self.moved))
-        return [packed(xp, dense, positions) for positions in tables.positions[:2]]
+        dense = _products(self.xp, self, self._matrices(), decomposition_columns(self.xp, self.moved))
+        return [packed(self.xp, dense, positions) for positions in self.tables.positions[:2]]
 
     def gradient(self) -> list[Any]:
         """Packed c0."""
-        xp, tables, moments = self.space.xp, self.tables, self.states.moments
-        wrench = self.states.wrenches[:, 0]
-        if self.space.fuses:
-            links, joints = tables.pairs
-            moments, wrench = _of_pairs(moments, links), taken(wrench, links)
-            wrenches = gradient_wrenches(xp, moments, joints, self.moved, wrench)
-            return [_gathered(self, wrenches, tables.entries[2])]
-        matrices = link_matrices(xp, tables.links, self.numbers, moments)
-        matrices = gradient_matrices(xp, tables.links, matrices, wrench)
+        xp, tables = self.xp, self.tables
+        matrices = gradient_matrices(xp, tables.links, self._matrices(), self.states.wrenches[:, 0])
         dense = _products(xp, self, matrices, gradient_columns(xp, self.moved))
         return [packed(xp, dense, tables.positions[2])]
 
     def singles(self, fields: Sequence[int]) -> list[Any]:
         """Packed S_e . (wrench) of g or tau, or both."""
-        xp, tables = self.space.xp, self.tables
-        if self.space.fuses:
-            flat = self.states.wrenches.reshape(6, -1, self.states.wrenches.shape[-1])
-            return [_gathered(self, flat, tables.entries[field]) for field in fields]
+        xp = self.xp
         axes, wrenches = _outermost(xp, _screws(xp, self.moved)), _outermost(xp, self.states.wrenches)
         samples, joints, links = axes.shape[0], axes.shape[2], wrenches.shape[3]
         answer = xp.swapaxes(axes, 1, 2) @ wrenches.reshape(samples, 6, 2 * links)
         dense = answer.reshape(samples, joints * 2 * links)
-        return [packed(xp, dense, tables.positions[field]) for field in fields]
+        return [packed(xp, dense, self.tables.positions[field]) for field in fields]
 
-
-def _of_pairs(moments: LinkMoments, links: Any) -> LinkMoments:
-    """The moments of each pair's link."""
-    return LinkMoments(*(taken(a, links) for a in moments))
-
-
-def _gathered(at: Moment, wrenches: Any, entries: Sequence[tuple[Any, Any]]) -> Any:
-    """Sums of S_e . (wrench), of wrenches (6, rows, samples), as (samples, count)."""
-    screws = at.moved.screws
-    parts = [
-        taken(screws[axis % 3, axis // 3], e) * taken(wrenches[axis], row)
-        for e, row in entries
-        for axis in range(6)
-    ]
-    return sum(parts[1:], parts[0]).swapaxes(0, 1)
+    def _matrices(self) -> Any:
+        return link_matrices(self.xp, self.tables.links, self.numbers, self.states.moments)
 
 
 def _products(xp: Any, at: Moment, matrices: Any, columns: Any) -> Any:
