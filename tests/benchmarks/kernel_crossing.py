@@ -6,9 +6,8 @@
 Prints the seconds of every pair, interleaved, the shortest of several rounds, one thread: closed forms and
 the rule, for one sample without an axis of samples (batch 0) and for batches; and the rule in spatial
 matrices and with its samples innermost. At its end stand the tables that `numpy_backend.py` and
-`torch_backend.py` keep: for each size the largest batch up to which the second of closed forms and rule, the
-first of the two forms of the rule, was quicker in every one. A row holds for the robots of its size and all
-larger ones that were measured.
+`torch_backend.py` keep: for robots of so many operations or more the largest batch up to which the rule was
+quicker in every one, and the links times samples up to which its matrices were.
 """
 
 import argparse
@@ -134,7 +133,7 @@ def main() -> None:
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     straight: dict[tuple[str, str], list[tuple[int, dict[int, bool]]]] = {}
-    matrices: dict[str, list[tuple[int, int]]] = {}
+    matrices: dict[str, dict[int, bool]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in arguments.robots:
             make, options = ROBOTS[name]
@@ -152,12 +151,14 @@ def main() -> None:
                     straight.setdefault((backend, table), []).append((operations[table], found))
                 pairs = list(forms_of_the_rule(package, backend, arguments.batches))
                 found = quicker("packed, matrices", backend, pairs, arguments.rounds)
-                matrices.setdefault(backend, []).append((links, largest(found)))
+                sizes = matrices.setdefault(backend, {})
+                for batch, quick in found.items():
+                    sizes[links * batch] = quick and sizes.get(links * batch, True)
     for (backend, table), robots in straight.items():
         least = alone([(size, found[0]) for size, found in robots])
         print(f'{backend} "{table}": Crossing({least}, {rows([(n, largest(f)) for n, f in robots])}),')
     for backend, sizes in matrices.items():
-        print(f"{backend} MATRICES: {rows(sizes)}")
+        print(f"{backend} MATRICES = {largest(sizes)}")
 
 
 if __name__ == "__main__":

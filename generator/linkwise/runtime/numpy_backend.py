@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .answers import Answers
 from .arguments import as_array, check_axes, no_common_shape, precision
-from .array_kernels import Crossing, Rows, known_kernel, largest_batch, operations
+from .array_kernels import Crossing, known_kernel, operations
 from .interface import ClosedForms, Entries
 from .joint_tree import Bodies
 from .parameter_values import fits
@@ -23,8 +23,8 @@ CROSSINGS = {
     "position_gradient": Crossing(2000, ((100, 64),)),
 }
 """Where the rule is quicker, see `array_kernels`."""
-MATRICES: Rows = ((0, 32),)
-"""Where the rule is quicker in spatial matrices than with its samples innermost, by links."""
+MATRICES = 128
+"""Links times samples up to which the rule is quicker in spatial matrices than with its samples innermost."""
 
 
 class NumpyBackend:
@@ -136,7 +136,7 @@ class NumpyBackend:
 
     def few(self, samples: int, links: int) -> bool:
         """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
-        return samples <= largest_batch(MATRICES, links)
+        return samples * links <= MATRICES
 
     def chunk(self, motion: Sequence[Any], most: int) -> int | None:
         """Samples to compute at once: as many as stay in the cache."""

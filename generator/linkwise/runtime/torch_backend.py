@@ -11,7 +11,7 @@ from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
 from .answers import Answers
 from .arguments import as_array, check_axes, no_common_shape, precision
-from .array_kernels import Crossing, Rows, known_kernel, largest_batch, operations
+from .array_kernels import Crossing, known_kernel, operations
 from .interface import ClosedForms
 from .joint_tree import Bodies
 from .parameter_values import fits
@@ -26,8 +26,8 @@ CROSSINGS = {
     "position_gradient": Crossing(2000, ((100, 64),)),
 }
 """Where the rule is quicker on a processor, see `array_kernels`; elsewhere it always is."""
-MATRICES: Rows = ((0, 32),)
-"""Where the rule is quicker in spatial matrices than with its samples innermost, by links."""
+MATRICES = 128
+"""Links times samples up to which the rule is quicker in spatial matrices than with its samples innermost."""
 
 
 class TorchBackend:
@@ -139,7 +139,7 @@ class TorchBackend:
 
     def few(self, samples: int, links: int) -> bool:
         """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
-        return not _watched() and samples <= largest_batch(MATRICES, links)
+        return not _watched() and samples * links <= MATRICES
 
     def chunk(self, motion: Sequence[Tensor], most: int) -> int | None:
         """Samples to compute at once: all, but on a CPU, with nothing recorded, what stays in its cache."""
