@@ -69,7 +69,7 @@ def refuse_choice(backend: str, kernel: str, bodies: Any) -> None:
         raise ValueError(f"{backend} computes with the package's own bodies; load numpy or torch with bodies")
 
 
-def operations(links: Sequence[ClosedForms] | None) -> Mapping[str, int]:
+def operations(links: Sequence[ClosedForms]) -> Mapping[str, int]:
     """Operations of each call of the closed forms."""
     calls = ("decomposition", "torque", "position_gradient")
-    return {call: sum(link.OPERATIONS[call] for link in links or ()) for call in calls}
+    return {call: sum(link.OPERATIONS[call] for link in links) for call in calls}

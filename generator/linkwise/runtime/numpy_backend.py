@@ -50,7 +50,7 @@ class NumpyBackend:
         """
         self.structure = structure
         self.links = links or ()
-        self.operations = operations(links)
+        self.operations = operations(links) if links and rule else {}
         self.rule = rule
         self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
         self.parameters: dict[str, Any] = {

@@ -52,7 +52,7 @@ class TorchBackend:
         """
         self.structure = structure
         self.links = links or ()
-        self.operations = operations(links)
+        self.operations = operations(links) if links and rule else {}
         self.rule = rule
         self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
         self.parameters: dict[str, Any] = {
