@@ -18,9 +18,9 @@ from .tree_arrays import checked_bodies
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
 CROSSINGS = {
-    "decomposition": Crossing(2000, ((100, 64),)),
-    "torque": Crossing(2000, ((100, 64),)),
-    "position_gradient": Crossing(2000, ((100, 64),)),
+    "decomposition": Crossing(1016, ((1016, 32), (3279, 64), (4264, 128), (11719, 256), (28167, 512))),
+    "torque": Crossing(618, ((618, 32), (1441, 64), (1985, 128), (21901, 256))),
+    "position_gradient": Crossing(1217, ((1217, 32), (2044, 64), (4990, 128), (29453, 512))),
 }
 """Where the rule is quicker, see `array_kernels`."""
 MATRICES = 128

@@ -21,9 +21,9 @@ from .tree_arrays import checked_bodies
 
 FLOATS = ({torch.float32}, {torch.float64})
 CROSSINGS = {
-    "decomposition": Crossing(2000, ((100, 64),)),
-    "torque": Crossing(2000, ((100, 64),)),
-    "position_gradient": Crossing(2000, ((100, 64),)),
+    "decomposition": Crossing(164, ((164, 16), (1016, 256), (3279, 512), (11719, 1024))),
+    "torque": Crossing(618, ((618, 256), (1985, 512), (21901, 1024))),
+    "position_gradient": Crossing(1217, ((1217, 128), (2044, 256), (4990, 512), (12905, 1024))),
 }
 """Where the rule is quicker on a processor, see `array_kernels`; elsewhere it always is."""
 MATRICES = 128
