@@ -22,7 +22,7 @@ from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import RigidSystem, System
 
-BLOCKS = ("acceleration", "velocity", "gravity", "torque", "position_gradient")
+BLOCKS = ("acceleration", "velocity", "gravity", "torque", "decomposed_torque", "position_gradient")
 
 
 def from_the_energy(system: System, link: int) -> tuple[Graph, LinkForms]:

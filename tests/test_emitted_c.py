@@ -15,7 +15,7 @@ import pytest
 from answers import random_states, relative_error
 from compiled import STRICT, Compiled, compile_library, name_of
 from conftest import DATA, PANDA, needs_compiler
-from linkwise import generate, read_system, write_package
+from linkwise import Coordinate, LinkEnergy, energy_system, generate, read_system, write_package
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
@@ -484,6 +484,13 @@ def test_links_of_energies_with_and_without_linear_terms_go_together(tmp_path: P
     for compiler in COMPILERS:
         if shutil.which(compiler):
             compile_library(tmp_path / "pair", tmp_path / "library.so", COMPILERS[compiler])
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_a_force_that_no_motion_changes_compiles_without_a_warning(compiler: str, tmp_path: Path) -> None:
+    x = Coordinate("x", "m")
+    write_package(generate(energy_system("weight", [x], [LinkEnergy("a", 0, 3 * x.q)])), tmp_path / "weight")
+    compile_library(tmp_path / "weight", tmp_path / "library.so", strict(compiler))
 
 
 def test_no_samples_touch_no_memory(directory_of: Callable[[str], Path]) -> None:

@@ -1,6 +1,6 @@
 """Calls of kernels, and where each writes: the decisions behind a robot's C file."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from linkwise.emit.c.kernel_function import KernelFunction
@@ -60,16 +60,19 @@ class LinkCalls:
 
 @dataclass(frozen=True)
 class GroupCalls:
-    """The function of a group of links for a tile of blocks: its name and calls, and how results leave.
+    """The functions of a group of links for a tile of blocks: name and statements, and how results leave.
 
-    `places` puts them into every array of the robot, for block `at`.
+    `unread` stands before those that read no motion; `places` puts results into every array of the robot, for
+    block `at`.
     """
 
     what: str
     name: str
+    unread: tuple[str, ...]
     decomposition: tuple[str, ...]
     moves: tuple[Moves, ...]
     places: tuple[str, ...]
+    unread_torque: tuple[str, ...]
     torque: tuple[str, ...]
     torques_to_rows: str
     links: str
@@ -109,13 +112,17 @@ def group_calls(links: Sequence[Span], kernels: Sequence[LinkKernels], arrays: S
     into = {array: f"r[t].{array}" for array in arrays}
     mine = [(kernels[link.first - 1], link.start - group.start) for link in links]
     one = group.first == group.last
+    decomposition = tuple(call(k.decomposition, "block", "m[t].", into, start) for k, start in mine)
+    torque = tuple(call(k.torque, "block", "m[t].", {"tau": "r[t].tau"}, start) for k, start in mine)
     return GroupCalls(
         f"Link {group.first}" if one else f"Links {group.first} to {group.last}",
         f"link_{group.first}" if one else f"links_{group.first}_to_{group.last}",
-        tuple(call(k.decomposition, "block", "m[t].", into, start) for k, start in mine),
+        unread(decomposition),
+        decomposition,
         tuple(_moves(array, group) for array in group.size.arrays),
         tuple(_moves(array, group).place for array in arrays),
-        tuple(call(k.torque, "block", "m[t].", {"tau": "r[t].tau"}, start) for k, start in mine),
+        unread(torque),
+        torque,
         _moves("tau", group).scatter,
         _counted_from_0(group),
     )
@@ -134,9 +141,9 @@ def call(
     return f"{function.name}_{width}({', '.join([*reads, *writes])})"
 
 
-def idle(calls: Iterable[str]) -> tuple[str, ...]:
-    """What tells a compiler that no call reads the motion: that of a slide, say, has a constant gradient."""
-    return () if any("m." in text or "m[" in text for text in calls) else ("(void)m",)
+def unread(calls: Sequence[str]) -> tuple[str, ...]:
+    """What tells a compiler that no call reads the motion: that of a constant force, say."""
+    return () if any("m[t]." in text for text in calls) else ("(void)m",)
 
 
 def total(array: str) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
-from linkwise.emit.c.calls import LinkKernels, group_calls, idle, link_calls, motions, total
+from linkwise.emit.c.calls import LinkKernels, group_calls, link_calls, motions, total
 from linkwise.emit.c.prototypes import cost, functions, pointers
 from linkwise.emit.c.quantity_table import causes, quantity_lines
 from linkwise.emit.c.sizes import EntryCounts, Span, groups, tile, whole
@@ -45,8 +45,6 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
         "passed_at_rest": ", ".join("qd" if array == "qdd" else array for array in motion),
         "links": calls,
         "groups": [group_calls(part, kernels, arrays) for part in parts],
-        "idle_torque": idle(link.torque for link in calls),
-        "idle_gradient": idle(link.position_gradient for link in calls),
         "tile": tile(waiting),
         "room": [(array, waiting.of(array)) for array in arrays],
         "room_of_one": [(array, one.of(array)) for array in arrays],
@@ -55,7 +53,6 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
         "streams": len(parts) == 1,
         "slopes": "r->h1" if robot.size.h1 else "NULL",
         "largest": max(waiting.of(array) for array in arrays),
-        "waiting_torques": waiting.g,
         "largest_gradient": max(link.size.c1 for link in links),
     }
 
