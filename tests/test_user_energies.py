@@ -87,7 +87,7 @@ WITHOUT_FORCE = {
         LinkEnergy("puck", (X.qd - 1.7 * Y.q) ** 2 + (Y.qd + 1.7 * X.q) ** 2 * (1 + X.q**2), 0),
     ],
 }
-"""Kinetic energies with terms b(q) . qd where b is the slope of a function, 3 x and x y, whose force is none."""
+"""Kinetic energies with terms b(q) . qd that have no force: b is the slope of a function, 3 x or x y."""
 
 
 @pytest.mark.parametrize("case", WITHOUT_FORCE)
