@@ -164,6 +164,47 @@ def test_arrays_refuse_tensors_that_would_lose_something(package_of: Callable[[s
         robot.partial_torque(torch.ones(3, dtype=torch.bfloat16), one, one)
 
 
+NOT_DENSE: dict[str, tuple[Callable[[], Any], str]] = {
+    "sparse": (
+        lambda: torch.ones(2, 3, dtype=torch.float64).to_sparse(),
+        r"has the layout torch\.sparse_coo; pass \w+\.to_dense\(\)",
+    ),
+    "nested": (
+        lambda: torch.nested.nested_tensor([torch.ones(3), torch.ones(3)]),
+        r"is a nested tensor; join its parts with torch\.stack or torch\.cat",
+    ),
+}
+
+
+@pytest.mark.filterwarnings("ignore:The PyTorch API of nested tensors:UserWarning")
+@pytest.mark.parametrize("kind", NOT_DENSE)
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_tensors_that_are_not_dense_are_refused_by_name(
+    backend: str, kind: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    make, message = NOT_DENSE[kind]
+    robot, q, odd = package_of("planar3").load(backend), torch.ones(2, 3, dtype=torch.float64), make()
+    for motion, name in (((odd, odd, odd), "q"), ((q, odd, q), "qd"), ((q, q.numpy(), odd), "qdd")):
+        with pytest.raises(TypeError, match=f"^{name} {message}$"):
+            robot.partial_torque(*motion)
+
+
+@needs_compiler
+@pytest.mark.parametrize(("kind", "axes", "names"), [("tensor", 65, "q, qd, qdd"), ("array", 33, "qd")])
+def test_more_axes_than_arrays_have_are_named(
+    kind: str, axes: int, names: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot = package_of("planar3").load("native")
+    motion = [torch.ones(*[1] * (count - 1), 3, dtype=torch.float64) for count in (1, axes, 1)]
+    given = motion if kind == "tensor" else [part.numpy() for part in motion]
+    message = (
+        rf"^{names}: {axes} axes are too many for this back end; join .*, as q\w*.reshape\(-1, 3\) does$"
+    )
+    with pytest.raises(ValueError, match=message):
+        robot.partial_torque(*given)
+    assert robot.partial_torque(*(part.reshape(-1, 3) for part in given)).shape == (1, 3, 3)
+
+
 @pytest.mark.parametrize("tensors", [False, True])
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_shapes_that_do_not_go_together_are_named(

@@ -63,6 +63,25 @@ def test_the_rule_takes_parameters_one_for_all_or_one_a_sample(
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("batch", [(0,), (2, 0)], ids=str)
+@FEW
+def test_parameters_and_bodies_may_be_those_of_no_samples(
+    backend: str, batch: tuple[int, ...], few: bool, arm: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion, own = motion_of(backend, 3, *batch), arm.bodies()
+    none = [np.broadcast_to(a, (*batch, *a.shape)) for a in own]
+    given = {name: np.full(batch, value) for name, value in arm.parameters.items()}
+    robots = [arm.load(backend, given, allow_unphysical=True, kernel="rule")]
+    each = [none, *([*own[:i], none[i], *own[i + 1 :]] for i in range(len(BODIES)))]
+    robots += [arm.load(backend, bodies=arm.Bodies(*bodies)) for bodies in each]
+    for robot in robots:
+        told(robot, few, monkeypatch)
+        for call in CALLS:
+            value, expected = getattr(robot, call)(*motion), getattr(arm.load(backend), call)(*motion)
+            assert (value.shape, value.dtype) == (expected.shape, expected.dtype)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_large_batches_in_pieces_are_what_single_samples_are(
     backend: str, package_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -291,6 +310,9 @@ def test_the_rule_runs_under_transformations(call: str, package_of: Callable[[st
         assert relative_error(robot.position_gradient(q, qd, qdd), slope) <= 1e-13
     with torch.inference_mode():
         assert relative_error(function(*motion), function(*motion)) == 0.0
+    q, qd, qdd = (a[:0] for a in motion)
+    slope = torch.func.jacfwd(lambda x: function(x, qd, qdd))(q)
+    assert slope.shape == (*function(q, qd, qdd).shape, *q.shape)
 
 
 class Torques(torch.nn.Module):  # type: ignore[misc]
@@ -325,6 +347,14 @@ def test_a_robot_is_compiled_in_one_piece(tmp_path: Path) -> None:
     compiled = torch.compile(package.load("torch").partial_torque, fullgraph=True)
     motion = motion_of("torch", 2, 16)
     expected = package.load("torch", kernel="straight").partial_torque(*motion)
+    assert relative_error(compiled(*motion), expected) <= 1e-14
+    assert compiled(*(a[:0] for a in motion)).shape == (0, 2, 2)
+
+
+def test_a_robot_with_parameters_of_its_own_is_compiled_in_one_piece(arm: ModuleType) -> None:
+    robot, motion = arm.load("torch", kernel="rule"), motion_of("torch", 3, 4)
+    compiled = torch.compile(robot.packed_torque, fullgraph=True, backend="eager")
+    expected = arm.load("torch", kernel="straight").packed_torque(*motion)
     assert relative_error(compiled(*motion), expected) <= 1e-14
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from linkwise import (
     write_package,
 )
 from linkwise.package.load import import_package
+from linkwise.symbolic.system import EnergySystem
 
 CART, TURNTABLE = str(DATA / "cart_pendulum.py"), str(DATA / "turntable.py")
 BACKENDS = ("numpy", "torch", "autograd", *(pytest.param(b, marks=needs_compiler) for b in ("c", "native")))
@@ -76,7 +78,61 @@ def test_emitted_c_has_the_linear_part_too(
     assert np.abs(given["linear"]).max() > 1.0
 
 
-X = Coordinate("x", "m")
+X, Y = Coordinate("x", "m"), Coordinate("y")
+WITHOUT_FORCE = {
+    "a belt": [LinkEnergy("cart", 2 * (X.qd + 3) ** 2 / 2, 2 * X.q**2)],
+    "beside others": [
+        LinkEnergy("plain", (2 + X.q**2) * Y.qd**2 + X.qd * Y.qd, 0),
+        LinkEnergy("sloped", X.qd**2 * (2 + sp.cos(Y.q)) + Y.qd**2 + Y.q * X.qd + X.q * Y.qd, X.q),
+        LinkEnergy("puck", (X.qd - 1.7 * Y.q) ** 2 + (Y.qd + 1.7 * X.q) ** 2 * (1 + X.q**2), 0),
+    ],
+}
+"""Kinetic energies with terms b(q) . qd that have no force: b is the slope of a function, 3 x or x y."""
+
+
+@pytest.mark.parametrize("case", WITHOUT_FORCE)
+@pytest.mark.parametrize("backend", ["numpy", "autograd", pytest.param("native", marks=needs_compiler)])
+def test_terms_linear_in_the_velocities_may_have_no_force(backend: str, case: str, tmp_path: Path) -> None:
+    links = WITHOUT_FORCE[case]
+    robot = energy_system("robot", [X, Y] if len(links) > 1 else [X], links)
+    write_package(generate(robot), tmp_path / "robot")
+    states = random_states(len(robot.coordinates), 7)
+    motion: Any = states
+    if backend == "autograd":
+        motion = [pytest.importorskip("torch").from_numpy(state) for state in states]
+    answer = import_package(tmp_path / "robot").load(backend).packed(*motion)
+    c2, c1, g, h1 = by_sympy(robot, *states)
+    pairs = (
+        (answer.acceleration, c2),
+        (answer.velocity, c1),
+        (answer.gravity, g),
+        (answer.velocity_linear, h1),
+    )
+    for found, expected in pairs:
+        np.testing.assert_allclose(np.asarray(found), expected, rtol=1e-14, atol=1e-13)
+
+
+def by_sympy(robot: EnergySystem, q: np.ndarray, qd: np.ndarray, _: np.ndarray) -> list[np.ndarray]:
+    """Packed c2, c1, g and h1, the last of links with terms linear in qd, derived in SymPy."""
+    x, v = [c.q for c in robot.coordinates], [c.qd for c in robot.coordinates]
+    forms: list[list[sp.Expr]] = [[], [], [], []]
+    c2, c1, g, h1 = forms
+    rest = dict.fromkeys(v, 0)
+    for j, link in enumerate(robot.links):
+        path, lagrangian = robot.path(j), link.kinetic - link.potential
+        leans = any(lagrangian.diff(v[i]).subs(rest).expand() != 0 for i in path)
+        for i in path:
+            momentum = lagrangian.diff(v[i])
+            h = sum(momentum.diff(x[s]) * v[s] for s in path) - lagrangian.diff(x[i])
+            slopes = [h.diff(v[k]) for k in path]
+            c2 += [momentum.diff(v[k]) for k in path if k >= i]
+            c1 += [(slope + slope.subs(rest)) / 2 for slope in slopes]
+            g += [h.subs(rest)]
+            h1 += [slope.subs(rest) for slope in slopes if leans]
+    values = [sp.lambdify([*x, *v], part)(*q.T, *qd.T) for part in forms]
+    return [np.stack([np.broadcast_to(a, len(q)) for a in part], -1) for part in values]
+
+
 A, B = sp.symbols("a b")
 
 

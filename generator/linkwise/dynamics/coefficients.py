@@ -21,7 +21,8 @@ class LinkForms:
 
     acceleration: c2_ijk for i ≤ k, link j's mass matrix M^j, which is symmetric
     velocity: c1_ijk, of the closing convention
-    velocity_linear: the part ∂h1/∂q̇ of c1 that stems from energy terms linear in q̇; empty without such
+    velocity_linear: the part ∂h1/∂q̇ of c1 that stems from energy terms linear in q̇, zero where they have no
+    force; empty where the energy has no such terms
     gravity: g_ij                         torque: τ_ij
     decomposed_torque: τ_ij where the coefficients are computed too, the same value in the cheaper of two ways
     position_gradient: c0_ijk = ∂τ_ij/∂q_k
@@ -35,12 +36,6 @@ class LinkForms:
     decomposed_torque: dict[int, Node]
     position_gradient: dict[tuple[int, int], Node]
     velocity_linear: dict[tuple[int, int], Node] = field(default_factory=dict)
-
-    def linear_block(self, zero: Node) -> list[Node]:
-        """`velocity_linear` with its zeros, over all (i, k); empty when there is none."""
-        if not self.velocity_linear:
-            return []
-        return [self.velocity_linear.get(pair, zero) for pair in self.velocity]
 
     def decomposition(self) -> Iterator[Node]:
         """Every output of the full decomposition, in the packed order: c2, c1, g, τ."""

@@ -4,6 +4,7 @@
 c2_ik = ∂²L/∂q̇_i∂q̇_k          g_i = −∂L/∂q_i at q̇ = 0
 h_i  = Σ_s ∂²L/∂q̇_i∂q_s q̇_s − ∂L/∂q_i = h2 + h1 + g, of degree 2, 1 and 0 in q̇
 c1_ik = ½ ∂h2_i/∂q̇_k + ∂h1_i/∂q̇_k = ½ (H + H₀), H = ∂h_i/∂q̇_k and H₀ = H at q̇ = 0.
+H₀ is there where L has terms b(q)·q̇, b = ∂L/∂q̇ at q̇ = 0, though zero where b is the slope of a function of q.
 """
 
 from linkwise.dynamics.coefficients import Inputs, LinkForms
@@ -22,13 +23,14 @@ def euler_lagrange(graph: Graph, lagrangian: Node, path: tuple[int, ...], x: Inp
         i: g.sub(g.sum(g.mul(derivative(g, momentum[i], x.q[s]), x.qd[s]) for s in path), force[i])
         for i in path
     }
+    leans = any(substitute(g, p, rest) != g.zero for p in momentum.values())
     c1, linear = {}, {}
     for i in path:
         for k in path:
             slope = derivative(g, h[i], x.qd[k])
             at_rest = substitute(g, slope, rest)
             c1[i, k] = g.mul(g.const(0.5), g.add(slope, at_rest))
-            if at_rest != g.zero:
+            if leans:
                 linear[i, k] = at_rest
     gravity = {i: substitute(g, h[i], rest) for i in path}
     tau = {i: g.add(h[i], g.sum(g.mul(c2[min(i, k), max(i, k)], x.qdd[k]) for k in path)) for i in path}

@@ -69,14 +69,13 @@ def labelled(kernel: Kernel, forms: LinkForms, j: int) -> dict[str, Rows]:
     def pairs(name: str, nodes: dict[int, Node]) -> Rows:
         return [(f"{name}({i + 1}, {j})", node) for i, node in nodes.items()]
 
-    linear = dict(zip(forms.velocity, forms.linear_block(kernel.graph.zero), strict=False))
     return {
         "c2": triples("c2", forms.acceleration),
         "c1": triples("c1", forms.velocity),
         "g": pairs("g", forms.gravity),
         "tau": pairs("tau", forms.decomposed_torque),
         "torque": pairs("tau", forms.torque),
-        "h1": triples("h1", linear),
+        "h1": triples("h1", forms.velocity_linear),
         "c0": triples("c0", forms.position_gradient),
     }
 

@@ -58,13 +58,12 @@ def turned(kernel: Kernel) -> dict[Node, str]:
 
 def decomposition_outputs(kernel: Kernel, forms: LinkForms, number: int) -> list[Output]:
     """Outputs of the full decomposition of link `number`."""
-    linear = dict(zip(forms.velocity, forms.linear_block(kernel.graph.zero), strict=False))
     return [
         *outputs("c2", forms.acceleration, number),
         *outputs("c1", forms.velocity, number),
         *outputs("g", forms.gravity, number),
         *outputs("tau", forms.decomposed_torque, number),
-        *outputs("h1", linear, number),
+        *outputs("h1", forms.velocity_linear, number),
     ]
 
 

@@ -72,8 +72,8 @@ def link_spans(kernels: Sequence[Kernel]) -> tuple[Span, ...]:
     start = EntryCounts()
     for number, kernel in enumerate(kernels, 1):
         forms = kernel.forms[0]
-        linear = len(forms.linear_block(kernel.graph.zero))
-        size = EntryCounts(len(forms.acceleration), len(forms.velocity), len(forms.gravity), linear)
+        c2, c1, g, h1 = forms.acceleration, forms.velocity, forms.gravity, forms.velocity_linear
+        size = EntryCounts(len(c2), len(c1), len(g), len(h1))
         spans.append(Span(number, number, size, start))
         start += size
     return tuple(spans)
