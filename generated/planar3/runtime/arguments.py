@@ -5,7 +5,8 @@
     arrays              where tensors are computed: become tensors, on the device of the others
     CPU tensors         where arrays are computed: become arrays, unless a gradient would be lost
 
-The rest is refused by name: booleans, complex numbers, other floats, gaps, tensors on different devices.
+The rest is refused by name: booleans, complex numbers, other floats, gaps, tensors that are not dense, or on
+different devices.
 """
 
 import sys
@@ -65,6 +66,16 @@ def precision(given: Mapping[str, Any], read: Mapping[str, Any]) -> str:
     return "float32" if own.intersection(FLOATS) == {"float32"} else "float64"
 
 
+def check_dense(values: Mapping[str, Any]) -> None:
+    """Raise TypeError, which names the argument, for a tensor that is sparse, nested or the like."""
+    for name, value in values.items():
+        if has_tensors([value]):
+            if value.is_nested:
+                raise TypeError(f"{name} is a nested tensor; join its parts with torch.stack or torch.cat")
+            if value.layout is not sys.modules["torch"].strided:
+                raise TypeError(f"{name} has the layout {value.layout}; pass {name}.to_dense()")
+
+
 def check_axes(arrays: Mapping[str, Any], n: int) -> None:
     """Raise ValueError, which names the argument, where a last axis is not n."""
     for name, a in arrays.items():
@@ -83,6 +94,16 @@ def no_common_shape(arrays: Mapping[str, Any], n: int) -> ValueError:
     )
 
 
+def too_many_axes(arrays: Mapping[str, Any], n: int) -> ValueError:
+    """What to raise where NumPy has no room for the axes of arrays (..., n), or of answers to them."""
+    most = max(a.ndim for a in arrays.values())
+    names = [name for name, a in arrays.items() if a.ndim == most]
+    return ValueError(
+        f"{', '.join(names)}: {most} axes are too many for this back end; join those of the samples, as "
+        f"{names[0]}.reshape(-1, {n}) does"
+    )
+
+
 def check_numbers(given: Mapping[str, Any], joint_names: Sequence[str]) -> None:
     """Raise ValueError, which names argument, sample and joint, for the first NaN or infinity."""
     for name, value in given.items():
@@ -95,6 +116,7 @@ def check_numbers(given: Mapping[str, Any], joint_names: Sequence[str]) -> None:
 
 
 def _array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
+    check_dense({name: tensor})
     if tensor.requires_grad and sys.modules["torch"].is_grad_enabled():
         raise TypeError(
             f"{name} requires a gradient, which arrays do not carry; load torch, or pass {name}.detach()"
@@ -103,6 +125,8 @@ def _array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
         raise TypeError(f"{name} lies on {tensor.device}; load torch, or pass {name}.cpu()")
     try:
         array: NDArray[Any] = tensor.detach().resolve_conj().resolve_neg().numpy()
+    except ValueError:
+        raise too_many_axes({name: tensor}, tensor.shape[-1]) from None
     except (TypeError, RuntimeError) as error:  # a dtype that NumPy lacks; inside torch.func
         raise TypeError(f"{name} does not read as an array: {_first_line(error)}") from None
     return array

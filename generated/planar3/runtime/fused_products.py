@@ -47,7 +47,8 @@ class FusedMoment(NamedTuple):
 
     def singles(self, fields: Sequence[int]) -> list[Any]:
         """Packed S_e . (wrench) of g or tau, or both."""
-        flat = self.states.wrenches.reshape(6, -1, self.states.wrenches.shape[-1])
+        wrenches = self.states.wrenches
+        flat = wrenches.reshape(6, wrenches.shape[1] * wrenches.shape[2], wrenches.shape[3])
         return [self._gathered(flat, self.tables.entries[field]) for field in fields]
 
     def _links(self) -> "_Links":

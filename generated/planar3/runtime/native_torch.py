@@ -10,6 +10,8 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
+from .answers import MOTION
+from .arguments import too_many_axes
 from .interface import ClosedForms
 from .native_build import Sources
 from .native_calls import NativeCalls
@@ -50,16 +52,16 @@ class TorchSide(TorchBackend):
         """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
         motion = list(named.values())
         q = motion[0]
-        alike = type(q) is Tensor and q.dtype in FLOATS and q.shape[-1:] == (n,)
-        if not alike or not all(
-            type(t) is Tensor and t.dtype == q.dtype and t.shape == q.shape and t.device == q.device
-            for t in motion
-        ):
+        plain = all(
+            type(t) is Tensor and t.is_cpu and t.layout is torch.strided and not t.is_nested for t in motion
+        )
+        alike = plain and q.dtype in FLOATS and q.shape[-1:] == (n,)
+        if not alike or not all(t.dtype == q.dtype and t.shape == q.shape for t in motion[1:]):
             motion = list(super().arrays(named, n))
-        if motion[0].device.type != "cpu":
-            raise TypeError(
-                f"the tensors lie on {motion[0].device}; this back end takes CPU tensors, torch takes all"
-            )
+            if not motion[0].is_cpu:
+                raise TypeError(
+                    f"the tensors lie on {motion[0].device}; this back end takes CPU tensors, torch takes all"
+                )
         if _transformed(motion):
             raise TypeError(
                 "this back end does not run inside torch.func or forward-mode differentiation; take torch"
@@ -97,7 +99,10 @@ class TorchSide(TorchBackend):
 
 def compute(run: Run, call: str, motion: Sequence[Tensor], into: Sequence[Tensor] | None = None) -> Any:
     """Results of the C code, which `run` calls with arrays, as tensors that share its memory."""
-    arrays = [as_numbers(t) for t in motion]
+    try:
+        arrays = [as_numbers(t) for t in motion]
+    except ValueError:  # of more than 64 axes
+        raise too_many_axes(dict(zip(MOTION, motion, strict=False)), motion[0].shape[-1]) from None
     if into is None:
         return tuple(torch.from_numpy(result) for result in run(call, arrays, None))
     for t in into:

@@ -128,9 +128,9 @@ class RigidRule:
         """What `answer` gives with the samples innermost, as many at once as the back end wants."""
         xp, tables, n = space.xp, self.tables(space, motion[0]), motion[0].shape[-1]
         # A copy: with views a compiler would gather from rows of samples in every loop.
-        flat = xp.stack([xp.swapaxes(a.reshape(-1, n), 0, 1) for a in motion], 0)
+        samples = math.prod(motion[0].shape[:-1])
+        flat = xp.stack([xp.swapaxes(a.reshape(samples, n), 0, 1) for a in motion], 0)
         joined: list[Any] = []
-        samples = flat.shape[2]
         for piece in self._pieces(space, motion, samples):
             own = [a[:, piece] for a in flat]
             some = TreeArrays(*(_samples(a, piece) for a in numbers))

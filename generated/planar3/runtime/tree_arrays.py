@@ -3,6 +3,7 @@
 Samples are innermost; what all of them share has one. See `kinematics` for `xp`.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -77,8 +78,8 @@ def with_formulas(
     found, at = [], 0
     for a in own:
         shape = tuple(a.shape[:-1])
-        size = int(np.prod(shape))
-        found.append(flat[at : at + size].reshape(*shape, -1))
+        size = math.prod(shape)
+        found.append(flat[at : at + size].reshape(*shape, flat.shape[1]))
         at += size
     return TreeArrays(*found)
 

@@ -10,7 +10,7 @@ from torch._subclasses.fake_tensor import unset_fake_temporarily
 from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
 from .answers import Answers
-from .arguments import as_array, as_weights, check_axes, no_common_shape, precision
+from .arguments import as_array, as_weights, check_axes, check_dense, no_common_shape, precision
 from .array_kernels import Crossing, known_kernel, operations
 from .interface import ClosedForms
 from .joint_tree import Bodies
@@ -66,6 +66,7 @@ class TorchBackend:
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
+        check_dense(named)
         given = [value for value in named.values() if torch.is_tensor(value)]
         if len({t.device for t in given}) > 1:
             raise TypeError(f"{', '.join(named)} lie on different devices; move them to one")

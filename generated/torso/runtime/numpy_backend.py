@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .answers import Answers
-from .arguments import as_array, as_weights, check_axes, no_common_shape, precision
+from .arguments import as_array, as_weights, check_axes, no_common_shape, precision, too_many_axes
 from .array_kernels import Crossing, known_kernel, operations
 from .interface import ClosedForms, Entries
 from .joint_tree import Bodies
@@ -76,6 +76,8 @@ class NumpyBackend:
             shape = np.broadcast_shapes(*(a.shape for a in arrays.values()))
         except ValueError:
             raise no_common_shape(arrays, n) from None
+        except RuntimeError:  # of more than 32 axes
+            raise too_many_axes(arrays, n) from None
         return [a if a.shape == shape else np.broadcast_to(a, shape) for a in arrays.values()]
 
     def answers(self, check_finite: bool) -> Answers:

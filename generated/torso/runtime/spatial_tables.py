@@ -108,8 +108,8 @@ def spatial_numbers(xp: Any, tables: SpatialTables, numbers: TreeArrays) -> Spat
         slide = as_matrices(tables.axes, tables.offset) @ (tables.turned[0, 0] + tables.turned[1, 0])
         frames = xp.concat([frames, xp.broadcast_to(slide, frames[:1].shape)], 0)
     # (1 + [0 0; [c]x 0]) diag(m 1, J) (1 + [0 0; [c]x 0])^T
-    flat = xp.moveaxis(inertias.reshape(inertias.shape[0], 9, -1), 1, 2)
-    count = max(len(masses), len(flat))
+    flat = xp.moveaxis(inertias.reshape(inertias.shape[0], 9, inertias.shape[3]), 1, 2)
+    count = len(flat) if len(masses) == 1 else len(masses)
     parts = [xp.broadcast_to(a, (count, *a.shape[1:])) for a in (masses[..., None], flat)]
     body = as_matrices(xp.concat(parts, -1), tables.body)
     away = as_matrices(xp.swapaxes(centres, 1, 2), tables.offset)
