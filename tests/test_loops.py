@@ -92,6 +92,26 @@ def brush(legs: int, parts: str) -> str:
     return robot(*links, *joints)
 
 
+@needs_compiler
+@pytest.mark.parametrize("speed", [1.0, 1e4])
+def test_torques_err_by_the_rounding_of_what_they_are_summed_from(
+    speed: float, package_of: Callable[[str], ModuleType], directory_of: Callable[[str], Path]
+) -> None:
+    """In float, against double: also where velocities ask a large force of a link that no joint bears."""
+    package, loops = package_of("puma560"), import_package(directory_of("puma560 loops")).load("native")
+    arrays = package.load("numpy", kernel="rule")
+    q, qd, qdd = (a.astype(np.float32) for a in random_states(6, 100))
+    motion = q, np.float32(speed) * qd, qdd
+    exact = [a.astype(float) for a in motion]
+    expected = package.load("numpy", kernel="straight").partial_torque(*exact)
+    mass = np.abs(package.load("numpy").coefficients(*exact[:2]).acceleration).max((1, 3))
+    moved = (exact[1] ** 2).sum(-1) + np.sqrt((exact[2] ** 2).sum(-1))
+    scale = mass * moved[:, None] + np.abs(expected).max(1)
+    for kernel in (loops, arrays):
+        error = np.abs(kernel.partial_torque(*motion) - expected).max(1)
+        assert (error / scale).max() <= 16 * np.finfo(np.float32).eps
+
+
 def test_where_the_base_is_does_not_matter(tmp_path: Path) -> None:
     library = Compiled(crane(tmp_path, Options(base="floating")))
     q, qd, qdd = random_states(9, 5)

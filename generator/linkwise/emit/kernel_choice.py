@@ -41,9 +41,10 @@ def chosen_kernel(system: System, choice: str, backends: Iterable[str] | None) -
     if closed or isinstance(system, EnergySystem):
         return "straight"
     cost = closed_form_cost(system)
+    if cost > MOST_DERIVED:
+        return "loops"
     kinds: tuple[KernelKind, ...] = ("straight", "loops") if cost <= MOST_STRAIGHT else ("loops", "straight")
-    possible = kinds[: 2 if cost <= MOST_DERIVED else 1]
-    return next((kind for kind in possible if not fault(system, kind, backends)), kinds[0])
+    return next((kind for kind in kinds if not fault(system, kind, backends)), kinds[0])
 
 
 def fault(system: System, kind: KernelKind, backends: Iterable[str] | None) -> str:
@@ -57,12 +58,13 @@ def check_size(system: System, kind: KernelKind, backends: Iterable[str] | None)
     if not (why := fault(system, kind, backends)):
         return
     other: KernelKind = "loops" if kind == "straight" else "straight"
-    derivable = other == "loops" or (
-        isinstance(system, RigidSystem) and closed_form_cost(system) <= MOST_DERIVED
-    )
-    if derivable and not fault(system, other, None):
+    if not fault(system, other, None) and (other == "loops" or _derivable(system)):
         raise LinkwiseError(f"{why}; take --kernel {other}")
     raise LinkwiseError(f"{why}; take back ends without C: --backend numpy, say")
+
+
+def _derivable(system: System) -> bool:
+    return isinstance(system, RigidSystem) and closed_form_cost(system) <= MOST_DERIVED
 
 
 def closed_form_cost(system: RigidSystem) -> float:
