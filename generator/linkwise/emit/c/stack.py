@@ -89,4 +89,4 @@ def _cubes(n: int, links: int, longest: int) -> int:
     most = max(1024 // (n * n), 1)
     if most >= links:
         return 2 * links * n * n + n
-    return (longest * n if most == 1 else most * n * n) + 1 + n
+    return ((longest + 1) * n if most == 1 else most * n * n) + 1 + n

@@ -4,13 +4,13 @@
 enum torques { PACKED, DENSE, SUMS };
 
 /* Links whose cubes wait in a block at a time, as many as a usual second-level cache holds beside their rows, and whether
-   that is all of them. Of a link by itself only the rows of its path wait, as the others are zero. */
+   that is all of them. Of a link by itself only the rows of its path wait, and one of zeros for all others. */
 enum {
     MOST = 1024 / (N * N) > 1 ? 1024 / (N * N) : 1,
     WHOLE = MOST >= LINKS,
     AT_ONCE = WHOLE ? LINKS : MOST,
     BY_ITSELF = MOST == 1 && !WHOLE,
-    CUBES = BY_ITSELF ? LONGEST * N : AT_ONCE * N * N,
+    CUBES = BY_ITSELF ? (LONGEST + 1) * N : AT_ONCE * N * N,
     STREAMED = WHOLE ? CUBE : 1
 };
 
@@ -33,19 +33,15 @@ static inline void begin_cubes(struct waiting_cubes *wait, size_t count, size_t 
 static inline const real *to_cubes_by_itself(int j, int half, const real *c, const real *by, size_t samples,
     struct waiting_cubes *wait, real *cubes)
 {
-    int x = path_start[j];
-    const real *waiting = wait->block;
-    memset(wait->block, 0, (size_t)(path_start[j + 1] - x) * N * BLOCK * sizeof(real));
+    const short *const joint = path + path_start[j];
+    const int length = path_start[j + 1] - path_start[j];
+    const real *const zeros = wait->block + (size_t)length * N * BLOCK;
+    memset(wait->block, 0, (size_t)(length + 1) * N * BLOCK * sizeof(real));
     c = place_block(j, j + 1, half, c, by, 1, 1, wait->block);
-    for (int i = 0; i < N; ++i) {
-        real *const rows = cubes + (size_t)(i * LINKS + j) * N;
-        if (x < path_start[j + 1] && path[x] == i) {
-            scatter(samples, N, CUBE, waiting, rows);
-            waiting += N * BLOCK;
-            ++x;
-        } else
-            for (size_t b = 0; b < samples; ++b)
-                memset(rows + b * CUBE, 0, N * sizeof(real));
+    for (int i = 0, x = 0; i < N; ++i) {
+        const int moves = x < length && joint[x] == i;
+        scatter(samples, N, CUBE, moves ? wait->block + (size_t)x * N * BLOCK : zeros, cubes + (size_t)(i * LINKS + j) * N);
+        x += moves;
     }
     return c;
 }
