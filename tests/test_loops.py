@@ -18,7 +18,7 @@ from conftest import DATA, needs_compiler
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
 from linkwise.check import check_package
 from linkwise.cli.app import app
-from linkwise.emit.kernel_choice import chosen_kernel
+from linkwise.emit.kernel_choice import check_size, chosen_kernel
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 from test_emitted_c import COMPILERS, PARTS, aligned, counting, strict
@@ -64,6 +64,52 @@ def test_it_answers_as_the_closed_forms_do(
             assert relative_error(given[field], getattr(expected, field)) <= 1e-14, (count, field)
         slopes = straight.position_gradient(*states)[:, *straight.layout.velocity.T]
         assert relative_error(loops.position_gradient(*states), slopes) <= 1e-14, count
+
+
+@needs_compiler
+@pytest.mark.parametrize("kernel", ["straight", "loops"])
+def test_a_wide_tree_answers_with_its_zeros(kernel: str, tmp_path: Path) -> None:
+    """24 joints, of which two move a link at most: the other rows of a link's results wait nowhere."""
+    path = tmp_path / "brush.urdf"
+    path.write_text(brush(12, "ab"), encoding="utf-8")
+    write_package(generate(read_system(path), ["native", "numpy"], kernel=kernel), tmp_path / "brush")
+    package, states = import_package(tmp_path / "brush"), random_states(24, 13)
+    native, rule = package.load("native"), package.load("numpy", kernel="rule")
+    answers = [(*r.propagation(*states), r.position_gradient(*states)) for r in (native, rule)]
+    for given, expected in zip(*answers, strict=True):
+        assert relative_error(given, expected) <= 1e-13
+
+
+def brush(legs: int, parts: str) -> str:
+    """URDF of legs on one base, each of these parts behind a joint."""
+    links, joints = [link("base")], []
+    for leg in range(legs):
+        for up, part in pairwise(("", *parts)):
+            above = f"{up}{leg}" if up else "base"
+            links.append(link(f"{part}{leg}"))
+            at = {"xyz": f"{leg} 0.1 0", "rpy": "0 0 0", "axis": "0 1 0"}
+            joints.append(joint(f"{part}j{leg}", above, f"{part}{leg}", **at))
+    return robot(*links, *joints)
+
+
+@needs_compiler
+@pytest.mark.parametrize("speed", [1.0, 1e4])
+def test_torques_err_by_the_rounding_of_what_they_are_summed_from(
+    speed: float, package_of: Callable[[str], ModuleType], directory_of: Callable[[str], Path]
+) -> None:
+    """In float, against double: also where velocities ask a large force of a link that no joint bears."""
+    package, loops = package_of("puma560"), import_package(directory_of("puma560 loops")).load("native")
+    arrays = package.load("numpy", kernel="rule")
+    q, qd, qdd = (a.astype(np.float32) for a in random_states(6, 100))
+    motion = q, np.float32(speed) * qd, qdd
+    exact = [a.astype(float) for a in motion]
+    expected = package.load("numpy", kernel="straight").partial_torque(*exact)
+    mass = np.abs(package.load("numpy").coefficients(*exact[:2]).acceleration).max((1, 3))
+    moved = (exact[1] ** 2).sum(-1) + np.sqrt((exact[2] ** 2).sum(-1))
+    scale = mass * moved[:, None] + np.abs(expected).max(1)
+    for kernel in (loops, arrays):
+        error = np.abs(kernel.partial_torque(*motion) - expected).max(1)
+        assert (error / scale).max() <= 16 * np.finfo(np.float32).eps
 
 
 def test_where_the_base_is_does_not_matter(tmp_path: Path) -> None:
@@ -197,6 +243,49 @@ def test_what_parallel_axes_save_is_seen(turn: str, kernel: str, tmp_path: Path)
     assert chosen_kernel(read_system(path), "auto", None) == kernel
 
 
+def test_a_joint_each_for_many_links_is_straight_and_may_be_in_loops(tmp_path: Path) -> None:
+    """Links behind one joint have almost nothing to compute, and no limit goes by their number."""
+    path = tmp_path / "brush.urdf"
+    path.write_text(brush(300, "a"), encoding="utf-8")
+    system = read_system(path)
+    assert chosen_kernel(system, "auto", None) == "straight"
+    for kernel in ("straight", "loops"):
+        check_size(system, kernel, None)
+
+
+def test_auto_is_straight_where_loops_cannot_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    system = read_system("planar40")
+    monkeypatch.setattr("linkwise.emit.c.stack.MOST_STACK", 400_000)
+    assert chosen_kernel(system, "auto", None) == "straight"
+    assert chosen_kernel(system, "auto", ["numpy"]) == "loops"
+    told = "of stack, and 400000 are the most; take --kernel straight"
+    with pytest.raises(LinkwiseError, match=re.escape(told)):
+        generate(system, kernel="loops")
+
+
+def test_a_robot_too_large_is_refused_before_any_work() -> None:
+    """No file is rendered: nothing reports progress."""
+    told = "400 joints are too many for C in loops: .*; take back ends without C: --backend numpy, say"
+    with pytest.raises(LinkwiseError, match=told):
+        generate(read_system("planar400"), progress=lambda *at: pytest.fail(f"at work: {at}"))
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+@pytest.mark.parametrize(
+    ("robot", "kernel"), [("planar40", "loops"), ("puma560", "straight")], ids=["loops", "straight"]
+)
+def test_the_header_says_how_much_stack_it_takes(robot: str, kernel: str, tmp_path: Path) -> None:
+    write_package(generate(read_system(robot), ["c"], kernel=kernel), tmp_path / robot)
+    header = (tmp_path / robot / "c" / f"{robot}.h").read_text(encoding="utf-8")
+    told = int(re.findall(r"of which none takes\s+more than ([\d,]+) bytes", header)[0].replace(",", ""))
+    source = str(tmp_path / robot / "c" / f"{robot}.c")
+    command = ["gcc", "-std=c99", "-O2", "-fstack-usage", "-c", source, "-o", str(tmp_path / "robot.o")]
+    subprocess.run(command, check=True)
+    lines = (tmp_path / "robot.su").read_text(encoding="utf-8").splitlines()
+    most = max(int(line.split("\t")[1]) for line in lines)
+    assert 0.85 * told < most < told
+
+
 def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("linkwise.emit.kernel_choice.MOST_STRAIGHT", 0)
     kernels = {
@@ -215,7 +304,7 @@ def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch)
             {"kernel": "loops", "backends": ["formulas"]},
             "'formulas' is not there with --kernel loops",
         ),
-        ("planar151", {"backends": ["c"]}, "151 joints are too many for C in loops"),
+        ("planar160", {"backends": ["c"]}, "160 joints are too many for C in loops: it answers with"),
         ("planar3", {"kernel": "curved"}, "no kernel 'curved'; choose among auto, straight, loops"),
     ],
 )

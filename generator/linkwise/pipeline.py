@@ -19,7 +19,7 @@ from linkwise.dynamics.derive import derive
 from linkwise.emit.assemble import checked_identifier, package_files
 from linkwise.emit.backend import backends_of, chosen_backends
 from linkwise.emit.derivation import Derivation
-from linkwise.emit.kernel_choice import chosen_kernel
+from linkwise.emit.kernel_choice import check_size, chosen_kernel
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import is_file
 from linkwise.progress import Progress, silent
@@ -57,11 +57,12 @@ def generate(
     robot's size; with loops no closed forms are derived, and `formulas` are not there.
 
     `request` goes into the manifest, so that a reader sees how to make the package again.
-    Raises LinkwiseError for a name, back end or kernel that cannot be.
+    Raises LinkwiseError for a name, back end or kernel that cannot be, before anything is derived.
     """
     system = rigid_system(robot) if isinstance(robot, Robot) else robot
     kind = chosen_kernel(system, kernel, backends)
     chosen = chosen_backends(backends_of(kind) if backends is None else backends, kind)
+    check_size(system, kind, backends)
     package = checked_identifier(name, system.name)
     kernels = derive(system, progress) if kind == "straight" else ()
     return package_files(Derivation(system, kernels, package, request or {}), chosen, progress)

@@ -14,9 +14,26 @@ from linkwise.errors import LinkwiseError
 if TYPE_CHECKING:
     from linkwise.emit.derivation import Derivation
     from linkwise.package.entries import KernelKind
+    from linkwise.symbolic.system import System
 
 Emitter = Callable[["Derivation"], Iterator[tuple[str, str]]]
 """Turns a derivation into files: paths inside the package and texts."""
+
+
+def _no_fault(_: System) -> str:
+    return ""
+
+
+def _too_large_for_straight(system: System) -> str:
+    from linkwise.emit.c.stack import too_large_for_straight
+
+    return too_large_for_straight(system)
+
+
+def _too_large_for_loops(system: System) -> str:
+    from linkwise.emit.c.stack import too_large_for_loops
+
+    return too_large_for_loops(system)
 
 
 @dataclass(frozen=True)
@@ -53,6 +70,8 @@ class BackendFiles:
     """None where nothing loads."""
     needs: tuple[str, ...] = ()
     """Other back ends without which it cannot be."""
+    fault: Callable[[System], str] = _no_fault
+    """Why it cannot be for a robot; nothing if it can."""
 
 
 def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
@@ -200,6 +219,7 @@ BACKENDS: dict[str, BackendFiles] = {
             "c",
             "closed forms in C99 and C++17, to compile into a program of your own",
             emits=(_c,),
+            fault=_too_large_for_straight,
         ),
         BackendFiles("formulas", "closed forms to read, for small robots", emits=(_formulas,)),
     )
@@ -217,6 +237,7 @@ LOOPS: dict[str, BackendFiles] = {
             BACKENDS["c"],
             doc="loops over links and joints in C99 and C++17, to compile into a program of your own",
             emits=(_loops,),
+            fault=_too_large_for_loops,
         ),
     )
 }

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from linkwise.dynamics.frame_search import FrameSearch
 from linkwise.dynamics.link_motion import Origin
 from linkwise.dynamics.screws import CommonAxes
-from linkwise.emit.backend import LOOPS
+from linkwise.emit.backend import LOOPS, backends_of, chosen_backends
 from linkwise.emit.c.loop_costs import decomposition_cost, link_costs
 from linkwise.errors import LinkwiseError
 from linkwise.package.entries import KernelKind
@@ -16,8 +16,14 @@ CHOICES = ("auto", "straight", "loops")
 MOST_STRAIGHT = 12_000
 """Operations up to which closed forms are derived, as `closed_form_cost` estimates them: docs/kernels.md."""
 
+MOST_DERIVED = 50_000
+"""Operations, estimated alike, up to which closed forms are worth minutes where loops cannot be had."""
+
 LEAST_SHARE = 0.1
-"""Closed forms of a large robot need more than this share of the operations of loops: planar arms 0.15."""
+"""Closed forms of a large robot need more than this share of the operations of loops: planar arms 0.15.
+
+Of links behind a single joint they need almost none.
+"""
 
 
 def chosen_kernel(system: System, choice: str, backends: Iterable[str] | None) -> KernelKind:
@@ -34,7 +40,31 @@ def chosen_kernel(system: System, choice: str, backends: Iterable[str] | None) -
     closed = backends is not None and not set(backends) <= LOOPS.keys()
     if closed or isinstance(system, EnergySystem):
         return "straight"
-    return "straight" if closed_form_cost(system) <= MOST_STRAIGHT else "loops"
+    cost = closed_form_cost(system)
+    if cost > MOST_DERIVED:
+        return "loops"
+    kinds: tuple[KernelKind, ...] = ("straight", "loops") if cost <= MOST_STRAIGHT else ("loops", "straight")
+    return next((kind for kind in kinds if not fault(system, kind, backends)), kinds[0])
+
+
+def fault(system: System, kind: KernelKind, backends: Iterable[str] | None) -> str:
+    """Why a robot cannot have these back ends with this kind of kernel; nothing if it can."""
+    chosen = chosen_backends(backends_of(kind) if backends is None else backends, kind)
+    return next(filter(None, (backend.fault(system) for backend in chosen)), "")
+
+
+def check_size(system: System, kind: KernelKind, backends: Iterable[str] | None) -> None:
+    """Raise LinkwiseError, which names a way that there is, where these back ends cannot be."""
+    if not (why := fault(system, kind, backends)):
+        return
+    other: KernelKind = "loops" if kind == "straight" else "straight"
+    if not fault(system, other, None) and (other == "loops" or _derivable(system)):
+        raise LinkwiseError(f"{why}; take --kernel {other}")
+    raise LinkwiseError(f"{why}; take back ends without C: --backend numpy, say")
+
+
+def _derivable(system: System) -> bool:
+    return isinstance(system, RigidSystem) and closed_form_cost(system) <= MOST_DERIVED
 
 
 def closed_form_cost(system: RigidSystem) -> float:
@@ -43,11 +73,13 @@ def closed_form_cost(system: RigidSystem) -> float:
     That one's are counted in one frame, about its centre of mass, and all others are taken to save as much as
     it does of what loops would take. No link is derived where even the sparsest would have too many.
     """
-    loops = decomposition_cost(system)
-    if LEAST_SHARE * loops > MOST_STRAIGHT:
-        return LEAST_SHARE * loops
+    loops, costs = decomposition_cost(system), link_costs(system)
+    behind_more = sum(cost for link, cost in zip(system.links, costs, strict=True) if len(link.joints) > 1)
+    least = LEAST_SHARE * loops * behind_more / sum(costs)
+    if least > MOST_STRAIGHT:
+        return least
     middle = sorted(range(len(system.links)), key=lambda j: len(system.path(j)))[len(system.links) // 2]
     tree = [(f - 1, joint) for f, joint in enumerate(system.links[middle].joints)]
     search = FrameSearch(system, [middle], tree, [range(len(tree))])
     counted, _, _ = search.attempt(CommonAxes(len(tree) // 2), Origin())
-    return loops * counted / link_costs(system)[middle]
+    return loops * counted / costs[middle]

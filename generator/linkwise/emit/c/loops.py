@@ -11,9 +11,9 @@ from linkwise.emit.c.prototypes import pointers
 from linkwise.emit.c.robot_files import given, header_view, totals
 from linkwise.emit.c.robot_tables import formulas, path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
+from linkwise.emit.c.stack import loops_stack
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
-from linkwise.errors import LinkwiseError
 from linkwise.symbolic.system import RigidSystem
 from linkwise.version import VERSION
 
@@ -40,24 +40,14 @@ FIXED = (
 """Files that are the same in every package with a kernel in loops."""
 
 
-MOST_JOINTS = 150
-"""Coordinates of which all pairs' results for one link wait on the stack: some 4 MB of a thread's 8."""
-
-
 def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     """Paths inside the package and texts.
 
-    Raises TypeError for what is not rigid bodies, and LinkwiseError for a robot of too many joints.
+    Raises TypeError for what is not rigid bodies.
     """
     system, name = derivation.system, derivation.package
     if not isinstance(system, RigidSystem):
         raise TypeError("a kernel in loops goes over rigid bodies")
-    joints = len(system.coordinates)
-    if joints > MOST_JOINTS:
-        raise LinkwiseError(
-            f"{joints} joints are too many for C in loops, which takes {MOST_JOINTS}, as results "
-            "wait on the stack; ask for back ends without C: --backend numpy, say"
-        )
     links = path_spans(system)
     common = {"version": VERSION, "name": name}
     yield f"c/{name}.c", render("c/robot_loops.c.j2", common | _robot_view(system, links))
@@ -67,8 +57,12 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
         "decomposition_cost": decomposition_cost(system),
         "torque_cost": torque_cost(system),
         "gradient_cost": gradient_cost(system),
+        "stack": f"{loops_stack(system):,}",
     }
-    yield f"c/{name}.h", render("c/robot.h.j2", names | header_view(system, links, name) | costs)
+    yield (
+        f"c/{name}.h",
+        render("c/robot.h.j2", names | header_view(system, links, name) | costs),
+    )
     tables = {"tables": list(header.index_tables(system, links))}
     yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)
     for file in FIXED:

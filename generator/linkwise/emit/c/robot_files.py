@@ -9,7 +9,7 @@ from linkwise.emit.c import header
 from linkwise.emit.c.calls import LinkKernels, group_calls, link_calls, motions, total
 from linkwise.emit.c.prototypes import cost, functions, pointers
 from linkwise.emit.c.quantity_table import causes, quantity_lines
-from linkwise.emit.c.sizes import EntryCounts, Span, groups, tile, whole
+from linkwise.emit.c.sizes import EntryCounts, Span, groups, most_counts, tile, waiting_counts, whole
 from linkwise.symbolic.system import System
 
 
@@ -19,9 +19,9 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
     arrays = robot.size.arrays
     n = len(system.coordinates)
     paths = [system.path(link.first - 1) for link in links]
-    one = _most([link.size for link in links])
+    one = most_counts([link.size for link in links])
     parts = tuple(groups(links))
-    waiting = _most([whole(part).size for part in parts])
+    waiting = waiting_counts(links)
     names = list(parameter_names(system).values())
     motion = given(system)
     calls = [link_calls(link, k) for link, k in zip(links, kernels, strict=True)]
@@ -29,6 +29,7 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
         "n": n,
         "paths": [", ".join(map(str, path)) for path in paths if path],
         "path_starts": ", ".join(map(str, accumulate(map(len, paths), initial=0))),
+        "longest": max(map(len, paths)),
         "linear": ", ".join("1" if link.size.h1 else "0" for link in links),
         "totals": totals(robot.size),
         "total": robot.size.total,
@@ -58,7 +59,7 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
 
 
 def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, Any]:
-    """Fields of NAME.h but for its name and its costs."""
+    """Fields of NAME.h but for its name, its costs and its stack."""
     robot = whole(links)
     linear = bool(robot.size.h1)
     return {
@@ -96,8 +97,3 @@ def given(system: System) -> tuple[str, ...]:
 def totals(size: EntryCounts) -> list[tuple[str, int]]:
     """Names in C and values of the robot's numbers of entries."""
     return [(total(array), size.of(array)) for array in size.arrays if array != "tau"]
-
-
-def _most(sizes: Sequence[EntryCounts]) -> EntryCounts:
-    """Return room for any of these."""
-    return EntryCounts(*(max(size.of(array) for size in sizes) for array in ("c2", "c1", "g", "h1")))

@@ -101,3 +101,13 @@ def groups(links: Sequence[Span]) -> Iterator[tuple[Span, ...]]:
             group = []
         group.append(link)
     yield tuple(group)
+
+
+def most_counts(sizes: Sequence[EntryCounts]) -> EntryCounts:
+    """Return room for any of these."""
+    return EntryCounts(*(max(size.of(array) for size in sizes) for array in ("c2", "c1", "g", "h1")))
+
+
+def waiting_counts(links: Sequence[Span]) -> EntryCounts:
+    """Return room for any group of links: what waits of a block."""
+    return most_counts([whole(part).size for part in groups(links)])

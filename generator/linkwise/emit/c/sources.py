@@ -18,6 +18,7 @@ from linkwise.emit.c.kernel_function import (
 )
 from linkwise.emit.c.robot_files import costs, header_view, robot_view
 from linkwise.emit.c.sizes import link_spans
+from linkwise.emit.c.stack import straight_stack
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.escape import c_comment
@@ -41,10 +42,9 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     yield f"c/{name}.c", render("c/robot.c.j2", robot)
     yield f"c/{name}f.c", render("c/robotf.c.j2", common)
     names = common | {"upper": name.upper()}
-    yield (
-        f"c/{name}.h",
-        render("c/robot.h.j2", names | header_view(system, links, name) | costs(kernels)),
-    )
+    about = header_view(system, links, name) | costs(kernels)
+    about["stack"] = f"{straight_stack(system, links):,}"
+    yield f"c/{name}.h", render("c/robot.h.j2", names | about)
     tables = {"tables": list(header.index_tables(system, links))}
     yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)
     for file in FIXED:

@@ -95,8 +95,8 @@ SHARED void API(dense_one)(INPUTS, const struct dense *to)
         link_one(x, j, &m, c2, c1, g, tau);
         if (to->slopes)
             to_slopes_one(j, j + 1, c1, NULL);
-        place_one(j, j + 1, 1, c2, to->torques ? qdd : ones, LINKS, to->acceleration + at);
-        place_one(j, j + 1, 0, c1, to->torques ? qd : ones, LINKS, to->velocity + at);
+        place_one(j, j + 1, 1, c2, to->torques ? qdd : ones, LINKS, 0, to->acceleration + at);
+        place_one(j, j + 1, 0, c1, to->torques ? qd : ones, LINKS, 0, to->velocity + at);
         to_squares_one(j, j + 1, g, 1, to->gravity);
     }
 }

@@ -14,7 +14,10 @@
        tau:      N = I wd - w x E w  f = cdd - gravity
        g:        N = 0               f = -gravity
    and joint i bears z_i . N + m (s_i - c x z_i) . f of each. The term with E is that by which c1 is 1/2 d(tau)/d(qd)
-   (S. Echeandia, P. Wensing, J. Comput. Nonlinear Dynam. 16(9), 2021). */
+   (S. Echeandia, P. Wensing, J. Comput. Nonlinear Dynam. 16(9), 2021).
+
+   Errors of tau are rounding of its wrench. What velocities add to that, a centripetal force say, may be large and do
+   nothing along any axis: where the joints move fast and hardly accelerate, few digits of tau are left. */
 
 #define motion KERNEL(motion)
 #define moving_link KERNEL(moving_link)

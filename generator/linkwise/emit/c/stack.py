@@ -1,0 +1,92 @@
+"""Bytes of stack that a package's C takes, and robots that are too large for it.
+
+Blocks of samples wait on the stack, in arrays whose sizes follow from the robot. A value of a block takes 64
+bytes, 8 samples in double or 16 in float. Beside them a kernel keeps some kB of its own.
+"""
+
+from collections.abc import Callable
+
+from linkwise.emit.c.robot_tables import columns, path_spans
+from linkwise.emit.c.sizes import Span, tile, waiting_counts, whole
+from linkwise.symbolic.system import RigidSystem, System
+
+VALUE = 64
+"""Bytes of a value in a block, one cache line."""
+
+OWN = 8_000
+"""Bytes for what functions keep beside their arrays."""
+
+MOST_STACK = 5_000_000
+"""Bytes of stack that a function may take: a thread has 8 MiB as a rule, and its callers need some."""
+
+MOST_RESULTS = 2_000_000
+"""Results of a sample, of which NAME_index.h has a line of some 13 bytes each."""
+
+MOST_INT = 2**31 - 1
+"""Entries that C counts in an int."""
+
+
+def loops_stack(system: RigidSystem) -> int:
+    """Bytes that the functions of a kernel in loops take at most."""
+    n, frames, longest = len(system.coordinates), len(system.robot.links), _longest(system)
+    # motion: frames with 24 numbers each, and columns; wrenches; q, qd, qdd and angles, sines, cosines.
+    moved = 24 * (frames + 1) + 12 * (frames + len(columns(system).sums)) + 3 * n + 3 * frames
+    wrenches = 18 * longest
+    cubes = _cubes(n, len(system.links), longest)
+    square = longest * longest
+    values = max(
+        4 * max(longest, 96),
+        longest * (longest + 1) // 2 + square + 2 * longest + 2 * n + cubes,
+        6 * (frames + 1) + square + cubes,
+    )
+    numbers = 13 * frames + 10 * len(system.links) + 3 if system.parameters else 0
+    return VALUE * (moved + wrenches + values) + 8 * numbers + OWN
+
+
+def straight_stack(system: System, links: tuple[Span, ...]) -> int:
+    """Bytes that the functions of closed forms take at most, `links` being their results."""
+    n, waiting = len(system.coordinates), waiting_counts(links)
+    blocks, whole_robot = tile(waiting), whole(links).size
+    cubes = _cubes(n, len(links), _longest(system))
+    largest = max(map(waiting.of, whole_robot.arrays))
+    values = max(waiting.total * blocks + max(cubes, largest), max(link.size.c1 for link in links) + cubes)
+    return VALUE * (5 * n * blocks + values) + OWN
+
+
+def too_large_for_loops(system: System) -> str:
+    """Why C in loops cannot be had, or nothing."""
+    if not isinstance(system, RigidSystem):
+        return ""
+    return _fault(system, "in loops", lambda _: loops_stack(system))
+
+
+def too_large_for_straight(system: System) -> str:
+    """Why C of closed forms cannot be had, or nothing; if none of its results is zero."""
+    if not isinstance(system, RigidSystem):
+        return ""
+    return _fault(system, "of closed forms", lambda links: straight_stack(system, links))
+
+
+def _fault(system: RigidSystem, kind: str, stack_of: Callable[[tuple[Span, ...]], int]) -> str:
+    links = path_spans(system)
+    n, results = len(system.coordinates), whole(links).size.total
+    what = f"{n} joints are too many for C {kind}: "
+    if n * n * len(links) > MOST_INT:
+        return f"{what}its results with their zeros are {n * n * len(links)}, more than an int counts"
+    if results > MOST_RESULTS:
+        return f"{what}it answers with {results} values, and {MOST_RESULTS} are the most"
+    if (stack := stack_of(links)) > MOST_STACK:
+        return f"{what}it takes {stack} bytes of stack, and {MOST_STACK} are the most"
+    return ""
+
+
+def _longest(system: System) -> int:
+    return max(len(system.path(j)) for j in range(len(system.links)))
+
+
+def _cubes(n: int, links: int, longest: int) -> int:
+    """Values of `struct waiting_cubes` in dense_rows.h."""
+    most = max(1024 // (n * n), 1)
+    if most >= links:
+        return 2 * links * n * n + n
+    return ((longest + 1) * n if most == 1 else most * n * n) + 1 + n
