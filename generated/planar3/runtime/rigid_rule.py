@@ -13,6 +13,9 @@ and asks of each joint f a wrench (N, f), whose part on joint e is S_e . (N, f) 
     c0:   those of S-dot-dot and of twice zd; and where joint e is not behind f,
           S_f x* (N, f) = (z x N + s x f, z x f) of tau's wrench
 
+Errors of tau are rounding of its wrench. What velocities add to that, a centripetal force say, may be large
+and do nothing along any axis: where joints move fast and hardly accelerate, few digits of tau are left.
+
 They are linear in the screws. So a link is also a matrix of 6 rows, whose columns meet (z, s) and z, and
 matrix products answer for the links of a group and all pairs of joints, of which `rule_layout` says what is
 packed.

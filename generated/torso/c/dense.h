@@ -21,23 +21,24 @@ struct dense {
 #endif
 
 /* Links into a cube that `links` share, the first one's entries at its start: each times `by` of joint k. c has all
-   (i, k), or `half` of them, i <= k, where (k, i) is the same. Returns where the next link's begin. */
+   (i, k), or `half` of them, i <= k, where (k, i) is the same. The cube has rows for every i, or, of a link by itself,
+   for those on its `path_only`. Returns where the next link's begin. */
 APART const real *SIZED(place)(int first, int last, int half, const real *RESTRICT c, const real *RESTRICT by, int links,
-    real *RESTRICT cube)
+    int path_only, real *RESTRICT cube)
 {
     for (int j = first; j < last; ++j) {
         const short *const joint = path + path_start[j];
         const int length = path_start[j + 1] - path_start[j];
         real *const mine = cube + (size_t)(j - first) * N * W;
         for (int x = 0; x < length; ++x) {
-            const int i = joint[x];
+            const int i = joint[x], row = path_only ? x : i;
             for (int y = half ? x : 0; y < length; ++y, c += W) {
-                const int k = joint[y];
-                real *const to = mine + ((size_t)i * links * N + k) * W;
+                const int k = joint[y], mirror = path_only ? y : k;
+                real *const to = mine + ((size_t)row * links * N + k) * W;
                 for (int b = 0; b < W; ++b)
                     to[b] = c[b] * by[k * W + b];
                 if (half) {
-                    real *const mirrored = mine + ((size_t)k * links * N + i) * W;
+                    real *const mirrored = mine + ((size_t)mirror * links * N + i) * W;
                     for (int b = 0; b < W; ++b)
                         mirrored[b] = c[b] * by[i * W + b];
                 }

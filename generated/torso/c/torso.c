@@ -9,7 +9,7 @@
 #include "numbers.h"
 #include "sines.h"
 
-enum { N = 7, LINKS = 5, C2 = 56, C1 = 91, G = 21 };
+enum { N = 7, LINKS = 5, LONGEST = 5, C2 = 56, C1 = 91, G = 21 };
 
 #if !PART(SINES) || PART(BLOCKS)
 /* The joints on each link's path, counted from 0; where each path begins; which links have h1. */
@@ -138,8 +138,8 @@ static void to_dense_one(int j, const struct inputs *m, const struct results *r,
         ones[k] = 1;
     if (to->slopes)
         to_slopes_one(j, j + 1, r->c1, NULL);
-    place_one(j, j + 1, 1, r->c2, to->torques ? m->qdd : ones, LINKS, to->acceleration + at);
-    place_one(j, j + 1, 0, r->c1, to->torques ? m->qd : ones, LINKS, to->velocity + at);
+    place_one(j, j + 1, 1, r->c2, to->torques ? m->qdd : ones, LINKS, 0, to->acceleration + at);
+    place_one(j, j + 1, 0, r->c1, to->torques ? m->qd : ones, LINKS, 0, to->velocity + at);
     to_squares_one(j, j + 1, r->g, 1, to->gravity);
 }
 

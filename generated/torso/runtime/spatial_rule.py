@@ -11,6 +11,8 @@ V x* its negative transpose, and I the spatial inertia of a link about the base'
     c2: S_e . I S_f      c1: S_e . (I Sd_f + B S_f)
     c0: S_e . (I Sdd_f + 2 B Sd_f), and + S_e . (S_f x* W) where joint e is not behind f
 
+Errors of tau are those of W, as `rigid_rule` says.
+
 (Wensing and Slotine's factorisation of the Coriolis terms; Singh, Russell and Wensing's derivatives.) Every
 small matrix is a product of its own inside of numpy or torch, so samples in great number are better
 innermost, as `rigid_rule` has them.
