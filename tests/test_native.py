@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from copy import deepcopy
+from copy import copy, deepcopy
 from types import ModuleType
 from typing import Any
 
@@ -99,6 +99,33 @@ def test_threads_give_the_same_numbers(planar3: ModuleType, motion: np.ndarray) 
     one = robot.packed(*many).velocity
     robot.backend.threads = 3
     np.testing.assert_array_equal(robot.packed(*many).velocity, one)
+
+
+@pytest.mark.parametrize("count", [0, -1, 2.0, "2", True, None, np.ones(2)])
+def test_threads_are_a_whole_number_from_1_on(count: Any, planar3: ModuleType) -> None:
+    backend = planar3.load("native").backend
+    backend.threads = np.int64(3)
+    with pytest.raises((TypeError, ValueError), match=r"^threads is .*; give a whole number from 1 on$"):
+        backend.threads = count
+    assert backend.threads == 3
+
+
+def test_threads_are_those_of_copies_and_where_gradients_are_recorded(
+    planar3: ModuleType, motion: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = planar3.load("native")
+    assert pickle.loads(pickle.dumps(robot)).backend.threads_set is None
+    robot.backend.threads = 3
+    for again in (copy(robot), deepcopy(robot), pickle.loads(pickle.dumps(robot))):
+        assert again.backend.threads == 3
+    parts = []
+    share = type(robot.backend.calls)._share
+    monkeypatch.setattr(
+        type(robot.backend.calls), "_share", lambda *given: (parts.append(given[4]), share(*given))
+    )
+    q, qd, qdd = torch.from_numpy(np.tile(motion, (1, 4, 1)))
+    robot.packed_torque(q.requires_grad_(), qd, qdd).sum().backward()
+    assert parts == [3]
 
 
 HOLDINGS: dict[str, Callable[[Any], Any]] = {

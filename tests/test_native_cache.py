@@ -3,18 +3,21 @@
 import os
 import pty
 import pwd
+import shutil
 import signal
 import stat
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 from conftest import needs_compiler
+from linkwise.package.load import import_package
 from linkwise.runtime import native_build, native_compiler, native_process
 from linkwise.runtime.native_build import Sources, library
 from linkwise.runtime.native_cache import cache_directory, is_whole, locked
@@ -123,6 +126,43 @@ def test_a_whole_library_needs_nothing_written(tiny: Sources) -> None:
     path.with_suffix(".lock").unlink()
     assert library(tiny, "double") == path
     assert not path.with_suffix(".lock").exists()
+
+
+def test_c_generated_anew_is_not_mixed_with_the_python_that_was_loaded(
+    directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    directory = tmp_path / "planar3"
+    shutil.copytree(directory_of("planar3"), directory)
+    package = import_package(directory)
+    robot, motion = package.load("native"), np.ones((3, 3))
+    before = robot.partial_torque(*motion)
+    with (directory / "c/planar3.h").open("a") as header:
+        header.write("/* of another text */\n")
+    for answer in (
+        lambda: robot.position_gradient(*motion),
+        lambda: package.load("native").partial_torque(*motion.astype("f4")),
+    ):
+        with pytest.raises(RuntimeError) as error:
+            answer()
+        assert (
+            one_line(error) == "planar3 was generated anew after it was loaded; start Python again to use it"
+        )
+    np.testing.assert_array_equal(robot.partial_torque(*motion), before)
+
+
+def test_what_changes_while_it_is_compiled_is_not_kept(
+    tiny: Sources, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run_all = native_build.run_all
+
+    def slowly(commands: Sequence[Sequence[str]], tell: native_process.Tell) -> None:
+        run_all(commands, tell)
+        tiny.file("double").write_text(TINY.replace("1.0", "2.0"))
+
+    monkeypatch.setattr(native_build, "run_all", slowly)
+    with pytest.raises(RuntimeError, match="tiny was generated anew after it was loaded"):
+        library(tiny, "double")
+    assert not list(cache_directory().glob("*.so"))
 
 
 def test_another_source_compiler_or_processor_has_a_library_of_its_own(

@@ -1,6 +1,8 @@
 """The compiled module that calls C says to the bit what ctypes says, and takes nothing that it should not."""
 
 import gc
+import inspect
+import pickle
 import sys
 import weakref
 from collections.abc import Callable, Iterator
@@ -46,7 +48,7 @@ def without(package: ModuleType, **instead: Any) -> Iterator[None]:
 
 
 def is_compiled(robot: Any) -> bool:
-    return type(robot._answers.of_arrays).__name__ == "Calls"
+    return "partial_torque" in vars(robot)
 
 
 def parts(answer: Any) -> tuple[np.ndarray, ...]:
@@ -112,27 +114,105 @@ def test_without_it_ctypes_answers_silently(
     assert capfd.readouterr() == ("", "")
 
 
-def test_what_is_not_plain_is_read_as_by_the_other_back_ends(planar3: ModuleType) -> None:
-    robot, reference = planar3.load("native"), planar3.load("numpy")
-    q, qd, qdd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 6, 3))
+def test_no_line_of_python_runs_for_plain_arrays(planar3: ModuleType) -> None:
+    robot, motion = planar3.load("native"), np.ones((3, 5, 3))
+    lines: list[str] = []
+    for name, call in CALLS.items():
+        call(robot, *motion)  # what is compiled at the first call is called otherwise from then on
+        sys.setprofile(
+            lambda frame, event, _: lines.append(frame.f_code.co_name) if event == "call" else None
+        )
+        try:
+            call(robot, *motion)
+        finally:
+            sys.setprofile(None)
+        assert lines == ["<lambda>"], name
+        lines.clear()
+
+
+def test_arguments_are_taken_by_name_as_by_order(planar3: ModuleType) -> None:
+    robot = planar3.load("native")
+    q, qd, qdd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 5, 3))
+    expected = robot.propagation(q, qd, qdd, "gradient")
+    out = tuple(np.full_like(a, np.nan) for a in expected)
+    answer = robot.propagation(q, convention="gradient", out=out, qdd=qdd, qd=qd)
+    for given, place, value in zip(answer, out, expected, strict=True):
+        assert given is place
+        np.testing.assert_array_equal(given, value)
+    for name in CALLS.keys() - {"gradient"}:
+        words = inspect.signature(getattr(robot, name)).parameters
+        own = inspect.signature(getattr(planar3.Dynamics, name)).parameters
+        assert {w: p.default for w, p in own.items() if w != "self"} == {
+            w: p.default for w, p in words.items()
+        }
+
+
+@pytest.mark.parametrize(
+    ("count", "named", "message"),
+    [
+        (2, {}, r"^Dynamics\.partial_torque\(\) missing 1 required positional argument: 'qdd'$"),
+        (3, {"q": None}, r"^Dynamics\.partial_torque\(\) got multiple values for argument 'q'$"),
+        (3, {"convention": "closing"}, r"got an unexpected keyword argument 'convention'$"),
+        (5, {}, r"^Dynamics\.partial_torque\(\) takes from 4 to 5 positional arguments but 6 were given$"),
+        (2, {"qdd": None}, r"^qdd is None; give an array"),
+    ],
+)
+def test_wrong_arguments_are_told_as_python_tells_them(
+    count: int, named: dict[str, Any], message: str, planar3: ModuleType
+) -> None:
+    with pytest.raises(TypeError, match=message):
+        planar3.load("native").partial_torque(*[np.ones(3)] * count, **named)
+
+
+def test_a_call_is_pickled_with_its_robot(planar3: ModuleType) -> None:
+    call = planar3.load("native").partial_torque
+    motion = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 3))
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(call))(*motion), call(*motion))
+
+
+@pytest.mark.parametrize("batch", [(6,), (1,), ()])
+@pytest.mark.parametrize("binding", ["compiled", "ctypes"])
+def test_what_is_not_plain_is_read_as_by_the_other_back_ends(
+    binding: str, batch: tuple[int, ...], planar3: ModuleType
+) -> None:
+    if binding == "compiled":
+        robot = planar3.load("native")
+    else:
+        with without(planar3, headers=lambda: ()):
+            robot = planar3.load("native")
+    assert is_compiled(robot) == (binding == "compiled")
+    reference = planar3.load("numpy")
+    q, qd, qdd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, *batch, 3))
+    robot.partial_torque(q, qd, qdd)
     frozen = q.copy()
     frozen.flags.writeable = False
     unusual = {
-        "strides": (np.asfortranarray(q), qd[::-1][::-1], qdd),
+        "strides": (np.asfortranarray(q), qd[..., ::-1][..., ::-1], qdd),
+        "gaps": (q, np.stack([qd, qdd], -1)[..., 0], qdd),
         "bytes": (q.astype(">f8"), qd, qdd),
-        "offset": (np.frombuffer(b"x" + q.tobytes(), np.uint8)[1:].view("f8").reshape(6, 3), qd, qdd),
+        "offset": (np.frombuffer(b"x" + q.tobytes(), np.uint8)[1:].view("f8").reshape(q.shape), qd, qdd),
         "lists": (q, qd.tolist(), qdd),
-        "shapes": (q, qd[0], qdd),
+        "shapes": (q, qd.reshape(-1, 3)[0], qdd),
         "dtypes": (q, qd.astype("f4"), qdd),
-        "subclass": (q.view(np.matrix), qd, qdd),
         "read-only": (frozen, qd, qdd),
+        "whole numbers": (q, np.ones(3, int), qdd),
     }
+    unusual["broadcast"] = (*np.broadcast_arrays(np.stack([q, q]), qd, qdd[..., :1]),)
+    if batch:
+        unusual["subclass"] = (q.view(np.matrix), qd, qdd)
     for name, motion in unusual.items():
         given = [np.asarray(m) if name == "subclass" else m for m in motion]
         expected = reference.partial_torque(*given)
         np.testing.assert_allclose(
             robot.partial_torque(*motion), expected, rtol=1e-12, atol=1e-12, err_msg=name
         )
+    for wrong, message in (
+        (np.ma.masked_invalid(qd), "qd is a masked array"),
+        (qd[..., :2], "qd has shape"),
+        (qd.astype(complex), "qd has dtype complex128"),
+    ):
+        with pytest.raises((TypeError, ValueError), match=message):
+            robot.partial_torque(q, wrong, qdd)
 
 
 def test_nothing_is_leaked_or_freed_twice(planar3: ModuleType) -> None:
@@ -173,6 +253,17 @@ def test_threads_call_side_by_side(planar3: ModuleType) -> None:
     with ThreadPoolExecutor(4) as pool:
         for answer in pool.map(lambda _: robot.propagation(*motion), range(50)):
             for a, b in zip(answer, expected, strict=True):
+                np.testing.assert_array_equal(a, b)
+
+
+def test_threads_through_ctypes_keep_their_samples_apart(planar3: ModuleType) -> None:
+    with without(planar3, headers=lambda: ()):
+        robot = planar3.load("native")
+    many = np.random.default_rng(0).uniform(-2.0, 2.0, (400, 3, 3))
+    expected = [robot.propagation(*motion) for motion in many]
+    with ThreadPoolExecutor(4) as pool:
+        for answer, right in zip(pool.map(lambda m: robot.propagation(*m), many), expected, strict=True):
+            for a, b in zip(answer, right, strict=True):
                 np.testing.assert_array_equal(a, b)
 
 

@@ -204,8 +204,40 @@ def test_wrong_shape_names_the_argument(backend: str, package_of: Callable[[str]
         ValueError, match=r"qd has shape \(5, 2\); its last axis must be 3, one for each joint"
     ):
         robot.partial_torque(q, qd[:, :2], qdd)
-    with pytest.raises(ValueError, match=r"the mask has shape \(2, 3\); it must be \(3, 3\)"):
-        robot.masked(q, qd, qdd, np.ones((2, 3)))
+
+
+MASKS: dict[str, tuple[Any, str]] = {
+    "complex": (np.ones((3, 3), complex), "the mask has dtype complex128; give zeros and ones, or weights"),
+    "a complex tensor": (torch.ones(3, 3, dtype=torch.complex64), "the mask has dtype complex64; give zeros"),
+    "words": ([["1"] * 3] * 3, "the mask has dtype str32; give zeros and ones, or weights between"),
+    "objects": (np.full((3, 3), None), "the mask has dtype object; give zeros and ones, or weights between"),
+    "gaps": (np.ma.masked_equal(np.eye(3), 0), "the mask is a masked array; fill its gaps first"),
+    "None": (None, "the mask is None; give an array, a tensor or a list"),
+    "one number": (1.0, r"the mask has shape \(\); it must be \(3, 3\): order, coordinate"),
+    "a row too few": (np.ones((2, 3)), r"the mask has shape \(2, 3\); it must be \(3, 3\)"),
+    "a mask a sample": (torch.ones(5, 3, 3), r"the mask has shape \(5, 3, 3\); it must be \(3, 3\)"),
+    "rows unlike": ([[1, 1, 1], [1, 1], [1]], "the mask does not read as an array: "),
+}
+
+
+@pytest.mark.parametrize("mask", MASKS)
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_is_no_mask_is_named(backend: str, mask: str, package_of: Callable[[str], ModuleType]) -> None:
+    robot, (given, message) = package_of("planar3").load(backend), MASKS[mask]
+    with pytest.raises((TypeError, ValueError), match=f"^{message}") as error:
+        robot.masked(*states_of(backend, 5, 3), given)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_mask_may_be_of_truth_values_numbers_or_tensors(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot, states = package_of("planar3").load(backend), states_of(backend, 5, 3)
+    mask = np.array([[0, 0, 0], [1, 0, 1], [0, 1, 1]])
+    expected = robot.masked(*states, mask.astype(float))
+    for same in (mask, mask.tolist(), mask.astype(bool), mask.astype("f2"), torch.from_numpy(mask)):
+        assert (robot.masked(*states, same) == expected).all()
 
 
 def test_tensors_on_different_devices_are_refused(package_of: Callable[[str], ModuleType]) -> None:

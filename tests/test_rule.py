@@ -158,6 +158,22 @@ def test_wrong_bodies_are_refused_by_name(
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
+def test_bodies_in_arrays_are_copied_and_may_be_read_only(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    package = package_of("planar3")
+    given = package.Bodies(*(a.copy() for a in package.bodies()))
+    for a in given:
+        a.flags.writeable = False
+    robot, motion = package.load(backend, bodies=given), np.ones((3, 3))
+    before = np.asarray(robot.partial_torque(*motion)).copy()
+    for a in given:
+        a.flags.writeable = True
+        a *= 2.0
+    np.testing.assert_array_equal(np.asarray(robot.partial_torque(*motion)), before)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_bodies_of_other_samples_than_the_motions_are_refused(
     backend: str, package_of: Callable[[str], ModuleType]
 ) -> None:

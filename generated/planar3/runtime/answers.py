@@ -1,6 +1,6 @@
 """The calls of `Dynamics` behind its face: motion is checked, answers computed and put where `out` says."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,6 +19,9 @@ KINDS: dict[str, Any] = {
     "gradient_propagation": GradientPropagation,
 }
 """What calls with several results answer with; the others answer with one array or tensor."""
+
+MOTION = ("q", "qd", "qdd")
+"""What the calls are given, the last only where it is asked for."""
 
 Shapes = tuple[tuple[int, ...], ...]
 
@@ -56,52 +59,51 @@ class Answers:
         self._shapes = answer_shapes(structure)
 
     @property
-    def of_arrays(self) -> Any:
-        """What answers in place of this where q is an array: what is quicker then, if there is anything."""
-        return self
+    def direct(self) -> Mapping[str, Callable[..., Any]]:
+        """Calls by name that are quicker than these, given first an object whose class has all calls."""
+        return {}
 
     def packed(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.packed`."""
-        return self._answer("packed", {"q": q, "qd": qd, "qdd": qdd}, out)
+        return self._answer("packed", (q, qd, qdd), out)
 
     def packed_torque(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.packed_torque`."""
-        return self._answer("packed_torque", {"q": q, "qd": qd, "qdd": qdd}, out)
+        return self._answer("packed_torque", (q, qd, qdd), out)
 
     def partial_torque(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.partial_torque`."""
-        return self._answer("partial_torque", {"q": q, "qd": qd, "qdd": qdd}, out)
+        return self._answer("partial_torque", (q, qd, qdd), out)
 
     def inverse_dynamics(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.inverse_dynamics`."""
-        return self._answer("inverse_dynamics", {"q": q, "qd": qd, "qdd": qdd}, out)
+        return self._answer("inverse_dynamics", (q, qd, qdd), out)
 
     def coefficients(self, q: Any, qd: Any, out: Any = None) -> Any:
         """See `Dynamics.coefficients`."""
-        return self._answer("coefficients", {"q": q, "qd": qd}, out)
+        return self._answer("coefficients", (q, qd), out)
 
     def propagation(self, q: Any, qd: Any, qdd: Any, convention: str, out: Any = None) -> Any:
         """See `Dynamics.propagation`."""
         if convention not in ("closing", "gradient"):
             raise ValueError(f"no convention {convention!r}; choose closing or gradient")
         call = "propagation" if convention == "closing" else "gradient_propagation"
-        return self._answer(call, {"q": q, "qd": qd, "qdd": qdd}, out)
+        return self._answer(call, (q, qd, qdd), out)
 
     def position_gradient(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.position_gradient`."""
-        return self._answer("position_gradient", {"q": q, "qd": qd, "qdd": qdd}, out)
+        return self._answer("position_gradient", (q, qd, qdd), out)
 
     def masked(self, q: Any, qd: Any, qdd: Any, mask: Any, out: Any = None) -> Any:
         """See `Dynamics.masked`."""
-        n = self._structure.n
-        if np.shape(mask) != (3, n):
-            raise ValueError(
-                f"the mask has shape {tuple(np.shape(mask))}; it must be (3, {n}): order, coordinate"
-            )
-        motion = self._motion({"q": q, "qd": qd, "qdd": qdd})
-        into = self._accepted("masked", {"q": motion[0], "qd": motion[1], "qdd": motion[2]}, out)
+        n, motion = self._structure.n, self._motion((q, qd, qdd))
+        into = self._accepted("masked", motion, out)
         q, qd, qdd = motion
-        weights = self._backend.asarray(mask, q)
+        weights = self._backend.weights("the mask", mask, q)
+        if tuple(weights.shape) != (3, n):
+            raise ValueError(
+                f"the mask has shape {tuple(weights.shape)}; it must be (3, {n}): order, coordinate"
+            )
         acceleration, velocity, _ = self._computed("coefficients", [q, qd])
         total = velocity @ (weights[1] * qd)[..., None, :, None]
         total = total + acceleration @ (weights[2] * qdd)[..., None, :, None]
@@ -115,29 +117,31 @@ class Answers:
         into[0][...] = torque
         return out
 
-    def _answer(self, call: str, named: dict[str, Any], out: Any) -> Any:
-        motion = self._motion(named)
+    def _answer(self, call: str, given: Sequence[Any], out: Any) -> Any:
+        """Answer to q, qd and, for most calls, qdd, as they were given."""
+        motion = self._motion(given)
         kind = KINDS.get(call)
         if out is None:
             values = self._computed(call, motion)
             return kind(*values) if kind else values[0]
-        into = self._accepted(call, dict(zip(named, motion, strict=True)), out)
+        into = self._accepted(call, motion, out)
         self._compute_into(call, motion, into)
         return kind(*out) if kind else out
 
-    def _motion(self, named: dict[str, Any]) -> Any:
+    def _motion(self, given: Sequence[Any]) -> Any:
         """The motion as the back end computes with it, in one shape, and looked at if that was asked for."""
+        named = dict(zip(MOTION, given, strict=False))
         arrays = self._backend.arrays(named, self._structure.n)
         if self._check_finite:
             check_numbers(named, self._structure.joint_names)
         return arrays
 
-    def _accepted(self, call: str, motion: Mapping[str, Any], out: Any) -> Any:
+    def _accepted(self, call: str, motion: Sequence[Any], out: Any) -> Any:
         if out is None:
             return None
-        kind = KINDS.get(call)
+        kind, named = KINDS.get(call), dict(zip(MOTION, motion, strict=False))
         fields, parameters = kind._fields if kind else (), self._backend.parameters.values()
-        return accepted(out, fields, self._shapes[call], motion, parameters, self.contiguous)
+        return accepted(out, fields, self._shapes[call], named, parameters, self.contiguous)
 
     def _computed(self, call: str, motion: Any) -> Any:
         """Results of a call in order."""

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 FLOATS = ("float32", "float64")
 INTEGERS = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
+REAL = ("bool", "int", "uint", "float", "bfloat")
+"""How names of dtypes of real numbers begin."""
 
 
 def has_tensors(values: Iterable[Any]) -> bool:
@@ -39,6 +41,19 @@ def as_array(name: str, value: Any) -> NDArray[Any]:
         return np.asarray(value)
     except (TypeError, ValueError, RuntimeError) as error:
         raise ValueError(f"{name} does not read as an array: {_first_line(error)}") from None
+
+
+def as_weights(name: str, value: Any) -> Any:
+    """A tensor as it is, or an array, of real numbers or truth values; raises as `as_array` does."""
+    if has_tensors([value]):
+        weights = value
+    elif value is None:
+        raise TypeError(f"{name} is None; give an array, a tensor or a list")
+    else:
+        weights = as_array(name, value)
+    if not _dtype(weights).startswith(REAL):
+        raise TypeError(f"{name} has dtype {_dtype(weights)}; give zeros and ones, or weights between")
+    return weights
 
 
 def precision(given: Mapping[str, Any], read: Mapping[str, Any]) -> str:

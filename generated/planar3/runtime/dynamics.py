@@ -10,9 +10,9 @@ tensors are a view that is built on request.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from types import MethodType
 from typing import Any, Literal, overload
 
-from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from .interface import Array, Backend
@@ -75,7 +75,8 @@ class Dynamics:
         self.backend, self.parameters = backend, backend.parameters
         self._load, self._asked = load, asked
         self._answers = backend.answers(check_finite)
-        self._of_arrays = self._answers.of_arrays
+        # They stand before the methods of the class, which they pass on to what is no plain array.
+        vars(self).update({name: MethodType(call, self) for name, call in self._answers.direct.items()})
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}
@@ -83,37 +84,37 @@ class Dynamics:
         return f"<{self.name} on {self.backend.name}: {', '.join(parts)}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled, copied or sent to another process, it is loaded again there."""
-        return self._load, self._asked
+        """Pickled, copied or sent to another process, it is loaded again there; threads set here stay."""
+        return self._load, self._asked, getattr(self.backend, "threads_set", None)
+
+    def __setstate__(self, threads: int) -> None:
+        """Set threads as they were set of the robot that this one is a copy of."""
+        backend: Any = self.backend
+        backend.threads = threads
 
     def packed(self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None) -> Packed[Array]:
         """Full decomposition without the zeros: c2, c1 (closing), g, tau, h1, (..., count) each."""
-        calls = self._of_arrays if type(q) is ndarray else self._answers
-        answer: Packed[Array] = calls.packed(q, qd, qdd, out)
+        answer: Packed[Array] = self._answers.packed(q, qd, qdd, out)
         return answer
 
     def packed_torque(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_ij on the paths only, (..., count); its indices are `layout.torque`."""
-        calls = self._of_arrays if type(q) is ndarray else self._answers
-        tau: Array = calls.packed_torque(q, qd, qdd, out)
+        tau: Array = self._answers.packed_torque(q, qd, qdd, out)
         return tau
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_ij, the torque on joint i through link j, shape (..., n, N)."""
-        calls = self._of_arrays if type(q) is ndarray else self._answers
-        tau: Array = calls.partial_torque(q, qd, qdd, out)
+        tau: Array = self._answers.partial_torque(q, qd, qdd, out)
         return tau
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_i = sum_j tau_ij, shape (..., n)."""
-        calls = self._of_arrays if type(q) is ndarray else self._answers
-        tau: Array = calls.inverse_dynamics(q, qd, qdd, out)
+        tau: Array = self._answers.inverse_dynamics(q, qd, qdd, out)
         return tau
 
     def coefficients(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Coefficients[Array]:
         """c2, c1 (..., n, N, n) and g (..., n, N) of the closing convention."""
-        calls = self._of_arrays if type(q) is ndarray else self._answers
-        answer: Coefficients[Array] = calls.coefficients(q, qd, out)
+        answer: Coefficients[Array] = self._answers.coefficients(q, qd, out)
         return answer
 
     @overload
@@ -148,15 +149,13 @@ class Dynamics:
         paper's Eq. 1 to the letter, whose velocity part sums to twice the velocity force. Any other word
         raises ValueError.
         """
-        calls = self._of_arrays if type(q) is ndarray else self._answers
         answer: Propagation[Array] | GradientPropagation[Array]
-        answer = calls.propagation(q, qd, qdd, convention, out)
+        answer = self._answers.propagation(q, qd, qdd, convention, out)
         return answer
 
     def position_gradient(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
-        calls = self._of_arrays if type(q) is ndarray else self._answers
-        c0: Array = calls.position_gradient(q, qd, qdd, out)
+        c0: Array = self._answers.position_gradient(q, qd, qdd, out)
         return c0
 
     def masked(

@@ -10,6 +10,7 @@ import platform
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from .native_cache import ELSEWHERE, cache_directory, is_whole, keep, locked
@@ -31,18 +32,37 @@ class Sources:
 
     name: str
     directory: Path
+    digest: str = ""
+    """Of what the directory held when the robot was loaded; empty where whatever it holds will do."""
 
     def file(self, real: str) -> Path:
         """File to compile for `real`, double or float."""
         return self.directory / f"{self.name}{'f' if real == 'float' else ''}.c"
 
 
+@cache
+def loaded(name: str, directory: Path) -> Sources:
+    """A robot's C as it is at first: what is generated anew later does not go with the Python that runs."""
+    return Sources(name, directory, digest_of(directory))
+
+
 def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
     """Path of a library, compiled if it isn't there or isn't whole; raises RuntimeError if it cannot be.
+
+    It cannot be where the sources are not those that were loaded.
 
     real: double or float; what: decomposition, which holds the torques alone too, or gradient.
     A terminal is told of the wait on stderr.
     """
+    digest = sources.digest or digest_of(sources.directory)
+
+    def check() -> None:
+        if digest_of(sources.directory) != digest:
+            raise RuntimeError(
+                f"{sources.name} was generated anew after it was loaded; start Python again to use it"
+            )
+
+    check()
     compiler = find_compiler()
 
     def commands(folder: Path) -> list[list[list[str]]]:
@@ -54,8 +74,8 @@ def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
         ]
         return [compiling, [compiler.linking(objects, str(folder / MADE))]]
 
-    name = f"{sources.name}-{what}-{real}-{_fingerprint(sources, compiler)}"
-    return _kept(name, f"{sources.name} ({what}, {real})", compiler, commands)
+    name = f"{sources.name}-{what}-{real}-{_fingerprint(digest, compiler)}"
+    return _kept(name, f"{sources.name} ({what}, {real})", compiler, commands, check)
 
 
 def extension(source: Path, headers: Sequence[str], versions: Sequence[str]) -> Path:
@@ -75,31 +95,40 @@ def extension(source: Path, headers: Sequence[str], versions: Sequence[str]) -> 
         platform.machine(),
     )
     digest = hashlib.sha256(source.read_bytes() + repr((place, *versions)).encode())
-    return _kept(f"{source.stem}-{digest.hexdigest()[:20]}", source.stem, compiler, commands)
+    return _kept(f"{source.stem}-{digest.hexdigest()[:20]}", source.stem, compiler, commands, lambda: None)
 
 
-def _kept(name: str, what: str, compiler: Compiler, commands: Commands) -> Path:
-    """Path of a library in the cache, made there if need be."""
+def _kept(name: str, what: str, compiler: Compiler, commands: Commands, check: Callable[[], None]) -> Path:
+    """Path of a library in the cache, made there if need be; `check` raises for what is not to be kept."""
     target = cache_directory() / f"{name}.so"
     if not is_whole(target):
         lock = target.with_suffix(".lock")
         with told(f"compiling {what}, once") as tell, locked(lock, tell):
             if not is_whole(target):
-                _build(compiler, commands, target, tell)
+                _build(compiler, commands, target, tell, check)
     return target
 
 
-def _fingerprint(sources: Sources, compiler: Compiler) -> str:
-    """Hash of everything that the library depends on."""
+def digest_of(directory: Path) -> str:
+    """Hash of the names and the bytes of all files; raises RuntimeError where they cannot be read."""
     digest = hashlib.sha256()
-    for path in sorted(sources.directory.iterdir()):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    place = (compiler.command, compiler.flags, compiler.version(), platform.machine(), processor())
-    digest.update(repr(place).encode())
-    return digest.hexdigest()[:20]
+    try:
+        for path in sorted(directory.iterdir()):
+            digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    except OSError as error:
+        raise RuntimeError(f"cannot read {error.filename}: {error.strerror}; generate it again") from None
+    return digest.hexdigest()
 
 
-def _build(compiler: Compiler, commands: Commands, target: Path, tell: Tell) -> None:
+def _fingerprint(digest: str, compiler: Compiler) -> str:
+    """Hash of everything that the library depends on."""
+    place = (digest, compiler.command, compiler.flags, compiler.version(), platform.machine(), processor())
+    return hashlib.sha256(repr(place).encode()).hexdigest()[:20]
+
+
+def _build(
+    compiler: Compiler, commands: Commands, target: Path, tell: Tell, check: Callable[[], None]
+) -> None:
     """Compile side by side, link, and move the library into place in one step."""
     folder = target.with_suffix(".build")
     try:
@@ -115,6 +144,7 @@ def _build(compiler: Compiler, commands: Commands, target: Path, tell: Tell) -> 
             raise RuntimeError(f"{error}; the other back ends need no compiler") from None
         if not made.is_file():
             raise RuntimeError(f"{compiler.command[0]} made no library; point CC to a C compiler")
+        check()  # it may be of two texts
         keep(made, target)
     except OSError as error:
         place = error.filename or target

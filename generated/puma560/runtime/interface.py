@@ -65,8 +65,8 @@ class Backend(Protocol[Kind]):
     def index(self, values: NDArray[np.intp], like: Kind) -> Kind:
         """A table of positions, to take from `like`."""
 
-    def asarray(self, value: Any, like: Kind) -> Kind:
-        """Anything array-like, of the kind and dtype of `like`."""
+    def weights(self, name: str, value: Any, like: Kind) -> Kind:
+        """Real numbers in anything array-like, of the kind and dtype of `like`; errors name the argument."""
 
     def zeros(self, like: Kind, count: int) -> Kind:
         """Zeros of shape (..., count) for `like` of shape (..., m)."""

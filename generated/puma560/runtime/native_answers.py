@@ -1,6 +1,6 @@
 """Answers that C writes, zeros included, for arrays and for tensors of which no gradient is recorded."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,6 +14,17 @@ from .native_module import compiled_calls
 
 DTYPES = (np.dtype("f8"), np.dtype("f4"))
 """In the order of the compiled module."""
+
+COMPILED = (
+    "packed",
+    "packed_torque",
+    "partial_torque",
+    "inverse_dynamics",
+    "coefficients",
+    "propagation",
+    "position_gradient",
+)
+"""What the compiled module has of the calls of `Dynamics`."""
 
 
 class NativeAnswers(Answers):
@@ -33,15 +44,23 @@ class NativeAnswers(Answers):
         self._known: set[tuple[str, np.dtype[Any]]] = set()
 
     @property
-    def of_arrays(self) -> Any:
-        """The compiled module, where there is one."""
-        return self._compiled or self
+    def direct(self) -> Mapping[str, Callable[..., Any]]:
+        """The compiled module's calls, where there is one."""
+        return {call: getattr(self._compiled, call) for call in COMPILED} if self._compiled else {}
 
     def _made(self, made: Any) -> Any:
         """The compiled module's side of this robot."""
         constants = [self._calls.constants(kind) for kind in DTYPES]
         answers = {call: (KINDS.get(call), shapes) for call, shapes in self._shapes.items()}
-        return made(self, self._structure.n, LARGE - 1, *constants, answers)
+        return made(self._structure.n, LARGE - 1, *constants, answers)
+
+    def _answer(self, call: str, given: Sequence[Any], out: Any) -> Any:
+        if out is None and not self._check_finite:
+            values = self._calls.desks.at_once(call, given)
+            if values is not None:
+                kind = KINDS.get(call)
+                return kind(*values) if kind else values[0]
+        return super()._answer(call, given, out)
 
     def _computed(self, call: str, motion: Sequence[Any]) -> Any:
         if type(motion[0]) is np.ndarray or not has_tensors(motion):
@@ -70,7 +89,9 @@ class NativeAnswers(Answers):
         convention = {"propagation": ("closing",), "gradient_propagation": ("gradient",)}.get(call, ())
         several = call in KINDS
         out = into if into is None else tuple(into) if several else into[0]
-        answer = getattr(self._compiled, "propagation" if convention else call)(*motion, *convention, out)
+        answer = getattr(self._compiled, "propagation" if convention else call)(
+            self, *motion, *convention, out
+        )
         return answer if several else (answer,)
 
     def _run(self, call: str, motion: Sequence[Any], into: Sequence[Any] | None = None) -> Any:

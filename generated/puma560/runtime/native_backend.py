@@ -11,7 +11,7 @@ from .answers import Answers
 from .arguments import has_tensors
 from .interface import ClosedForms
 from .native_answers import NativeAnswers
-from .native_calls import NativeCalls
+from .native_calls import NativeCalls, checked_threads
 from .numpy_backend import NumpyBackend
 from .rule_calls import RigidRule
 from .structure import Structure
@@ -51,7 +51,13 @@ class NativeBackend(NumpyBackend):
 
     @threads.setter
     def threads(self, count: int) -> None:
-        self.calls.threads = count
+        """Raises TypeError or ValueError for what is not a whole number from 1 on."""
+        self.calls.threads_set = checked_threads(count)
+
+    @property
+    def threads_set(self) -> int | None:
+        """Threads that somebody has set; None where nobody has."""
+        return self.calls.threads_set
 
     def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
@@ -92,9 +98,13 @@ class NativeBackend(NumpyBackend):
         """A table of positions, to take from `like`."""
         return self.on_torch().index(values, like) if has_tensors([like]) else super().index(values, like)
 
-    def asarray(self, value: Any, like: Any) -> Any:
-        """Anything array-like, of the kind and dtype of `like`."""
-        return self.on_torch().asarray(value, like) if has_tensors([like]) else super().asarray(value, like)
+    def weights(self, name: str, value: Any, like: Any) -> Any:
+        """Real numbers in anything array-like, of the kind and dtype of `like`; errors name the argument."""
+        return (
+            self.on_torch().weights(name, value, like)
+            if has_tensors([like])
+            else super().weights(name, value, like)
+        )
 
     def zeros(self, like: Any, count: int) -> Any:
         """Zeros of shape (..., count) for `like` of shape (..., m)."""

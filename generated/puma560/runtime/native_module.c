@@ -1,7 +1,7 @@
 /* Calls of a robot's compiled C from Python, without a detour through Python code. The same for every robot: `Calls` is
    made of the addresses of its functions, and answers what needs no second look: NumPy arrays of one shape and dtype,
-   float32 or float64, contiguous, whose results are small enough for one thread. Whatever else it is asked, it passes on
-   to `others`, an object with methods of the same names, as it was asked.
+   float32 or float64, contiguous, whose results are small enough for one thread. Every call is given first its owner,
+   an object of a class with methods of the same names: whatever else it is asked, it passes on to these, as it was asked.
 
    Limited API: one file serves every Python from 3.11 on. */
 #define Py_LIMITED_API 0x030B0000
@@ -45,15 +45,12 @@ struct answer {
 /* Functions are by dtype, float64 first; those that nobody has compiled yet are NULL. */
 typedef struct {
     PyObject_HEAD
-    PyObject *others;
     PyObject *parameters[2]; /* arrays */
     int parametric;          /* whether there is anything in them */
     npy_intp joints, limit;
     struct answer answers[CALLS];
     void *functions[CALLS][2];
 } Calls;
-
-static newfunc tuple_new;
 
 /* ---- Which arrays are taken ---- */
 
@@ -161,20 +158,13 @@ static PyObject *as_answer(const struct answer *answer, PyArrayObject **results)
 {
     if (!answer->kind)
         return (PyObject *)results[0];
-    PyObject *values = PyTuple_New(answer->results);
+    PyTypeObject *const kind = (PyTypeObject *)answer->kind;
+    PyObject *made = ((allocfunc)PyType_GetSlot(kind, Py_tp_alloc))(kind, answer->results);
     for (int r = 0; r < answer->results; ++r)
-        if (values)
-            PyTuple_SetItem(values, r, (PyObject *)results[r]);
+        if (made)
+            PyTuple_SetItem(made, r, (PyObject *)results[r]);
         else
             Py_DECREF(results[r]);
-    PyObject *arguments = values ? PyTuple_New(1) : NULL;
-    if (!arguments) {
-        Py_XDECREF(values);
-        return NULL;
-    }
-    PyTuple_SetItem(arguments, 0, values);
-    PyObject *made = tuple_new((PyTypeObject *)answer->kind, arguments, NULL);
-    Py_DECREF(arguments);
     return made;
 }
 
@@ -249,53 +239,84 @@ static PyObject *answered(Calls *self, enum call which, PyObject *const *motion,
 
 /* ---- The calls ---- */
 
-static PyObject *pass_on(Calls *self, const char *name, PyObject *const *arguments, Py_ssize_t count)
+/* What the method of the owner's class says; the owner is the first argument. */
+static PyObject *pass_on(const char *name, PyObject *const *arguments, Py_ssize_t count, PyObject *names)
 {
-    if (!self->others) {
-        PyErr_SetString(PyExc_RuntimeError, "this robot is being thrown away");
-        return NULL;
+    if (!count)
+        return PyErr_Format(PyExc_TypeError, "%s() is called without its owner", name);
+    const Py_ssize_t named = names ? PyTuple_Size(names) : 0;
+    PyObject *answer = NULL, *by_name = NULL, *in_order = PyTuple_New(count);
+    PyObject *method = PyObject_GetAttrString((PyObject *)Py_TYPE(arguments[0]), name);
+    if (!method || !in_order || (named && !(by_name = PyDict_New())))
+        goto done;
+    for (Py_ssize_t a = 0; a < count; ++a) {
+        Py_INCREF(arguments[a]);
+        PyTuple_SetItem(in_order, a, arguments[a]);
     }
-    PyObject *method = PyObject_GetAttrString(self->others, name), *all = method ? PyTuple_New(count) : NULL;
-    PyObject *answer = NULL;
-    if (all) {
-        for (Py_ssize_t a = 0; a < count; ++a) {
-            Py_INCREF(arguments[a]);
-            PyTuple_SetItem(all, a, arguments[a]);
-        }
-        answer = PyObject_Call(method, all, NULL);
-    }
-    Py_XDECREF(all);
+    for (Py_ssize_t a = 0; a < named; ++a)
+        if (PyDict_SetItem(by_name, PyTuple_GetItem(names, a), arguments[count + a]) < 0)
+            goto done;
+    answer = PyObject_Call(method, in_order, by_name);
+done:
+    Py_XDECREF(by_name);
+    Py_XDECREF(in_order);
     Py_XDECREF(method);
     return answer;
 }
 
-/* Calls (q, qd[, qdd], out). */
-#define METHOD(name, which, motions)                                                                      \
-    static PyObject *name(PyObject *self, PyObject *const *arguments, Py_ssize_t count)                   \
-    {                                                                                                     \
-        PyObject *answer = NULL;                                                                          \
-        if (count == (motions) + 1)                                                                       \
-            answer = answered((Calls *)self, which, arguments, motions, arguments[motions]);              \
-        return answer || PyErr_Occurred() ? answer : pass_on((Calls *)self, #name, arguments, count);     \
-    }
-METHOD(packed, PACKED, 3)
-METHOD(packed_torque, PACKED_TORQUE, 3)
-METHOD(partial_torque, PARTIAL_TORQUE, 3)
-METHOD(inverse_dynamics, INVERSE_DYNAMICS, 3)
-METHOD(coefficients, COEFFICIENTS, 2)
-METHOD(position_gradient, POSITION_GRADIENT, 3)
+/* What a call may be told after its owner; NULL, or None for `out`, where it is not told. */
+enum told { Q, QD, QDD, CONVENTION, OUT, TOLD };
+static const char *const WORDS[TOLD] = {"q", "qd", "qdd", "convention", "out"};
+enum { HAS_QDD = 1 << QDD, HAS_CONVENTION = 1 << CONVENTION, ALWAYS = 1 << Q | 1 << QD | 1 << OUT };
 
-/* (q, qd, qdd, convention, out) */
-static PyObject *propagation(PyObject *self, PyObject *const *arguments, Py_ssize_t count)
+/* Arguments where they belong, of those that a call has; 0 where there is one too few, too many, or twice. */
+static int sorted(int has, PyObject *const *arguments, Py_ssize_t count, PyObject *names, PyObject **told)
 {
-    PyObject *answer = NULL;
-    if (count == 5 && PyUnicode_Check(arguments[3])) {
-        if (!PyUnicode_CompareWithASCIIString(arguments[3], "closing"))
-            answer = answered((Calls *)self, PROPAGATION, arguments, 3, arguments[4]);
-        else if (!PyUnicode_CompareWithASCIIString(arguments[3], "gradient"))
-            answer = answered((Calls *)self, GRADIENT_PROPAGATION, arguments, 3, arguments[4]);
+    Py_ssize_t used = 1; /* the first is the owner */
+    for (int t = 0; t < TOLD; ++t)
+        told[t] = has >> t & 1 && used < count ? arguments[used++] : NULL;
+    if (used < count)
+        return 0;
+    const Py_ssize_t named = names ? PyTuple_Size(names) : 0;
+    for (Py_ssize_t a = 0; a < named; ++a) {
+        int t = 0;
+        while (t < TOLD && PyUnicode_CompareWithASCIIString(PyTuple_GetItem(names, a), WORDS[t]))
+            ++t;
+        if (t == TOLD || !(has >> t & 1) || told[t])
+            return 0;
+        told[t] = arguments[count + a];
     }
-    return answer || PyErr_Occurred() ? answer : pass_on((Calls *)self, "propagation", arguments, count);
+    if (!told[OUT])
+        told[OUT] = Py_None;
+    return told[Q] && told[QD] && (told[QDD] || !(has & HAS_QDD));
+}
+
+#define METHOD(name, which, has)                                                                                        \
+    static PyObject *name(PyObject *self, PyObject *const *arguments, Py_ssize_t count, PyObject *names)                \
+    {                                                                                                                   \
+        PyObject *told[TOLD], *answer = NULL;                                                                           \
+        if (sorted(has, arguments, count, names, told))                                                                 \
+            answer = answered((Calls *)self, which, told, (has) & HAS_QDD ? 3 : 2, told[OUT]);                          \
+        return answer || PyErr_Occurred() ? answer : pass_on(#name, arguments, count, names);                           \
+    }
+METHOD(packed, PACKED, ALWAYS | HAS_QDD)
+METHOD(packed_torque, PACKED_TORQUE, ALWAYS | HAS_QDD)
+METHOD(partial_torque, PARTIAL_TORQUE, ALWAYS | HAS_QDD)
+METHOD(inverse_dynamics, INVERSE_DYNAMICS, ALWAYS | HAS_QDD)
+METHOD(coefficients, COEFFICIENTS, ALWAYS)
+METHOD(position_gradient, POSITION_GRADIENT, ALWAYS | HAS_QDD)
+
+static PyObject *propagation(PyObject *self, PyObject *const *arguments, Py_ssize_t count, PyObject *names)
+{
+    PyObject *told[TOLD], *answer = NULL;
+    if (sorted(ALWAYS | HAS_QDD | HAS_CONVENTION, arguments, count, names, told)) {
+        PyObject *const word = told[CONVENTION];
+        if (!word || (PyUnicode_Check(word) && !PyUnicode_CompareWithASCIIString(word, "closing")))
+            answer = answered((Calls *)self, PROPAGATION, told, 3, told[OUT]);
+        else if (PyUnicode_Check(word) && !PyUnicode_CompareWithASCIIString(word, "gradient"))
+            answer = answered((Calls *)self, GRADIENT_PROPAGATION, told, 3, told[OUT]);
+    }
+    return answer || PyErr_Occurred() ? answer : pass_on("propagation", arguments, count, names);
 }
 
 /* (call, dtype's number, address): a function that has been compiled since. */
@@ -354,13 +375,13 @@ static int read_answer(struct answer *answer, PyObject *kind, PyObject *shapes)
     return 0;
 }
 
-/* Calls(others, joints, limit, parameters as float64, as float32, {call: (type of tuple or None, shapes)}) */
+/* Calls(joints, limit, parameters as float64, as float32, {call: (type of tuple or None, shapes)}) */
 static PyObject *calls_new(PyTypeObject *type, PyObject *arguments, PyObject *Py_UNUSED(named))
 {
-    PyObject *others, *parameters[2], *answers;
+    PyObject *parameters[2], *answers;
     Py_ssize_t joints, limit;
-    if (!PyArg_ParseTuple(arguments, "OnnO!O!O!:Calls", &others, &joints, &limit, &PyArray_Type, &parameters[0],
-            &PyArray_Type, &parameters[1], &PyDict_Type, &answers))
+    if (!PyArg_ParseTuple(arguments, "nnO!O!O!:Calls", &joints, &limit, &PyArray_Type, &parameters[0], &PyArray_Type,
+            &parameters[1], &PyDict_Type, &answers))
         return NULL;
     if (joints < 1 || !is_plain(parameters[0]) || !is_plain(parameters[1])) {
         PyErr_SetString(PyExc_ValueError, "joints are one or more, parameters plain arrays");
@@ -372,8 +393,6 @@ static PyObject *calls_new(PyTypeObject *type, PyObject *arguments, PyObject *Py
         return NULL;
     self->joints = joints;
     self->limit = limit;
-    Py_INCREF(others);
-    self->others = others;
     for (int kind = 0; kind < 2; ++kind) {
         Py_INCREF(parameters[kind]);
         self->parameters[kind] = parameters[kind];
@@ -396,17 +415,10 @@ static int calls_traverse(PyObject *object, visitproc visit, void *arg)
 {
     Calls *self = (Calls *)object;
     Py_VISIT(Py_TYPE(object));
-    Py_VISIT(self->others);
     for (int kind = 0; kind < 2; ++kind)
         Py_VISIT(self->parameters[kind]);
     for (int which = 0; which < CALLS; ++which)
         Py_VISIT(self->answers[which].kind);
-    return 0;
-}
-
-static int calls_clear(PyObject *object)
-{
-    Py_CLEAR(((Calls *)object)->others);
     return 0;
 }
 
@@ -415,7 +427,6 @@ static void calls_dealloc(PyObject *object)
     Calls *self = (Calls *)object;
     PyTypeObject *type = Py_TYPE(object);
     PyObject_GC_UnTrack(object);
-    Py_CLEAR(self->others);
     for (int kind = 0; kind < 2; ++kind)
         Py_CLEAR(self->parameters[kind]);
     for (int which = 0; which < CALLS; ++which)
@@ -424,21 +435,25 @@ static void calls_dealloc(PyObject *object)
     Py_DECREF(type);
 }
 
-#define FAST(name) {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL, NULL}
+/* Python reads signatures from the first lines. */
+#define FAST(name, told)                                                                                                \
+    {#name, (PyCFunction)(void (*)(void))name, METH_FASTCALL | METH_KEYWORDS,                                           \
+     #name "($self, owner, /, " told "out=None)\n--\n\nSee `Dynamics." #name "`."}
 static PyMethodDef methods[] = {
-    FAST(packed), FAST(packed_torque), FAST(partial_torque), FAST(inverse_dynamics), FAST(coefficients),
-    FAST(propagation), FAST(position_gradient), {"learn", learn, METH_VARARGS, NULL}, {NULL, NULL, 0, NULL},
+    FAST(packed, "q, qd, qdd, "), FAST(packed_torque, "q, qd, qdd, "), FAST(partial_torque, "q, qd, qdd, "),
+    FAST(inverse_dynamics, "q, qd, qdd, "), FAST(coefficients, "q, qd, "),
+    FAST(propagation, "q, qd, qdd, convention='closing', "), FAST(position_gradient, "q, qd, qdd, "),
+    {"learn", learn, METH_VARARGS, NULL}, {NULL, NULL, 0, NULL},
 };
 static PyType_Slot slots[] = {
     {Py_tp_new, (void *)calls_new}, {Py_tp_dealloc, (void *)calls_dealloc}, {Py_tp_methods, methods},
-    {Py_tp_traverse, (void *)calls_traverse}, {Py_tp_clear, (void *)calls_clear}, {0, NULL},
+    {Py_tp_traverse, (void *)calls_traverse}, {0, NULL},
 };
 static PyType_Spec spec = {"native_module.Calls", sizeof(Calls), 0, Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC, slots};
 
 static int fill(PyObject *module)
 {
     import_array1(-1);
-    tuple_new = (newfunc)PyType_GetSlot(&PyTuple_Type, Py_tp_new);
     PyObject *type = PyType_FromModuleAndSpec(module, &spec, NULL);
     if (!type || PyModule_AddObjectRef(module, "Calls", type) < 0) {
         Py_XDECREF(type);

@@ -16,6 +16,9 @@ NumberArray = NDArray[Any]
 
 Place = ctypes.c_char * 0
 
+CARRAY, WARNS = 0x501, 1 << 31
+"""Of `flags.num`: an array that C can read and write; one that warns where writing is spoken of."""
+
 LITTLE = 1 << 15
 """Bytes below which where memory starts is of no account."""
 
@@ -51,7 +54,8 @@ def address(array: NumberArray) -> int:
 def place(array: NumberArray) -> Any:
     """What ctypes takes for an array's place in memory, quicker than its address where it is writable."""
     buffer: Any = array
-    return Place.from_buffer(buffer) if array.flags.carray else address(array)
+    writable = array.flags.num & (CARRAY | WARNS) == CARRAY
+    return Place.from_buffer(buffer) if writable else address(array)
 
 
 def memory(shape: tuple[int, ...], kind: "np.dtype[Any]") -> NumberArray:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .answers import Answers
-from .arguments import as_array, check_axes, no_common_shape, precision
+from .arguments import as_array, as_weights, check_axes, no_common_shape, precision
 from .array_kernels import Crossing, known_kernel, rule_is_quicker
 from .interface import ClosedForms, Entries
 from .joint_tree import Bodies
@@ -119,9 +119,9 @@ class NumpyBackend:
         """A table of positions, to take from `like`."""
         return np.asarray(values, dtype=np.intp)
 
-    def asarray(self, value: Any, like: Any) -> Any:
-        """Anything array-like, in the dtype of `like`."""
-        return as_array("the mask", value).astype(like.dtype)
+    def weights(self, name: str, value: Any, like: Any) -> Any:
+        """Real numbers in anything array-like, in the dtype of `like`; errors name the argument."""
+        return as_array(name, as_weights(name, value)).astype(like.dtype)
 
     def zeros(self, like: Any, count: int) -> Any:
         """Zeros of shape (..., count) for `like` of shape (..., m)."""

@@ -10,7 +10,7 @@ from torch._subclasses.fake_tensor import unset_fake_temporarily
 from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
 from .answers import Answers
-from .arguments import as_array, check_axes, no_common_shape, precision
+from .arguments import as_array, as_weights, check_axes, no_common_shape, precision
 from .array_kernels import Crossing, known_kernel, rule_is_quicker
 from .interface import ClosedForms
 from .joint_tree import Bodies
@@ -117,8 +117,11 @@ class TorchBackend:
         """A table of positions, to take from `like`."""
         return _kept(values, torch.long, like.device)
 
-    def asarray(self, value: Any, like: Tensor) -> Tensor:
-        """Anything array-like, in the dtype and on the device of `like`."""
+    def weights(self, name: str, value: Any, like: Tensor) -> Tensor:
+        """Real numbers in anything array-like, as `like` in dtype and device; errors name the argument."""
+        if not torch.compiler.is_dynamo_compiling():  # which knows no dtypes of arrays
+            value = as_weights(name, value)
+            value = value if torch.is_tensor(value) else np.array(value, dtype=float)
         return torch.as_tensor(value, dtype=like.dtype, device=like.device)
 
     def zeros(self, like: Tensor, count: int) -> Tensor:

@@ -104,7 +104,7 @@ def with_bodies(xp: Any, numbers: TreeArrays, bodies: Bodies[Any], batch: tuple[
 
 
 def checked_bodies(given: Any, links: int, read: Callable[[str, Any], Any]) -> Bodies[Any]:
-    """Bodies as `read` makes arrays or tensors of them by name.
+    """Bodies as `read` makes arrays or tensors of them by name; arrays are copied, tensors may be learned.
 
     Raises TypeError for what is no number, and ValueError for a wrong shape.
     """
@@ -125,4 +125,4 @@ def checked_bodies(given: Any, links: int, read: Callable[[str, Any], Any]) -> B
             raise ValueError(
                 f"{name} has shape {tuple(value.shape)}; it must be {shape}, or that behind axes of samples"
             )
-    return Bodies(*values.values())
+    return Bodies(*(a.copy() if isinstance(a, np.ndarray) else a for a in values.values()))

@@ -172,6 +172,7 @@ BACKENDS: dict[str, BackendFiles] = {
                 "native_cache.py",
                 "native_calls.py",
                 "native_compiler.py",
+                "native_desk.py",
                 "native_library.py",
                 "native_memory.py",
                 "native_module.c",

@@ -5,7 +5,6 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,8 @@ import numpy as np
 
 from .answers import answer_shapes
 from .arguments import has_tensors
-from .native_build import Sources
+from .native_build import loaded
+from .native_desk import Desk, Desks, new_desk
 from .native_library import NumberArray, address, function, memory, place
 from .structure import Structure
 
@@ -51,14 +51,13 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=pool.cache_clear)
 
 
-@dataclass(frozen=True)
-class Desk:
-    """Memory for one sample's motion and results, and where a C function finds it."""
-
-    compute: Any
-    motion: list[NumberArray]
-    results: list[NumberArray]
-    addresses: tuple[int, ...]
+def checked_threads(count: Any) -> int:
+    """How many threads a large batch may use; raises TypeError or ValueError for what is no such number."""
+    if isinstance(count, bool) or not isinstance(count, int | np.integer):
+        raise TypeError(f"threads is a {type(count).__name__}; give a whole number from 1 on")
+    if count < 1:
+        raise ValueError(f"threads is {count}; give a whole number from 1 on")
+    return int(count)
 
 
 class NativeCalls:
@@ -67,20 +66,30 @@ class NativeCalls:
     `threads` is how many a large batch may use.
     """
 
-    def __init__(self, structure: Structure, sources: Path, parameters: Mapping[str, Any]) -> None:
-        """Compile at the first call for this package; raises RuntimeError where that cannot be."""
+    def __init__(
+        self, structure: Structure, sources: Path, parameters: Mapping[str, Any], threads: int | None = None
+    ) -> None:
+        """Compile at the first call for this package; raises RuntimeError where that cannot be.
+
+        threads: as many as there are cores unless given
+        """
         self.structure, self.parameters = structure, dict(parameters)
-        self.sources = Sources(structure.name, sources)
-        self.threads = os.cpu_count() or 1
+        self.sources = loaded(structure.name, sources)
+        self.threads_set, self._cores = threads, os.cpu_count() or 1
         self.shapes = answer_shapes(structure)
         self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
         self._complete = {call: all(sizes) for call, sizes in self.sizes.items()}
         self._widths = {call: sum(sizes) for call, sizes in self.sizes.items()}
         self.learned = has_tensors(parameters.values())
         self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
-        self._desks: dict[tuple[str, np.dtype[Any]], list[Desk]] = {}
+        self.desks = Desks(structure.n, self._desk)
         self._functions: dict[tuple[str, np.dtype[Any]], Any] = {}
         self._function("packed", np.dtype("f8"))
+
+    @property
+    def threads(self) -> int:
+        """How many threads a large batch may use."""
+        return self.threads_set or self._cores
 
     def run(
         self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
@@ -90,14 +99,15 @@ class NativeCalls:
         kind, batch = q.dtype, q.shape[:-1]
         count = q.size // q.shape[-1]
         if count == 1 and into is None and not self.learned:
-            return self._one(call, motion, kind, batch)
+            results = self.desks.results(call, motion)
+            return [a.reshape(*batch, *a.shape) for a in results] if batch else results
         shapes = self.shapes[call]
         if into is None:
             into = [memory((*batch, *shape), kind) for shape in shapes]
         if not count:
             return into
         compute = self._functions.get((call, kind)) or self._function(call, kind)
-        read = [a if a.flags.carray else plain(a) for a in motion]
+        read = [plain(a) for a in motion]
         if self.parameters:
             read.append(self._numbers(kind) if self.learned else self._constants[kind])
         sizes = self.sizes[call]
@@ -116,29 +126,12 @@ class NativeCalls:
         self._share(compute, count, arrays, parts, (read, into))
         return into
 
-    def _one(
-        self, call: str, motion: Sequence[NumberArray], kind: "np.dtype[Any]", batch: tuple[int, ...]
-    ) -> Sequence[NumberArray]:
-        """Results for one sample; copies to and from a desk cost less than to find out where arrays lie."""
-        desks = self._desks.setdefault((call, kind), [])
-        try:
-            desk = desks.pop()  # so that neither a thread nor a signal's handler finds it in use
-        except IndexError:
-            desk = self._new_desk(call, kind)
-        for to, a in zip(desk.motion, motion, strict=True):
-            to[...] = a
-        desk.compute(1, *desk.addresses)
-        results = [a.copy() for a in desk.results]
-        desks.append(desk)
-        return [a.reshape(*batch, *a.shape) for a in results] if batch else results
-
-    def _new_desk(self, call: str, kind: "np.dtype[Any]") -> "Desk":
+    def _desk(self, call: str, kind: "np.dtype[Any]") -> Desk:
+        """Memory for one sample of a call."""
         compute = self._functions.get((call, kind)) or self._function(call, kind)
-        motion = [np.empty(self.structure.n, kind) for _ in range(2 if call == "coefficients" else 3)]
-        results = [np.empty(shape, kind) for shape in self.shapes[call]]
+        motion = np.empty((2 if call == "coefficients" else 3, self.structure.n), kind)
         constants = [self._constants[kind]] if self.parameters else []
-        arrays = [*motion, *constants, *(a for a in results if a.size)]
-        return Desk(compute, motion, results, tuple(map(address, arrays)))
+        return new_desk(compute, motion, constants, [np.empty(shape, kind) for shape in self.shapes[call]])
 
     def constants(self, kind: "np.dtype[Any]") -> NumberArray:
         """Values of parameters that stay as they are, in the order of the structure."""

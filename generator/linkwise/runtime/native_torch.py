@@ -85,7 +85,7 @@ class TorchSide(TorchBackend):
         names = self.structure.parameters
         values = [self.parameters[name].to(q).reshape(()) for name in names]
         p = torch.stack(values) if values else q.new_empty(0)
-        operated = self.operators[call](q, qd, qdd, p)
+        operated = self.operators[call](q, qd, qdd, p, self.calls.threads)
         return operated if isinstance(operated, tuple) else (operated,)
 
     def needs_operators(self, motion: Sequence[Tensor]) -> bool:
@@ -124,30 +124,30 @@ def operator(
 def _define(
     calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
 ) -> Any:
-    """Operator (q, qd, qdd, p) -> results; p holds the parameters in the structure's order."""
+    """Operator (q, qd, qdd, p, threads) -> results; p holds the parameters in the structure's order."""
     structure, sources, sizes = calls.structure, calls.sources, calls.sizes[OPERATED[call]]
 
     def values(p: Tensor) -> dict[str, Tensor]:
         return dict(zip(structure.parameters, p.unbind(), strict=True))
 
-    def forward(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
-        present = NativeCalls(structure, sources.directory, values(p.detach()))
+    def forward(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, threads: int) -> Any:
+        present = NativeCalls(structure, sources.directory, values(p.detach()), threads)
         return _bare(compute(present.run, OPERATED[call], (q, qd, qdd)))
 
-    def fake(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
+    def fake(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, threads: int) -> Any:
         return _bare(tuple(q.new_empty((*q.shape[:-1], size)) for size in sizes))
 
     def setup(ctx: Any, inputs: Any, output: Any) -> None:
-        ctx.save_for_backward(*inputs)
+        ctx.save_for_backward(*inputs[:-1])
 
     def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
         def again(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
             return getattr(TorchBackend(structure, links, values(p), rule), call)(q, qd, qdd)
 
-        return _backward(again, ctx.saved_tensors, ctx.needs_input_grad, slopes)
+        return (*_backward(again, ctx.saved_tensors, ctx.needs_input_grad[:-1], slopes), None)
 
     results = ", ".join(["Tensor"] * len(sizes))
-    schema = f"(Tensor q, Tensor qd, Tensor qdd, Tensor p) -> ({results})"
+    schema = f"(Tensor q, Tensor qd, Tensor qdd, Tensor p, int threads) -> ({results})"
     made = torch.library.custom_op(f"{_namespace(sources)}::{call}", forward, mutates_args=(), schema=schema)
     made.register_fake(fake)
     made.register_autograd(backward, setup_context=setup)

@@ -4,6 +4,7 @@ import shutil
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -157,7 +158,7 @@ def calls_from_python(package: Package) -> dict[str, Callable[[], Any]]:
 
     whole = chain(package, list(range(package.sizes["JOINTS"])), None)
     data, x = whole.createData(), 0.1 * np.arange(1, whole.nv + 1)
-    return {"rnea": lambda: pin.rnea(whole, data, x, x, x), "regressor": regressor(package)}
+    return {"rnea": partial(pin.rnea, whole, data, x, x, x), "regressor": regressor(package)}
 
 
 def regressor(package: Package) -> Callable[[], Any]:

@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Iterator
+from copy import copy
 from functools import partial
 from importlib import import_module
 from types import ModuleType
@@ -97,21 +98,19 @@ def timed(
         for call in ("packed", *DENSE) if native else ("packed",):
             if batch * width * values(package, call) > MOST_BYTES or (call in DENSE and dtype == "float32"):
                 continue
-            method = getattr(robot, call)
-            work = partial(method, *motion[: 2 if call == "coefficients" else 3])
+            given = motion[: 2 if call == "coefficients" else 3]
+            for threads in (1, 2) if native and batch > 1 and call == "packed" else (1,):
+                method = getattr(on_threads(robot, threads) if native else robot, call)
+                yield (through, dtype, batch, threads, call), partial(method, *given)
             if "out" in inspect.signature(method).parameters and call in DENSE and batch > 1:
-                yield (through, dtype, batch, 1, f"{call} out"), partial(work, out=work())
-            if not native:
-                yield (through, dtype, batch, 1, call), work
-                continue
-            for threads in (1, 2) if batch > 1 and call == "packed" else (1,):
-                yield (through, dtype, batch, threads, call), partial(on_threads, robot, threads, work)
+                yield (through, dtype, batch, 1, f"{call} out"), partial(method, *given, out=method(*given))
 
 
-def on_threads(robot: Any, threads: int, work: Callable[[], Any]) -> Any:
-    """A call of the native back end on so many threads."""
+def on_threads(robot: Any, threads: int) -> Any:
+    """The native back end on so many threads, another robot where they are several."""
+    robot = robot if threads == 1 else copy(robot)
     robot.backend.threads = threads
-    return work()
+    return robot
 
 
 def values(package: Package, call: str) -> int:
