@@ -1,13 +1,16 @@
 """A kernel in loops: it answers as the closed forms do, for robots of every kind, and is chosen by size."""
 
+import ctypes
 import json
 import re
 import shutil
 import subprocess
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 from answers import random_states, relative_error
 from compiled import STRICT, Compiled, compile_library, name_of
@@ -15,10 +18,12 @@ from conftest import DATA, needs_compiler
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
 from linkwise.check import check_package
 from linkwise.cli.app import app
+from linkwise.emit.kernel_choice import chosen_kernel
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
-from test_emitted_c import COMPILERS, PARTS, strict
+from test_emitted_c import COMPILERS, PARTS, aligned, counting, strict
 from typer.testing import CliRunner
+from urdf_text import joint, link, robot
 
 CRANE, LEG, TURNTABLE = str(DATA / "crane.urdf"), str(DATA / "leg.toml"), str(DATA / "turntable.py")
 FIELDS = ("acceleration", "velocity", "gravity", "torque")
@@ -82,6 +87,34 @@ def test_it_compiles_without_a_warning_whole_and_in_parts(
         subprocess.run([*command, f"-DLINKWISE_PART={part}", "-c", str(source), "-o", made], check=True)
     linked = [compiler, "-shared", "-Wl,--no-undefined", *objects, "-lm", "-o", str(tmp_path / "all.so")]
     subprocess.run(linked, check=True)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+@pytest.mark.parametrize("behind", [0, 16], ids=["on a line", "off a line"])
+def test_large_blocks_go_past_the_cache_where_lines_are_whole(
+    behind: int, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """c2 and c1, and not the few values of g and tau; the numbers are those of few blocks."""
+    compiler = ("gcc", "-std=c99", "-O1", "-mavx", "-DLARGE=(size_t)16384", *counting(tmp_path, 32))
+    compile_library(directory_of("puma560 loops"), tmp_path / "library.so", compiler)
+    library = ctypes.CDLL(str(tmp_path / "library.so"))
+    sizes, few, many = (56, 91, 21, 21), 1, 12
+    motion = [rows.reshape(many, 8, 6).swapaxes(1, 2).copy() for rows in random_states(6, many * 8)]
+
+    def computed(blocks: int) -> list[np.ndarray]:
+        results = [aligned(blocks * 8 * size, np.float64, behind) for size in sizes]
+        arrays = [ctypes.c_void_p(a.ctypes.data) for a in (*motion, *results)]
+        library.puma560_decomposition_blocks(ctypes.c_size_t(blocks), *arrays)
+        return results
+
+    expected = computed(few)
+    streamed, unfenced = (ctypes.c_long.in_dll(library, name) for name in ("streamed", "unfenced"))
+    assert streamed.value == 0
+    results = computed(many)
+    assert streamed.value == (0 if behind else results[0].nbytes + results[1].nbytes)
+    assert unfenced.value == 0
+    for a, b in zip(results, expected, strict=True):
+        assert (a[: b.size] == b).all()
 
 
 @needs_compiler
@@ -152,6 +185,16 @@ def test_the_manifest_says_which_kernel_was_chosen(robot: str, choice: str, kern
     manifest = json.loads(generate(read_system(robot), ["c"], kernel=choice)["manifest.json"])
     assert manifest["kernel"] == kernel
     assert all(link["operations"] > 0 for link in manifest["links"])
+
+
+@pytest.mark.parametrize(("turn", "kernel"), [("0 0 0", "straight"), ("1.5707963267948966 0 0", "loops")])
+def test_what_parallel_axes_save_is_seen(turn: str, kernel: str, tmp_path: Path) -> None:
+    """Fourteen joints, whose axes are parallel or at right angles: as many results, and another choice."""
+    names = "abcdefghijklmno"
+    arm = [joint(a + b, a, b, rpy=turn, axis="0 0 1") for a, b in pairwise(names)]
+    path = tmp_path / "arm.urdf"
+    path.write_text(robot(*map(link, names), *arm), encoding="utf-8")
+    assert chosen_kernel(read_system(path), "auto", None) == kernel
 
 
 def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from answers import relative_error
 from conftest import needs_compiler
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
-from linkwise.runtime.array_kernels import rule_is_quicker
+from linkwise.runtime.array_kernels import Crossing, largest_batch
 from test_parameters import TOML
 
 torch = pytest.importorskip("torch")
@@ -26,6 +26,15 @@ def motion_of(backend: str, n: int, *batch: int, dtype: str = "float64") -> list
     return list(arrays) if backend == "numpy" else [torch.from_numpy(a) for a in arrays]
 
 
+FEW = pytest.mark.parametrize("few", [True, False], ids=["in matrices", "samples innermost"])
+
+
+def told(robot: Any, few: bool, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The robot, computing as it does for few samples or for many."""
+    monkeypatch.setattr(type(robot.backend), "few", lambda self, samples, links: few)
+    return robot
+
+
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     """An arm with a massless body, formulas and a parameter for every number."""
@@ -38,8 +47,9 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
 
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("each", [False, True])
+@FEW
 def test_the_rule_takes_parameters_one_for_all_or_one_a_sample(
-    backend: str, each: bool, arm: ModuleType
+    backend: str, each: bool, few: bool, arm: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     share = np.array([0.9, 1.0, 1.05]) if each else np.float64(1.05)
     given = {name: value * share for name, value in arm.parameters.items()}
@@ -47,6 +57,7 @@ def test_the_rule_takes_parameters_one_for_all_or_one_a_sample(
     rule, straight = (
         arm.load(backend, given, allow_unphysical=True, kernel=kernel) for kernel in ("rule", "straight")
     )
+    told(rule, few, monkeypatch)
     for call in CALLS:
         assert relative_error(getattr(rule, call)(*motion), getattr(straight, call)(*motion)) <= 1e-14
 
@@ -55,7 +66,7 @@ def test_the_rule_takes_parameters_one_for_all_or_one_a_sample(
 def test_large_batches_in_pieces_are_what_single_samples_are(
     backend: str, package_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    robot = package_of("torso").load(backend, kernel="rule")
+    robot = told(package_of("torso").load(backend, kernel="rule"), False, monkeypatch)
     motion = motion_of(backend, robot.n, 23)
     whole = robot.packed(*motion)
     monkeypatch.setattr(type(robot.backend), "chunk", lambda self, motion, most: 5)
@@ -67,10 +78,17 @@ def test_large_batches_in_pieces_are_what_single_samples_are(
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("batch", [(), (2, 3), (0,)])
+@FEW
 def test_the_rule_keeps_dtype_and_shape(
-    backend: str, dtype: str, batch: tuple[int, ...], package_of: Callable[[str], ModuleType]
+    backend: str,
+    dtype: str,
+    batch: tuple[int, ...],
+    few: bool,
+    package_of: Callable[[str], ModuleType],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     robot, other = (package_of("puma560").load(backend, kernel=kernel) for kernel in ("rule", "straight"))
+    told(robot, few, monkeypatch)
     motion = motion_of(backend, 6, *batch, dtype=dtype)
     for call in ("partial_torque", "position_gradient"):
         value, expected = getattr(robot, call)(*motion), getattr(other, call)(*motion)
@@ -113,11 +131,12 @@ def test_slopes_by_bodies_are_pinocchios_regressor(package_of: Callable[[str], M
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
+@FEW
 def test_bodies_may_differ_from_sample_to_sample(
-    backend: str, package_of: Callable[[str], ModuleType]
+    backend: str, few: bool, package_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = package_of("torso")
-    motion = motion_of(backend, package.load(backend).n, 4)
+    motion = motion_of(backend, told(package.load(backend), few, monkeypatch).n, 4)
     scale = np.array([0.5, 1.0, 2.0, 3.0])
     own = package.bodies()
     bodies = package.Bodies(
@@ -209,7 +228,9 @@ def test_auto_takes_what_the_table_says(
     package = package_of("planar3")
     robot = package.load(backend)
     module = __import__(type(robot.backend).__module__, fromlist=["CROSSINGS"])
-    monkeypatch.setattr(module, "CROSSINGS", {"torque": ((10, 0), (36, 4), (100, 99))})
+    operations = sum(link.OPERATIONS["torque"] for link in robot.backend.links)
+    rows = ((10, 0), (operations, 4), (operations + 1, 99))
+    monkeypatch.setattr(module, "CROSSINGS", {"torque": Crossing(operations, rows)})
     taken: list[int] = []
 
     def counted(self: Any, space: Any, motion: Any, p: Any, bodies: Any) -> Any:
@@ -220,7 +241,11 @@ def test_auto_takes_what_the_table_says(
     for samples in (3, 4, 5):
         robot.packed_torque(*motion_of(backend, 3, samples))
     assert taken == [3, 4]
-    assert [rule_is_quicker(module.CROSSINGS, "torque", n, 9) for n in (9, 99, 100)] == [False, False, True]
+    robot.packed_torque(*motion_of(backend, 3))
+    monkeypatch.setattr(module, "CROSSINGS", {"torque": Crossing(operations + 1, rows)})
+    robot.packed_torque(*motion_of(backend, 3))
+    assert taken == [3, 4, 3], "one sample without an axis of samples has a row of its own"
+    assert [largest_batch(rows, size) for size in (9, 10, operations, 9999)] == [0, 0, 4, 99]
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

@@ -44,7 +44,7 @@ def load(
     allow_unphysical: whether values of parameters are taken that no body has: there are none here.
 
     kernel: what numpy and torch compute by: "straight", closed forms, thousands of operations on arrays;
-    "rule", one hundred and fifty or so that serve all links at once; or "auto", what was measured to be quicker.
+    "rule", a hundred or so that serve all links at once; or "auto", what was measured to be quicker.
 
     bodies: masses, centres and inertias in place of the package's own, as `Bodies` says and `bodies()` has them, for
     numpy and torch: arrays or, for torch, tensors, through which gradients flow; one for all samples or one for each.

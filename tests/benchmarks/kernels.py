@@ -23,6 +23,8 @@ CASES = (
     Case("panda", shipped("panda.urdf"), FINGERS),
     Case("chain8", chain_file(8)),
     Case("planar10", built_in("planar10")),
+    Case("planar14", built_in("planar14")),
+    Case("planar20", built_in("planar20")),
     Case("chain12", chain_file(12)),
     Case("solo12", shipped("solo12.urdf"), FLOATING),
     Case("talos", shipped("talos_reduced.urdf")),

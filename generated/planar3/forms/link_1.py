@@ -12,6 +12,11 @@ from typing import Any
 
 LINK = 'link1'
 PATH = (0,)  # coordinates that move the link, counted from 0
+OPERATIONS: Mapping[str, int] = {
+    "decomposition": 4,
+    "torque": 7,
+    "position_gradient": 9,
+}
 
 
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -12,6 +12,11 @@ from typing import Any
 
 LINK = 'link3'
 PATH = (0, 1, 2)  # coordinates that move the link, counted from 0
+OPERATIONS: Mapping[str, int] = {
+    "decomposition": 109,
+    "torque": 70,
+    "position_gradient": 110,
+}
 
 
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .answers import Answers
 from .arguments import as_array, as_weights, check_axes, no_common_shape, precision
-from .array_kernels import Crossing, known_kernel, rule_is_quicker
+from .array_kernels import Crossing, known_kernel, operations
 from .interface import ClosedForms, Entries
 from .joint_tree import Bodies
 from .parameter_values import fits
@@ -17,12 +17,14 @@ from .structure import Structure
 from .tree_arrays import checked_bodies
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
-CROSSINGS: dict[str, Crossing] = {
-    "decomposition": ((70, 4), (189, 64)),
-    "torque": ((100, 4), (189, 16), (1785, 64)),
-    "position_gradient": ((70, 4), (189, 16), (280, 64)),
+CROSSINGS = {
+    "decomposition": Crossing(1016, ((1016, 32), (3279, 64), (4264, 128), (11719, 256), (28167, 512))),
+    "torque": Crossing(618, ((618, 32), (1441, 64), (1985, 128), (21901, 256))),
+    "position_gradient": Crossing(1217, ((1217, 32), (2044, 64), (4990, 128), (29453, 512))),
 }
 """Where the rule is quicker, see `array_kernels`."""
+MATRICES = 128
+"""Links times samples up to which the rule is quicker in spatial matrices than with its samples innermost."""
 
 
 class NumpyBackend:
@@ -48,6 +50,7 @@ class NumpyBackend:
         """
         self.structure = structure
         self.links = links or ()
+        self.operations = operations(links) if links and rule else {}
         self.rule = rule
         self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
         self.parameters: dict[str, Any] = {
@@ -131,6 +134,10 @@ class NumpyBackend:
         """The parts joined along the last axis."""
         return np.concatenate(list(parts), -1)
 
+    def few(self, samples: int, links: int) -> bool:
+        """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
+        return samples * links <= MATRICES
+
     def chunk(self, motion: Sequence[Any], most: int) -> int | None:
         """Samples to compute at once: as many as stay in the cache."""
         return most
@@ -138,8 +145,7 @@ class NumpyBackend:
     def _rule(self, call: str, q: Any) -> RigidRule | None:
         """The rule where it is to be taken, None for closed forms."""
         if self.kernel == "auto":
-            samples = q.size // q.shape[-1]
-            quicker = rule_is_quicker(CROSSINGS, call, sum(self.structure.sizes), samples)
+            quicker = CROSSINGS[call].rule_is_quicker(self.operations[call], tuple(q.shape[:-1]))
             return self.rule if quicker else None
         return self.rule if self.kernel == "rule" else None
 

@@ -12,6 +12,11 @@ from typing import Any
 
 LINK = 'link2'
 PATH = (0, 1)  # coordinates that move the link, counted from 0
+OPERATIONS: Mapping[str, int] = {
+    "decomposition": 50,
+    "torque": 57,
+    "position_gradient": 71,
+}
 
 
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -12,6 +12,11 @@ from typing import Any
 
 LINK = 'link4'
 PATH = (0, 1, 2, 3)  # coordinates that move the link, counted from 0
+OPERATIONS: Mapping[str, int] = {
+    "decomposition": 230,
+    "torque": 159,
+    "position_gradient": 325,
+}
 
 
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -12,6 +12,11 @@ from typing import Any
 
 LINK = 'link5'
 PATH = (0, 1, 2, 3, 4)  # coordinates that move the link, counted from 0
+OPERATIONS: Mapping[str, int] = {
+    "decomposition": 405,
+    "torque": 237,
+    "position_gradient": 505,
+}
 
 
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:

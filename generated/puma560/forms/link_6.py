@@ -12,6 +12,11 @@ from typing import Any
 
 LINK = 'link6'
 PATH = (0, 1, 2, 3, 4, 5)  # coordinates that move the link, counted from 0
+OPERATIONS: Mapping[str, int] = {
+    "decomposition": 734,
+    "torque": 392,
+    "position_gradient": 984,
+}
 
 
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:

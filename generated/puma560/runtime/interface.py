@@ -26,6 +26,9 @@ class ClosedForms(Protocol):
     `Layout`.
     """
 
+    OPERATIONS: Mapping[str, int]
+    """Operations of each of the functions, sines and the like included: so many there are on arrays."""
+
     def decomposition(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Entries, ...]:
         """(c2, c1, g, tau), and h1 after them for a link whose energy has terms linear in the velocities."""
 

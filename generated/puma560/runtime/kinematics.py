@@ -3,7 +3,7 @@
 `xp` is the array namespace, numpy or torch. Arrays have their samples innermost and their joints (or links)
 before them: a vector is (3, joints, samples), and what all samples share has one. The number of array
 operations grows with the logarithm of the tree's depth alone: frames are composed over one joint, then two,
-four, eight, and what adds up along a chain of joints is one product with a matrix of zeros and ones.
+four, eight, and so is what adds up along a chain of joints.
 
 Vectors are in the base's axes, and moments and linear velocities about an origin o at rest: at the instant
 it is in the first hinge of each path, and places are counted from there, so that what is far from the base,
@@ -39,10 +39,8 @@ class KinematicTables(NamedTuple):
     """Frame that carries each one."""
     steps: tuple[Any, ...]
     """For each step of composition the frame that each one's axes are in so far."""
-    before: Any
-    """(frames, frames): ones for the joints before each, itself apart."""
-    reach: Any
-    """(frames, frames): ones for the joints on each one's path behind the first hinge, itself included."""
+    behind: Any
+    """(frames, 1): ones for the frames that have a hinge before them, whose steps count."""
 
 
 class Poses(NamedTuple):
@@ -65,7 +63,7 @@ class Twists(NamedTuple):
     rates: Any
     """The same of their rates, zd and sd."""
     twists: Any
-    """The same: omega and v of what carries each joint."""
+    """The same: omega and v of each frame; V x S is also that of what carries the joint, as S x S = 0."""
     accelerations: Any
     """The same: their rates, from minus gravity."""
 
@@ -79,9 +77,6 @@ def kinematic_tables(tree: JointTree) -> KinematicTables:
     x, y, z = rotation[:, 0], rotation[:, 1], rotation[:, 2]
     none, ground = np.zeros_like(x), len(joints)
     parents = np.array([*(ground if j.parent is None else j.parent for j in joints), ground])
-    before = np.zeros((ground + 1, ground + 1))
-    for f, joint in enumerate(joints):
-        before[f, list(tree.chain(joint.parent))] = 1.0
     return KinematicTables(
         np.array([*(j.coordinate for j in joints), 0]),
         np.where(hinge, ratio, 0.0),
@@ -92,20 +87,18 @@ def kinematic_tables(tree: JointTree) -> KinematicTables:
         np.stack([y, -x, none], 1),
         z,
         parents,
-        tuple(_doubled(parents)),
-        before,
-        _reach(tree, before),
+        tuple(doubled(parents)),
+        np.array([*hinge_before(tree), False])[:, None].astype(float),
     )
 
 
-def _reach(tree: JointTree, before: Any) -> Any:
-    """Joints whose steps lie between the first hinge of a path and each frame: those with a hinge before."""
-    turns = np.array([*(joint.kind == "revolute" for joint in tree.joints), False])
-    behind = (before @ turns > 0.0)[None]
-    return np.where(behind, before + np.eye(len(before)), 0.0)
+def hinge_before(tree: JointTree) -> list[bool]:
+    """Whether each joint's path has a hinge before it."""
+    hinges = [joint.kind == "revolute" for joint in tree.joints]
+    return [any(hinges[f] for f in tree.chain(joint.parent)) for joint in tree.joints]
 
 
-def _doubled(parents: Any) -> Any:
+def doubled(parents: Any) -> Any:
     """Frames 1, 2, 4, ... joints before each; the ground, the last one, stays where it is."""
     while (parents != len(parents) - 1).any():
         yield parents
@@ -119,7 +112,9 @@ def poses(xp: Any, tables: KinematicTables, translations: Any, position: Any) ->
     coordinate, (frames, samples)
     """
     angle = tables.turns * position
-    axes = tables.still + tables.cosine * xp.cos(angle) + tables.sine * xp.sin(angle)
+    # Stacked, as a compiler then keeps them; else it works them out again for every entry of the axes.
+    cosine, sine = xp.stack([xp.cos(angle), xp.sin(angle)], 0)
+    axes = tables.still + tables.cosine * cosine + tables.sine * sine
     for parents in tables.steps:
         axes = product(taken(axes, parents), axes)
     # Each joint is so far from the one before: p_f - p_parent = R_parent t, and it all adds up.
@@ -128,7 +123,7 @@ def poses(xp: Any, tables: KinematicTables, translations: Any, position: Any) ->
         step = step + tables.axes * (tables.slides * position)
     before = taken(axes, tables.parents)
     step = before[:, 0] * step[0] + before[:, 1] * step[1] + before[:, 2] * step[2]
-    return Poses(axes, tables.reach @ step)
+    return Poses(axes, _summed(tables, tables.behind * step))
 
 
 def twists(
@@ -145,21 +140,28 @@ def twists(
     if tables.slides is not None:
         s = s + axis * tables.slides
     screws = around(xp, xp.stack([z, s], 1))
-    # V = sum of S qd, Sd = V x S, A = -gravity + sum of S qdd + Sd qd, over the joints before.
-    before = tables.before @ (screws * velocity)
-    rates = motion_cross(xp, before, screws)
-    change = tables.before @ (screws * acceleration + rates * velocity)
+    # V = sum of S qd, Sd = V x S, A = -gravity + sum of S qdd + Sd qd, over the joints of the path.
+    moved = _summed(tables, screws * velocity)
+    rates = motion_cross(xp, moved, screws)
+    change = _summed(tables, screws * acceleration + rates * velocity)
     weight = around(xp, xp.stack([0.0 * gravity, gravity], 1))
-    return Twists(screws, rates, before, change - weight)
+    return Twists(screws, rates, moved, change - weight)
+
+
+def _summed(tables: KinematicTables, a: Any) -> Any:
+    """Sums over the path of each frame, itself included; of (..., frames, samples), zero for the ground."""
+    for parents in tables.steps:
+        a = a + taken(a, parents)
+    return a
 
 
 def taken(a: Any, index: Any, axis: int = -2) -> Any:
-    """Some entries of an axis, here the joints of (..., joints, samples), or of the last one: -1.
+    """Some entries of an axis, counted from the end: -2 is that of the joints in (..., joints, samples).
 
     index: a slice, or a table of positions
     """
     if isinstance(index, slice):
-        return a[..., index, :] if axis == -2 else a[..., index]
+        return a[(..., index) + (slice(None),) * (-1 - axis)]
     return a.take(index, axis) if isinstance(a, np.ndarray) else a.index_select(axis, index)
 
 

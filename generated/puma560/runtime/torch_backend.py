@@ -11,7 +11,7 @@ from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
 from .answers import Answers
 from .arguments import as_array, as_weights, check_axes, no_common_shape, precision
-from .array_kernels import Crossing, known_kernel, rule_is_quicker
+from .array_kernels import Crossing, known_kernel, operations
 from .interface import ClosedForms
 from .joint_tree import Bodies
 from .parameter_values import fits
@@ -20,12 +20,14 @@ from .structure import Structure
 from .tree_arrays import checked_bodies
 
 FLOATS = ({torch.float32}, {torch.float64})
-CROSSINGS: dict[str, Crossing] = {
-    "decomposition": ((70, 64), (189, 256)),
-    "torque": ((70, 16), (189, 64), (280, 256)),
-    "position_gradient": ((70, 64), (189, 256)),
+CROSSINGS = {
+    "decomposition": Crossing(164, ((164, 16), (1016, 256), (3279, 512), (11719, 1024))),
+    "torque": Crossing(618, ((618, 256), (1985, 512), (21901, 1024))),
+    "position_gradient": Crossing(1217, ((1217, 128), (2044, 256), (4990, 512), (12905, 1024))),
 }
 """Where the rule is quicker on a processor, see `array_kernels`; elsewhere it always is."""
+MATRICES = 128
+"""Links times samples up to which the rule is quicker in spatial matrices than with its samples innermost."""
 
 
 class TorchBackend:
@@ -50,6 +52,7 @@ class TorchBackend:
         """
         self.structure = structure
         self.links = links or ()
+        self.operations = operations(links) if links and rule else {}
         self.rule = rule
         self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
         self.parameters: dict[str, Any] = {
@@ -137,6 +140,10 @@ class TorchBackend:
         """Whether a compiler makes one loop of many operations, to which a matrix product is a wall."""
         return torch.compiler.is_dynamo_compiling()
 
+    def few(self, samples: int, links: int) -> bool:
+        """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
+        return not _watched() and samples * links <= MATRICES
+
     def chunk(self, motion: Sequence[Tensor], most: int) -> int | None:
         """Samples to compute at once: all, but on a CPU, with nothing recorded, what stays in its cache."""
         given = (*motion, *self.parameters.values(), *filter(torch.is_tensor, self.bodies or ()))
@@ -148,8 +155,7 @@ class TorchBackend:
     def _rule(self, call: str, q: Tensor) -> RigidRule | None:
         """The rule where it is to be taken, None for closed forms."""
         if self.kernel == "auto" and not _watched() and q.device.type == "cpu":
-            samples = q.numel() // q.shape[-1]
-            quicker = rule_is_quicker(CROSSINGS, call, sum(self.structure.sizes), samples)
+            quicker = CROSSINGS[call].rule_is_quicker(self.operations[call], tuple(q.shape[:-1]))
             return self.rule if quicker else None
         return None if self.kernel == "straight" else self.rule
 

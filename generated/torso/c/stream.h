@@ -1,35 +1,47 @@
 /* Results that no cache holds go past it: memory is then written without being read first. The same in every package
    of linkwise. It needs rows.h. */
-#if defined(__AVX__) || defined(__AVX512F__)
-#include <immintrin.h>
-#endif
 #include <string.h>
 
-/* Above this many bytes, results are better not kept in the cache. */
+/* Above this many bytes, results are better not kept in the cache: where they are read back at once, writing and reading
+   took the same time either way at 20 MB, with a last-level cache of 32 MB. */
 #ifndef LARGE
-#define LARGE ((size_t)64 << 20)
+#define LARGE ((size_t)20 << 20)
 #endif
 
-/* One cache line past the cache; `to` starts on one. */
+/* A vector past the cache, to where such a vector may start, and the end of it. The compilers' own functions do for gcc and
+   clang, as reading <immintrin.h> takes them longer than most kernels here. A build may bring its own. */
+#if !defined(STREAM) && defined(__GNUC__) && (defined(__AVX__) || defined(__AVX512F__))
 #if defined(__AVX512F__)
-#define STREAMS 1
-static inline void stream_line(const void *from, void *to)
+#define STREAM_BYTES 64
+#define STREAM_BUILTIN __builtin_ia32_movntdq512
+#else
+#define STREAM_BYTES 32
+#define STREAM_BUILTIN __builtin_ia32_movntdq256
+#endif
+#if defined(__clang__)
+#define STREAM(to, value) __builtin_nontemporal_store(value, to)
+#else
+#define STREAM(to, value) STREAM_BUILTIN(to, value)
+#endif
+#define STREAM_END() __builtin_ia32_sfence()
+#endif
+
+#if defined(STREAM)
+typedef long long stream_vector __attribute__((vector_size(STREAM_BYTES), may_alias));
+typedef long long stream_vector_anywhere __attribute__((vector_size(STREAM_BYTES), aligned(sizeof(real)), may_alias));
+
+/* One cache line past the cache; `to` starts on one. */
+static inline void stream_line(const real *from, real *to)
 {
-    _mm512_stream_si512((__m512i *)to, _mm512_loadu_si512(from));
-}
-#elif defined(__AVX__)
-#define STREAMS 1
-static inline void stream_line(const void *from, void *to)
-{
-    _mm256_stream_si256((__m256i *)to, _mm256_loadu_si256((const __m256i *)from));
-    _mm256_stream_si256((__m256i *)to + 1, _mm256_loadu_si256((const __m256i *)from + 1));
+    for (size_t v = 0; v < 64 / STREAM_BYTES; ++v)
+        STREAM((stream_vector *)to + v, ((const stream_vector_anywhere *)from)[v]);
 }
 #endif
 
 /* `count` values past the cache where the processor can; lines that hold other values too are written as usual. */
 static void stream(size_t count, const real *from, real *to)
 {
-#if defined(STREAMS)
+#if defined(STREAM)
     const size_t before = (64 - (size_t)to % 64) % 64 / sizeof(real), head = before < count ? before : count;
     const size_t end = head + (count - head) / BLOCK * BLOCK;
     memcpy(to, from, head * sizeof(real));
@@ -52,7 +64,7 @@ static inline void stream_rows(size_t entries, const real *block, real *rows, re
    another thread of it, say. Stores past the cache are not ordered with others otherwise. */
 static inline void stream_end(void)
 {
-#if defined(STREAMS)
-    _mm_sfence();
+#if defined(STREAM)
+    STREAM_END();
 #endif
 }

@@ -12,6 +12,11 @@ from typing import Any
 
 LINK = 'chest'
 PATH = (0, 1, 2)  # coordinates that move the link, counted from 0
+OPERATIONS: Mapping[str, int] = {
+    "decomposition": 168,
+    "torque": 137,
+    "position_gradient": 232,
+}
 
 
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -12,6 +12,11 @@ from typing import Any
 
 LINK = 'right_forearm'
 PATH = (0, 1, 2, 5, 6)  # coordinates that move the link, counted from 0
+OPERATIONS: Mapping[str, int] = {
+    "decomposition": 456,
+    "torque": 278,
+    "position_gradient": 622,
+}
 
 
 def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Any, ...]:

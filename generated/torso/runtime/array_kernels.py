@@ -1,16 +1,41 @@
 """Which of its two kernels a back end of arrays takes: closed forms, straight on, or the vectorised rule.
 
 Closed forms do the fewest additions and multiplications, one array operation each: thousands, whose calls
-cost more than their work unless the batch is large. The rule does more in a hundred and fifty or so. Which
-is quicker hangs on the robot, by the packed numbers of one sample, and on the batch;
-`tests/benchmarks/kernel_crossing.py` measures it and prints the tables that the back ends keep.
+cost more than their work unless the batch is large. The rule does more in a hundred or so, with few samples
+in spatial matrices, with many of them innermost. Which is quicker hangs on the operations of the closed forms
+and on the batch; `tests/benchmarks/kernel_crossing.py` measures it and prints the tables that the back ends
+keep.
 """
 
-from collections.abc import Mapping
-from typing import Any
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
-Crossing = tuple[tuple[int, int], ...]
-"""Rows (packed numbers of a sample, largest batch in which the rule is quicker), by rising numbers."""
+from .interface import ClosedForms
+
+Rows = tuple[tuple[int, int], ...]
+"""(size of a robot, largest batch in which something is quicker), by rising sizes."""
+
+
+def largest_batch(rows: Rows, size: int) -> int:
+    """The largest batch for a robot of a size: that of the last row not above it; 0 below the first."""
+    return next((most for least, most in reversed(rows) if least <= size), 0)
+
+
+class Crossing(NamedTuple):
+    """Where the rule is quicker than closed forms; robots are measured by the operations of these."""
+
+    alone: int
+    """From so many on, for one sample of shape (n,): then they are operations on numbers, not arrays."""
+    batches: Rows
+
+    def rule_is_quicker(self, operations: int, batch: tuple[int, ...]) -> bool:
+        """Whether it is for closed forms of so many operations and samples of shape `batch`."""
+        if not batch:
+            return operations >= self.alone
+        return math.prod(batch) <= largest_batch(self.batches, operations)
+
+
 KERNELS = ("auto", "straight", "rule")
 
 
@@ -44,10 +69,7 @@ def refuse_choice(backend: str, kernel: str, bodies: Any) -> None:
         raise ValueError(f"{backend} computes with the package's own bodies; load numpy or torch with bodies")
 
 
-def rule_is_quicker(crossings: Mapping[str, Crossing], call: str, numbers: int, samples: int) -> bool:
-    """Whether the rule is to be taken for a call, a robot of so many packed numbers, and a batch."""
-    most = 0
-    for size, batch in crossings[call]:
-        if size <= numbers:
-            most = batch
-    return samples <= most
+def operations(links: Sequence[ClosedForms]) -> Mapping[str, int]:
+    """Operations of each call of the closed forms."""
+    calls = ("decomposition", "torque", "position_gradient")
+    return {call: sum(link.OPERATIONS[call] for link in links) for call in calls}

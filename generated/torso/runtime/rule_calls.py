@@ -1,24 +1,41 @@
 """The rigid-link rule for one robot: packed results, in the order of `Layout`, from motion and numbers."""
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .fused_products import FusedMoment
 from .joint_tree import Bodies, JointTree
 from .kinematics import poses, taken, twists
 from .rigid_rule import LinkNumbers, link_numbers, link_states
 from .rule_layout import RuleLayout, rule_layout
-from .rule_products import Moment, coefficients, gradient, singles
+from .rule_products import Moment
 from .rule_tables import RuleTables, Space, converted, listed_tables
+from .spatial_rule import spatial_moment
+from .spatial_tables import spatial_numbers
 from .tree_arrays import TreeArrays, with_bodies, with_formulas
 
 CACHE = 1 << 22
 """Bytes of the arrays of one chunk of samples, which are to stay in the processor's cache."""
 LINK_NUMBERS = 200
 """Numbers that a link and its joint have of one sample, beside the products."""
+
+
+class Answering(Protocol):
+    """Joints and links in motion, which packed numbers are made of."""
+
+    def coefficients(self) -> list[Any]:
+        """Packed c2 and c1."""
+
+    def gradient(self) -> list[Any]:
+        """Packed c0."""
+
+    def singles(self, fields: Sequence[int]) -> list[Any]:
+        """Packed g (field 3) or tau (field 4), or both."""
 
 
 class RigidRule:
@@ -58,9 +75,8 @@ class RigidRule:
     ) -> list[Any]:
         """c2, c1, g and tau, (..., count) each."""
 
-        def answer(at: Moment) -> list[Any]:
-            pairs = coefficients(space, at)
-            return [*pairs, *singles(space, at, (3, 4))]
+        def answer(at: Answering) -> list[Any]:
+            return [*at.coefficients(), *at.singles((3, 4))]
 
         return self._answers(space, motion, p, bodies, answer)
 
@@ -69,8 +85,8 @@ class RigidRule:
     ) -> Any:
         """tau (..., count)."""
 
-        def answer(at: Moment) -> list[Any]:
-            return singles(space, at, (4,))
+        def answer(at: Answering) -> list[Any]:
+            return at.singles((4,))
 
         return self._answers(space, motion, p, bodies, answer)[0]
 
@@ -79,8 +95,8 @@ class RigidRule:
     ) -> Any:
         """c0 (..., count)."""
 
-        def answer(at: Moment) -> list[Any]:
-            return gradient(space, at)
+        def answer(at: Answering) -> list[Any]:
+            return at.gradient()
 
         return self._answers(space, motion, p, bodies, answer)[0]
 
@@ -90,28 +106,42 @@ class RigidRule:
         """What `answer` gives for the samples of a motion, (..., n) each."""
         q = motion[0]
         batch, n = tuple(q.shape[:-1]), q.shape[-1]
-        xp, tables = space.xp, self.tables(space, q)
-        numbers, links = tables.own, tables.numbers
-        if self.tree.formulas or bodies is not None:
-            numbers = with_formulas(xp, self.tree, numbers, tables.sources, p, batch)
+        tables = self.tables(space, q)
+        numbers = tables.own
+        if given := bool(self.tree.formulas) or bodies is not None:
+            numbers = with_formulas(space.xp, self.tree, numbers, tables.sources, p, batch)
             if bodies is not None:
-                numbers = with_bodies(xp, numbers, bodies, batch)
-            links = link_numbers(xp, tables.links.eye, *numbers[2:])
-        flat = [xp.swapaxes(a.reshape(-1, n), 0, 1) for a in motion]
+                numbers = with_bodies(space.xp, numbers, bodies, batch)
+        samples = math.prod(batch)
+        if space.few(samples, len(self.tree.links)):
+            matrices = spatial_numbers(space.xp, tables.spatial, numbers) if given else tables.matrices
+            flat = [a.reshape(samples, n) for a in motion]
+            parts = answer(spatial_moment(space.xp, tables, matrices, flat))
+        else:
+            links = link_numbers(space.xp, tables.links.eye, *numbers[2:]) if given else tables.numbers
+            parts = self._in_pieces(space, motion, numbers, links, answer)
+        return [a.reshape(*batch, a.shape[-1]) for a in parts]
+
+    def _in_pieces(
+        self, space: Space, motion: Sequence[Any], numbers: TreeArrays, links: LinkNumbers, answer: Any
+    ) -> list[Any]:
+        """What `answer` gives with the samples innermost, as many at once as the back end wants."""
+        xp, tables, n = space.xp, self.tables(space, motion[0]), motion[0].shape[-1]
+        # A copy: with views a compiler would gather from rows of samples in every loop.
+        flat = xp.stack([xp.swapaxes(a.reshape(-1, n), 0, 1) for a in motion], 0)
         joined: list[Any] = []
-        samples = flat[0].shape[1]
+        samples = flat.shape[2]
         for piece in self._pieces(space, motion, samples):
             own = [a[:, piece] for a in flat]
             some = TreeArrays(*(_samples(a, piece) for a in numbers))
             carried = LinkNumbers(*(_samples(a, piece) for a in links))
-            part = answer(_moment(xp, tables, own, some, carried))
+            part: list[Any] = answer(_moment(space, tables, own, some, carried))
             if piece == slice(None):
-                joined = part
-                continue
-            joined = joined or [xp.empty((samples, a.shape[1]), dtype=q.dtype) for a in part]
+                return part
+            joined = joined or [xp.empty((samples, a.shape[1]), dtype=a.dtype) for a in part]
             for whole, a in zip(joined, part, strict=True):
                 whole[piece] = a
-        return [a.reshape(*batch, a.shape[-1]) for a in joined]
+        return joined
 
     def _pieces(self, space: Space, motion: Sequence[Any], samples: int) -> Sequence[slice]:
         """Slices of the samples, each to be computed at once."""
@@ -124,16 +154,17 @@ class RigidRule:
 
 
 def _moment(
-    xp: Any, tables: RuleTables, motion: Sequence[Any], numbers: TreeArrays, links: LinkNumbers
-) -> Moment:
+    space: Space, tables: RuleTables, motion: Sequence[Any], numbers: TreeArrays, links: LinkNumbers
+) -> Moment | FusedMoment:
     """Motion of joints and links for q, qd and qdd (n, samples)."""
-    frames = tables.frames
+    xp, frames = space.xp, tables.frames
     position, velocity, acceleration = (taken(a, frames.coordinates) for a in motion)
     placed = poses(xp, frames, numbers.translations, position)
     moved = twists(xp, frames, placed, numbers.gravity, velocity, acceleration)
-    own = velocity, acceleration
-    states = link_states(xp, tables.links, links, placed, moved, own, numbers.gravity)
-    return Moment(tables, links, moved, states)
+    states = link_states(xp, tables.links, links, placed, moved, numbers.gravity)
+    if space.fuses:
+        return FusedMoment(xp, tables, moved, states)
+    return Moment(xp, tables, links, moved, states)
 
 
 def _samples(a: Any, piece: slice) -> Any:

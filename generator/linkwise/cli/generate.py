@@ -35,7 +35,7 @@ def generate(
         Literal["auto", "straight", "loops"],
         typer.Option(
             help="straight: closed forms; loops: nothing is derived, C in loops over links and joints; "
-            "auto: by the robot's size"
+            "auto: by what closed forms would cost"
         ),
     ] = "auto",
     derivation: Annotated[

@@ -96,12 +96,15 @@ def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
 RULE_FILES = (
     "joint_tree.py",
     "array_kernels.py",
+    "fused_products.py",
     "kinematics.py",
     "rigid_rule.py",
     "rule_calls.py",
     "rule_layout.py",
     "rule_products.py",
     "rule_tables.py",
+    "spatial_rule.py",
+    "spatial_tables.py",
     "tree_arrays.py",
 )
 """Of linkwise/runtime: the vectorised rule."""

@@ -25,6 +25,8 @@ class FormFunction:
     name: str
     doc: str
     cost: str
+    operations: int
+    """All of them, sines and the like included."""
     inputs: tuple[str, ...]
     assignments: tuple[tuple[str, str], ...]
     groups: tuple[tuple[tuple[str, str], ...], ...]
@@ -85,6 +87,6 @@ def _function(system: System, kernel: Kernel, name: str, doc: str, groups: Seque
     cost = count_operations(kernel.graph, nodes)
     texts = iter(code.outputs)
     results = tuple(tuple((next(texts), label) for label, _ in rows) for rows in groups)
-    return FormFunction(
-        name, doc, in_words(cost), fetched(system, code, "[..., {}]"), code.assignments, results
-    )
+    inputs = fetched(system, code, "[..., {}]")
+    operations = cost.arithmetic + cost.functions
+    return FormFunction(name, doc, in_words(cost), operations, inputs, code.assignments, results)

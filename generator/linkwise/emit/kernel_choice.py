@@ -4,15 +4,22 @@ from collections.abc import Iterable
 from typing import get_args
 
 from linkwise.dynamics.derive import Method
+from linkwise.dynamics.frame_search import FrameSearch
+from linkwise.dynamics.link_motion import Origin
+from linkwise.dynamics.screws import CommonAxes
 from linkwise.emit.backend import LOOPS
+from linkwise.emit.c.loop_costs import decomposition_cost, link_costs
 from linkwise.errors import LinkwiseError
 from linkwise.package.entries import KernelKind
-from linkwise.symbolic.system import EnergySystem, System
+from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
 CHOICES = ("auto", "straight", "loops")
 
-MOST_STRAIGHT = 1500
-"""Values of c2, c1, g and tau of one sample up to which closed forms are derived: see docs/kernels.md."""
+MOST_STRAIGHT = 12_000
+"""Operations up to which closed forms are derived, as `closed_form_cost` estimates them: docs/kernels.md."""
+
+LEAST_SHARE = 0.1
+"""Closed forms of a large robot need more than this share of the operations of loops: planar arms 0.15."""
 
 
 def chosen_kernel(
@@ -27,19 +34,29 @@ def chosen_kernel(
         raise LinkwiseError(f"no derivation {derivation!r}; choose rule or energy")
     if choice not in CHOICES:
         raise LinkwiseError(f"no kernel {choice!r}; choose among {', '.join(CHOICES)}")
-    energies = isinstance(system, EnergySystem)
-    if choice == "loops" and energies:
+    if choice == "loops" and isinstance(system, EnergySystem):
         raise LinkwiseError("--kernel loops goes over rigid bodies, and here are energies; leave it out")
     if choice == "loops" and derivation == "energy":
         raise LinkwiseError("--kernel loops derives nothing, and --derivation energy does; leave one out")
-    if choice == "auto":
-        energies |= derivation == "energy"
-        closed = backends is not None and not set(backends) <= LOOPS.keys()
-        return "straight" if energies or closed or results(system) <= MOST_STRAIGHT else "loops"
-    return "loops" if choice == "loops" else "straight"
+    if choice != "auto":
+        return "loops" if choice == "loops" else "straight"
+    closed = derivation == "energy" or (backends is not None and not set(backends) <= LOOPS.keys())
+    if closed or isinstance(system, EnergySystem):
+        return "straight"
+    return "straight" if closed_form_cost(system) <= MOST_STRAIGHT else "loops"
 
 
-def results(system: System) -> int:
-    """Values of c2, c1, g and tau of one sample, zeros by chance of geometry included."""
-    lengths = [len(system.path(j)) for j in range(len(system.links))]
-    return sum(d * (d + 1) // 2 + d * d + 2 * d for d in lengths)
+def closed_form_cost(system: RigidSystem) -> float:
+    """Operations of the closed forms of all links, estimated from the link of the middle path length.
+
+    That one's are counted in one frame, about its centre of mass, and all others are taken to save as much as
+    it does of what loops would take. No link is derived where even the sparsest would have too many.
+    """
+    loops = decomposition_cost(system)
+    if LEAST_SHARE * loops > MOST_STRAIGHT:
+        return LEAST_SHARE * loops
+    middle = sorted(range(len(system.links)), key=lambda j: len(system.path(j)))[len(system.links) // 2]
+    tree = [(f - 1, joint) for f, joint in enumerate(system.links[middle].joints)]
+    search = FrameSearch(system, [middle], tree, [range(len(tree))])
+    counted, _, _ = search.attempt(CommonAxes(len(tree) // 2), Origin())
+    return loops * counted / link_costs(system)[middle]

@@ -82,18 +82,11 @@ def link_numbers(xp: Any, eye: Any, masses: Any, centres: Any, inertias: Any) ->
 
 
 def link_states(
-    xp: Any, tables: LinkTables, numbers: LinkNumbers, poses: Poses, moved: Twists, own: Any, gravity: Any
+    xp: Any, tables: LinkTables, numbers: LinkNumbers, poses: Poses, moved: Twists, gravity: Any
 ) -> LinkStates:
-    """Moments and wrenches of the links.
-
-    own: velocity and acceleration of every joint's coordinate, (frames, samples) each; gravity (3, 1,
-    samples)
-    """
+    """Moments and wrenches of the links; gravity (3, 1, samples)."""
     joints = tables.joints
-    screws, rates = taken(moved.screws, joints), taken(moved.rates, joints)
-    qd, qdd = (taken(a, joints) for a in own)
-    twist = taken(moved.twists, joints) + screws * qd
-    change = taken(moved.accelerations, joints) + screws * qdd + rates * qd
+    twist, change = taken(moved.twists, joints), taken(moved.accelerations, joints)
     moments = _moments(xp, tables, numbers, poses, twist)
     whole = accelerated(xp, moments, change[:, 0], change[:, 1]) + turning(xp, moments, twist[:, 0])
     moment = cross(moments.h, around(xp, gravity))
@@ -178,19 +171,3 @@ def second_rates(xp: Any, moved: Twists) -> Any:
 def _halves(screws: Any) -> tuple[Any, Any]:
     """z and s of pairs of vectors (5, 2, frames, samples), without the ground."""
     return screws[:3, 0, :-1], screws[:3, 1, :-1]
-
-
-def decomposition_wrenches(xp: Any, link: LinkMoments, joints: Any, moved: Twists) -> tuple[Any, Any]:
-    """Wrenches of c2 and of c1, (6, pairs, samples) each, for the link and the joint of each pair."""
-    s, rate = taken(moved.screws, joints), taken(moved.rates, joints)
-    c1 = accelerated(xp, link, rate[:, 0], rate[:, 1]) + turning(xp, link, s[:, 0])
-    return accelerated(xp, link, s[:, 0], s[:, 1]), c1
-
-
-def gradient_wrenches(xp: Any, link: LinkMoments, joints: Any, moved: Twists, wrench: Any) -> Any:
-    """Wrenches of c0 for joints behind joint f, then for it and those before, (6, 2 pairs, samples)."""
-    s, rate, second = (taken(a, joints) for a in (moved.screws, moved.rates, second_rates(xp, moved)))
-    after = accelerated(xp, link, second[:, 0], second[:, 1]) + 2.0 * turning(xp, link, rate[:, 0])
-    n, f = around(xp, wrench[:3]), around(xp, wrench[3:])
-    turned = xp.concat([cross(s[:, 0], n) + cross(s[:, 1], f), cross(s[:, 0], f)], 0)
-    return xp.concat([after, after + turned], 1)

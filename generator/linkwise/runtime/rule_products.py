@@ -1,7 +1,6 @@
 """Parts of wrenches on joints: every packed number, from joints and links in motion.
 
-Eager operations take matrix products, of whole groups of links and joints, and pick what is packed; where a
-compiler makes one loop of many operations, every pair of a link and a joint has its own wrenches instead.
+Matrix products answer for whole groups of links and joints; what is packed is picked from them.
 """
 
 import math
@@ -12,78 +11,48 @@ import numpy as np
 
 from .kinematics import Twists, taken
 from .rigid_rule import (
-    LinkMoments,
     LinkNumbers,
     LinkStates,
     decomposition_columns,
-    decomposition_wrenches,
     gradient_columns,
     gradient_matrices,
-    gradient_wrenches,
     link_matrices,
 )
-from .rule_tables import RuleTables, Space
+from .rule_tables import RuleTables
 
 
 class Moment(NamedTuple):
     """Samples side by side: how joints and links move, and with which numbers."""
 
+    xp: Any
     tables: RuleTables
     numbers: LinkNumbers
     moved: Twists
     states: LinkStates
 
+    def coefficients(self) -> list[Any]:
+        """Packed c2 and c1."""
+        dense = _products(self.xp, self, self._matrices(), decomposition_columns(self.xp, self.moved))
+        return [packed(self.xp, dense, positions) for positions in self.tables.positions[:2]]
 
-def coefficients(space: Space, at: Moment) -> list[Any]:
-    """Packed c2 and c1."""
-    if space.fuses:
-        return _fused_coefficients(space, at)
-    xp, tables = space.xp, at.tables
-    matrices = link_matrices(xp, tables.links, at.numbers, at.states.moments)
-    dense = _products(xp, at, matrices, decomposition_columns(xp, at.moved))
-    return [_packed(xp, dense, positions) for positions in tables.positions[:2]]
+    def gradient(self) -> list[Any]:
+        """Packed c0."""
+        xp, tables = self.xp, self.tables
+        matrices = gradient_matrices(xp, tables.links, self._matrices(), self.states.wrenches[:, 0])
+        dense = _products(xp, self, matrices, gradient_columns(xp, self.moved))
+        return [packed(xp, dense, tables.positions[2])]
 
+    def singles(self, fields: Sequence[int]) -> list[Any]:
+        """Packed S_e . (wrench) of g or tau, or both."""
+        xp = self.xp
+        axes, wrenches = _outermost(xp, _screws(xp, self.moved)), _outermost(xp, self.states.wrenches)
+        samples, joints, links = axes.shape[0], axes.shape[2], wrenches.shape[3]
+        answer = xp.swapaxes(axes, 1, 2) @ wrenches.reshape(samples, 6, 2 * links)
+        dense = answer.reshape(samples, joints * 2 * links)
+        return [packed(xp, dense, self.tables.positions[field]) for field in fields]
 
-def gradient(space: Space, at: Moment) -> list[Any]:
-    """Packed c0."""
-    if space.fuses:
-        return _fused_gradient(space, at)
-    xp, tables = space.xp, at.tables
-    matrices = link_matrices(xp, tables.links, at.numbers, at.states.moments)
-    matrices = gradient_matrices(xp, tables.links, matrices, at.states.wrenches[:, 0])
-    dense = _products(xp, at, matrices, gradient_columns(xp, at.moved))
-    return [_packed(xp, dense, tables.positions[2])]
-
-
-def _fused_coefficients(space: Space, at: Moment) -> list[Any]:
-    """Packed c2 and c1, pair by pair."""
-    links, joints = at.tables.pairs
-    wrenches = decomposition_wrenches(space.xp, _of_pairs(at.states.moments, links), joints, at.moved)
-    return [_gathered(at, w, entries) for w, entries in zip(wrenches, at.tables.entries[:2], strict=True)]
-
-
-def _fused_gradient(space: Space, at: Moment) -> list[Any]:
-    """Packed c0, pair by pair."""
-    links, joints = at.tables.pairs
-    moments, wrench = _of_pairs(at.states.moments, links), taken(at.states.wrenches[:, 0], links)
-    wrenches = gradient_wrenches(space.xp, moments, joints, at.moved, wrench)
-    return [_gathered(at, wrenches, at.tables.entries[2])]
-
-
-def _of_pairs(moments: LinkMoments, links: Any) -> LinkMoments:
-    """The moments of each pair's link."""
-    return LinkMoments(*(taken(a, links) for a in moments))
-
-
-def _gathered(at: Moment, wrenches: Any, entries: Sequence[tuple[Any, Any]]) -> Any:
-    """Sums of S_e . (wrench), of wrenches (6, rows, samples), as (samples, count)."""
-    screws = at.moved.screws
-    parts = [
-        taken(screws[axis % 3, axis // 3], e) * taken(wrenches[axis], row)
-        for e, row in entries
-        for axis in range(6)
-    ]
-    return sum(parts[1:], parts[0]).swapaxes(0, 1)
+    def _matrices(self) -> Any:
+        return link_matrices(self.xp, self.tables.links, self.numbers, self.states.moments)
 
 
 def _products(xp: Any, at: Moment, matrices: Any, columns: Any) -> Any:
@@ -105,19 +74,6 @@ def _products(xp: Any, at: Moment, matrices: Any, columns: Any) -> Any:
     return xp.concat(answers, 1) if len(answers) > 1 else answers[0]
 
 
-def singles(space: Space, at: Moment, fields: Sequence[int]) -> list[Any]:
-    """Packed S_e . (wrench) of g or tau, or both."""
-    xp = space.xp
-    if space.fuses:
-        flat = at.states.wrenches.reshape(6, -1, at.states.wrenches.shape[-1])
-        return [_gathered(at, flat, at.tables.entries[field]) for field in fields]
-    axes, wrenches = _outermost(xp, _screws(xp, at.moved)), _outermost(xp, at.states.wrenches)
-    samples, joints, links = axes.shape[0], axes.shape[2], wrenches.shape[3]
-    answer = xp.swapaxes(axes, 1, 2) @ wrenches.reshape(samples, 6, 2 * links)
-    dense = answer.reshape(samples, joints * 2 * links)
-    return [_packed(xp, dense, at.tables.positions[field]) for field in fields]
-
-
 def _screws(xp: Any, moved: Twists) -> Any:
     """z and s of the joints, (6, joints, samples)."""
     return xp.concat([moved.screws[:3, 0, :-1], moved.screws[:3, 1, :-1]], 0)
@@ -131,7 +87,7 @@ def _outermost(xp: Any, a: Any) -> Any:
     return flat.reshape(samples, *shape)
 
 
-def _packed(xp: Any, values: Any, positions: Sequence[Any]) -> Any:
+def packed(xp: Any, values: Any, positions: Sequence[Any]) -> Any:
     """Entries (samples, count) of values (samples, entries), or sums of some; behind them stands a zero."""
     if len(positions) > 1:
         values = xp.concat([values, 0.0 * values[:, :1]], 1)

@@ -10,6 +10,7 @@ from .joint_tree import JointTree
 from .kinematics import KinematicTables, kinematic_tables
 from .rigid_rule import LinkNumbers, LinkTables, link_numbers
 from .rule_layout import RuleLayout, pair_layout
+from .spatial_tables import SpatialNumbers, SpatialTables, spatial_numbers, spatial_tables
 from .tree_arrays import TreeArrays, formula_sources, own_numbers
 
 
@@ -30,6 +31,9 @@ class Space(Protocol):
     def fuses(self) -> bool:
         """Whether a compiler makes one loop of many operations, to which a matrix product is a wall."""
 
+    def few(self, samples: int, links: int) -> bool:
+        """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
+
     def chunk(self, motion: Sequence[Any], most: int) -> int | None:
         """Samples to compute at once where `most` of them stay in the cache; None for all."""
 
@@ -41,6 +45,9 @@ class RuleTables(NamedTuple):
     links: LinkTables
     own: TreeArrays
     numbers: LinkNumbers
+    spatial: SpatialTables
+    matrices: SpatialNumbers
+    """The tree's own."""
     sources: Any
     groups: tuple[tuple[Any, Any], ...]
     """Links and path of each."""
@@ -58,6 +65,7 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
     # (a, -a, 0)
     skew = np.array([6, 5, 1, 2, 6, 3, 4, 0, 6])
     links = LinkTables(_span([link.joint for link in tree.links]), eye, skew)
+    spatial = spatial_tables(tree, links.joints, _span([joint.coordinate for joint in tree.joints]))
     coefficients = [layout.acceleration, layout.velocity, layout.position_gradient]
     pairs = pair_layout(layout, coefficients, len(tree.joints))
     # c2 and c1 have wrenches of one kind each.
@@ -72,6 +80,8 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
         links,
         own,
         link_numbers(np, eye, *own[2:]),
+        spatial,
+        spatial_numbers(np, spatial, own),
         formula_sources(tree),
         tuple((_span(group.links), _span(group.path)) for group in layout.groups),
         tuple(tuple(getattr(layout, field)) for field in fields),

@@ -18,6 +18,7 @@ from linkwise.symbolic.system import RigidSystem
 from linkwise.version import VERSION
 
 FIXED = (
+    "block_rows.h",
     "blocks.h",
     "calls.h",
     "dense.h",
@@ -27,6 +28,7 @@ FIXED = (
     "loops.h",
     "numbers.h",
     "one_sample.h",
+    "packed_rows.h",
     "rows.h",
     "rule.h",
     "shares.h",

@@ -7,7 +7,6 @@
 #define SIZED(name) name##_block
 #define TAKE(at) LANES_FROM(at)
 #define PUT(at, value) (LANES_AT(at) = (value))
-#define AHEAD(at) WRITTEN_SOON(at)
 #include "vectors.h"
 
 #include "rule.h"

@@ -45,101 +45,57 @@ static inline void angles(const struct numbers *x, int width, const real *q, rea
 
 #if PART(BLOCKS)
 #include "shares.h"
+#include "block_rows.h"
+#include "packed_rows.h"
 
-/* Consecutive results that wait in the cache. */
-enum { ROOM = 4 * LONGEST > 384 ? 4 * LONGEST : 384 };
-
-/* Where the results of a block go: straight to their places; or, where they wait, to rows of `samples` samples, or past
-   the cache. c2, c1 and g say which entries of the robot's wait first, the others how many do. */
-struct results {
-    real *c2_to, *c1_to, *g_to, *tau_to;
-    int waits;
-    size_t samples;
-    int c2, c1, g, c2_count, c1_count, g_count;
-    ALIGNED real c2_room[ROOM * BLOCK];
-    ALIGNED real c1_room[ROOM * BLOCK];
-    ALIGNED real g_room[ROOM * BLOCK];
-    ALIGNED real tau_room[ROOM * BLOCK];
-};
-
-static void leave(const struct results *r, int count, int every, int first, const real *room, real *to)
+/* How link j moves in a block, what its coordinates ask of it, and its g and tau. */
+static void wrenches_of_link(const struct numbers *x, const motion *m, int j, wrenches *w, real *g, real *tau)
 {
-    if (r->samples)
-        scatter(r->samples, (size_t)count, (size_t)every, room, to + first);
-    else
-        stream((size_t)count * BLOCK, room, to + (size_t)first * BLOCK);
+    const int length = path_start[j + 1] - path_start[j];
+    for (int i = 0; i < length; ++i) {
+        WRITTEN_SOON(g + i * BLOCK);
+        WRITTEN_SOON(tau + i * BLOCK);
+    }
+    for (int part = 0; part < BLOCK_PARTS; ++part) {
+        const moving_link l = link_at_block(&m[part], links[j].frame, &x->bodies[j], x->gravity);
+        columns_block(&m[part], &l, columns + path_start[j], length, &w[part]);
+        torques_block(&l, &w[part], length, g + part * LANES, tau + part * LANES);
+    }
 }
 
-/* What waits leaves; nothing does afterwards. */
-static void leave_rows(struct results *r)
-{
-    leave(r, r->c2_count, C2, r->c2, r->c2_room, r->c2_to);
-    leave(r, r->c1_count, C1, r->c1, r->c1_room, r->c1_to);
-    r->c2 += r->c2_count;
-    r->c1 += r->c1_count;
-    r->c2_count = r->c1_count = 0;
-}
-
-static void leave_torques(struct results *r)
-{
-    if (r->g_to)
-        leave(r, r->g_count, G, r->g, r->g_room, r->g_to);
-    leave(r, r->g_count, G, r->g, r->tau_room, r->tau_to);
-    r->g += r->g_count;
-    r->g_count = 0;
-}
-
-/* A block's results of all links. */
-static void results_of_block(const struct numbers *x, const motion *m, struct results *r)
+/* All results of link j in a block, packed; c2 and c1 past the cache where they are `large`. */
+static void results_of_link(const struct numbers *x, const motion *m, int j, int large, real *c2, real *c1, real *g, real *tau)
 {
     ALIGNED wrenches w[BLOCK_PARTS];
-    for (int j = 0; j < LINKS; ++j) {
-        const struct link *link = &links[j];
-        const int length = path_start[j + 1] - path_start[j];
-        if (r->g_count + length > ROOM)
-            leave_torques(r);
-        real *g = r->waits ? r->g_room + r->g_count * BLOCK : r->g_to + (size_t)link->g * BLOCK;
-        real *tau = r->waits ? r->tau_room + r->g_count * BLOCK : r->tau_to + (size_t)link->g * BLOCK;
-        for (int part = 0; part < BLOCK_PARTS; ++part) {
-            const moving_link l = link_at_block(&m[part], link->frame, &x->bodies[j], x->gravity);
-            columns_block(&m[part], &l, columns + path_start[j], length, &w[part]);
-            torques_block(&l, &w[part], length, g + part * LANES, tau + part * LANES);
-        }
-        r->g_count += r->waits ? length : 0;
-        real *c2 = r->c2_to + (size_t)link->c2 * BLOCK, *c1 = r->c1_to + (size_t)link->c1 * BLOCK;
-        for (int i = 0; i < length; i += 2) {
-            const int rows = length - i > 1 ? 2 : 1, c2_count = rows * (length - i) - (rows - 1);
-            if (r->waits) {
-                if (r->c2_count + c2_count > ROOM || r->c1_count + rows * length > ROOM)
-                    leave_rows(r);
-                c2 = r->c2_room + r->c2_count * BLOCK;
-                c1 = r->c1_room + r->c1_count * BLOCK;
-                r->c2_count += c2_count;
-                r->c1_count += rows * length;
-            }
-            two_rows_block(&w[0], i, length, 1, c2, c1);
-            for (int part = 1; part < BLOCK_PARTS; ++part)
-                two_rows_block(&w[part], i, length, 0, c2 + part * LANES, c1 + part * LANES);
-            c2 += c2_count * BLOCK;
-            c1 += rows * length * BLOCK;
-        }
-    }
-    if (r->waits) {
-        leave_rows(r);
-        leave_torques(r);
+    const int length = path_start[j + 1] - path_start[j];
+    wrenches_of_link(x, m, j, w, g, tau);
+    if (large) {
+        rows_of(w, 1, length, 1, c2);
+        rows_of(w, 0, length, 1, c1);
+    } else {
+        rows_of(w, 1, length, 0, c2);
+        rows_of(w, 0, length, 0, c1);
     }
 }
 
-/* Results from the robot's first entries on. */
-static void begin(struct results *r, int waits, size_t samples, real *c2, real *c1, real *g, real *tau)
+void API(decomposition_blocks)(size_t blocks, INPUTS, real *c2, real *c1, real *g, real *tau)
 {
-    r->c2_to = c2;
-    r->c1_to = c1;
-    r->g_to = g;
-    r->tau_to = tau;
-    r->waits = waits;
-    r->samples = samples;
-    r->c2 = r->c1 = r->g = r->c2_count = r->c1_count = r->g_count = 0;
+    if (!blocks)
+        return;
+    NUMBERS(x);
+    ALIGNED motion m[BLOCK_PARTS];
+    const size_t most = LARGE / ((C2 + C1 + 2 * G) * sizeof(real) * BLOCK);
+    const int large = blocks > most && may_pass(c2) && may_pass(c1);
+    for (size_t s = 0; s < blocks * BLOCK; s += BLOCK) {
+        moved_block(x, q + s * N, qd + s * N, qdd + s * N, m);
+        for (int j = 0; j < LINKS; ++j) {
+            const size_t at_c2 = s * C2 + (size_t)links[j].c2 * BLOCK, at_c1 = s * C1 + (size_t)links[j].c1 * BLOCK;
+            const size_t at_g = s * G + (size_t)links[j].g * BLOCK;
+            results_of_link(x, m, j, large, c2 + at_c2, c1 + at_c1, g + at_g, tau + at_g);
+        }
+    }
+    if (large)
+        stream_end();
 }
 
 void API(decomposition)(size_t count, INPUTS, real *c2, real *c1, real *g, real *tau)
@@ -152,30 +108,28 @@ void API(decomposition)(size_t count, INPUTS, real *c2, real *c1, real *g, real 
         return;
     NUMBERS(x);
     ALIGNED motion m[BLOCK_PARTS];
-    struct results r;
+    ALIGNED wrenches w[BLOCK_PARTS];
+    struct waiting all_c2, all_c1, all_g, all_tau;
     for (size_t s = 0; s < count; s += BLOCK) {
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
         rows_moved(x, samples, q + s * N, qd + s * N, qdd + s * N, m);
-        begin(&r, 1, samples, c2 + s * C2, c1 + s * C1, g + s * G, tau + s * G);
-        results_of_block(x, m, &r);
+        begin_waiting(&all_c2, samples, C2, c2 + s * C2);
+        begin_waiting(&all_c1, samples, C1, c1 + s * C1);
+        begin_waiting(&all_g, samples, G, g + s * G);
+        begin_waiting(&all_tau, samples, G, tau + s * G);
+        for (int j = 0; j < LINKS; ++j) {
+            const int length = path_start[j + 1] - path_start[j];
+            wrenches_of_link(x, m, j, w, room_for(&all_g, length), room_for(&all_tau, length));
+            for (int i = 0; i < length; ++i)
+                row_of(w, 1, i, length, 0, room_for(&all_c2, length - i));
+            for (int i = 0; i < length; ++i)
+                row_of(w, 0, i, length, 0, room_for(&all_c1, length));
+        }
+        leave(&all_c2);
+        leave(&all_c1);
+        leave(&all_g);
+        leave(&all_tau);
     }
-}
-
-void API(decomposition_blocks)(size_t blocks, INPUTS, real *c2, real *c1, real *g, real *tau)
-{
-    if (!blocks)
-        return;
-    NUMBERS(x);
-    ALIGNED motion m[BLOCK_PARTS];
-    struct results r;
-    const int large = blocks * BLOCK > LARGE / ((C2 + C1 + 2 * G) * sizeof(real));
-    for (size_t s = 0; s < blocks * BLOCK; s += BLOCK) {
-        moved_block(x, q + s * N, qd + s * N, qdd + s * N, m);
-        begin(&r, large, 0, c2 + s * C2, c1 + s * C1, g + s * G, tau + s * G);
-        results_of_block(x, m, &r);
-    }
-    if (large)
-        stream_end();
 }
 
 /* tau of link j in a block. */
@@ -200,45 +154,27 @@ static void torque_rows(size_t count, INPUTS, enum torques kind, real *tau)
     const size_t rows_of[] = {G, SQUARE, N}, row = rows_of[kind];
     NUMBERS(x);
     ALIGNED motion m[BLOCK_PARTS];
-    struct results r;
+    struct waiting packed;
     for (size_t s = 0; s < count; s += BLOCK) {
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
         real *const rows = tau + s * row;
         rows_moved(x, samples, q + s * N, qd + s * N, qdd + s * N, m);
-        begin(&r, 1, samples, NULL, NULL, NULL, rows);
+        begin_waiting(&packed, samples, G, rows);
         if (kind != PACKED)
             memset(rows, 0, samples * row * sizeof(real));
         for (int j = 0; j < LINKS; ++j) {
             const int length = path_start[j + 1] - path_start[j];
-            if (r.g_count + length > ROOM)
-                leave_torques(&r);
-            torques_of_link(x, m, j, r.tau_room + r.g_count * BLOCK);
-            if (kind == PACKED)
-                r.g_count += length;
-            else if (kind == DENSE)
-                to_squares_block(j, j + 1, r.tau_room, samples, rows);
+            if (kind == PACKED) {
+                torques_of_link(x, m, j, room_for(&packed, length));
+                continue;
+            }
+            torques_of_link(x, m, j, packed.room);
+            if (kind == DENSE)
+                to_squares_block(j, j + 1, packed.room, samples, rows);
             else
-                to_sums_block(j, j + 1, r.tau_room, samples, rows);
+                to_sums_block(j, j + 1, packed.room, samples, rows);
         }
-        leave_torques(&r);
-    }
-}
-
-/* All results of link j in a block, packed. */
-static void results_of_link(const struct numbers *x, const motion *m, int j, real *c2, real *c1, real *g, real *tau)
-{
-    const int length = path_start[j + 1] - path_start[j];
-    for (int part = 0; part < BLOCK_PARTS; ++part) {
-        wrenches w;
-        const moving_link l = link_at_block(&m[part], links[j].frame, &x->bodies[j], x->gravity);
-        real *second = c2 + part * LANES, *first = c1 + part * LANES;
-        columns_block(&m[part], &l, columns + path_start[j], length, &w);
-        torques_block(&l, &w, length, g + part * LANES, tau + part * LANES);
-        for (int i = 0; i < length; i += 2) {
-            two_rows_block(&w, i, length, 0, second, first);
-            second += (2 * (length - i) - 1) * BLOCK;
-            first += 2 * length * BLOCK;
-        }
+        leave(&packed);
     }
 }
 
@@ -263,7 +199,7 @@ static void dense_rows(size_t count, INPUTS, const struct dense *to)
         gather(samples, N, qdd + s * N, acceleration);
         memset(to->gravity + s * SQUARE, 0, samples * SQUARE * sizeof(real));
         for (int j = 0; j < LINKS; ++j) {
-            results_of_link(x, m, j, c2, c1, g, tau);
+            results_of_link(x, m, j, 0, c2, c1, g, tau);
             if (to->slopes)
                 to_slopes_block(j, j + 1, c1, NULL);
             to_cubes(j, j + 1, 1, c2, to->torques ? acceleration : wait.ones, samples, &wait,

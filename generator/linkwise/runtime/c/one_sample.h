@@ -5,7 +5,6 @@
 #define SIZED(name) name##_one
 #define TAKE(at) (*(at))
 #define PUT(at, value) (*(at) = (value))
-#define AHEAD(at) ((void)(at))
 #include "vectors.h"
 
 #include "rule.h"
@@ -39,7 +38,7 @@ static inline void link_one(const struct numbers *x, int j, const motion *m, rea
     columns_one(m, &l, columns + path_start[j], length, &w);
     torques_one(&l, &w, length, g, tau);
     for (int i = 0; i < length; i += 2) {
-        two_rows_one(&w, i, length, 0, c2, c1);
+        two_rows_one(&w, i, length, c2, c1);
         c2 += 2 * (length - i) - 1;
         c1 += 2 * length;
     }
@@ -108,4 +107,3 @@ SHARED void API(dense_one)(INPUTS, const struct dense *to)
 #undef SIZED
 #undef TAKE
 #undef PUT
-#undef AHEAD

@@ -1,6 +1,6 @@
 /* Rows of results from the wrenches of rule.h: what each joint bears of them. The same in every package of linkwise.
 
-   Entry e is stored at e * W by PUT. AHEAD says which memory is written soon, so that it is in the cache by then. */
+   Entry e is stored at e * W by PUT. */
 
 /* What a wrench does along two motions, each of its components read once. */
 INLINE void KERNEL(along_both)(const screw *a, const screw *b, const screw *f, real *first, real *second)
@@ -20,9 +20,8 @@ INLINE void KERNEL(along_both)(const screw *a, const screw *b, const screw *f, r
     PUT(second, y);
 }
 
-/* Rows i and, if there is one, i + 1 of a link's c2 and c1; with `ahead`, the memory of the next two is fetched. */
-INLINE void KERNEL(two_rows)(const wrenches *RESTRICT x, int i, int length, int ahead, real *RESTRICT c2,
-    real *RESTRICT c1)
+/* Rows i and, if there is one, i + 1 of a link's c2 and c1. */
+INLINE void KERNEL(two_rows)(const wrenches *RESTRICT x, int i, int length, real *RESTRICT c2, real *RESTRICT c1)
 {
     const screw a = x->moves[i];
     PUT(c2, along(&a, &x->c2[i]));
@@ -33,20 +32,10 @@ INLINE void KERNEL(two_rows)(const wrenches *RESTRICT x, int i, int length, int 
     }
     const screw b = x->moves[i + 1];
     real *second2 = c2 + (length - i - 1) * W, *second1 = c1 + length * W;
-    for (int k = i + 1; k < length; ++k) {
-        if (ahead) {
-            AHEAD(second2 + (k - i + length - i) * W);
-            AHEAD(second2 + (k - i + 2 * (length - i)) * W);
-        }
+    for (int k = i + 1; k < length; ++k)
         KERNEL(along_both)(&a, &b, &x->c2[k], c2 + (k - i) * W, second2 + (k - i) * W);
-    }
-    for (int k = 0; k < length; ++k) {
-        if (ahead) {
-            AHEAD(second1 + (k + length) * W);
-            AHEAD(second1 + (k + 2 * length) * W);
-        }
+    for (int k = 0; k < length; ++k)
         KERNEL(along_both)(&a, &b, &x->c1[k], c1 + k * W, second1 + k * W);
-    }
 }
 
 /* A link's g and tau. */

@@ -1,0 +1,144 @@
+"""The rigid-link rule in spatial matrices: few array operations, for few samples.
+
+The formulas are those of `rigid_rule` with S = (s, z), V = (v, omega) and A its rate, from minus gravity, and
+with 6 x 6 matrices in place of 3-vectors, see `spatial_tables`. With V x S = (omega x s + v x z, omega x z),
+V x* its negative transpose, and I the spatial inertia of a link about the base's origin,
+
+    Sd = V x S       Sdd = A x S + V x Sd                  rates of a joint's screw
+    P = I V          W = I A + V x* P                      wrench of a link in motion
+    B = 1/2 (V x* I - I (V x) + the matrix of P)           of which only the columns that meet z are not zero
+
+    c2: S_e . I S_f      c1: S_e . (I Sd_f + B S_f)
+    c0: S_e . (I Sdd_f + 2 B Sd_f), and + S_e . (S_f x* W) where joint e is not behind f
+
+(Wensing and Slotine's factorisation of the Coriolis terms; Singh, Russell and Wensing's derivatives.) Every
+small matrix is a product of its own inside of numpy or torch, so samples in great number are better
+innermost, as `rigid_rule` has them.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from .kinematics import taken
+from .rule_products import packed
+from .rule_tables import RuleTables
+from .spatial_tables import SpatialNumbers, as_matrices
+
+
+class SpatialMoment(NamedTuple):
+    """Joints and links in motion, about the first hinge of their path; samples outermost.
+
+    Its methods are those of `Moment`.
+    """
+
+    xp: Any
+    tables: RuleTables
+    screws: Any
+    """S of each joint, (samples, joints, 6)."""
+    rates: Any
+    """Sd, the same."""
+    accelerations: Any
+    """A, the same."""
+    crosses: Any
+    """V x of each joint, (samples, joints, 6, 6)."""
+    inertias: Any
+    """I of each link, (samples, N, 6, 6)."""
+    momenta: Any
+    """P, (samples, N, 6)."""
+    wrenches: Any
+    """W, (samples, N, 6)."""
+    weights: Any
+    """I of minus gravity, the same."""
+
+    def coefficients(self) -> list[Any]:
+        """Packed c2 and c1."""
+        z = self.screws[..., 3:]
+        columns = [self.screws, 0.0 * z], [self.rates, z]
+        dense = self._products(self._matrices(), columns)
+        return [packed(self.xp, dense, positions) for positions in self.tables.positions[:2]]
+
+    def gradient(self) -> list[Any]:
+        """Packed c0."""
+        s, rate = self.screws, self.rates
+        second = _applied(self._cross(self.accelerations), s) + _applied(self.crosses, rate)
+        columns = [second, 2.0 * rate[..., 3:], 0.0 * s], [second, 2.0 * rate[..., 3:], s]
+        matrices = self.xp.concat([self._matrices(), self._wrench_cross(self.wrenches)], -1)
+        return [packed(self.xp, self._products(matrices, columns), self.tables.positions[2])]
+
+    def singles(self, fields: Sequence[int]) -> list[Any]:
+        """Packed S_e . (wrench) of g or tau, or both."""
+        both = self.xp.concat([self.wrenches, self.weights], 1)
+        dense = self.screws @ self.xp.swapaxes(both, 1, 2)
+        dense = dense.reshape(dense.shape[0], dense.shape[1] * dense.shape[2])
+        return [packed(self.xp, dense, self.tables.positions[field]) for field in fields]
+
+    def _matrices(self) -> Any:
+        """[I B] of each link, of B the columns that meet z, (samples, N, 6, 9)."""
+        own = self.inertias @ taken(self.crosses, self.tables.spatial.joints, -3)
+        b = 0.5 * (self._wrench_cross(self.momenta) - own - self.xp.swapaxes(own, -1, -2))
+        return self.xp.concat([self.inertias, b[..., 3:]], -1)
+
+    def _cross(self, motions: Any) -> Any:
+        return as_matrices(motions, self.tables.spatial.motion_cross)
+
+    def _wrench_cross(self, wrenches: Any) -> Any:
+        return as_matrices(wrenches, self.tables.spatial.force_cross)
+
+    def _products(self, matrices: Any, columns: Sequence[Sequence[Any]]) -> Any:
+        """S_e . (L column) for each group's links and any two joints e and f on its path, (samples, entries).
+
+        matrices: L, (samples, N, 6, m); columns: of each kind the parts that make one of m entries, (samples,
+        joints, ...). Entries are ordered by e, link, kind, f; groups stand in a row.
+        """
+        xp, answers = self.xp, []
+        right = xp.stack([xp.concat(list(parts), -1) for parts in columns], 1)
+        samples, kinds, _, size = right.shape
+        for links, path in self.tables.groups:
+            block, behind = taken(matrices, links, -3), taken(right, path, -2)
+            count, depth = block.shape[1], behind.shape[2]
+            rows = xp.swapaxes(block, 1, 2).reshape(samples, 6 * count, size)
+            wrench = rows @ xp.swapaxes(behind.reshape(samples, kinds * depth, size), 1, 2)
+            answer = taken(self.screws, path) @ wrench.reshape(samples, 6, count * kinds * depth)
+            answers.append(answer.reshape(samples, depth * count * kinds * depth))
+        return xp.concat(answers, 1) if len(answers) > 1 else answers[0]
+
+
+def spatial_moment(
+    xp: Any, tables: RuleTables, numbers: SpatialNumbers, motion: Sequence[Any]
+) -> SpatialMoment:
+    """Motion of joints and links for q, qd and qdd, (samples, n) each."""
+    spatial = tables.spatial
+    x = _placed(xp, tables, numbers, taken(motion[0], spatial.coordinates, -1))
+    s = taken((x[:, :-1] @ spatial.units)[..., 0], spatial.swapped, -1)
+    velocity, acceleration = (taken(a, spatial.own, -1)[..., None] for a in motion[1:])
+    # V = sum of S qd, A = -gravity + sum of S qdd + Sd qd, over the joints of the path; S x S = 0.
+    v = spatial.chains @ (s * velocity)
+    crosses = as_matrices(v, spatial.motion_cross)
+    rate = _applied(crosses, s)
+    a = spatial.chains @ (s * acceleration + rate * velocity) - numbers.gravity
+    links = spatial.joints
+    x = taken(x, links, -3)
+    inertia = x @ numbers.inertias @ xp.swapaxes(x, -1, -2)
+    momentum = _applied(inertia, taken(v, links))
+    # V x* is minus the transpose of V x.
+    turning = _applied(xp.swapaxes(taken(crosses, links, -3), -1, -2), momentum)
+    wrench = _applied(inertia, taken(a, links)) - turning
+    weight = _applied(inertia, -numbers.gravity)
+    return SpatialMoment(xp, tables, s, rate, a, crosses, inertia, momentum, wrench, weight)
+
+
+def _placed(xp: Any, tables: RuleTables, numbers: SpatialNumbers, position: Any) -> Any:
+    """X of all frames into the base's axes, (samples, frames, 6, 6), for q of each, (samples, frames)."""
+    angle = tables.spatial.turns * position
+    x = numbers.frames[0] + numbers.frames[1] * xp.cos(angle)[..., None, None]
+    x = x + numbers.frames[2] * xp.sin(angle)[..., None, None]
+    if tables.spatial.slides is not None:
+        x = x + numbers.frames[3] * (tables.spatial.slides * position)[..., None, None]
+    for parents in tables.spatial.steps:
+        x = taken(x, parents, -3) @ x
+    return x
+
+
+def _applied(matrices: Any, vectors: Any) -> Any:
+    """Matrices (..., 6, 6) times vectors (..., 6)."""
+    return (matrices @ vectors[..., None])[..., 0]
