@@ -249,8 +249,8 @@ WRONG = {
     "gravity": ("forms/link_2.py", "g_2,  # g(2, 2)", "g_1,  # g(2, 2)", "numpy: g against"),
     "energy": (
         "energies/link_2.py",
-        "0.6 * u2",
-        "0.6000001 * u2",
+        '"mass": 0.6,',
+        '"mass": 0.6000001,',
         "autograd: Lagrangians against the energies",
     ),
     "text": ("formulas.txt", "588399*cos(q_1 + q_2)", "588399*cos(q_1 - q_2)", "formulas.txt: tau_ij"),
