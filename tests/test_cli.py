@@ -75,13 +75,24 @@ def test_generate_replaces_an_earlier_package_whole(linkwise: Run, planar2: Path
 def test_manifest_tells_how_to_make_the_package_again(planar2: Path) -> None:
     manifest = json.loads((planar2 / "manifest.json").read_text())
     assert manifest["schema"] == 6
-    asked = {"robot": "planar2", "backends": ["numpy"], "kernel": "auto"}
+    asked = {"robot": "planar2", "backends": ["numpy"], "kernel": "auto", "derivation": "rule"}
     assert manifest["request"] == asked | asdict(Options())
     assert manifest["kernel"] == "straight"
     assert [joint["name"] for joint in manifest["joints"]] == ["joint1", "joint2"]
     assert manifest["links"][1]["path"] == [0, 1]
     written = {p.relative_to(planar2).as_posix() for p in planar2.rglob("*") if p.is_file()}
     assert set(manifest["files"]) == written - {"manifest.json"}
+
+
+def test_closed_forms_are_derived_from_energies_where_asked(linkwise: Run, tmp_path: Path) -> None:
+    asked = ("generate", "planar2", "--out", "out", "--backend", "numpy", "--derivation", "energy")
+    assert linkwise(*asked).returncode == 0
+    assert (
+        json.loads((tmp_path / "out/planar2/manifest.json").read_text())["request"]["derivation"] == "energy"
+    )
+    done = linkwise(*asked, "--kernel", "loops")
+    assert done.returncode == 2
+    assert "--kernel loops derives nothing, and --derivation energy does; leave one out" in done.stderr
 
 
 def test_check_prints_the_largest_error_of_each(linkwise: Run, planar2: Path) -> None:

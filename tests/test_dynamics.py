@@ -11,7 +11,6 @@ from evaluation import evaluate
 from linkwise import Options, read_system
 from linkwise.dynamics.coefficients import LinkForms
 from linkwise.dynamics.derive import derive, link_kernel
-from linkwise.dynamics.euler_lagrange import euler_lagrange
 from linkwise.dynamics.frame_search import FrameSearch, _spread
 from linkwise.dynamics.kernel import lowering
 from linkwise.dynamics.link_motion import Origin
@@ -19,22 +18,14 @@ from linkwise.dynamics.screws import CommonAxes, Orientation
 from linkwise.expression.count import count_operations
 from linkwise.expression.graph import Graph
 from linkwise.symbolic.chain_rule import partial_torques
-from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import RigidSystem, System
 
 BLOCKS = ("acceleration", "velocity", "gravity", "torque", "decomposed_torque", "position_gradient")
 
 
 def from_the_energy(system: System, link: int) -> tuple[Graph, LinkForms]:
-    """Forms by differentiating the link's Lagrangian, its definitions lowered one after another."""
-    lower, x = lowering(system)
-    for energy in lineage(link_energies(system), link):
-        lower.define(energy.twist.definitions)
-    kinetic = lower(energy.kinetic)
-    for energy in lineage(link_energies(system), link):
-        lower.define(energy.height.definitions)
-    lagrangian = lower.graph.sub(kinetic, lower(energy.potential))
-    return lower.graph, euler_lagrange(lower.graph, lagrangian, system.path(link), x)
+    kernel = link_kernel(system, link, "energy")
+    return kernel.graph, kernel.forms[0]
 
 
 def numbers(graph: Graph, forms: LinkForms, block: str, states: list[dict[str, float]]) -> np.ndarray:

@@ -131,23 +131,24 @@ def pendulum(backend: str) -> Dynamics:
     """The pendulum on one of the back ends, put together by hand."""
     if backend == "numpy":
         return Dynamics(ROD, NumpyBackend(ROD, [Pendulum()], ROD.values(None)), pendulum, (backend,))
-    from linkwise.runtime.autograd_backend import AutogradBackend
+    from linkwise.runtime.dynamics_module import DynamicsModule
+    from linkwise.runtime.link_modules import backend_of_links
     from linkwise.runtime.partial_lagrangian import PartialLagrangian
     from linkwise.runtime.torch_backend import TorchBackend
 
     class Lagrangian(PartialLagrangian):
         path = (0,)
 
-        def kinetic(self, q: Any, qd: Any) -> Any:
-            return 0.5 * self.p["m"] * qd[0] ** 2
+        def kinetic(self, q: Any, qd: Any, p: Any) -> Any:
+            return 0.5 * p["m"] * qd[0] ** 2
 
-        def potential(self, q: Any) -> Any:
-            return -9.81 * self.p["m"] * torch.cos(q[0])
+        def potential(self, q: Any, p: Any) -> Any:
+            return -9.81 * p["m"] * torch.cos(q[0])
 
     if backend == "torch":
         return Dynamics(ROD, TorchBackend(ROD, [Pendulum()], ROD.values(None)), pendulum, (backend,))
-    made = AutogradBackend(ROD, lambda p: [Lagrangian(p)], ROD.values(None))
-    return Dynamics(ROD, made, pendulum, (backend,))
+    made = backend_of_links(ROD, [Lagrangian], ROD.values(None))
+    return DynamicsModule(ROD, made, pendulum, (backend,))
 
 
 @pytest.mark.parametrize("batch", [(), (4,), (2, 3)])
@@ -184,41 +185,45 @@ def test_lagrangians_are_differentiated_a_part_of_a_large_batch_at_a_time(
 
 def test_what_a_link_hands_on_is_worked_out_once_for_all_that_it_carries() -> None:
     from linkwise.runtime.lanes import carried
+    from linkwise.runtime.link_modules import backend_of_links
     from linkwise.runtime.partial_lagrangian import PartialLagrangian
-    from linkwise.runtime.sweeps import decomposition
 
     calls = []
-
-    @carried
-    def speed(q: Any, qd: Any) -> Any:
-        calls.append(tuple(qd[0].shape))
-        return (torch.cos(q[0]) * qd[0],)
-
-    @carried
-    def onward(q: Any, qd: Any) -> Any:
-        return (speed(q, qd)[0] + qd[1],)
 
     class First(PartialLagrangian):
         path = (0,)
 
-        def kinetic(self, q: Any, qd: Any) -> Any:
-            return 0.5 * speed(q, qd)[0] ** 2
+        @carried
+        def speed(self, q: Any, qd: Any) -> Any:
+            calls.append(tuple(qd[0].shape))
+            return (torch.cos(q[0]) * qd[0],)
 
-        def potential(self, q: Any) -> Any:
+        def kinetic(self, q: Any, qd: Any, p: Any) -> Any:
+            return 0.5 * self.speed(q, qd)[0] ** 2
+
+        def potential(self, q: Any, p: Any) -> Any:
             return 0.0
 
     class Second(First):
         path = (0, 1)
         parent = First
 
-        def kinetic(self, q: Any, qd: Any) -> Any:
-            return 0.5 * onward(q, qd)[0] ** 2
+        @carried
+        def onward(self, q: Any, qd: Any) -> Any:
+            return (self.before.speed(q, qd)[0] + qd[1],)
+
+        def kinetic(self, q: Any, qd: Any, p: Any) -> Any:
+            return 0.5 * self.onward(q, qd)[0] ** 2
 
     class Third(Second):
         parent = First
 
     q, qd = torch.tensor([0.3, 0.1]), torch.tensor([2.0, 0.5])
-    c2, c1, *_ = decomposition([kind({}) for kind in (First, Second, Third)], q, qd, qd)
+    kinds = (First, Second, Third)
+    tripod = replace(
+        FORK, joint_names=FORK.joint_names[:2], paths=tuple(kind.path for kind in kinds), linear=()
+    )
+    c2, c1, *_ = backend_of_links(tripod, kinds, {}).decomposition(q, qd, qd)
     assert calls == [(5,)]
     x, slope = np.cos(0.3), -np.sin(0.3) * 2.0
     np.testing.assert_allclose(c2, [x * x, x * x, x, 1, x * x, x, 1], rtol=1e-6)
@@ -227,17 +232,18 @@ def test_what_a_link_hands_on_is_worked_out_once_for_all_that_it_carries() -> No
 
 
 def test_an_energy_off_its_path_is_refused() -> None:
+    from linkwise.runtime.link_modules import backend_of_links
     from linkwise.runtime.partial_lagrangian import PartialLagrangian
-    from linkwise.runtime.sweeps import torque
 
     class Stray(PartialLagrangian):
         path = (1,)
 
-        def kinetic(self, q: Any, qd: Any) -> Any:
+        def kinetic(self, q: Any, qd: Any, p: Any) -> Any:
             return qd[0] ** 2
 
+    alone = replace(FORK, link_names=("stray",), paths=((1,),), linear=())
     with pytest.raises(ValueError, match=r"asks for coordinate 0, which is not on its path \(1,\)"):
-        torque([Stray({})], *torch.zeros(3, 2))
+        backend_of_links(alone, [Stray], {}).torque(*torch.zeros(3, 3))
 
 
 def test_a_parameter_may_be_an_array_of_one_value_a_sample() -> None:

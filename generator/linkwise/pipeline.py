@@ -4,18 +4,19 @@
     energies in Python ─read_energies───────────▶ EnergySystem ─┤
                                                                 ▼
     derive         closed forms, one kernel per link: by the rigid-link rule, which differentiates nothing, or
-                   by Euler–Lagrange from energies that a user wrote; left out where the kernel is in loops
+                   by Euler–Lagrange from energies, those that a user wrote or, if asked for, those of rigid
+                   links; left out where the kernel is in loops
     package_files  their text in each back end, the runtime, the manifest
 
-SymPy energies of rigid links take no part in this: they are worked out for what shows or differentiates them,
-the autograd back end, formulas and reports.
+SymPy energies of rigid links take no part in this otherwise: they are worked out for what shows or
+differentiates them, the autograd back end, formulas and reports.
 """
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from linkwise.dynamics.derive import derive
+from linkwise.dynamics.derive import Method, derive
 from linkwise.emit.assemble import checked_identifier, package_files
 from linkwise.emit.backend import backends_of, chosen_backends
 from linkwise.emit.derivation import Derivation
@@ -50,19 +51,21 @@ def generate(
     request: Mapping[str, Any] | None = None,
     progress: Progress = silent,
     kernel: str = "auto",
+    derivation: Method = "rule",
 ) -> dict[str, str]:
     """Files of a package, {path inside the package: text}.
 
     `backends` are all that there are if not given. `kernel` is straight, loops, or auto, which chooses by the
-    robot's size; with loops no closed forms are derived, and `formulas` are not there.
+    robot's size; with loops no closed forms are derived, and `formulas` are not there. `derivation` says how
+    those of rigid links are: rule, which is cheaper, or energy, by Euler-Lagrange from SymPy energies.
 
     `request` goes into the manifest, so that a reader sees how to make the package again.
     Raises LinkwiseError for a name, back end or kernel that cannot be, before anything is derived.
     """
     system = rigid_system(robot) if isinstance(robot, Robot) else robot
-    kind = chosen_kernel(system, kernel, backends)
+    kind = chosen_kernel(system, kernel, backends, derivation)
     chosen = chosen_backends(backends_of(kind) if backends is None else backends, kind)
     check_size(system, kind, backends)
     package = checked_identifier(name, system.name)
-    kernels = derive(system, progress) if kind == "straight" else ()
+    kernels = derive(system, progress, derivation) if kind == "straight" else ()
     return package_files(Derivation(system, kernels, package, request or {}), chosen, progress)

@@ -13,6 +13,7 @@ from linkwise.check.body_reference import body_reference
 from linkwise.check.c_functions import CFunctions, compile_c
 from linkwise.check.compare import Result, Skipped
 from linkwise.check.compiled_c import CompiledPackage
+from linkwise.check.derivations import derivations
 from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.magnitudes import Magnitudes
@@ -158,6 +159,10 @@ class _Checks:
                 yield Skipped(f"{way.label}{label}: not called", "its C is wrong, see above")
             else:
                 yield from against_reference(Named(f"{way.label}{label}", model, rows, reference), manifest)
+        if manifest.tree is not None:
+            how = "from energies" if manifest.request.get("derivation") == "energy" else "by the rigid rule"
+            ways = {way.label: model for way, model in loaded.items()}
+            yield from derivations(ways, rows, reference, how, label)
 
     def _other_parameters(self, rows: IndexRows, compiled: CompiledPackage | None) -> Iterator[Result]:
         """Every parameter changed a little: equal ones tell no longer one from another, and none is zero."""

@@ -152,6 +152,18 @@ def _energies(checked: Named) -> Iterator[Result]:
     value = _lagrangians(model, reference.states)
     entries = Entries("L", value, expected, scale)
     yield compare(f"{name}: Lagrangians against the energies", [entries], reference.tolerance)
+    yield compare(f"{name}: each link by itself", _links(checked), reference.tolerance)
+
+
+def _links(checked: Named) -> Iterator[Entries]:
+    """What each module gives of its own link."""
+    torch = extra("torch")
+    states, modules = checked.reference.states, list(checked.model.backend.modules)
+    motion = [torch.from_numpy(x) for x in states.motion]
+    parts = [module.coefficients(*motion[:2]) for module in modules]
+    values = dict(zip(("c2", "c1", "g"), zip(*parts, strict=True), strict=True))
+    for what, rows in (values | {"tau": [module.torque(*motion) for module in modules]}).items():
+        yield dense(what, np.stack([row.detach().numpy() for row in rows], 2), checked.reference)
 
 
 def _lagrangians(model: Model, states: States) -> Array:

@@ -38,6 +38,13 @@ def generate(
             "auto: by what closed forms would cost"
         ),
     ] = "auto",
+    derivation: Annotated[
+        Literal["rule", "energy"],
+        typer.Option(
+            help="How closed forms of rigid links are found: by the rigid-link rule, or from their energies "
+            "in SymPy by Euler-Lagrange, which costs more"
+        ),
+    ] = "rule",
     details: Details = False,
 ) -> None:
     """Write the package of a robot."""
@@ -45,19 +52,20 @@ def generate(
     chosen_backends(backend or ())
     path = Path(robot)
     system = pipeline.read_system(robot, options)
-    kind = chosen_kernel(system, kernel, backend)
+    kind = chosen_kernel(system, kernel, backend, derivation)
     backends = [chosen.name for chosen in chosen_backends(backend or backends_of(kind), kind)]
     request = {
         "robot": path.name if is_file(path) else robot,
         "backends": backends,
         "kernel": kernel,
+        "derivation": derivation,
         **asdict(options),
     }
     directory = out / checked_identifier(name, system.name)
     check_target(directory, system.name)
     require_writable(directory)
     with progress() as report:
-        files = pipeline.generate(system, backends, name, request, report, kind)
+        files = pipeline.generate(system, backends, name, request, report, kind, derivation)
     write_package(files, directory)
     for effect in effects(system.notes, details):
         tell(f"warning: {robot}: {effect}", err=True)

@@ -1,19 +1,27 @@
 """From a system to kernels: the closed forms of each link."""
 
 from operator import itemgetter
+from typing import Literal
 
 from linkwise.dynamics.euler_lagrange import euler_lagrange
 from linkwise.dynamics.frame_search import MAX_AXES, FrameSearch
 from linkwise.dynamics.kernel import Kernel, lowering, parameter_nodes
 from linkwise.errors import within
 from linkwise.progress import Progress, silent
+from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import EnergySystem, System
 
+Method = Literal["rule", "energy"]
+"""How the closed forms of rigid links are found: by the rigid-link rule, or from their SymPy energies."""
 
-def link_kernel(system: System, link: int) -> Kernel:
-    """Closed forms of one link from its own path alone, whatever else the robot has."""
+
+def link_kernel(system: System, link: int, method: Method = "rule") -> Kernel:
+    """Closed forms of one link from its own path alone, whatever else the robot has.
+
+    Those of energies that a user wrote come from these in any case.
+    """
     with within(f"link {system.links[link].name!r}"):
-        if isinstance(system, EnergySystem):
+        if isinstance(system, EnergySystem) or method == "energy":
             return _energy_kernel(system, link)
         rigid = system.links[link]
         tree = [(f - 1, joint) for f, joint in enumerate(rigid.joints)]
@@ -22,20 +30,25 @@ def link_kernel(system: System, link: int) -> Kernel:
         return search.build(axes, origin)
 
 
-def _energy_kernel(system: EnergySystem, link: int) -> Kernel:
+def _energy_kernel(system: System, link: int) -> Kernel:
+    """Closed forms by Euler-Lagrange on the expression graph."""
     lower, x = lowering(system)
-    energy, path = system.links[link], system.path(link)
+    energies = link_energies(system)
+    for carrier in lineage(energies, link):
+        lower.define(carrier.twist.definitions)
+        lower.define(carrier.height.definitions)
+    energy = energies[link]
     lagrangian = lower.graph.sub(lower(energy.kinetic), lower(energy.potential))
-    forms = euler_lagrange(lower.graph, lagrangian, path, x)
+    forms = euler_lagrange(lower.graph, lagrangian, system.path(link), x)
     return Kernel(lower.graph, x, parameter_nodes(system, lower), (forms,), ())
 
 
-def derive(system: System, progress: Progress = silent) -> tuple[Kernel, ...]:
+def derive(system: System, progress: Progress = silent, method: Method = "rule") -> tuple[Kernel, ...]:
     """One kernel per link: its closed forms on a graph."""
     kernels = []
     for j in range(len(system.links)):
         progress("derive", j, len(system.links))
         with within(f"while deriving robot {system.name!r}"):
-            kernels.append(link_kernel(system, j))
+            kernels.append(link_kernel(system, j, method))
     progress("derive", len(system.links), len(system.links))
     return tuple(kernels)

@@ -54,6 +54,8 @@ class Loading:
     """Whether it may be made of RULE, the vectorised rule of rigid links, which is None for energies."""
     chooses: bool = False
     """Whether it has kernels to choose from and takes bodies, as `kernel` and `bodies`."""
+    learns: bool = False
+    """Whether its links are torch modules, whose numbers `requires_grad` makes nn.Parameters."""
 
 
 @dataclass(frozen=True)
@@ -167,20 +169,28 @@ BACKENDS: dict[str, BackendFiles] = {
             emits=(_energies,),
             runtime=(
                 "autograd_backend.py",
+                "dynamics_module.py",
+                "energy_interface.py",
+                "frame_motion.py",
+                "functional_sweeps.py",
                 "lane_entries.py",
                 "lanes.py",
+                "link_modules.py",
                 "partial_lagrangian.py",
                 "recording.py",
                 "rigid_body.py",
+                "rigid_lagrangian.py",
+                "run_time_values.py",
                 "sweeps.py",
                 "torch_backend.py",
                 *RULE_FILES,
             ),
             loading=Loading(
-                "autograd_backend",
-                "AutogradBackend(ROBOT, links, values)",
-                ("from .energies import links",),
+                "link_modules",
+                "backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad)",
+                ("from .energies import LAGRANGIANS",),
                 speed=4,
+                learns=True,
             ),
         ),
         BackendFiles(

@@ -1,7 +1,9 @@
 """Which kind of kernel a package gets: straight lines of closed forms, or loops over links and joints."""
 
 from collections.abc import Iterable
+from typing import get_args
 
+from linkwise.dynamics.derive import Method
 from linkwise.dynamics.frame_search import FrameSearch
 from linkwise.dynamics.link_motion import Origin
 from linkwise.dynamics.screws import CommonAxes
@@ -26,18 +28,25 @@ Of links behind a single joint they need almost none.
 """
 
 
-def chosen_kernel(system: System, choice: str, backends: Iterable[str] | None) -> KernelKind:
+def chosen_kernel(
+    system: System, choice: str, backends: Iterable[str] | None, derivation: str = "rule"
+) -> KernelKind:
     """Kind of kernel for one of CHOICES and the back ends asked for by name, None for all there are.
 
-    Raises LinkwiseError for a choice that is not one, and for loops over energies.
+    Raises LinkwiseError for a choice that is not one, and for loops over energies or for a derivation from
+    them.
     """
+    if derivation not in get_args(Method):
+        raise LinkwiseError(f"no derivation {derivation!r}; choose rule or energy")
     if choice not in CHOICES:
         raise LinkwiseError(f"no kernel {choice!r}; choose among {', '.join(CHOICES)}")
     if choice == "loops" and isinstance(system, EnergySystem):
         raise LinkwiseError("--kernel loops goes over rigid bodies, and here are energies; leave it out")
+    if choice == "loops" and derivation == "energy":
+        raise LinkwiseError("--kernel loops derives nothing, and --derivation energy does; leave one out")
     if choice != "auto":
         return "loops" if choice == "loops" else "straight"
-    closed = backends is not None and not set(backends) <= LOOPS.keys()
+    closed = derivation == "energy" or (backends is not None and not set(backends) <= LOOPS.keys())
     if closed or isinstance(system, EnergySystem):
         return "straight"
     cost = closed_form_cost(system)

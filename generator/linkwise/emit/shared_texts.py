@@ -33,6 +33,7 @@ class Maker:
     imports: tuple[str, ...]
     made: str
     chooses: bool
+    learns: bool
 
     @classmethod
     def of(cls, backend: BackendFiles, loading: Loading, rigid: bool, kernel: KernelKind) -> "Maker":
@@ -46,7 +47,7 @@ class Maker:
             imports.append("from .tree import RULE" if rigid else "RULE = None")
         if loading.uses_forms and kernel == "loops":
             imports.append("LINKS = None")
-        return cls(backend.name, backend.doc, tuple(imports), loading.made, loading.chooses)
+        return cls(backend.name, backend.doc, tuple(imports), loading.made, loading.chooses, loading.learns)
 
 
 def init_text(
@@ -69,6 +70,8 @@ def init_text(
         "default": next((backend.name for backend in loadable), ""),
         "makers": [Maker.of(backend, loading, rigid, kernel) for backend, loading in loadable.items()],
         "choosing": [backend.name for backend, loading in loadable.items() if loading.chooses],
+        "learning": [backend.name for backend, loading in loadable.items() if loading.learns],
+        "rigid": rigid,
         "bodies": rigid and any(loading.uses_rule for loading in loadable.values()),
         "fastest_first": [backend.name for backend, _ in fastest_first],
         "parameters": _parameter_lines(parameters),

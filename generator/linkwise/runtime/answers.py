@@ -1,6 +1,6 @@
 """The calls of `Dynamics` behind its face: motion is checked, answers computed and put where `out` says."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -62,6 +62,11 @@ class Answers:
     def direct(self) -> Mapping[str, Callable[..., Any]]:
         """Calls by name that are quicker than these, given first an object whose class has all calls."""
         return {}
+
+    def read_beside_motion(self) -> Iterable[Any]:
+        """Arrays or tensors that results hang on, beside the motion."""
+        values: Iterable[Any] = self._backend.parameters.values()
+        return values
 
     def packed(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.packed`."""
@@ -140,8 +145,8 @@ class Answers:
         if out is None:
             return None
         kind, named = KINDS.get(call), dict(zip(MOTION, motion, strict=False))
-        fields, parameters = kind._fields if kind else (), self._backend.parameters.values()
-        return accepted(out, fields, self._shapes[call], named, parameters, self.contiguous)
+        fields = kind._fields if kind else ()
+        return accepted(out, fields, self._shapes[call], named, self.read_beside_motion(), self.contiguous)
 
     def _computed(self, call: str, motion: Any) -> Any:
         """Results of a call in order."""

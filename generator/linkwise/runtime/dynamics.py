@@ -52,8 +52,6 @@ class Dynamics:
     """Names of the links, in the order of j."""
     layout: Layout
     """Indices that packed values belong to."""
-    parameters: Mapping[str, Any]
-    """Values of the run-time parameters."""
     backend: Backend[Any]
     """What computes; of the native one `threads` may be set."""
     check_finite: bool
@@ -72,11 +70,17 @@ class Dynamics:
         self.n, self.N = structure.n, structure.N
         self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
         self.link_names, self.layout = structure.link_names, structure.layout
-        self.backend, self.parameters = backend, backend.parameters
+        self.backend = backend
         self._load, self._asked = load, asked
         self._answers = backend.answers(check_finite)
         # They stand before the methods of the class, which they pass on to what is no plain array.
         vars(self).update({name: MethodType(call, self) for name, call in self._answers.direct.items()})
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Values of the run-time parameters."""
+        values: Mapping[str, Any] = self.backend.parameters
+        return values
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}

@@ -45,7 +45,10 @@ class Backend(Protocol[Kind]):
     name: ClassVar[str]
     takes_tensors: ClassVar[bool]
     """Whether motion is given as torch tensors only."""
-    parameters: dict[str, Any]
+    face: ClassVar[Any]
+    """Class of the robots that compute with it; None for `Dynamics`."""
+    parameters: Any
+    """Values of the run-time parameters by name."""
 
     def arrays(self, named: Mapping[str, Kind], n: int) -> Sequence[Kind]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""

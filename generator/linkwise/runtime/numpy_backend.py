@@ -32,6 +32,7 @@ class NumpyBackend:
 
     name: ClassVar = "numpy"
     takes_tensors: ClassVar = False
+    face: ClassVar[Any] = None
     xp: ClassVar[Any] = np
     fuses: ClassVar = False
 

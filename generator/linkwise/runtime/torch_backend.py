@@ -35,6 +35,7 @@ class TorchBackend:
 
     name: ClassVar = "torch"
     takes_tensors: ClassVar = True
+    face: ClassVar[Any] = None
     xp: ClassVar[Any] = torch
 
     def __init__(

@@ -103,7 +103,7 @@ def link_energies(system: System) -> tuple[StepwiseEnergy, ...]:
         state = states[parent] if parent is not None else start
         twist, height = _Namer(), _Namer()
         for at in steps:
-            label = f"{number + 1}" if at == index else f"{number + 1}{_letters(steps.index(at))}"
+            label = f"{number + 1}" if at == index else f"{number + 1}{letters(steps.index(at))}"
             state = _step(state, robot.links[at].joint, robot.coordinates, label, twist, height)
         states[index], position[index] = state, number
         (mass, _, _), com = exact((rigid.mass, 0, 0)), exact(rigid.com)
@@ -138,10 +138,10 @@ def exact(a: Sequence[Scalar]) -> Vec3:
     return x, y, z
 
 
-def _letters(index: int) -> str:
+def letters(index: int) -> str:
     """a, b, …, z, ba, …: tells massless joints before one link apart."""
     head, last = divmod(index, 26)
-    return (_letters(head) if head else "") + chr(ord("a") + last)
+    return (letters(head) if head else "") + chr(ord("a") + last)
 
 
 def _step(
