@@ -171,8 +171,9 @@ def test_every_table_of_a_page_is_read_as_one() -> None:
         ["τ_1", "3", "6", "3", "1", "2"],
     ]
     assert [len(row) for row in operations] == [3] * 9
-    terms, costs = tables(reduction_markdown(result))
+    terms, uncombined, costs = tables(reduction_markdown(result))
     assert [row[:4] for row in terms[1:]] == [["1", "3", "2", "0.3333"], ["2", "14", "6", "0.5714"]]
+    assert [row[:3] for row in uncombined[1:]] == [["1", "4", "3"], ["2", "22", "10"]]
     assert [len(row) for row in (*terms, *costs)] == [7] * 3 + [8] * 3
     (seconds,) = tables(seconds_markdown(result, seconds_json("arm", timings)))
     assert seconds == [
