@@ -25,6 +25,7 @@ from linkwise.report import (
     fit,
     held_against,
     link_operations,
+    measure_derivations,
     reduction_images,
     reduction_json,
     reduction_markdown,
@@ -161,6 +162,12 @@ def test_uncombined_terms_end_at_the_budget() -> None:
     system = planar(5)
     assert isinstance(system, RigidSystem)
     assert len(list(uncombined_terms(system, 5, 100))) == 3
+
+
+def test_deriving_by_sympy_stops_at_its_limit_of_time() -> None:
+    first, second = measure_derivations(planar(2), (1, 2), silent, limit=0.0)
+    assert (first.whole, first.link, second.whole, second.link) == (None, None, None, None)
+    assert min(first.rule, second.rule) > 0.0
 
 
 def test_no_polynomial_is_claimed_without_counts_to_confirm_it() -> None:

@@ -4,19 +4,32 @@ p_j = p_j−1 + R_j−1 t_j      R_j = R_j−1 E_j Rz(q_j)      r_j = p_j + R_j 
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import TypeAlias
+from itertools import islice
+from typing import TypeAlias, TypeVar
 
 import sympy as sp
 
-from linkwise.report.expand import Expansion, snapped
-from linkwise.report.laurent import ONE, ZERO, Laurent, add, constant, multiply
+from linkwise.report.expand import ROUNDING, Expansion, angle_units, snapped
+from linkwise.report.expanded_torques import is_exact
+from linkwise.report.laurent import ONE, ZERO, BudgetExceededError, Laurent, add, constant, multiply
 from linkwise.robot import Coordinate, Joint
-from linkwise.symbolic.link_energy import exact
+from linkwise.symbolic.link_energy import exact, link_energies
 from linkwise.symbolic.system import RigidSystem
 
 Vector: TypeAlias = list[Laurent]
 Columns: TypeAlias = list[Vector]
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class ExpandedArm:
+    """An arm's first links, as far as a budget of terms reaches, and gravity in the world's axes in m/s²."""
+
+    expansion: Expansion
+    bodies: tuple["ExpandedBody", ...]
+    gravity: Vector
 
 
 @dataclass(frozen=True)
@@ -29,8 +42,23 @@ class ExpandedBody:
     inertia: Columns
 
 
-def expanded_bodies(system: RigidSystem, expansion: Expansion) -> Iterator[ExpandedBody]:
-    """Links of a serial arm one after another; raises BudgetExceededError at one too large."""
+def expanded_arm(system: RigidSystem, links: int, budget: int) -> ExpandedArm:
+    """Expand the first `links` links of a serial arm, or those that the budget of terms suffices for."""
+    turns = [joint for joint in system.links[links - 1].joints if joint.kind == "revolute"]
+    waves = [sp.cos(exact((j.ratio, 0, 0))[0] * system.coordinates[j.coordinate].q) for j in turns]
+    rounding = 0.0 if is_exact(system, link_energies(system)) else ROUNDING
+    expansion = Expansion(system.coordinates, angle_units(system.coordinates, waves), budget, rounding)
+    gravity = [expansion(a) for a in exact(system.robot.gravity)]
+    return ExpandedArm(expansion, tuple(affordable(islice(_bodies(system, expansion), links))), gravity)
+
+
+def affordable(found: Iterator[Item]) -> Iterator[Item]:
+    """What comes before a budget of terms is exceeded."""
+    with suppress(BudgetExceededError):
+        yield from found
+
+
+def _bodies(system: RigidSystem, expansion: Expansion) -> Iterator[ExpandedBody]:
     columns: Columns = [[ONE, ZERO, ZERO], [ZERO, ONE, ZERO], [ZERO, ZERO, ONE]]
     origin, spin = [ZERO] * 3, [ZERO] * 3
     links, reached = iter(system.links), 0
