@@ -294,6 +294,7 @@ def test_csv_header_comes_back(analysis) -> None:
 
 def test_templates_have_the_rules_as_filters() -> None:
     view = {"robot": "a|b", "batch": 1, "machine": "<m>", "verdicts": [], "rows": [], "pictures": False}
+    view |= {"derivations": [], "limit": "20"}
     text = render("report/measured.md.j2", view)
     assert "# Measured time of a\\|b\n" in text
     assert "&lt;m&gt;" in text

@@ -100,11 +100,14 @@ def test_any_bucket_of_any_torque_can_be_asked_for() -> None:
 def test_measured_seconds_stay_in_files_of_their_own_and_draw_again(tmp_path: Path) -> None:
     first, again = tmp_path / "first", tmp_path / "again"
     assert report("reduction", "--dof", "1..2", "--measure", "--out", str(first)).returncode == 0
-    timings = json.loads((first / "measured.json").read_text())["timings"]
+    found = json.loads((first / "measured.json").read_text())
+    timings, derivations = found["timings"], found["derivations"]
     assert [(t["dof"], t["method"]) for t in timings] == [
         (n, method) for n in (1, 2) for method in ("closed form", "autograd")
     ]
     assert all(t["extract"] > 0.0 and 0.0 < t["whole"] < 1e6 for t in timings)
+    assert [d["dof"] for d in derivations] == [1, 2]
+    assert all(0.0 < d[way] < 20.0 for d in derivations for way in ("whole", "link", "rule"))
     assert "](savings-measured.svg)" in (first / "measured.md").read_text()
     assert (first / "savings-measured.svg").read_bytes() != (first / "savings.svg").read_bytes()
     stored = str(first / "measured.json")

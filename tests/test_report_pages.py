@@ -15,6 +15,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import printable
 from linkwise.progress import silent
 from linkwise.report import (
+    DerivationTime,
     TermQuery,
     Timing,
     measure,
@@ -35,6 +36,8 @@ from linkwise.robot import Coordinate, Options, read_robot
 from linkwise.symbolic.system import EnergySystem, LinkEnergy, System, rigid_system
 from markdown_it import MarkdownIt
 
+DERIVED = (DerivationTime(2, None, 0.25, 0.125),)
+
 
 def planar(n: int) -> System:
     return rigid_system(read_robot(f"planar{n}", Options(parameters="symbolic")))
@@ -53,7 +56,7 @@ def test_each_template_uses_every_field_of_its_view_and_no_other(monkeypatch: py
     result = study("arm", arm, 1, 1, 1, 100, silent)
     terms_markdown(terms_report(arm, TermQuery(), 100, False, silent))
     reduction_markdown(result)
-    seconds_markdown(result, seconds_json("arm", measure(arm, (1,), silent)))
+    seconds_markdown(result, seconds_json("arm", measure(arm, (1,), silent), DERIVED))
     assert seen.keys() == {
         f"report/{name}.j2" for name in ("terms.md", "reduction.md", "measured.md", "row.py")
     }
@@ -84,7 +87,7 @@ def test_the_data_of_the_terms_hold_what_the_page_shows() -> None:
 def test_measured_seconds_are_held_against_the_terms() -> None:
     result = study("arm", planar(2), 1, 2, 2, 100, silent)
     timings = [Timing(2, "closed form", 1.0, 2.0, 3.0), Timing(2, "autograd", 1.0, 10.0, 11.0)]
-    said = seconds_markdown(result, seconds_json("arm", timings))
+    said = seconds_markdown(result, seconds_json("arm", timings, DERIVED))
     assert "**Closed form**: at 2 DoF extracting saves 50.0% of the time, weaker than the 57.1%" in said
     assert "**Autograd**: at 2 DoF extracting saves 90.0% of the time, stronger than the 57.1%" in said
 
@@ -105,6 +108,8 @@ MEASURED = {
     "numpy": "2",
     "torch": "2",
     "timings": [TIMING],
+    "derivations": [{"dof": 1, "whole": 2.0, "link": None, "rule": 0.5}],
+    "derivation_limit": 20.0,
 }
 
 
@@ -120,6 +125,7 @@ MEASURED = {
         {"timings": [TIMING | {"dof": math.inf}]},
         {"timings": [TIMING | {"extract": math.nan}]},
         {"remark": math.nan},
+        {"derivations": [{"dof": 1}]},
     ],
     ids=str,
 )
@@ -171,15 +177,17 @@ def test_every_table_of_a_page_is_read_as_one() -> None:
         ["τ_1", "3", "6", "3", "1", "2"],
     ]
     assert [len(row) for row in operations] == [3] * 9
-    terms, costs = tables(reduction_markdown(result))
+    terms, uncombined, costs = tables(reduction_markdown(result))
     assert [row[:4] for row in terms[1:]] == [["1", "3", "2", "0.3333"], ["2", "14", "6", "0.5714"]]
+    assert [row[:3] for row in uncombined[1:]] == [["1", "4", "3"], ["2", "22", "10"]]
     assert [len(row) for row in (*terms, *costs)] == [7] * 3 + [8] * 3
-    (seconds,) = tables(seconds_markdown(result, seconds_json("arm", timings)))
+    seconds, derivations = tables(seconds_markdown(result, seconds_json("arm", timings, DERIVED)))
     assert seconds == [
         ["DoF", "method", "extract", "whole", "everything", "reduction 1 − extract/whole"],
         ["2", "closed form", "1.000", "2.000", "3.000", "0.500"],
         ["2", "autograd", "1.000", "2.000", "3.000", "0.500"],
     ]
+    assert derivations[1:] == [["2", "–", "0.250", "0.125"]]
     assert all(cell for table in (operations, terms, costs, seconds) for row in table for cell in row)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 from linkwise.dynamics.derive import derive
 from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.emit.render import render
@@ -24,6 +25,7 @@ from linkwise.report import (
     fit,
     held_against,
     link_operations,
+    measure_derivations,
     reduction_images,
     reduction_json,
     reduction_markdown,
@@ -32,8 +34,9 @@ from linkwise.report import (
     verdicts,
 )
 from linkwise.report.seconds import row_view
+from linkwise.report.uncombined_terms import uncombined_terms
 from linkwise.robot import Options, read_robot
-from linkwise.symbolic.system import System, rigid_system
+from linkwise.symbolic.system import RigidSystem, System, rigid_system
 from matplotlib.figure import Figure
 
 GOLDEN = json.loads((Path(__file__).parent / "data" / "term_counts.json").read_text())
@@ -75,6 +78,96 @@ def test_polynomials_from_eight_counts_predict_the_next_six(points: tuple[CurveP
     assert kept.coefficients == (2, 4, 3, 1)
     assert [total(p.dof) for p in points[8:]] == [p.total for p in points[8:]]
     assert [kept(p.dof) for p in points[8:]] == [p.kept for p in points[8:]]
+
+
+T = sp.Symbol("t")
+Q = [sp.Function(f"q{k}")(T) for k in range(3)]
+POLAR = """schema = 1
+name = "polar"
+gravity = [0, -9.81, 0]
+[[link]]
+name = "beam"
+mass = 2.0
+com = [0.5, 0, 0]
+inertia = { xx = 0.01, yy = 0.3, zz = 0.3 }
+[[link]]
+name = "carriage"
+mass = 3.0
+com = [0.25, 0, 0]
+inertia = { xx = 0.02, yy = 0.1, zz = 0.1 }
+[[joint]]
+name = "turn"
+type = "revolute"
+parent = "base"
+child = "beam"
+axis = [0, 0, 1]
+[[joint]]
+name = "slide"
+type = "prismatic"
+parent = "beam"
+child = "carriage"
+axis = [1, 0, 0]
+"""
+
+
+def terms_by_sympy(
+    places: Sequence[tuple[sp.Expr, sp.Expr]], angles: Sequence[sp.Expr]
+) -> list[tuple[int, int]]:
+    """Terms of τ_1 of the first 1, 2, … links, and those with q̈_1, of energies in the world's axes."""
+    counts, total, kept = [], 0, 0
+    for j, ((x, y), angle) in enumerate(zip(places, angles, strict=True)):
+        m, inertia, g = sp.symbols(f"m{j} I{j} g")
+        kinetic = m * (sp.diff(x, T) ** 2 + sp.diff(y, T) ** 2) / 2 + inertia * sp.diff(angle, T) ** 2 / 2
+        lagrangian = kinetic - m * g * y
+        torque = sp.diff(sp.diff(lagrangian, sp.diff(Q[0], T)), T) - sp.diff(lagrangian, Q[0])
+        terms = sp.Add.make_args(sp.expand(torque))
+        total, kept = total + len(terms), kept + sum(term.has(sp.diff(Q[0], T, 2)) for term in terms)
+        counts.append((total, kept))
+    return counts
+
+
+def counts(system: System, links: int) -> list[tuple[int, int]]:
+    assert isinstance(system, RigidSystem)
+    return [(pair.total, pair.kept) for pair in uncombined_terms(system, links, 10**6)]
+
+
+def test_uncombined_terms_of_a_planar_arm_are_those_that_sympy_expands() -> None:
+    x = y = sp.S.Zero
+    angles, places = [sum(Q[: j + 1]) for j in range(3)], []
+    for j, angle in enumerate(angles):
+        length, r = sp.symbols(f"l{j} r{j}")
+        places.append((x + r * sp.cos(angle), y + r * sp.sin(angle)))
+        x, y = x + length * sp.cos(angle), y + length * sp.sin(angle)
+    assert counts(planar(3), 3) == terms_by_sympy(places, angles)
+
+
+def test_uncombined_terms_of_a_slide_are_those_that_sympy_expands(tmp_path: Path) -> None:
+    (tmp_path / "polar.toml").write_text(POLAR)
+    system = rigid_system(read_robot(str(tmp_path / "polar.toml"), Options(parameters="nonzero")))
+    r, s = sp.symbols("r s")
+    places = [(a * sp.cos(Q[0]), a * sp.sin(Q[0])) for a in (r, Q[1] + s)]
+    assert counts(system, 2) == terms_by_sympy(places, [Q[0], Q[0]])
+
+
+def test_both_conventions_give_sixteen_redundant_terms_and_one_gives_the_papers_curve() -> None:
+    result = study("planar arm", planar(10), 1, 10, 10, 10**6, silent)
+    assert [(p.total, p.kept) for p in result.uncombined[3:5]] == [(204, 44), (464, 75)]
+    assert round(result.points[9].redundant_per_kept) == round(result.uncombined[9].redundant_per_kept) == 16
+    assert result.uncombined_fit is not None
+    assert (result.uncombined_fit.a, result.uncombined_fit.rate) == pytest.approx((0.9626, 0.4004), abs=1e-3)
+    assert "misses these points by up to 0.0882" in " ".join(verdicts(result))
+
+
+def test_uncombined_terms_end_at_the_budget() -> None:
+    system = planar(5)
+    assert isinstance(system, RigidSystem)
+    assert len(list(uncombined_terms(system, 5, 100))) == 3
+
+
+def test_deriving_by_sympy_stops_at_its_limit_of_time() -> None:
+    first, second = measure_derivations(planar(2), (1, 2), silent, limit=0.0)
+    assert (first.whole, first.link, second.whole, second.link) == (None, None, None, None)
+    assert min(first.rule, second.rule) > 0.0
 
 
 def test_no_polynomial_is_claimed_without_counts_to_confirm_it() -> None:
@@ -162,7 +255,9 @@ def test_the_page_holds_every_count_and_what_it_saves() -> None:
         y = 1 - point.kept / point.total
         assert float(row[5]) == pytest.approx(y - result.fitted(point.dof), abs=1e-4)
         assert float(row[6]) == pytest.approx(y - 0.95 * (1 - np.exp(-0.44 * point.dof)), abs=1e-4)
-        torque, part, reduction, written, kept, saved, everything = map(float, table[3 + at][1:])
+        pair = result.uncombined[at]
+        assert table[3 + at][1:3] == [str(pair.total), str(pair.kept)]
+        torque, part, reduction, written, kept, saved, everything = map(float, table[6 + at][1:])
         assert reduction == pytest.approx(1 - part / torque, abs=1e-4)
         assert saved == pytest.approx(1 - kept / written, abs=1e-4)
         assert part <= torque <= written

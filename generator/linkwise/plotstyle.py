@@ -11,7 +11,7 @@ from linkwise.extras import extra
 # Okabe and Ito 2008, the first three in the paper's order of red, blue and green; their yellow is too pale
 # on white, so a brown stands in its place.
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31")
-VERMILION, BLUE, GREEN, PURPLE, _, SKY, _ = COLOURS
+VERMILION, BLUE, GREEN, PURPLE, _, SKY, BROWN = COLOURS
 ON_DARK = ("#FF8B3D", "#3D9BE0", "#2ECC9B", "#E59AC7", "#F5B942", "#9BDCFF", "#C9A66B")
 """The same colours, light enough for a dark page."""
 

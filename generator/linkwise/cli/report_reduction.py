@@ -16,6 +16,7 @@ from linkwise.pipeline import read_system
 from linkwise.progress import progress
 from linkwise.report import (
     measure,
+    measure_derivations,
     read_seconds,
     reduction_json,
     reduction_markdown,
@@ -61,7 +62,8 @@ def reduction(
     with progress() as advance:
         result = study(name, system, first, last, beyond, budget, advance)
         if measured and found is None:
-            found = seconds_json(name, measure(system, result.dof, advance))
+            derivations = measure_derivations(system, result.dof, advance)
+            found = seconds_json(name, measure(system, result.dof, advance), derivations)
     if out is not None:
         write_files(out, study_files(result, found))
     if as_json:

@@ -5,6 +5,7 @@ page (`terms_markdown`, …), or as all files that go into a directory (`terms_f
 """
 
 from linkwise.report.curve_fit import CountPolynomial, Saturation, count_polynomial, fit, held_against
+from linkwise.report.derivation_seconds import DerivationTime, measure_derivations
 from linkwise.report.expanded_torques import LinkTorques, link_torques
 from linkwise.report.operations import LinkOperations, Operations, link_operations
 from linkwise.report.plots import SavingsLine, draw_savings, reduction_images, savings_lines, terms_images
@@ -21,6 +22,7 @@ __all__ = [
     "PAPER",
     "CountPolynomial",
     "CurvePoint",
+    "DerivationTime",
     "LinkOperations",
     "LinkTorques",
     "Operations",
@@ -42,6 +44,7 @@ __all__ = [
     "link_operations",
     "link_torques",
     "measure",
+    "measure_derivations",
     "position",
     "progress_line",
     "read_seconds",

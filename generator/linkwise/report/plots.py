@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from linkwise.extras import extra
-from linkwise.plotstyle import BLUE, GREEN, INK, PURPLE, SKY, VERMILION, drawn, saved, styled
+from linkwise.plotstyle import BLUE, BROWN, GREEN, INK, PURPLE, SKY, VERMILION, drawn, saved, styled
 from linkwise.report.curve_fit import Saturation
 from linkwise.report.reduction_curve import Study
 from linkwise.report.seconds import METHODS, Timing
@@ -83,11 +83,15 @@ def savings_lines(result: Study, timings: Sequence[Timing] = ()) -> tuple[Saving
     written = tuple(p.written_reduction for p in points)
     emitted = tuple(p.operations_reduction for p in points)
     long = (0, (5, 1))
+    pairs = tuple(pair.reduction for pair in result.uncombined)
     lines = [
         SavingsLine("terms", "terms, as in the paper", dof, terms, BLUE, "o", "-"),
         SavingsLine("operations", "operations, nothing shared", dof, written, SKY, "v", long),
         SavingsLine("operations", "operations as emitted", dof, emitted, VERMILION, "s", "--"),
     ]
+    if pairs:
+        label = "terms, sin² + cos² left"
+        lines.insert(0, SavingsLine("terms", label, dof[: len(pairs)], pairs, BROWN, "P", (0, (2, 1))))
     for method, look in zip(METHODS, ((GREEN, "^", "-."), (PURPLE, "D", ":")), strict=True):
         chosen = [t for t in timings if t.method == method]
         if chosen:

@@ -16,33 +16,22 @@ from linkwise.report.curve_fit import (
 from linkwise.report.expanded_torques import form_of, link_torques
 from linkwise.report.laurent import BudgetExceededError
 from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations, link_operations, summed
-from linkwise.report.term_count import RunningCount, TermQuery
-from linkwise.symbolic.system import System
+from linkwise.report.term_count import RunningCount, TermPair, TermQuery
+from linkwise.report.uncombined_terms import uncombined_terms
+from linkwise.symbolic.system import RigidSystem, System
 
 PAPER = TermQuery(joint=0, link=None, coordinate=0, order=2)
 """The paper's: from τ_1, what contains q̈_1."""
 
 
 @dataclass(frozen=True)
-class CurvePoint:
+class CurvePoint(TermPair):
     """The arm of the first `dof` links: Σ_j τ_1j against what its q̈_1 part alone takes."""
 
     dof: int
-    total: int
-    kept: int
     torque: Operations
     part: Operations
     everything: Operations
-
-    @property
-    def reduction(self) -> float:
-        """Share of terms that need no computing."""
-        return 1.0 - self.kept / self.total
-
-    @property
-    def redundant_per_kept(self) -> float:
-        """Terms computed in vain for each one that is wanted."""
-        return (self.total - self.kept) / self.kept
 
     @property
     def operations_reduction(self) -> float:
@@ -62,7 +51,11 @@ def _saved(part: int, whole: int) -> float:
 
 @dataclass(frozen=True)
 class Study:
-    """The curve of one arm, with fits. The polynomials rest on points beyond those asked for too."""
+    """The curve of one arm, with fits. The polynomials rest on points beyond those asked for too.
+
+    uncombined: the points by the convention of `uncombined_terms`, as far as the budget reaches; none for
+    energies that a user wrote
+    """
 
     robot: str
     form: str
@@ -71,6 +64,8 @@ class Study:
     paper: Saturation
     total: CountPolynomial | None
     kept: CountPolynomial | None
+    uncombined: tuple[TermPair, ...]
+    uncombined_fit: Saturation | None
 
     @property
     def dof(self) -> tuple[int, ...]:
@@ -85,6 +80,9 @@ def study(
     every = curve(system, last, budget, progress, beyond)
     points = every[first - 1 : last]
     dof, y = [p.dof for p in points], [p.reduction for p in points]
+    uncombined = (
+        tuple(uncombined_terms(system, last, budget))[first - 1 :] if isinstance(system, RigidSystem) else ()
+    )
     return Study(
         name,
         form_of(system),
@@ -93,6 +91,8 @@ def study(
         held_against(PAPER_A, PAPER_RATE, dof, y),
         count_polynomial([p.total for p in every]),
         count_polynomial([p.kept for p in every]),
+        uncombined,
+        fit(dof[: len(uncombined)], [pair.reduction for pair in uncombined]),
     )
 
 
@@ -123,7 +123,7 @@ def curve(
                 raise LinkwiseError(
                     f"{system.name}: no term of τ_1 contains q̈_1; the curve needs a first link with inertia"
                 )
-            points.append(CurvePoint(len(points) + 1, total, kept, whole, part, everything))
+            points.append(CurvePoint(total, kept, len(points) + 1, whole, part, everything))
     except BudgetExceededError as error:
         if len(points) >= last:
             return tuple(points)

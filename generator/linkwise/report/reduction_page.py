@@ -6,6 +6,8 @@ from typing import Any
 from linkwise.emit.render import render
 from linkwise.report.curve_fit import PAPER_A, PAPER_RATE, CountPolynomial, Saturation, held_against
 from linkwise.report.reduction_curve import CurvePoint, Study
+from linkwise.report.term_count import TermPair
+from linkwise.report.uncombined_terms import FORM as UNCOMBINED
 
 DIGITS = 6
 """Decimals of a rate: more would be noise in a file that is compared byte for byte."""
@@ -27,6 +29,11 @@ def reduction_json(result: Study) -> dict[str, Any]:
         "points": [point_row(point) for point in result.points],
         "fit": _saturation(result.fitted),
         "paper": _saturation(result.paper),
+        "uncombined": {
+            "form": UNCOMBINED,
+            "points": [pair_row(dof, pair) for dof, pair in zip(result.dof, result.uncombined, strict=False)],
+            "fit": _saturation(result.uncombined_fit),
+        },
         "polynomials": {"total": _polynomial(result.total), "kept": _polynomial(result.kept)},
         "verdicts": [text.replace("**", "") for text in verdicts(result)],
     }
@@ -46,6 +53,16 @@ def point_row(point: CurvePoint) -> dict[str, Any]:
         "operations_reduction": round(point.operations_reduction, DIGITS),
         "written_out_reduction": round(point.written_reduction, DIGITS),
         "decomposition_operations": point.everything.shared,
+    }
+
+
+def pair_row(dof: int, pair: TermPair) -> dict[str, Any]:
+    """Return one point's terms by another convention as JSON values."""
+    return {
+        "dof": dof,
+        "terms": pair.total,
+        "kept": pair.kept,
+        "reduction": round(pair.reduction, DIGITS),
     }
 
 
@@ -84,6 +101,8 @@ def reduction_markdown(result: Study, pictures: bool = False) -> str:
             for name, p in (("total", result.total), ("kept", result.kept))
             if p is not None
         ],
+        "uncombined": UNCOMBINED,
+        "pairs": [_pair(dof, pair) for dof, pair in zip(result.dof, result.uncombined, strict=False)],
         "costs": [_costs(point) for point in result.points],
     }
     return render("report/reduction.md.j2", view)
@@ -99,6 +118,16 @@ def _line(point: CurvePoint, result: Study, at: int) -> tuple[str, ...]:
         f"{point.redundant_per_kept:.1f}",
         fitted,
         f"{result.paper.residuals[at]:+.4f}",
+    )
+
+
+def _pair(dof: int, pair: TermPair) -> tuple[str, ...]:
+    return (
+        str(dof),
+        str(pair.total),
+        str(pair.kept),
+        f"{pair.reduction:.4f}",
+        f"{pair.redundant_per_kept:.1f}",
     )
 
 
@@ -123,6 +152,8 @@ def verdicts(result: Study) -> Iterator[str]:
             yield _redundancy_verdict(point)
     if result.total is not None and result.kept is not None:
         yield _limit_verdict(result.total, result.kept)
+    if result.uncombined:
+        yield _convention_verdict(result)
     yield _operations_verdict(result.points[-1])
 
 
@@ -169,6 +200,31 @@ def _limit_verdict(total: CountPolynomial, kept: CountPolynomial) -> str:
     return (
         f"**Holds: many DoF.** {counts}: 1 − y falls like {scale:.4g}/n^{excess}, and y tends to 1, as the "
         f"paper says. The exponential is a fit, not a law: it ends at A = {PAPER_A}{passed}."
+    )
+
+
+def _convention_verdict(result: Study) -> str:
+    """Say which of the paper's numbers the other convention gives too."""
+    pairs = dict(zip(result.dof, result.uncombined, strict=False))
+    told = [
+        f"{pairs[dof].redundant_per_kept:.1f} redundant terms for each kept one at {dof} DoF "
+        f"(the paper: {stated})"
+        for dof, stated in PAPER_REDUNDANT.items()
+        if dof in pairs
+    ]
+    if result.uncombined_fit is not None:
+        found = result.uncombined_fit
+        paper = held_against(PAPER_A, PAPER_RATE, list(pairs), [pair.reduction for pair in pairs.values()])
+        told.append(
+            f"a free fit of A = {found.a:.4f} and λ = {found.rate:.4f}; the paper's curve misses these "
+            f"points by up to {paper.largest:.4f}"
+        )
+    last = max(pairs)
+    return (
+        f"**By another convention**, which leaves sin² + cos² as two terms: {pairs[last].reduction:.1%} of "
+        f"{pairs[last].total} terms are not needed at {last} DoF"
+        + "".join(f"; {text}" for text in told)
+        + "."
     )
 
 

@@ -15,6 +15,7 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import json_text
 from linkwise.extras import extra
 from linkwise.input_file import require_file
+from linkwise.report.derivation_seconds import LIMIT, DerivationTime
 from linkwise.report.reduction_curve import Study
 from linkwise.report.seconds import BATCH, METHODS, Timing
 
@@ -22,11 +23,13 @@ DIGITS = 4
 MADE_WITH = ("machine", "python", "numpy", "torch")
 
 
-def seconds_json(robot: str, timings: Sequence[Timing]) -> dict[str, Any]:
-    """Return the measurement, and where it was made, as JSON values; times in µs a sample."""
+def seconds_json(
+    robot: str, timings: Sequence[Timing], derivations: Sequence[DerivationTime]
+) -> dict[str, Any]:
+    """Return the measurement, and where it was made, as JSON values; times in µs a sample, in s to derive."""
     rows = [{**asdict(t), "reduction": t.reduction} for t in timings]
     return {
-        "schema": 1,
+        "schema": 2,
         "robot": robot,
         "unit": "microseconds a sample",
         "batch": BATCH,
@@ -36,10 +39,14 @@ def seconds_json(robot: str, timings: Sequence[Timing]) -> dict[str, Any]:
         "python": platform.python_version(),
         "numpy": np.__version__,
         "torch": extra("torch").__version__,
-        "timings": [
-            {k: round(v, DIGITS) if isinstance(v, float) else v for k, v in row.items()} for row in rows
-        ],
+        "timings": [_rounded(row) for row in rows],
+        "derivations": [_rounded(asdict(d)) for d in derivations],
+        "derivation_limit": LIMIT,
     }
+
+
+def _rounded(row: dict[str, Any]) -> dict[str, Any]:
+    return {k: round(v, DIGITS) if isinstance(v, float) else v for k, v in row.items()}
 
 
 def read_seconds(path: Path) -> dict[str, Any]:
@@ -65,7 +72,9 @@ def _check(found: dict[str, Any]) -> None:
     json_text(found)  # raises for NaN
     methods = {timing.method for timing in timings_of(found) if math.isfinite(timing.reduction)}
     texts = all(isinstance(found[key], str) for key in ("robot", *MADE_WITH))
-    if not (methods <= set(METHODS) and texts and isinstance(found["batch"], int)):
+    derived = all(isinstance(d.dof, int) and math.isfinite(d.rule) for d in derivations_of(found))
+    numbers = derived and isinstance(found["batch"], int) and math.isfinite(found["derivation_limit"])
+    if not (methods <= set(METHODS) and texts and numbers):
         raise ValueError
 
 
@@ -83,6 +92,18 @@ def timings_of(found: dict[str, Any]) -> tuple[Timing, ...]:
     )
 
 
+def derivations_of(found: dict[str, Any]) -> tuple[DerivationTime, ...]:
+    """Return the times of deriving of a measurement's data."""
+
+    def seconds(value: Any) -> float | None:
+        return None if value is None else float(value)
+
+    return tuple(
+        DerivationTime(int(d["dof"]), seconds(d["whole"]), seconds(d["link"]), float(d["rule"]))
+        for d in found["derivations"]
+    )
+
+
 def seconds_markdown(result: Study, found: dict[str, Any], pictures: bool = False) -> str:
     """Return the measurement as Markdown; with its picture where that lies beside it."""
     timings = timings_of(found)
@@ -94,6 +115,8 @@ def seconds_markdown(result: Study, found: dict[str, Any], pictures: bool = Fals
         "machine": ", ".join(f"{k} {found[k]}" for k in MADE_WITH),
         "verdicts": [_verdict(result, [t for t in timings if t.method == m]) for m in methods],
         "rows": [_line(t) for t in timings],
+        "limit": f"{found['derivation_limit']:g}",
+        "derivations": [_derivation(d) for d in derivations_of(found)],
     }
     return render("report/measured.md.j2", view)
 
@@ -113,3 +136,7 @@ def _verdict(result: Study, timings: Sequence[Timing]) -> str:
 def _line(t: Timing) -> tuple[str, ...]:
     times = (f"{v:.3f}" for v in (t.extract, t.whole, t.everything))
     return (str(t.dof), t.method, *times, f"{t.reduction:.3f}")
+
+
+def _derivation(d: DerivationTime) -> tuple[str, ...]:
+    return (str(d.dof), *("–" if t is None else f"{t:.3f}" for t in (d.whole, d.link, d.rule)))

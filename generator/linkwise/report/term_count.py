@@ -44,6 +44,24 @@ def position(text: str, names: Sequence[str], option: str) -> int:
 
 
 @dataclass(frozen=True)
+class TermPair:
+    """Terms of Σ_j τ_1j of the first links, and those of them that contain q̈_1."""
+
+    total: int
+    kept: int
+
+    @property
+    def reduction(self) -> float:
+        """Share of terms that need no computing."""
+        return 1.0 - self.kept / self.total
+
+    @property
+    def redundant_per_kept(self) -> float:
+        """Terms computed in vain for each one that is wanted."""
+        return (self.total - self.kept) / self.kept
+
+
+@dataclass(frozen=True)
 class TermCount:
     """Terms of one τ_ij, or of a sum of them whose links share no parameter.
 
