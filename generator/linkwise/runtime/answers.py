@@ -9,7 +9,7 @@ from .arguments import check_numbers
 from .composed import Composed
 from .interface import Backend
 from .outputs import accepted
-from .quantities import Coefficients, GradientPropagation, Packed, Propagation
+from .quantities import PARAMETERS, Coefficients, GradientPropagation, Packed, Propagation
 from .structure import Structure
 
 KINDS: dict[str, Any] = {
@@ -17,6 +17,7 @@ KINDS: dict[str, Any] = {
     "coefficients": Coefficients,
     "propagation": Propagation,
     "gradient_propagation": GradientPropagation,
+    "coefficient_regressors": Coefficients,
 }
 """What calls with several results answer with; the others answer with one array or tensor."""
 
@@ -41,6 +42,8 @@ def answer_shapes(structure: Structure) -> dict[str, Shapes]:
         "position_gradient": ((n, links, n),),
         "packed_position_gradient": ((sizes.c1,),),
         "masked": ((n, links),),
+        "regressor": ((n, links, PARAMETERS),),
+        "coefficient_regressors": tuple((*shape, PARAMETERS) for shape in cubes),
     }
 
 
@@ -93,6 +96,14 @@ class Answers:
     def position_gradient(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.position_gradient`."""
         return self._answer("position_gradient", (q, qd, qdd), out)
+
+    def regressor(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
+        """See `Dynamics.regressor`."""
+        return self._answer("regressor", (q, qd, qdd), out)
+
+    def coefficient_regressors(self, q: Any, qd: Any, out: Any = None) -> Any:
+        """See `Dynamics.coefficient_regressors`."""
+        return self._answer("coefficient_regressors", (q, qd), out)
 
     def masked(self, q: Any, qd: Any, qdd: Any, mask: Any, out: Any = None) -> Any:
         """See `Dynamics.masked`."""

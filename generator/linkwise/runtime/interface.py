@@ -59,6 +59,12 @@ class Backend(Protocol[Kind]):
     def position_gradient(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
         """c0 (..., count) in the order of `Layout.velocity`."""
 
+    def regressor(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
+        """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
+
+    def coefficient_regressors(self, q: Kind, qd: Kind, qdd: Kind) -> Sequence[Kind]:
+        """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
+
     def answers(self, check_finite: bool) -> Any:
         """The calls of `Dynamics` on this back end: an `Answers`."""
 
