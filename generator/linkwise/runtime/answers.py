@@ -99,10 +99,12 @@ class Answers:
 
     def regressor(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.regressor`."""
+        self._check_rigid()
         return self._answer("regressor", (q, qd, qdd), out)
 
     def coefficient_regressors(self, q: Any, qd: Any, out: Any = None) -> Any:
         """See `Dynamics.coefficient_regressors`."""
+        self._check_rigid()
         return self._answer("coefficient_regressors", (q, qd), out)
 
     def masked(self, q: Any, qd: Any, qdd: Any, mask: Any, out: Any = None) -> Any:
@@ -127,6 +129,13 @@ class Answers:
             return torque
         into[0][...] = torque
         return out
+
+    def _check_rigid(self) -> None:
+        if self._backend.rule is None:
+            raise ValueError(
+                f"{self._structure.name} on {self._backend.name} has no regressors, which come from the rule "
+                "for rigid links; load numpy, torch or native of a robot of rigid links"
+            )
 
     def _answer(self, call: str, given: Sequence[Any], out: Any) -> Any:
         """Answer to q, qd and, for most calls, qdd, as they were given."""

@@ -34,7 +34,7 @@ class Dense:
         return dense
 
     def spread_rows(self, values: Array, field: str) -> Array:
-        """Rows of 10 (..., 10 count) of a field over (..., n, N, 10) or (..., n, N, n, 10), zeros elsewhere."""
+        """Rows of 10 (..., 10 count) of a field over (..., n, N[, n], 10), zeros elsewhere."""
         padded = self._backend.concatenate([values, self._backend.zeros(values, PARAMETERS)])
         entries = padded[..., self._table(f"rows of {field}", values)]
         dense: Array = entries.reshape(*values.shape[:-1], *self._shapes[field], PARAMETERS)

@@ -162,8 +162,8 @@ class Dynamics:
         """Y_ij, what tau_ij multiplies link j's inertial parameters by, shape (..., n, N, 10).
 
         tau_ij = Y_ij . pi_j, whatever the link carries: pi_j = (m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz,
-        I_yz, I_zz) in kg, kg m and kg m^2, I about the origin of the link's frame, in which the package's
-        `bodies().inertial_parameters()` are. For numpy, torch and native, and for rigid links; raises
+        I_yz, I_zz) in kg, kg m and kg m^2, I about the origin of the link's frame and in its axes, as the
+        package's inertial_parameters(bodies()) are. For numpy, torch and native, and for rigid links; raises
         ValueError for others.
         """
         rows: Array = self._answers.regressor(q, qd, qdd, out)

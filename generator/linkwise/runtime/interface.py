@@ -46,6 +46,8 @@ class Backend(Protocol[Kind]):
     takes_tensors: ClassVar[bool]
     """Whether motion is given as torch tensors only."""
     parameters: dict[str, Any]
+    rule: Any
+    """The vectorised rule of rigid links, None without it."""
 
     def arrays(self, named: Mapping[str, Kind], n: int) -> Sequence[Kind]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""

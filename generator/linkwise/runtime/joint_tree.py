@@ -5,11 +5,9 @@ the frame at `translation` in the frame of its parent, turned by `rotation` Rz(r
 `translation` + `rotation` z ratio q.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple
-
-import numpy as np
 
 from .interface import Array
 
@@ -81,30 +79,3 @@ class Bodies(NamedTuple, Generic[Array]):
     """Centres of mass in m, (N, 3)."""
     inertias: Array
     """About the centres of mass in kg m^2, (N, 3, 3); of each the symmetric part counts."""
-
-    def inertial_parameters(self) -> Array:
-        """pi_j = (m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz), (..., N, 10), as `regressor` says.
-
-        I is about the origin: I = J + m (c . c 1 - c c^T), J about the centre.
-        """
-        m, c, j = self.masses[..., None], self.centres, self.inertias
-        h = m * c
-        squares = (h * c).sum(-1)
-
-        def about_origin(a: int, b: int) -> Any:
-            own = 0.5 * (j[..., a, b] + j[..., b, a]) - h[..., a] * c[..., b]
-            return own + squares if a == b else own
-
-        places = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-        columns = [self.masses, *(h[..., a] for a in range(3)), *(about_origin(a, b) for a, b in places)]
-        out: Array = _stacked(columns)
-        return out
-
-
-def _stacked(columns: Sequence[Any]) -> Any:
-    """Arrays or tensors of one shape, side by side on a last axis."""
-    if all(isinstance(column, np.ndarray) for column in columns):
-        return np.stack(columns, -1)
-    import torch
-
-    return torch.stack(list(columns), -1)

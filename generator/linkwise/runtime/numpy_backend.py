@@ -12,7 +12,7 @@ from .array_kernels import Crossing, known_kernel, operations
 from .interface import ClosedForms, Entries
 from .joint_tree import Bodies
 from .parameter_values import fits
-from .rule_calls import RigidRule, of_rigid_links
+from .rule_calls import RigidRule
 from .structure import Structure
 from .tree_arrays import checked_bodies
 
@@ -116,12 +116,14 @@ class NumpyBackend:
 
     def regressor(self, q: Any, qd: Any, qdd: Any) -> Any:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
-        rows: Any = of_rigid_links(self.rule).regressor(self, (q, qd, qdd), self._values(q))
+        assert self.rule is not None  # Answers has seen to it
+        rows: Any = self.rule.regressor(self, (q, qd, qdd), self._values(q))
         return rows
 
     def coefficient_regressors(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
-        return of_rigid_links(self.rule).coefficient_regressors(self, (q, qd, qdd), self._values(q))
+        assert self.rule is not None  # Answers has seen to it
+        return self.rule.coefficient_regressors(self, (q, qd, qdd), self._values(q))
 
     def constant(self, values: NDArray[Any], like: Any) -> Any:
         """A table of numbers, to compute with `like`."""

@@ -9,7 +9,6 @@ from typing import Generic, NamedTuple
 
 from .interface import Array
 
-
 PARAMETERS = 10
 """Inertial parameters of a link: m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz."""
 

@@ -8,9 +8,9 @@ with the inertia I about the origin of the link's frame and in its axes:
 In these axes, and about this origin, which is where a link's joint has it, coordinate i turns the link by z_i
 and moves the origin by u_i, its partial velocity; the link turns at omega. One row serves all,
 
-    Y = [u_i . a,  a x z_i + u_i x alpha + (u_i x beta) x omega,  sym(z_i alpha^T + y beta^T) - 1/2 (y . beta) 1]
+    Y = [u_i . a,   a x z_i + u_i x alpha + (u_i x beta) x omega,   z_i alpha^T + y beta^T - 1/2 (y . beta) 1]
 
-with y = z_i x omega, for
+with y = z_i x omega, a product of inertia meeting both entries of the matrix, for
 
     tau:      a the origin's acceleration less gravity    alpha = omega-dot     beta = omega
     c2 of k:  a = u_k                                     alpha = z_k           beta = 0
@@ -26,7 +26,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .joint_tree import JointTree
+from .arguments import has_tensors
+from .joint_tree import Bodies, JointTree
 from .kinematics import KinematicTables, around, cross, poses, taken, twists
 from .quantities import PARAMETERS
 from .rule_layout import joined, members
@@ -54,6 +55,28 @@ class LinkAxes(NamedTuple):
     omega: Any
     v: Any
     """Of the origin, in m/s."""
+
+
+def inertial_parameters(bodies: Bodies[Any]) -> Any:
+    """pi_j of bodies, (..., N, 10), an array or a tensor as they are.
+
+    I is about the origin: I = J + m (c . c 1 - c c^T), J about the centre c.
+    """
+    m, c, j = bodies
+    h = m[..., None] * c
+    squares = (h * c).sum(-1)
+
+    def about_origin(a: int, b: int) -> Any:
+        own = 0.5 * (j[..., a, b] + j[..., b, a]) - h[..., a] * c[..., b]
+        return own + squares if a == b else own
+
+    moments = [about_origin(b, c) for c in range(3) for b in range(c + 1)]
+    columns = [m, *(h[..., a] for a in range(3)), *moments]
+    if has_tensors(columns):
+        import torch
+
+        return torch.stack(columns, -1)
+    return np.stack(columns, -1)
 
 
 def regressor_tables(tree: JointTree) -> RegressorTables:

@@ -42,16 +42,6 @@ class Answering(Protocol):
         """Packed g (field 3) or tau (field 4), or both."""
 
 
-def of_rigid_links(rule: "RigidRule | None") -> "RigidRule":
-    """The rule; raises ValueError where a back end has none."""
-    if rule is None:
-        raise ValueError(
-            "regressors come from the rule for rigid links, which this back end or package does without; load "
-            "numpy, torch or native of a robot of rigid links"
-        )
-    return rule
-
-
 class RigidRule:
     """The rule for a robot's tree; tables are made when first asked for, for each dtype and device."""
 
@@ -196,9 +186,7 @@ class RigidRule:
                 whole[piece] = a
         return joined
 
-    def _pieces(
-        self, space: Space, motion: Sequence[Any], samples: int, products: int
-    ) -> Sequence[slice]:
+    def _pieces(self, space: Space, motion: Sequence[Any], samples: int, products: int) -> Sequence[slice]:
         """Slices of the samples, each to be computed at once."""
         links = len(self.tree.links)
         most = CACHE // (motion[0].itemsize * (products + LINK_NUMBERS * links)) + 1

@@ -15,7 +15,7 @@ from .array_kernels import Crossing, known_kernel, operations
 from .interface import ClosedForms
 from .joint_tree import Bodies
 from .parameter_values import fits
-from .rule_calls import RigidRule, of_rigid_links
+from .rule_calls import RigidRule
 from .structure import Structure
 from .tree_arrays import checked_bodies
 
@@ -114,12 +114,14 @@ class TorchBackend:
 
     def regressor(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
-        rows: Tensor = of_rigid_links(self.rule).regressor(self, (q, qd, qdd), self._values(q))
+        assert self.rule is not None  # Answers has seen to it
+        rows: Tensor = self.rule.regressor(self, (q, qd, qdd), self._values(q))
         return rows
 
     def coefficient_regressors(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
-        return of_rigid_links(self.rule).coefficient_regressors(self, (q, qd, qdd), self._values(q))
+        assert self.rule is not None  # Answers has seen to it
+        return self.rule.coefficient_regressors(self, (q, qd, qdd), self._values(q))
 
     def constant(self, values: Any, like: Tensor) -> Tensor:
         """A table of numbers, to compute with `like`."""
