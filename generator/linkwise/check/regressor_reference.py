@@ -112,6 +112,5 @@ def _rows(
 def _by_cause(torque: Callable[[Array, Array, Array], Array], q: Array, qd: Array) -> Array:
     """Torques for each unit vector, side by side on a last axis: all of them in one call."""
     n = q.shape[1]
-    many = [np.repeat(a, n, axis=0) for a in (q, qd)]
-    found = torque(*many, np.tile(np.eye(n), (len(q), 1)))
+    found = torque(np.repeat(q, n, axis=0), np.repeat(qd, n, axis=0), np.tile(np.eye(n), (len(q), 1)))
     return np.moveaxis(found.reshape(len(q), n, *found.shape[1:]), 1, -1)
