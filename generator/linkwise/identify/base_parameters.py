@@ -7,7 +7,6 @@ Y P = Q [R1 R2], and the others are their combinations, Y2 = Y1 R1^-1 R2: so wit
 Y pi = Y1 beta, beta = pi1 + R1^-1 R2 pi2, whatever the motion.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,10 +19,14 @@ NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Mass, first moment, and inertia about the origin of the link's frame, in the order of the regressor."""
 UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
 
+LATER = 0.01
+"""What columns of masses are scaled by: a sum is named after the first moment that a mass adds to, say."""
 RANK = 1e-8
 """Of the largest: a smaller diagonal entry of R, of columns scaled to one size, is rounding, and no rank."""
 NOTHING = 1e-9
 """Of a column's size: a smaller part of another column is rounding too."""
+SPEED = 3.0
+"""rad/s and rad/s^2, m/s and m/s^2."""
 ROWS = 4
 """Rows of random motion for each column."""
 
@@ -37,6 +40,10 @@ class BaseParameters:
     """Positions in pi of the parameter that each combination is named after, ascending."""
     combinations: Array
     """(base, 10 N), the identity in the picked columns."""
+    sizes: Array
+    """Root mean square of the picked columns of the regressor over random motions, (base,)."""
+    condition: float
+    """Condition number of these columns, each divided by its size: that of a good motion."""
 
     @property
     def count(self) -> int:
@@ -63,25 +70,30 @@ class BaseParameters:
 
 
 def base_parameters(model: Model) -> BaseParameters:
-    """Base parameters of a robot, by random motions; raises as its `regressor` does."""
+    """Base parameters of a robot, by random motions of up to SPEED; raises as its `regressor` does."""
     links, n = tuple(model.link_names), len(model.joint_names)
     columns = len(NAMES) * len(links)
     generator = np.random.default_rng(0)
     q = generator.uniform(-np.pi, np.pi, (-(-ROWS * columns // n) + ROWS, n))
-    qd, qdd = generator.uniform(-3.0, 3.0, (2, *q.shape))
+    qd, qdd = generator.uniform(-SPEED, SPEED, (2, *q.shape))
     rows = model.regressor(q, qd, qdd).reshape(-1, columns)
     picked, rest, shares = _independent(rows)
     combinations = np.zeros((len(picked), columns))
     combinations[np.arange(len(picked)), picked] = 1.0
     combinations[:, rest] = shares
     order = np.argsort(picked)
-    return BaseParameters(links, tuple(picked[order].tolist()), combinations[order])
+    shown = rows[:, picked[order]]
+    sizes = np.sqrt(np.mean(shown**2, axis=0))
+    condition = float(np.linalg.cond(shown / sizes))
+    return BaseParameters(links, tuple(picked[order].tolist()), combinations[order], sizes, condition)
 
 
 def _independent(rows: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Independent columns, the others, and these as combinations of those, (picked, others)."""
     sizes = np.sqrt(np.mean(rows**2, axis=0))
     sizes[sizes <= NOTHING * sizes.max(initial=0.0)] = np.inf  # what no motion shows
+    weights = np.where(np.arange(len(sizes)) % len(NAMES), 1.0, LATER)
+    sizes = sizes / weights
     r, order = extra("scipy.linalg").qr(rows / sizes, mode="r", pivoting=True)
     diagonal = np.abs(np.diag(r))
     rank = int((diagonal > RANK * diagonal[0]).sum())
@@ -95,8 +107,3 @@ def _independent(rows: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array
 def _term(factor: float, name: str) -> str:
     sign, size = ("-" if factor < 0 else "+"), f"{abs(factor):.6g}"
     return f"{sign} {name}" if size == "1" else f"{sign} {size} {name}"
-
-
-def friction_names(joints: Sequence[str]) -> list[tuple[str, str]]:
-    """Name and unit of each joint's friction: viscous and Coulomb, joint by joint."""
-    return [(f"{kind}({joint})", kind) for joint in joints for kind in ("viscous", "Coulomb")]

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from linkwise.errors import LinkwiseError
-from linkwise.extras import extra
-from linkwise.identify.base_parameters import BaseParameters
+from linkwise.identify.base_parameters import SPEED, BaseParameters
 from linkwise.identify.normal_factors import JointEquations
 from linkwise.package.load import Array
 
@@ -19,8 +18,8 @@ ROUNDS = 3
 """From equal weights to the joints' own, and twice again."""
 LEAST = 1e-9
 """Of a joint's torque: the noise of a log that has none."""
-WORST = 1e6
-"""Condition number from which a log says nothing of some combinations."""
+POOR, WORST = 30.0, 1000.0
+"""Times the condition number of random motions: there a log tells some combinations badly, or not at all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,27 +34,24 @@ class Fit:
     noise: Array
     """sigma of each joint, (n,), in N m or N."""
     condition: float
-    """Of the weighted equations, their columns scaled to one size."""
+    """Of the equations, each column divided by its size over random motions."""
     triangle: Array
     """[W | tau] of all joints, weighted: the unknowns are beta and, joint by joint, its friction."""
 
 
 def weighted_fit(equations: JointEquations, base: BaseParameters, friction: bool) -> Fit:
     """Fit all joints together; raises LinkwiseError where the log does not show a combination."""
-    n = len(equations.triangles)
-    noise, found = np.ones(n), None
+    n, noise = len(equations.triangles), np.ones(len(equations.triangles))
+    condition = _excitation(stacked(equations, noise, friction), base)
     for _ in range(ROUNDS):
         triangle = stacked(equations, noise, friction)
-        found = _solved(triangle, base, n, friction)
-        beta, rubbing, _ = found
-        left = equations.errors(beta, rubbing) * np.sqrt(
-            equations.rows / max(equations.rows - len(triangle) / n, 1)
-        )
+        beta, rubbing = _solved(triangle, base, n, friction)
+        free = max(equations.rows - len(triangle) / n, 1.0)
+        left = equations.errors(beta, rubbing) * np.sqrt(equations.rows / free)
         noise = np.maximum(left, LEAST * np.maximum(equations.sizes(), 1e-300))
     triangle = stacked(equations, noise, friction)
-    beta, rubbing, condition = _solved(triangle, base, n, friction)
-    square = triangle[:-1, :-1]
-    inverse = extra("scipy.linalg").solve_triangular(square, np.eye(len(square)))
+    beta, rubbing = _solved(triangle, base, n, friction)
+    inverse = np.linalg.inv(triangle[:-1, :-1])
     errors = np.linalg.norm(inverse, axis=1)
     own = errors[base.count :].reshape(n, 2) if friction else np.zeros((n, 2))
     return Fit(beta, rubbing, errors[: base.count], own, noise, condition, triangle)
@@ -76,21 +72,24 @@ def stacked(equations: JointEquations, noise: Array, friction: bool) -> Array:
     return np.asarray(triangle)
 
 
-def _solved(triangle: Array, base: BaseParameters, n: int, friction: bool) -> tuple[Array, Array, float]:
-    """beta, friction and the condition number."""
-    square, right = triangle[:-1, :-1], triangle[:-1, -1]
-    sizes = np.linalg.norm(square, axis=0)
-    sizes[sizes == 0] = 1.0
-    _, values, directions = np.linalg.svd(square / sizes)
+def _solved(triangle: Array, base: BaseParameters, n: int, friction: bool) -> tuple[Array, Array]:
+    """beta and friction."""
+    x = np.linalg.solve(triangle[:-1, :-1], triangle[:-1, -1]).astype(float)
+    return x[: base.count], x[base.count :].reshape(n, 2) if friction else np.zeros((n, 2))
+
+
+def _excitation(triangle: Array, base: BaseParameters) -> float:
+    """Condition number, columns as large as random motions make them; LinkwiseError for one far too large."""
+    frictions = triangle.shape[1] - 1 - base.count
+    sizes = np.concatenate([base.sizes, np.tile([SPEED / np.sqrt(3.0), 1.0], frictions // 2)])
+    _, values, directions = np.linalg.svd(triangle[:-1, :-1] / sizes)
     condition = float(values[0] / max(values[-1], 1e-300))
-    if condition > WORST:
+    if condition > WORST * base.condition:
         worst = int(np.abs(directions[-1]).argmax())
-        texts = base.texts()
-        what = texts[worst] if worst < len(texts) else "a joint's friction"
+        what = base.texts()[worst] if worst < base.count else "a joint's friction"
         raise LinkwiseError(
             f"too little excitation: the log does not tell {what} from the rest (condition number "
-            f"{condition:.1g}); record a motion in which every joint moves far and fast, in many postures"
+            f"{condition:.1g}, {base.condition:.1g} for random motions); record a motion in which every "
+            "joint moves far and fast, in many postures"
         )
-    x = np.linalg.solve(square, right).astype(float)
-    rubbing = x[base.count :].reshape(n, 2) if friction else np.zeros((n, 2))
-    return x[: base.count], rubbing, condition
+    return condition

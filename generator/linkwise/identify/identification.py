@@ -10,7 +10,7 @@ from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.analysis.settings import Processing, Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.identify.base_parameters import BaseParameters, base_parameters
-from linkwise.identify.fit import Fit, weighted_fit
+from linkwise.identify.fit import POOR, Fit, weighted_fit
 from linkwise.identify.normal_factors import JointEquations, joint_equations
 from linkwise.identify.physical_fit import PhysicalFit, physical_fit
 from linkwise.identify.torque_log import TorqueLog, read_torque_log
@@ -98,7 +98,7 @@ def identify(
     with within(str(log)):
         _refuse_few(seen, base, fitting)
         fit = weighted_fit(seen, base, fitting.friction)
-        warnings = _units(seen, base, own, loaded.joints)
+        warnings = (*_units(seen, base, own, loaded.joints), *_poor(fit, base))
         physical = physical_fit(fit, base, own, fitting.friction)
     return Identification(loaded, read, base, fit, physical, own, seen, unseen, (*read.warnings, *warnings))
 
@@ -106,9 +106,9 @@ def identify(
 def _own_parameters(robot: LoadedRobot) -> Array:
     if robot.bodies is None:
         raise LinkwiseError(f"{robot.name} is made of energies; only rigid links have parameters to identify")
-    if robot.model.backend.rule is None:
+    if not hasattr(robot.model, "regressor") or robot.model.backend.rule is None:
         raise LinkwiseError(
-            f"{robot.name} has no back end with regressors; generate the robot again with --backend numpy"
+            f"{robot.name} has no back end with regressors; generate the robot again, with --backend numpy"
         )
     by_name = {body.link: body for body in robot.bodies}
     bodies = [by_name[name] for name in robot.links]
@@ -123,6 +123,15 @@ def _refuse_few(seen: JointEquations, base: BaseParameters, fitting: Fitting) ->
         raise LinkwiseError(
             f"{seen.rows} samples are too few for {unknowns} unknowns; give a longer log, or lower --unseen"
         )
+
+
+def _poor(fit: Fit, base: BaseParameters) -> tuple[str, ...]:
+    if fit.condition <= POOR * base.condition:
+        return ()
+    return (
+        f"little excitation: the condition number is {fit.condition:.3g}, {base.condition:.3g} for random "
+        "motions; see the standard errors, or record a motion in which every joint moves far and fast",
+    )
 
 
 def _units(seen: JointEquations, base: BaseParameters, own: Array, joints: Sequence[str]) -> tuple[str, ...]:

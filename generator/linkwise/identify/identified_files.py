@@ -80,8 +80,8 @@ def _head(found: Identification) -> Iterator[str]:
     yield ""
     yield (
         f"{found.seen.rows:,} samples at {found.log.rate:.6g} Hz were fitted, the {found.unseen.rows:,} "
-        "after them were not: they are what *unseen* means. Condition number of the equations, their columns "
-        f"scaled to one size: {found.fit.condition:.3g}."
+        "after them were not: they are what *unseen* means. Condition number of the equations: "
+        f"{found.fit.condition:.3g}, where random motions have {found.base.condition:.3g}."
     )
 
 

@@ -57,7 +57,8 @@ def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: bool) -> Phys
 def _within_cones(left: Array, right: Array, sizes: Array, frictions: int) -> Array:
     """x that is least ||left x - right|| where the links' pseudo-inertias and the frictions allow it.
 
-    In y = R x, left = Q R, the objective is 1/2 y^T y - (Q^T right)^T y: as round as can be.
+    With left = Q R and y = R x - Q^T right, the way from where it is least anyhow, it is 1/2 y^T y but for a
+    constant: as round as can be.
     """
     clarabel, sparse = extra("clarabel"), extra("scipy.sparse")
     q, r = np.linalg.qr(left)
@@ -76,14 +77,15 @@ def _within_cones(left: Array, right: Array, sizes: Array, frictions: int) -> Ar
         bounds.append(np.zeros(frictions))
         cones.append(clarabel.NonnegativeConeT(frictions))
     constraints = np.linalg.solve(r.T, np.concatenate(rows).T).T
+    least = q.T @ right
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     count = left.shape[1]
     solution = clarabel.DefaultSolver(
         sparse.identity(count, format="csc"),
-        -(q.T @ right),
+        np.zeros(count),
         sparse.csc_matrix(constraints),
-        np.concatenate(bounds),
+        np.concatenate(bounds) - constraints @ least,
         cones,
         settings,
     ).solve()
@@ -92,7 +94,7 @@ def _within_cones(left: Array, right: Array, sizes: Array, frictions: int) -> Ar
             f"no bodies that can exist fit these torques (the solver ended with {solution.status}); see that "
             "the torques are in N m, and of this robot"
         )
-    x: Array = np.linalg.solve(r, np.array(solution.x))
+    x: Array = np.linalg.solve(r, least + np.array(solution.x))
     return x
 
 
