@@ -13,6 +13,7 @@ ROOMS = (
     "cli",
     "pipeline",
     "report",
+    "identify",
     "analysis",
     "check",
     "emit",

@@ -6,6 +6,7 @@ from typing import Any
 from linkwise.errors import LinkwiseError
 
 BROUGHT_BY = {
+    "clarabel": "identify",
     "matplotlib": "motion",
     "mujoco": "mjcf",
     "plotly": "motion",

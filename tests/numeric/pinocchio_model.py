@@ -93,18 +93,30 @@ class PinocchioModel:
     def torque(self, q: Any, qd: Any, qdd: Any, link: str | None = None) -> Any:
         """τ of all links, or τ_ij of one."""
         model = self.model if link is None else self.alone[link]
-        state, rate, change = np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv)
-        for at, v, circle, k, ratio, offset in self.maps:
+        full = pin.rnea(model, self.data, *self._state(q, qd, qdd))
+        return self.tie.T @ full
+
+    def regressor(self, q: Any, qd: Any, qdd: Any) -> Any:
+        """Y of all joints' bodies (n, joints, 10), in the frames of Pinocchio's joints."""
+        full = pin.computeJointTorqueRegressor(self.model, self.data, *self._state(q, qd, qdd))
+        rows = self.tie.T @ full
+        return rows.reshape(self.n, -1, 10)
+
+    @property
+    def tie(self) -> Any:
+        """Velocities of Pinocchio's joints for those of the coordinates (nv, n)."""
+        tie = np.zeros((self.model.nv, self.n))
+        for _, v, _, k, ratio, _ in self.maps:
+            if k is not None:
+                tie[v, k] += ratio
+        return tie
+
+    def _state(self, q: Any, qd: Any, qdd: Any) -> tuple[Any, Any, Any]:
+        state = np.zeros(self.model.nq)
+        for at, _, circle, k, ratio, offset in self.maps:
             angle = offset if k is None else ratio * q[k] + offset
             if circle:
                 state[at : at + 2] = np.cos(angle), np.sin(angle)
             else:
                 state[at] = angle
-            if k is not None:
-                rate[v], change[v] = ratio * qd[k], ratio * qdd[k]
-        full = pin.rnea(model, self.data, state, rate, change)
-        tau = np.zeros(self.n)
-        for _, v, _, k, ratio, _ in self.maps:
-            if k is not None:
-                tau[k] += ratio * full[v]
-        return tau
+        return state, self.tie @ qd, self.tie @ qdd

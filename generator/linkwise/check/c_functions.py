@@ -34,6 +34,15 @@ DENSE = {
 }
 """Functions whose results have their zeros: what these are, and what the header calls them."""
 
+REGRESSORS = {
+    "regressor": (("Y",), ("regressor",)),
+    "coefficient_regressors": (("Y c2", "Y c1", "Y g"), ("acceleration", "velocity", "gravity")),
+}
+"""The same of functions that robots of rigid links have."""
+
+AT_REST = ("coefficients", "coefficient_regressors")
+"""Functions that take no qdd."""
+
 MANY = 192
 """Bytes for each result of a sample that still count as few: 24 samples in double, 48 in float."""
 
@@ -59,7 +68,7 @@ class CFunctions:
             dense[(slice(None), *self.rows.tau.T)] = found["tau"].reshape(len(q), -1)
         return dense
 
-    def check(self, label: str, reference: Reference) -> Iterator[Result]:
+    def check(self, label: str, reference: Reference, regressors: Reference | None) -> Iterator[Result]:
         """One result a function; `label` stands before its name."""
         for function in self.functions:
             symbol = f"{self.manifest.name}_{function.name}"
@@ -69,7 +78,11 @@ class CFunctions:
                 continue
             single = FLOAT32 if function.real == "float" else {"tolerance": reference.tolerance}
             try:
-                yield compare(name, list(self._calls(function, reference)), **single)
+                if function.short in REGRESSORS:
+                    calls = self._regressors(function, regressors)
+                else:
+                    calls = self._calls(function, reference)
+                yield compare(name, list(calls), **single)
             except _OutOfBounds as error:
                 yield Result(name, False, None, f"{error.args[0]} wrote beyond its arrays")
 
@@ -80,7 +93,7 @@ class CFunctions:
             yield from self._link(function, reference, int(link[1]) - 1)
             return
         if function.short in DENSE:
-            yield from self._dense(function, reference)
+            yield from self._dense(function, reference, dense_quantities(reference))
             return
         width = 1
         if function.short.endswith("_blocks"):
@@ -103,19 +116,25 @@ class CFunctions:
             flat = found[what].reshape(len(at) // width, size, width).swapaxes(1, 2).reshape(len(at), size)
             yield _packed(what, flat, self.rows.of(what), reference, at)
 
-    def _dense(self, function: Prototype, reference: Reference) -> Iterator[Entries]:
+    def _dense(
+        self, function: Prototype, reference: Reference, expected: Mapping[str, tuple[Array, Array]]
+    ) -> Iterator[Entries]:
         """Calls of a function whose results have their zeros."""
-        expected = dense_quantities(reference)
         for count, shift in product(ROWS, (0, 1)):
             at = np.arange(count) * 3 % max(len(reference.states.q), 1)
             given = dict(zip(("q", "qd", "qdd"), reference.states.at(at).motion, strict=True))
-            what, names = DENSE[function.short]
+            what, names = (DENSE | REGRESSORS)[function.short]
             shapes = [expected[quantity][0].shape[1:] for quantity in what]
             sizes = {name: count * math.prod(shape) for name, shape in zip(names, shapes, strict=True)}
             found = self._call(function, count, given, sizes, shift)
             for quantity, name, shape in zip(what, names, shapes, strict=True):
                 values, scales = (source[at] for source in expected[quantity])
                 yield Entries(quantity, found[name].reshape(count, *shape), values, scales)
+
+    def _regressors(self, function: Prototype, reference: Reference | None) -> Iterator[Entries]:
+        if reference is not None:
+            expected = {what: (value, reference.scales[what]) for what, value in reference.values.items()}
+            yield from self._dense(function, reference, expected)
 
     def _link(self, function: Prototype, reference: Reference, link: int) -> Iterator[Entries]:
         own = {what: self.rows.of(what)[self.rows.of(what)[:, 1] == link] for what in function.outputs}
@@ -147,12 +166,13 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
     """The functions that a package's header must declare, by the manifest's links and parameters."""
     inputs = ("q", "qd", "qdd", *(["p"] if manifest.parameters else []))
     every = tuple(what for what in OUTPUTS if len(rows.of(what)))
+    rigid = REGRESSORS if manifest.tree is not None else {}
     functions = [
         ("decomposition", "count", every),
         ("decomposition_blocks", "blocks", every),
         ("torque", "count", ("tau",)),
         ("position_gradient", "count", ("c0",)),
-        *((name, "count", outputs) for name, (_, outputs) in DENSE.items()),
+        *((name, "count", outputs) for name, (_, outputs) in (DENSE | rigid).items()),
     ]
     for j in range(len(manifest.links)):
         own = tuple(what for what in every if j in rows.of(what)[:, 1])
@@ -166,7 +186,7 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
 
 def _inputs(name: str, every: tuple[str, ...]) -> tuple[str, ...]:
     """Arrays that a function reads: coefficients do not depend on qdd."""
-    return tuple(what for what in every if name != "coefficients" or what != "qdd")
+    return tuple(what for what in every if name not in AT_REST or what != "qdd")
 
 
 def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[CompiledPackage | None, Result]:

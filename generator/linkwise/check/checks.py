@@ -23,6 +23,7 @@ from linkwise.check.own_process import Ended, in_own_process
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.parametric_tree import changed_values, check_bodies, tree_with
 from linkwise.check.reference import Reference
+from linkwise.check.regressor_reference import regressor_calls, regressor_reference
 from linkwise.check.states import random_states
 from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.torque_reference import states_of_torques, torque_reference
@@ -150,7 +151,8 @@ class _Checks:
         if reference is None:
             yield Skipped(f"numbers{label}", "nothing here computes with the energies")
             return
-        for result in _c_results(functions, f"c{label}", reference) if functions else ():
+        regressors = self._regressors(values, reference)
+        for result in _c_results(functions, f"c{label}", reference, regressors) if functions else ():
             c_passes &= result.passed
             yield result
         for way, model in loaded.items():
@@ -159,6 +161,8 @@ class _Checks:
                 yield Skipped(f"{way.label}{label}: not called", "its C is wrong, see above")
             else:
                 yield from against_reference(Named(f"{way.label}{label}", model, rows, reference), manifest)
+                if regressors is not None and model.backend.rule is not None:
+                    yield from regressor_calls(f"{way.label}{label}", model, regressors)
         if manifest.tree is not None:
             how = "from energies" if manifest.request.get("derivation") == "energy" else "by the rigid rule"
             ways = {way.label: model for way, model in loaded.items()}
@@ -189,6 +193,13 @@ class _Checks:
             defined = len(found.states.q) > 0
             return energy_reference(exact, noisy, found.states) if defined else None, found.tried
         return self._own_reference(loaded, functions)
+
+    def _regressors(self, values: Mapping[str, float], reference: Reference) -> Reference | None:
+        """What regressors are held against; energies have none."""
+        manifest = self.package.manifest
+        if manifest.tree is None:
+            return None
+        return regressor_reference(manifest, tree_with(manifest.tree, values), reference.states)
 
     def _own_reference(
         self, loaded: Mapping[Way, Model], functions: CFunctions | None
@@ -222,10 +233,12 @@ def _told(name: str, reference: Reference | None, tried: int, samples: int) -> I
         yield Result(f"{name}: are defined", True, None, detail)
 
 
-def _c_results(functions: CFunctions, name: str, reference: Reference) -> list[Result]:
+def _c_results(
+    functions: CFunctions, name: str, reference: Reference, regressors: Reference | None
+) -> list[Result]:
     """What each function of the C gives; a wrong one may write anywhere."""
     try:
-        return in_own_process(lambda: list(functions.check(name, reference)))
+        return in_own_process(lambda: list(functions.check(name, reference, regressors)))
     except Ended as ended:
         return [Result(f"{name}: runs to its end", False, None, str(ended))]
 

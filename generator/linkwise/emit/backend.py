@@ -119,6 +119,7 @@ RULE_FILES = (
     "array_kernels.py",
     "fused_products.py",
     "kinematics.py",
+    "regressors.py",
     "rigid_rule.py",
     "rule_calls.py",
     "rule_layout.py",

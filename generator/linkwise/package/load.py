@@ -59,6 +59,12 @@ class Model(Protocol):
     def position_gradient(self, q: Array, qd: Array, qdd: Array) -> Array:
         """c0 (..., n, N, n)."""
 
+    def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Y_ij (..., n, N, 10), for rigid links."""
+
+    def coefficient_regressors(self, q: Array, qd: Array) -> Any:
+        """Y of c2, c1 (..., n, N, n, 10) and g (..., n, N, 10)."""
+
     def masked(self, q: Array, qd: Array, qdd: Array, mask: Array) -> Array:
         """Chosen terms of the decomposition (..., n, N)."""
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from importlib.resources import files
+from itertools import accumulate
 from typing import Any
 
 from linkwise.dynamics.kernel import parameter_names
@@ -9,7 +10,7 @@ from linkwise.emit.c import header
 from linkwise.emit.c.loop_costs import decomposition_cost, gradient_cost, torque_cost
 from linkwise.emit.c.prototypes import pointers
 from linkwise.emit.c.robot_files import given, header_view, totals
-from linkwise.emit.c.robot_tables import formulas, path_spans, table_view
+from linkwise.emit.c.robot_tables import path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
 from linkwise.emit.c.stack import loops_stack
 from linkwise.emit.derivation import Derivation
@@ -18,6 +19,7 @@ from linkwise.symbolic.system import RigidSystem
 from linkwise.version import VERSION
 
 FIXED = (
+    "angles.h",
     "block_rows.h",
     "blocks.h",
     "calls.h",
@@ -29,6 +31,7 @@ FIXED = (
     "numbers.h",
     "one_sample.h",
     "packed_rows.h",
+    "regressors.h",
     "rows.h",
     "rule.h",
     "shares.h",
@@ -51,6 +54,7 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     links = path_spans(system)
     common = {"version": VERSION, "name": name}
     yield f"c/{name}.c", render("c/robot_loops.c.j2", common | _robot_view(system, links))
+    yield f"c/{name}_tree.h", render("c/tree.h.j2", common | table_view(system))
     yield f"c/{name}f.c", render("c/robotf.c.j2", common)
     names = common | {"upper": name.upper()}
     costs = {
@@ -72,11 +76,14 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
 def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
     """Fields of NAME.c but for its name."""
     robot, motion = whole(links), given(system)
-    return table_view(system, links) | {
+    paths = [system.path(j) for j in range(len(links))]
+    return {
         "n": len(system.coordinates),
+        "links": len(links),
+        "path_starts": ", ".join(map(str, accumulate(map(len, paths), initial=0))),
+        "paths": [", ".join(map(str, path)) for path in paths],
         "totals": totals(robot.size),
         "parameters": list(enumerate(parameter_names(system).values())),
-        "formulas": formulas(system),
         "inputs": pointers("const real", motion),
         "passed": ", ".join(motion),
         "inputs_at_rest": pointers("const real", (array for array in motion if array != "qdd")),

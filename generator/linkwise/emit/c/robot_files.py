@@ -10,7 +10,7 @@ from linkwise.emit.c.calls import LinkKernels, group_calls, link_calls, motions,
 from linkwise.emit.c.prototypes import cost, functions, pointers
 from linkwise.emit.c.quantity_table import causes, quantity_lines
 from linkwise.emit.c.sizes import EntryCounts, Span, groups, most_counts, tile, waiting_counts, whole
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import RigidSystem, System
 
 
 def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKernels]) -> dict[str, Any]:
@@ -54,6 +54,7 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
         "streams": len(parts) == 1,
         "slopes": "r->h1" if robot.size.h1 else "NULL",
         "largest": max(waiting.of(array) for array in arrays),
+        "rigid": isinstance(system, RigidSystem),
         "largest_gradient": max(link.size.c1 for link in links),
     }
 
@@ -76,6 +77,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "joints": list(header.joint_lines(system)),
         "parameters": header.parameter_lines(system),
         "blocks": tuple(header.BLOCK.values()),
+        "rigid": isinstance(system, RigidSystem),
         "functions": list(functions(given(system), robot, links)),
     }
 

@@ -1,6 +1,6 @@
 """A tree of rigid bodies as tables in C: what a kernel in loops goes by."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
@@ -57,9 +57,9 @@ def path_spans(system: RigidSystem) -> tuple[Span, ...]:
     )
 
 
-def table_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
-    """Fields of NAME.c that are tables."""
-    found, robot = columns(system), system.robot
+def table_view(system: RigidSystem) -> dict[str, Any]:
+    """Fields of NAME_tree.h but for its name."""
+    found, robot, links = columns(system), system.robot, path_spans(system)
     paths = [system.path(j) for j in range(len(links))]
     return {
         "frames": len(robot.links),
@@ -72,12 +72,12 @@ def table_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
             f"/* {span.first}, {c_comment(link.name)} */"
             for link, span in zip(system.links, links, strict=True)
         ],
-        "path_starts": ", ".join(map(str, accumulate(map(len, paths), initial=0))),
-        "paths": [", ".join(map(str, path)) for path in paths],
         "path_columns": [", ".join(map(str, own)) for own in found.of_links],
         "placings": list(_placings(system)),
         "bodies": list(_bodies(system)),
         "gravity": _row(_values(system, robot.gravity)),
+        "parameters": bool(system.parameters),
+        "formulas": formulas(system),
     }
 
 

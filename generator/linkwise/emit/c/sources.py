@@ -17,16 +17,20 @@ from linkwise.emit.c.kernel_function import (
     outputs,
 )
 from linkwise.emit.c.robot_files import costs, header_view, robot_view
+from linkwise.emit.c.robot_tables import table_view
 from linkwise.emit.c.sizes import link_spans
 from linkwise.emit.c.stack import straight_stack
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.escape import c_comment
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import RigidSystem, System
 from linkwise.version import VERSION
 
 FIXED = ("numbers.h", "sines.h", "rows.h", "dense.h", "stream.h", "dense_rows.h", "calls.h")
 """Files that are the same in every package."""
+
+FIXED_OF_RIGID = ("angles.h", "blocks.h", "lanes.h", "regressors.h", "rule.h", "tree.h", "vectors.h")
+"""Those beside them in every package of rigid links, whose regressors are in loops."""
 
 
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
@@ -47,7 +51,11 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     yield f"c/{name}.h", render("c/robot.h.j2", names | about)
     tables = {"tables": list(header.index_tables(system, links))}
     yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)
-    for file in FIXED:
+    fixed: tuple[str, ...] = FIXED
+    if isinstance(system, RigidSystem):
+        yield f"c/{name}_tree.h", render("c/tree.h.j2", common | table_view(system))
+        fixed += FIXED_OF_RIGID
+    for file in fixed:
         yield f"c/{file}", files("linkwise.runtime").joinpath("c", file).read_text(encoding="utf-8")
 
 

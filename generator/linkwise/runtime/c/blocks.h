@@ -1,5 +1,12 @@
-/* Blocks of samples for a kernel in loops: their motion, the links' results, and where these go. The same in every
-   package of linkwise. */
+/* Blocks of samples for what goes in loops over links and joints, and their motion. The same in every package of linkwise. */
+#ifndef LINKWISE_BLOCKS_H
+#define LINKWISE_BLOCKS_H
+
+#include "angles.h"
+#include "lanes.h"
+#include "rows.h"
+
+#include <string.h>
 
 #define W BLOCK
 #define number lanes
@@ -42,3 +49,5 @@ static inline void rows_moved(const struct numbers *x, size_t samples, const rea
     gather(samples, N, qdd, block[2]);
     moved_block(x, block[0], block[1], block[2], m);
 }
+
+#endif

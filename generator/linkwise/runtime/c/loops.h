@@ -19,25 +19,13 @@ SHARED void API(dense_torque_one)(INPUTS, int sums, real *torque);
 static const char linear[LINKS] = {0};
 #endif
 
-#if PART(ONE_SAMPLE) || PART(BLOCKS) || PART(POSITION_GRADIENT)
-/* The angles by which frames turn, of `width` samples; 0 for one that slides. */
-static inline void angles(const struct numbers *x, int width, const real *q, real *angle)
-{
-    for (int f = 0; f < FRAMES; ++f)
-        for (int b = 0; b < width; ++b)
-            angle[f * width + b]
-                = joints[f].kind == REVOLUTE ? x->placings[f].ratio * q[joints[f].coordinate * width + b] : R(0.0);
-}
-#endif
-
 #if PART(ONE_SAMPLE)
 #include "one_sample.h"
 #endif
 
 #if PART(BLOCKS) || PART(POSITION_GRADIENT)
-#include "rows.h"
-
 #include "blocks.h"
+
 #include "dense.h"
 #include "stream.h"
 #include "dense_rows.h"
@@ -267,3 +255,7 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
 #endif
 
 #include "calls.h"
+
+#if PART(REGRESSORS)
+#include "regressors.h"
+#endif

@@ -1,4 +1,6 @@
 /* The functions of one sample, for a kernel in loops. The same in every package of linkwise. */
+#include "angles.h"
+
 #define W 1
 #define number real
 #define KERNEL(name) name##_one

@@ -1,0 +1,116 @@
+"""What regressors are held against: the recursion, for bodies that have one inertial parameter each."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from linkwise.check.compare import Entries, Result, compare
+from linkwise.check.magnitudes import Magnitudes
+from linkwise.check.model_calls import FLOAT32
+from linkwise.check.newton_euler import NewtonEuler
+from linkwise.check.packed_layout import Rows
+from linkwise.check.reference import TOLERANCE, Reference
+from linkwise.check.states import States
+from linkwise.package.entries import RigidTree
+from linkwise.package.load import Array, Model
+from linkwise.package.manifest import Manifest
+
+NUMBERS = 1 << 20
+"""Torques computed at a time: a robot of many joints is looked at in fewer states."""
+MOST = 12
+"""States, at most."""
+MOMENTS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Ixx, Ixy, Iyy, Ixz, Iyz, Izz, as the regressor has them."""
+
+Body = tuple[float, tuple[float, ...], Array]
+"""Mass, centre of mass, and inertia about it."""
+
+
+def regressor_reference(manifest: Manifest, tree: RigidTree, states: States) -> Reference:
+    """Y of tau, c2, c1 and g, of the first few states."""
+    n, links = len(manifest.joints), len(manifest.links)
+    few = states.at(slice(max(1, min(MOST, NUMBERS // (n * n * links)))))
+    found = [_rows(manifest, tree, few, body) for body in _unit_bodies()]
+    values, scales = (
+        {what: np.stack([one[at][what] for one in found], -1) for what in found[0][at]} for at in (0, 1)
+    )
+    for what, value in values.items():
+        # A mass at e_a without inertia about the origin has m and mc_a.
+        value[..., 1:4] -= value[..., :1]
+        scales[what][..., 1:4] += scales[what][..., :1]
+    return Reference("Newton-Euler recursion", TOLERANCE, few, values, scales)
+
+
+def regressor_calls(name: str, model: Model, reference: Reference) -> Iterator[Result]:
+    """Both calls of a back end, of all states, of one and of none, and in single precision."""
+    states, every = reference.states, np.arange(len(reference.states.q))
+
+    def entries(kind: type, rows: Rows) -> Iterator[Entries]:
+        motion: list[Any] = [a.astype(kind) for a in states.at(rows).motion]
+        found = {"Y": model.regressor(*motion)}
+        parts = zip(("Y c2", "Y c1", "Y g"), model.coefficient_regressors(*motion[:2]), strict=True)
+        for what, value in (found | dict(parts)).items():
+            expected, scale = (
+                source[what][rows.reshape(-1)] for source in (reference.values, reference.scales)
+            )
+            yield Entries(what, value.reshape(rows.size, *value.shape[rows.ndim :]), expected, scale)
+
+    groups = [each for rows in (every, every[:0], every[0]) for each in entries(np.float64, np.asarray(rows))]
+    yield compare(f"{name}: regressors against {reference.name}", groups, reference.tolerance)
+    fitting = np.flatnonzero(reference.fits_single())
+    yield compare(f"{name}: regressors in single precision", entries(np.float32, fitting), **FLOAT32)
+
+
+def _unit_bodies() -> Iterator[Body]:
+    none = np.zeros((3, 3))
+    yield 1.0, (0.0, 0.0, 0.0), none
+    for a in range(3):
+        away = np.eye(3)[a]
+        yield 1.0, tuple(away), np.outer(away, away) - np.eye(3)
+    for a, b in MOMENTS:
+        inertia = none.copy()
+        inertia[a, b] = inertia[b, a] = 1.0
+        yield 0.0, (0.0, 0.0, 0.0), inertia
+
+
+def _rows(
+    manifest: Manifest, tree: RigidTree, states: States, body: Body
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """tau, c2, c1 and g, and bounds of what they are summed from, where all links carry the same."""
+    mass, com, inertia = body
+    rows = tuple(map(tuple, inertia.tolist()))
+    bodies = tuple(replace(b, mass=mass, com=com, inertia=rows) for b in tree.bodies)  # type: ignore[arg-type]
+    changed = replace(tree, bodies=bodies)
+    torque, size = NewtonEuler(manifest, changed).partial_torque, Magnitudes(manifest, changed).partial_torque
+    q, qd, qdd = states.motion
+    rest = 0.0 * q
+    values = {
+        "Y": torque(q, qd, qdd),
+        "Y c2": _by_cause(lambda q, qd, e: torque(q, 0.0 * qd, e, gravity=False), q, qd),
+        "Y c1": _by_cause(lambda q, qd, e: 0.5 * torque(q, qd + 1j * e, 0.0 * q, gravity=False).imag, q, qd),
+        "Y g": torque(q, rest, rest),
+    }
+    at, speed, change = (np.abs(x) for x in states.motion)
+
+    def moving(q: Array, qd: Array) -> Array:
+        return size(q, qd, 0.0 * q, gravity=False)
+
+    scales = {
+        "Y": size(at, speed, change),
+        "Y c2": _by_cause(lambda q, qd, e: size(q, 0.0 * qd, e, gravity=False), at, speed),
+        # Of a bound B that is quadratic in qd, 1/2 dB/dqd_k = 1/2 (B(qd + e_k) - B(qd) - B(e_k)).
+        "Y c1": _by_cause(
+            lambda q, qd, e: 0.5 * (moving(q, qd + e) - moving(q, qd) - moving(q, e)), at, speed
+        ),
+        "Y g": size(at, rest, rest),
+    }
+    return values, scales
+
+
+def _by_cause(torque: Callable[[Array, Array, Array], Array], q: Array, qd: Array) -> Array:
+    """Torques for each unit vector, side by side on a last axis: all of them in one call."""
+    n = q.shape[1]
+    found = torque(np.repeat(q, n, axis=0), np.repeat(qd, n, axis=0), np.tile(np.eye(n), (len(q), 1)))
+    return np.moveaxis(found.reshape(len(q), n, *found.shape[1:]), 1, -1)

@@ -1,0 +1,112 @@
+"""The command `identify`."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.settings import Reading, choices
+from linkwise.cli import Json, tell
+from linkwise.cli.log_options import (
+    UNITS,
+    AngleUnits,
+    Backend,
+    Cutoff,
+    Degree,
+    FilterOrder,
+    How,
+    IgnoreExtra,
+    Log,
+    Map,
+    Package,
+    Pad,
+    Resample,
+    Time,
+    Window,
+    chosen_lowpass,
+    chosen_processing,
+    pairs,
+)
+from linkwise.escape import json_text, listed
+from linkwise.identify import Identification
+from linkwise.identify import identify as identified
+from linkwise.identify.identification import Fitting
+from linkwise.identify.identified_files import identified_files, record
+from linkwise.output import require_writable, write_files
+from linkwise.package.manifest import Manifest
+from linkwise.package.write import refuse_inside_package
+from linkwise.progress import progress as shown_progress
+
+Out = Annotated[Path, typer.Option(help="Directory to write to: a page, a record, and the robot as URDF")]
+Torque = Annotated[
+    list[str] | None,
+    typer.Option("--torque", metavar="COLUMN=JOINT", help="Column of a joint's torque; may be repeated"),
+]
+Factor = Annotated[float, typer.Option(help="What brings torques to N m and forces to N: 0.001 for N mm")]
+Friction = Annotated[bool, typer.Option("--friction/--no-friction", help="Viscous and Coulomb friction")]
+Unseen = Annotated[float, typer.Option(help="Share of the log, its end, to predict and not to fit")]
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def identify(
+    log: Log,
+    robot: Package,
+    out: Out,
+    units: AngleUnits = None,
+    time: Time = None,
+    mapping: Map = None,
+    torque: Torque = None,
+    torque_factor: Factor = 1.0,
+    ignore_extra: IgnoreExtra = False,
+    resample: Resample = None,
+    derivative: How = "five-point",
+    window: Window = None,
+    degree: Degree = None,
+    cutoff: Cutoff = None,
+    filter_order: FilterOrder = None,
+    padding: Pad = None,
+    friction: Friction = True,
+    unseen: Unseen = 0.2,
+    backend: Backend = None,
+    as_json: Json = False,
+) -> None:
+    """What a log of motion and torques says of the links: masses, centres, inertias, friction."""
+    reading = Reading(units, time, pairs("--map", mapping or []), ignore_extra, resample)
+    lowpass = chosen_lowpass(cutoff, filter_order, padding)
+    processing = chosen_processing(derivative, window, degree, lowpass, "trim")
+    fitting = Fitting(pairs("--torque", torque or []), torque_factor, friction, unseen)
+    package = load_robot(robot, backend)
+    refuse_inside_package(out)
+    require_writable(out)
+    with shown_progress(UNITS) as progress:
+        found = identified(log, package, reading, processing, fitting, progress)
+    chosen = choices(reading, processing) | {"fitting": asdict(fitting)}
+    files = write_files(out, identified_files(found, Manifest.read(robot), chosen))
+    for warning in found.warnings:
+        tell(f"warning: {log}: {warning}", err=True)
+    if found.log.ignored:
+        tell(f"left out: {listed(found.log.ignored)}", err=True)
+    if as_json:
+        print(json_text(record(found)))
+    else:
+        tell(*_told(found, files))
+
+
+def _told(found: Identification, files: Sequence[Path]) -> Iterator[str]:
+    errors, sizes = found.errors(found.unseen if found.unseen.rows else found.seen), found.seen.sizes()
+    what = "unseen" if found.unseen.rows else "fitted"
+    yield (
+        f"{found.seen.rows:,} samples at {found.log.rate:.6g} Hz: {found.base.count} combinations of "
+        f"{found.own.size} parameters, condition number {found.fit.condition:.3g}"
+    )
+    for i, joint in enumerate(found.robot.joints):
+        yield (
+            f"{joint}: torque {sizes[i]:.3g}, error {errors['fit'][i]:.3g} {what}, by the bodies "
+            f"{errors['bodies'][i]:.3g}, by the package {errors['package'][i]:.3g} (root mean squares)"
+        )
+    yield from map(str, files)

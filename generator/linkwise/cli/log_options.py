@@ -1,0 +1,80 @@
+"""The flags that read a log of motion and derive velocities, for every command that reads one."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from linkwise.analysis.settings import Convention, Derivative, Edges, Lowpass, Padding, Processing, Units
+from linkwise.errors import LinkwiseError
+
+UNITS = {"reading": "B", "resampling": "samples", "analysing": "samples", "fitting": "samples"}
+"""What progress is counted in."""
+
+Log = Annotated[Path, typer.Argument(help="Motion log: .csv, .mot, .sto or .parquet")]
+Package = Annotated[Path, typer.Option(help="Directory of a generated robot")]
+AngleUnits = Annotated[
+    Units | None,
+    typer.Option(help="Unit of the angles, lengths are metres; the file's own, else rad, if not given"),
+]
+Time = Annotated[str | None, typer.Option(help="Column of the time, in s")]
+Map = Annotated[
+    list[str] | None,
+    typer.Option("--map", metavar="COLUMN=JOINT", help="Column of a joint; may be repeated"),
+]
+IgnoreExtra = Annotated[bool, typer.Option("--ignore-extra", help="Leave out columns no joint has")]
+Resample = Annotated[float | None, typer.Option(help="Bring uneven time to this rate, Hz, by splines")]
+How = Annotated[Derivative, typer.Option(help="How velocities and accelerations are made")]
+Window = Annotated[int | None, typer.Option(help="Savitzky-Golay: samples a window; 11 if not given")]
+Degree = Annotated[int | None, typer.Option(help="Savitzky-Golay: degree of the fit; 4 if not given")]
+Cutoff = Annotated[
+    float | None, typer.Option(help="Zero-phase Butterworth low-pass, Hz; no filter if not given")
+]
+FilterOrder = Annotated[int | None, typer.Option(help="The filter's order, of one pass; 2 if not given")]
+Pad = Annotated[
+    Padding | None, typer.Option(help="How the filter continues the log past its ends; odd if not given")
+]
+Ends = Annotated[Edges, typer.Option(help="First and last samples: one-sided formulas, or cut off")]
+Backend = Annotated[str | None, typer.Option(help="Back end of the package; its fastest if not given")]
+
+
+def chosen_processing(
+    derivative: Derivative,
+    window: int | None,
+    degree: int | None,
+    lowpass: Lowpass | None,
+    edges: Edges,
+    convention: Convention = "closing",
+) -> Processing:
+    """How velocities come about, by the flags; raises LinkwiseError for those of another derivative."""
+    if derivative == "five-point" and (window, degree) != (None, None):
+        raise LinkwiseError("--window and --degree go with --derivative savitzky-golay; add it")
+    return Processing(
+        derivative,
+        11 if window is None else window,
+        4 if degree is None else degree,
+        lowpass,
+        edges,
+        convention,
+    )
+
+
+def chosen_lowpass(cutoff: float | None, order: int | None, padding: Padding | None) -> Lowpass | None:
+    """The filter that the flags ask for; raises LinkwiseError for flags of none."""
+    if cutoff is not None:
+        return Lowpass(cutoff, 2 if order is None else order, padding or "odd")
+    if (order, padding) != (None, None):
+        raise LinkwiseError("--filter-order and --padding go with --cutoff; add it")
+    return None
+
+
+def pairs(flag: str, given: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """Columns and joints of a flag's COLUMN=JOINT; raises LinkwiseError for what is written otherwise."""
+    found = []
+    for text in given:
+        column, sign, joint = text.rpartition("=")
+        if not (sign and column and joint):
+            raise LinkwiseError(f"{flag} {text}: write it as COLUMN=JOINT")
+        found.append((column, joint))
+    return tuple(found)

@@ -1,0 +1,109 @@
+"""Which combinations of the links' inertial parameters torques can tell: base parameters.
+
+    W. Khalil, J.-F. Bennis, Int. J. Robotics Research 14(2), 1995; M. Gautier, J. Robotic Systems 8(4), 1991
+
+The regressor of many random motions has dependent columns. QR with column pivoting picks independent ones,
+Y P = Q [R1 R2], and the others are their combinations, Y2 = Y1 R1^-1 R2: so with pi1 the picked parameters
+Y pi = Y1 beta, beta = pi1 + R1^-1 R2 pi2, whatever the motion.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.extras import extra
+from linkwise.package.load import Array, Model
+
+NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+"""Mass, first moment, and inertia about the origin of the link's frame, in the order of the regressor."""
+UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
+
+LATER = 0.01
+"""What columns of masses are scaled by: a sum is named after the first moment that a mass adds to, say."""
+RANK = 1e-8
+"""Of the largest: a smaller diagonal entry of R, of columns scaled to one size, is rounding, and no rank."""
+NOTHING = 1e-9
+"""Of a column's size: a smaller part of another column is rounding too."""
+SPEED = 3.0
+"""rad/s and rad/s^2, m/s and m/s^2."""
+ROWS = 4
+"""Rows of random motion for each column."""
+
+
+@dataclass(frozen=True)
+class BaseParameters:
+    """Independent combinations beta = combinations @ pi of all links' parameters, pi of shape (10 N,)."""
+
+    links: tuple[str, ...]
+    picked: tuple[int, ...]
+    """Positions in pi of the parameter that each combination is named after, ascending."""
+    combinations: Array
+    """(base, 10 N), the identity in the picked columns."""
+    sizes: Array
+    """Root mean square of the picked columns of the regressor over random motions, (base,)."""
+    condition: float
+    """Condition number of these columns, each divided by its size: that of a good motion."""
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.picked)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each."""
+        return tuple(UNITS[at % len(NAMES)] for at in self.picked)
+
+    def texts(self) -> list[str]:
+        """Each as a sum of the links' parameters, such as m(upper) + 2.5 mcx(lower)."""
+        return [self._text(row, own) for row, own in zip(self.combinations, self.picked, strict=True)]
+
+    def _text(self, row: Array, own: int) -> str:
+        others = [at for at in np.flatnonzero(row).tolist() if at != own]
+        return " ".join([self.name(own), *(_term(row[at], self.name(at)) for at in others)])
+
+    def name(self, at: int) -> str:
+        """Name of a parameter of pi."""
+        link, which = divmod(at, len(NAMES))
+        return f"{NAMES[which]}({self.links[link]})"
+
+
+def base_parameters(model: Model) -> BaseParameters:
+    """Base parameters of a robot, by random motions of up to SPEED; raises as its `regressor` does."""
+    links, n = tuple(model.link_names), len(model.joint_names)
+    columns = len(NAMES) * len(links)
+    generator = np.random.default_rng(0)
+    q = generator.uniform(-np.pi, np.pi, (-(-ROWS * columns // n) + ROWS, n))
+    qd, qdd = generator.uniform(-SPEED, SPEED, (2, *q.shape))
+    rows = model.regressor(q, qd, qdd).reshape(-1, columns)
+    picked, rest, shares = _independent(rows)
+    combinations = np.zeros((len(picked), columns))
+    combinations[np.arange(len(picked)), picked] = 1.0
+    combinations[:, rest] = shares
+    order = np.argsort(picked)
+    shown = rows[:, picked[order]]
+    sizes = np.sqrt(np.mean(shown**2, axis=0))
+    condition = float(np.linalg.cond(shown / sizes))
+    return BaseParameters(links, tuple(picked[order].tolist()), combinations[order], sizes, condition)
+
+
+def _independent(rows: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Independent columns, the others, and these as combinations of those, (picked, others)."""
+    sizes = np.sqrt(np.mean(rows**2, axis=0))
+    sizes[sizes <= NOTHING * sizes.max(initial=0.0)] = np.inf  # what no motion shows
+    weights = np.where(np.arange(len(sizes)) % len(NAMES), 1.0, LATER)
+    sizes = sizes / weights
+    r, order = extra("scipy.linalg").qr(rows / sizes, mode="r", pivoting=True)
+    diagonal = np.abs(np.diag(r))
+    rank = int((diagonal > RANK * diagonal[0]).sum())
+    picked, rest = order[:rank], order[rank:]
+    shares = np.linalg.solve(r[:rank, :rank], r[:rank, rank:])
+    shares[np.abs(shares) < NOTHING] = 0.0
+    scaled = shares * np.where(np.isinf(sizes[rest]), 0.0, sizes[rest]) / sizes[picked][:, None]
+    return picked, rest, scaled
+
+
+def _term(factor: float, name: str) -> str:
+    sign, size = ("-" if factor < 0 else "+"), f"{abs(factor):.6g}"
+    return f"{sign} {name}" if size == "1" else f"{sign} {size} {name}"

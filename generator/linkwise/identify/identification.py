@@ -1,0 +1,150 @@
+"""`identify`: from a log and a robot to what its links carry."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.analysis.settings import Processing, Reading
+from linkwise.errors import LinkwiseError, within
+from linkwise.identify.base_parameters import BaseParameters, base_parameters
+from linkwise.identify.fit import POOR, Fit, weighted_fit
+from linkwise.identify.normal_factors import JointEquations, joint_equations
+from linkwise.identify.physical_fit import PhysicalFit, physical_fit
+from linkwise.identify.torque_log import TorqueLog, read_torque_log
+from linkwise.package.load import Array
+from linkwise.progress import Progress, silent
+from linkwise.runtime.joint_tree import Bodies
+from linkwise.runtime.regressors import inertial_parameters
+
+LARGE = 100.0
+"""Times: torques so much larger, or smaller, than the robot's own are perhaps in another unit."""
+
+
+@dataclass(frozen=True)
+class Fitting:
+    """What is fitted: which columns of the log are torques, as (column, joint) pairs, and how.
+
+    factor: what brings torques to N m, and forces to N; unseen: share of the log, at its end, that is left
+    out of the fit and predicted by it. Raises LinkwiseError for values that cannot be.
+    """
+
+    torques: tuple[tuple[str, str], ...] = ()
+    factor: float = 1.0
+    friction: bool = True
+    unseen: float = 0.2
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.unseen <= 0.9:
+            raise LinkwiseError(f"--unseen {self.unseen:g}: give a share of the log from 0 to 0.9")
+        if not 0 < abs(self.factor) < float("inf"):
+            raise LinkwiseError(f"--torque-factor {self.factor:g}: give a number that is not 0")
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """What a log says of a robot."""
+
+    robot: LoadedRobot
+    log: TorqueLog
+    base: BaseParameters
+    fit: Fit
+    """Base parameters and friction, by weighted least squares."""
+    physical: PhysicalFit
+    """Every link's parameters, such as a body can have."""
+    own: Array
+    """Those of the package, (N, 10)."""
+    seen: JointEquations
+    unseen: JointEquations
+    """Equations of the part of the log that was fitted, and of the rest."""
+    warnings: tuple[str, ...]
+
+    def errors(self, equations: JointEquations) -> dict[str, Array]:
+        """Root mean square error of each joint's torque: of the fit, of its bodies, and of the package."""
+        combinations, none = self.base.combinations, np.zeros_like(self.fit.friction)
+        bodies = combinations @ self.physical.pi.reshape(-1)
+        return {
+            "fit": equations.errors(self.fit.beta, self.fit.friction),
+            "bodies": equations.errors(bodies, self.physical.friction),
+            "package": equations.errors(combinations @ self.own.reshape(-1), none),
+        }
+
+
+def identify(
+    log: str | Path,
+    robot: str | Path | LoadedRobot,
+    reading: Reading | None = None,
+    processing: Processing | None = None,
+    fitting: Fitting | None = None,
+    progress: Progress = silent,
+) -> Identification:
+    """Identify a robot's links from a log of motion and torques.
+
+    Velocities and accelerations come from positions, as in `analyze`; torques are taken as they are.
+    Raises LinkwiseError, in one line that names the mend, for what cannot be identified.
+    """
+    loaded = robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot))
+    own = _own_parameters(loaded)
+    reading, processing, fitting = reading or Reading(), processing or Processing(), fitting or Fitting()
+    read = read_torque_log(Path(log), loaded, reading, processing, fitting.torques, fitting.factor, progress)
+    base = base_parameters(loaded.model)
+    end = read.stop - round(fitting.unseen * (read.stop - read.start))
+    seen, unseen = (
+        joint_equations(read, span, loaded.model, base, processing, progress)
+        for span in ((read.start, end), (end, read.stop))
+    )
+    with within(str(log)):
+        _refuse_few(seen, base, fitting)
+        fit = weighted_fit(seen, base, fitting.friction)
+        warnings = (*_units(seen, base, own, loaded.joints), *_poor(fit, base))
+        physical = physical_fit(fit, base, own, fitting.friction)
+    return Identification(loaded, read, base, fit, physical, own, seen, unseen, (*read.warnings, *warnings))
+
+
+def _own_parameters(robot: LoadedRobot) -> Array:
+    if robot.bodies is None:
+        raise LinkwiseError(f"{robot.name} is made of energies; only rigid links have parameters to identify")
+    if not hasattr(robot.model, "regressor") or robot.model.backend.rule is None:
+        raise LinkwiseError(
+            f"{robot.name} has no back end with regressors; generate the robot again, with --backend numpy"
+        )
+    by_name = {body.link: body for body in robot.bodies}
+    bodies = [by_name[name] for name in robot.links]
+    values = ([b.mass for b in bodies], [b.com for b in bodies], [b.inertia for b in bodies])
+    pi: Array = inertial_parameters(Bodies(*(np.array(value, dtype=float) for value in values)))
+    return pi
+
+
+def _refuse_few(seen: JointEquations, base: BaseParameters, fitting: Fitting) -> None:
+    unknowns = base.count + (2 * len(seen.triangles) if fitting.friction else 0)
+    if seen.rows * len(seen.triangles) < 2 * unknowns:
+        raise LinkwiseError(
+            f"{seen.rows} samples are too few for {unknowns} unknowns; give a longer log, or lower --unseen"
+        )
+
+
+def _poor(fit: Fit, base: BaseParameters) -> tuple[str, ...]:
+    if fit.condition <= POOR * base.condition:
+        return ()
+    return (
+        f"little excitation: the condition number is {fit.condition:.3g}, {base.condition:.3g} for random "
+        "motions; see the standard errors, or record a motion in which every joint moves far and fast",
+    )
+
+
+def _units(seen: JointEquations, base: BaseParameters, own: Array, joints: Sequence[str]) -> tuple[str, ...]:
+    """A warning where torques are not of the size that the package expects."""
+    n, beta = len(seen.triangles), base.combinations @ own.reshape(-1)
+    # What the package expects is Y beta: the error of the equations without their torque.
+    bare = JointEquations(seen.triangles.copy(), seen.rows)
+    bare.triangles[:, :, -1] = 0.0
+    expected, found = bare.errors(beta, np.zeros((n, 2))), seen.sizes()
+    at = int(np.argmax(found))
+    if not expected[at] or 1 / LARGE < found[at] / expected[at] < LARGE:
+        return ()
+    return (
+        f"the torque of {joints[at]!r} is {found[at]:.3g} (root mean square) where the robot, as it is, "
+        f"needs {expected[at]:.3g}: if it is in another unit, pass --torque-factor, 0.001 for N mm",
+    )

@@ -1,0 +1,146 @@
+"""The files of an identification: a record, a page, and the robot as a URDF file."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from linkwise.escape import json_text, markdown
+from linkwise.identify.base_parameters import NAMES, UNITS
+from linkwise.identify.identification import Identification
+from linkwise.identify.pseudo_inertia import central
+from linkwise.identify.urdf_file import gravity_differs, urdf_text
+from linkwise.package.manifest import Manifest
+
+COEFFICIENTS = {"rad": ("N m s/rad", "N m"), "m": ("N s/m", "N")}
+"""Units of viscous and Coulomb friction, by that of the joint."""
+
+
+def identified_files(found: Identification, manifest: Manifest, choices: dict[str, Any]) -> dict[str, bytes]:
+    """The files, by name; `choices` are recorded."""
+    assert manifest.tree is not None
+    pi = dict(zip(found.robot.links, found.physical.pi, strict=True))
+    friction = dict(zip(found.robot.joints, found.physical.friction, strict=True))
+    urdf = urdf_text(manifest.name, manifest.tree, manifest.joints, pi, friction)
+    texts = {
+        "identified.json": json_text(record(found) | {"choices": choices}, indent=1) + "\n",
+        "identified.md": page(found, gravity_differs(manifest.tree)),
+        f"{manifest.name}.urdf": urdf,
+    }
+    return {name: text.encode() for name, text in texts.items()}
+
+
+def record(found: Identification) -> dict[str, Any]:
+    """Everything found, as plain data."""
+    fit, robot = found.fit, found.robot
+    joints = {
+        name: {
+            "viscous": fit.friction[i, 0],
+            "viscous_error": fit.friction_errors[i, 0],
+            "coulomb": fit.friction[i, 1],
+            "coulomb_error": fit.friction_errors[i, 1],
+            "noise": fit.noise[i],
+            **{f"unseen_error_{what}": e[i] for what, e in found.errors(found.unseen).items()},
+            **{f"seen_error_{what}": e[i] for what, e in found.errors(found.seen).items()},
+        }
+        for i, name in enumerate(robot.joints)
+    }
+    own = found.base.combinations @ found.own.reshape(-1)
+    base = [
+        {"combination": text, "unit": unit, "value": value, "standard_error": error, "package": before}
+        for text, unit, value, error, before in zip(
+            found.base.texts(), found.base.units, fit.beta, fit.beta_errors, own, strict=True
+        )
+    ]
+    links = {
+        link: dict(zip(NAMES, pi.tolist(), strict=True))
+        for link, pi in zip(robot.links, found.physical.pi, strict=True)
+    }
+    return {
+        "robot": robot.name,
+        "log": found.log.source,
+        "rate": found.log.rate,
+        "samples_fitted": found.seen.rows,
+        "samples_unseen": found.unseen.rows,
+        "condition_number": fit.condition,
+        "base_parameters": base,
+        "joints": joints,
+        "links": links,
+        "warnings": list(found.warnings),
+    }
+
+
+def page(found: Identification, gravity: bool) -> str:
+    """The page, in Markdown."""
+    return "\n".join([*_head(found), *_joints(found), *_base(found), *_links(found, gravity), ""])
+
+
+def _head(found: Identification) -> Iterator[str]:
+    yield f"# {markdown(found.robot.name)}, identified from {markdown(found.log.source)}"
+    yield ""
+    yield (
+        f"{found.seen.rows:,} samples at {found.log.rate:.6g} Hz were fitted, the {found.unseen.rows:,} "
+        "after them were not: they are what *unseen* means. Condition number of the equations: "
+        f"{found.fit.condition:.3g}, where random motions have {found.base.condition:.3g}."
+    )
+
+
+def _joints(found: Identification) -> Iterator[str]:
+    yield from ("", "## Torques and friction", "")
+    yield (
+        "| joint | torque, r.m.s. | error, fitted | error, unseen | by the bodies below | by the package "
+        "| viscous | Coulomb | unit of both |"
+    )
+    yield "|---|---|---|---|---|---|---|---|---|"
+    seen, unseen = found.errors(found.seen), found.errors(found.unseen)
+    shown = unseen if found.unseen.rows else seen
+    for i, (name, unit) in enumerate(zip(found.robot.joints, found.robot.units, strict=True)):
+        numbers = (
+            found.seen.sizes()[i],
+            seen["fit"][i],
+            unseen["fit"][i],
+            shown["bodies"][i],
+            shown["package"][i],
+        )
+        rubs = zip(found.fit.friction[i], found.fit.friction_errors[i], strict=True)
+        cells = [markdown(name), *(f"{x:.3g}" for x in numbers), *(f"{f:.4g} ± {e:.1g}" for f, e in rubs)]
+        yield f"| {' | '.join([*cells, ', '.join(COEFFICIENTS[unit])])} |"
+
+
+def _base(found: Identification) -> Iterator[str]:
+    yield from ("", f"## Base parameters: the {found.base.count} combinations that torques can tell", "")
+    yield "| combination | identified | standard error | package | unit |"
+    yield "|---|---|---|---|---|"
+    own = found.base.combinations @ found.own.reshape(-1)
+    rows = zip(found.base.texts(), found.fit.beta, found.fit.beta_errors, own, found.base.units, strict=True)
+    for text, value, error, before, unit in rows:
+        yield f"| {markdown(text)} | {value:.5g} | {error:.1g} | {before:.5g} | {unit} |"
+    yield ""
+    yield (
+        f"{', '.join(NAMES)}(link): mass, first moment, and inertia about the origin of the link's frame, "
+        f"in its axes; {', '.join(dict.fromkeys(UNITS))}. The frames are those of the URDF file beside this "
+        "page."
+    )
+
+
+def _links(found: Identification, gravity: bool) -> Iterator[str]:
+    yield from ("", "## Bodies that can exist and fit", "")
+    yield "| link | mass, kg | centre of mass, m | principal moments about it, kg m² | mass in the package |"
+    yield "|---|---|---|---|---|"
+    for name, pi, own in zip(found.robot.links, found.physical.pi, found.own, strict=True):
+        mass, com, inertia = central(pi)
+        moments = np.linalg.eigvalsh(inertia)
+        places = (", ".join(f"{x:.4g}" for x in values) for values in (com, moments))
+        yield f"| {markdown(name)} | {mass:.4g} | {' | '.join(places)} | {own[0]:.4g} |"
+    yield ""
+    yield (
+        "What torques do not tell, such as how a mass is shared between links that move alike, is as near to "
+        "the package's own bodies as the rest allows: no mass here is measured unless the table above has it "
+        "alone."
+    )
+    if gravity:
+        yield ""
+        yield (
+            "A URDF file has no gravity, and is read with 9.81 m/s² along -z: the package's is another, so "
+            "that weights will be too."
+        )

@@ -1,0 +1,122 @@
+"""The parameters of every link, such as bodies can have, that fit the log: a semidefinite program.
+
+    minimise   || W (B pi, f) - tau ||^2  +  || (pi - pi0) / size ||^2
+    over       J(pi_j) >= a speck, f >= 0
+
+W and tau are the weighted equations of `fit`, B the base parameters' combinations, J the pseudo-inertia, f
+the friction. The second term settles what torques do not show: there the links keep the robot's own
+parameters pi0, each known, as it were, to within its own size; where the log says anything it outweighs that
+by far. Solved by Clarabel (P. Goulart, Y. Chen, arXiv:2405.12762), an interior-point method.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from linkwise.errors import LinkwiseError
+from linkwise.extras import extra
+from linkwise.identify.base_parameters import NAMES, BaseParameters
+from linkwise.identify.fit import Fit
+from linkwise.identify.pseudo_inertia import pseudo_inertia
+from linkwise.package.load import Array
+
+SPECK = 1e-6
+"""Of a link's size: how far inside of what can exist a body stays, so that rounding keeps it there."""
+SMALLEST = 0.05
+"""Of the largest mass, or length: the least size that a link's parameters are taken to have."""
+SOLVED = ("Solved", "AlmostSolved")
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalFit:
+    """Parameters of links (N, 10), each of a body that can exist, and friction (n, 2), nowhere below 0."""
+
+    pi: Array
+    friction: Array
+
+
+def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: bool) -> PhysicalFit:
+    """Fit bodies near the robot's `own` parameters (N, 10); raises LinkwiseError where the solver fails."""
+    sizes = _sizes(own)
+    n, count = len(fit.friction), own.size
+    frictions = 2 * n if rubs else 0
+    rubbing = _friction_sizes(fit, rubs)
+    scale = np.concatenate([sizes.reshape(-1), rubbing])
+    reach = np.zeros((base.count + frictions, count + frictions))
+    reach[: base.count, :count] = base.combinations
+    reach[base.count :, count:] = np.eye(frictions)
+    equations = fit.triangle[:-1, :-1] @ reach * scale
+    prior = np.eye(count, count + frictions)
+    left = np.concatenate([equations, prior])
+    right = np.concatenate([fit.triangle[:-1, -1], (own / sizes).reshape(-1)])
+    x = scale * _within_cones(left, right, sizes, frictions)
+    friction = x[count:].reshape(n, 2) if rubs else np.zeros((n, 2))
+    return PhysicalFit(x[:count].reshape(own.shape), np.maximum(friction, 0.0))
+
+
+def _within_cones(left: Array, right: Array, sizes: Array, frictions: int) -> Array:
+    """x that is least ||left x - right|| where the links' pseudo-inertias and the frictions allow it.
+
+    With left = Q R and y = R x - Q^T right, the way from where it is least anyhow, it is 1/2 y^T y but for a
+    constant: as round as can be.
+    """
+    clarabel, sparse = extra("clarabel"), extra("scipy.sparse")
+    q, r = np.linalg.qr(left)
+    cones, rows, bounds = [], [], []
+    for j, size in enumerate(sizes):
+        block = np.zeros((len(NAMES), left.shape[1]))
+        block[:, j * len(NAMES) : (j + 1) * len(NAMES)] = np.diag(size)
+        length = np.sqrt(size[4] / size[0])
+        frame = np.diag([1 / length] * 3 + [1.0]) / np.sqrt(size[0])
+        matrices = [frame @ pseudo_inertia(unit) @ frame for unit in np.eye(len(NAMES))]
+        rows.append(-np.stack([_triangle(m) for m in matrices], 1) @ block)
+        bounds.append(-SPECK * _triangle(np.eye(4)))
+        cones.append(clarabel.PSDTriangleConeT(4))
+    if frictions:
+        rows.append(-np.eye(frictions, left.shape[1], left.shape[1] - frictions))
+        bounds.append(np.zeros(frictions))
+        cones.append(clarabel.NonnegativeConeT(frictions))
+    constraints = np.linalg.solve(r.T, np.concatenate(rows).T).T
+    least = q.T @ right
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    count = left.shape[1]
+    solution = clarabel.DefaultSolver(
+        sparse.identity(count, format="csc"),
+        np.zeros(count),
+        sparse.csc_matrix(constraints),
+        np.concatenate(bounds) - constraints @ least,
+        cones,
+        settings,
+    ).solve()
+    if str(solution.status) not in SOLVED:
+        raise LinkwiseError(
+            f"no bodies that can exist fit these torques (the solver ended with {solution.status}); see that "
+            "the torques are in N m, and of this robot"
+        )
+    x: Array = np.linalg.solve(r, least + np.array(solution.x))
+    return x
+
+
+def _triangle(matrix: Array) -> Array:
+    """Upper triangle, column by column, what is off the diagonal times the root of 2: the cone's order."""
+    entries: list[float] = [
+        matrix[a, b] * (1.0 if a == b else np.sqrt(2.0)) for b in range(4) for a in range(b + 1)
+    ]
+    return np.array(entries, dtype=float)
+
+
+def _sizes(own: Array) -> Array:
+    """How large each parameter of a link is by its mass and its reach, (N, 10): m, m l, m l^2."""
+    masses, moments = own[:, 0], np.trace(pseudo_inertia(own)[:, :3, :3], axis1=-2, axis2=-1)
+    mass = np.maximum(masses, SMALLEST * (masses.max() or 1.0))
+    reach = np.sqrt(np.maximum(moments, 0.0) / mass)
+    length = np.maximum(reach, SMALLEST * (reach.max() or 1.0))
+    sizes: Array = mass[:, None] * length[:, None] ** np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+    return sizes
+
+
+def _friction_sizes(fit: Fit, rubs: bool) -> Array:
+    """One unit for each friction: what it was found to be, or its standard error."""
+    found = np.maximum(np.abs(fit.friction), fit.friction_errors)
+    return np.where(found > 0, found, 1.0).reshape(-1) if rubs else np.zeros(0)

@@ -1,0 +1,39 @@
+"""Inertial parameters as pseudo-inertia, by which a body that can exist is known.
+
+    P. Wensing, S. Kim, J.-J. Slotine, IEEE Robotics and Automation Letters 3(1), 2018
+
+With second moments S = 1/2 tr(I) 1 - I about the origin and the first moment h = m c,
+
+    J = [S h; h^T m]
+
+is positive semidefinite if and only if some density of mass, nowhere negative, has these parameters. It is
+linear in pi = (m, mcx, mcy, mcz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz).
+"""
+
+import numpy as np
+
+from linkwise.package.load import Array
+
+MOMENTS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Where the last six stand in the inertia."""
+
+
+def pseudo_inertia(pi: Array) -> Array:
+    """J of parameters (..., 10), (..., 4, 4)."""
+    inertia = np.zeros((*pi.shape[:-1], 3, 3))
+    for at, (a, b) in enumerate(MOMENTS, 4):
+        inertia[..., a, b] = inertia[..., b, a] = pi[..., at]
+    half = 0.5 * np.trace(inertia, axis1=-2, axis2=-1)
+    j = np.empty((*pi.shape[:-1], 4, 4))
+    j[..., :3, :3] = half[..., None, None] * np.eye(3) - inertia
+    j[..., :3, 3] = j[..., 3, :3] = pi[..., 1:4]
+    j[..., 3, 3] = pi[..., 0]
+    return j
+
+
+def central(pi: Array) -> tuple[float, Array, Array]:
+    """Mass, centre of mass (3,) and inertia about it (3, 3) of parameters (10,); a mass above 0."""
+    j = pseudo_inertia(pi)
+    mass, h = float(j[3, 3]), j[:3, 3]
+    second = j[:3, :3] - np.outer(h, h) / mass
+    return mass, h / mass, np.trace(second) * np.eye(3) - second

@@ -1,0 +1,125 @@
+"""A log of motion and torques: which columns are the torques, and all of it in SI units."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from linkwise.analysis.filtering import lowpass
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.logs import open_log
+from linkwise.analysis.samples import read_samples
+from linkwise.analysis.settings import Lowpass, Processing, Reading
+from linkwise.analysis.stream import span_of
+from linkwise.errors import LinkwiseError, within
+from linkwise.escape import listed
+from linkwise.package.load import Array
+from linkwise.progress import Progress
+
+SPELLINGS = ("tau/{}", "tau_{}", "{}_moment", "{}_force", "{}_torque", "{}/effort", "{}_effort")
+"""How logs name the torque of a joint: `analyze`, scripts, OpenSim's inverse dynamics, ROS."""
+PERIODS = 1.5
+"""Of the cutoff, for each order: the filter's response to what is beyond an end has died down by then."""
+STILL = 0.01
+"""rad or m: within less, a joint's motion shows nothing but noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueLog:
+    """Evenly spaced samples: positions `q` (S, n) in rad or m, filtered, and torques (S, n) as measured."""
+
+    source: str
+    rate: float
+    q: Array
+    torque: Array
+    start: int
+    stop: int
+    """First sample to use, and the one after the last: derivatives may need those beyond."""
+    warnings: tuple[str, ...]
+    ignored: tuple[str, ...]
+
+
+def read_torque_log(
+    path: Path,
+    robot: LoadedRobot,
+    reading: Reading,
+    processing: Processing,
+    torques: Sequence[tuple[str, str]],
+    factor: float,
+    progress: Progress,
+) -> TorqueLog:
+    """Read a log; `torques` are (column, joint) pairs, and `factor` brings these columns to N m (N).
+
+    Raises LinkwiseError for a joint without a torque, or one that stands still.
+    """
+    with within(str(path)):
+        columns = _torque_columns(open_log(path).columns, robot.joints, torques)
+    names = tuple(f"torque of {joint}" for joint in robot.joints)
+    mapping = (*reading.mapping, *zip(columns, names, strict=True))
+    samples = read_samples(
+        path,
+        (*robot.joints, *names),
+        (*robot.units, *["N m"] * len(names)),
+        replace(reading, mapping=mapping),
+        progress,
+    )
+    n = len(robot.joints)
+    q, torque = samples.q[:, :n].copy(), samples.q[:, n:] * factor
+    with within(str(path)):
+        start, stop = span_of(samples, processing)
+        if processing.lowpass is not None:
+            lowpass(q, samples.rate, processing.lowpass)
+            start, stop = _settled(start, stop, samples.rate, processing.lowpass)
+        _refuse_still(q[start:stop], robot)
+    return TorqueLog(path.name, samples.rate, q, torque, start, stop, samples.warnings, samples.ignored)
+
+
+def _settled(start: int, stop: int, rate: float, filtered: Lowpass) -> tuple[int, int]:
+    """Samples that the filter does not reach from beyond the log's ends; LinkwiseError if none are left."""
+    margin = round(PERIODS * filtered.order * rate / filtered.cutoff)
+    if stop - start <= 2 * margin:
+        raise LinkwiseError(
+            f"{stop - start} samples are too few for --cutoff {filtered.cutoff:g}, which blurs {margin} at "
+            "either end; give a longer log, or raise it"
+        )
+    return start + margin, stop - margin
+
+
+def _torque_columns(
+    columns: Sequence[str], joints: Sequence[str], torques: Sequence[tuple[str, str]]
+) -> list[str]:
+    """Name of each joint's torque column, in the robot's order."""
+    given = {joint: column for column, joint in torques}
+    for joint, column in given.items():
+        if joint not in joints or column not in columns:
+            what, there = ("joint", joints) if joint not in joints else ("column", columns)
+            raise LinkwiseError(
+                f"--torque {column}={joint}: there is no such {what}; there are {listed(map(repr, there))}"
+            )
+    found, missing = [], []
+    for joint in joints:
+        names = [given[joint]] if joint in given else [spelling.format(joint) for spelling in SPELLINGS]
+        there = [name for name in names if name in columns]
+        found += there[:1]
+        missing += [] if there else [joint]
+    if missing:
+        example = missing[0]
+        raise LinkwiseError(
+            f"no torque column for joint {listed(map(repr, missing))}; call it 'tau/{example}' or "
+            f"'{example}_moment', or name it with --torque COLUMN={example}"
+        )
+    return found
+
+
+def _refuse_still(q: Array, robot: LoadedRobot) -> None:
+    ranges = np.ptp(q, axis=0)
+    still = [at for at in range(len(ranges)) if ranges[at] < STILL]
+    if still:
+        at = still[0]
+        joint = robot.joints[at]
+        raise LinkwiseError(
+            f"too little excitation: joint {joint!r} moves by {ranges[at]:.2g} {robot.units[at]} in all; "
+            "record a motion of every joint, or generate the robot with "
+            f"--lock {joint}={np.mean(q[:, at]):.4g}"
+        )

@@ -1,0 +1,130 @@
+"""A package's robot as a URDF file, for which `generate` makes the same torques.
+
+Links and joints have their own names and the frames of the package: z on the joint's axis.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from linkwise.escape import one_line
+from linkwise.identify.pseudo_inertia import central
+from linkwise.package.entries import BodyEntry, JointEntry, RigidTree
+from linkwise.package.load import Array
+
+STANDARD = 9.81
+"""m/s^2 along -z: a URDF file says nothing of gravity, and this is what it is read with."""
+
+
+def gravity_differs(tree: RigidTree) -> bool:
+    """Whether gravity is stronger or weaker than a URDF file is read with."""
+    return not math.isclose(float(np.linalg.norm(tree.gravity)), STANDARD, rel_tol=1e-9)
+
+
+def urdf_text(
+    name: str,
+    tree: RigidTree,
+    joints: Sequence[JointEntry],
+    pi: Mapping[str, Array],
+    friction: Mapping[str, Array],
+) -> str:
+    """The file; pi: inertial parameters (10,) by link, friction: viscous and Coulomb (2,) by joint."""
+    base = _unused("base", [body.link for body in tree.bodies])
+    lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>", f"  <link name={quoteattr(base)}/>"]
+    root = base
+    if (turn := _upright(tree)) is not None:
+        root = _unused(f"{base}_upright", [body.link for body in tree.bodies])
+        lines += [f"  <link name={quoteattr(root)}/>"]
+        mount = _unused("mount", [body.joint for body in tree.bodies])
+        lines += _joint(mount, "fixed", base, root, (0.0, 0.0, 0.0), turn, [])
+    masters = [joint.name for joint in joints]
+    for body in tree.bodies:
+        lines += _link(body, pi)
+        parent = root if body.parent is None else tree.bodies[body.parent].link
+        more = ['<axis xyz="0 0 1"/>', *_follows(body, masters)]
+        if body.joint in friction:
+            viscous, coulomb = friction[body.joint].tolist()
+            more.append(f'<dynamics damping="{viscous:.6g}" friction="{coulomb:.6g}"/>')
+        kind = "prismatic" if body.kind == "prismatic" else "continuous"
+        limits = (
+            ['<limit lower="-1e9" upper="1e9" effort="1e9" velocity="1e9"/>'] if kind == "prismatic" else []
+        )
+        turn = np.array(body.rotation)
+        lines += _joint(body.joint, kind, parent, body.link, body.translation, turn, more + limits)
+    return "\n".join([*lines, "</robot>", ""])
+
+
+def _link(body: BodyEntry, pi: Mapping[str, Array]) -> list[str]:
+    if body.link not in pi:
+        return [f"  <link name={quoteattr(body.link)}/>"]
+    mass, com, inertia = central(pi[body.link])
+    entries = zip(("xx", "xy", "xz", "yy", "yz", "zz"), inertia[np.triu_indices(3)].tolist(), strict=True)
+    moments = " ".join(f'i{key}="{value!r}"' for key, value in entries)
+    return [
+        f"  <link name={quoteattr(body.link)}>",
+        "    <inertial>",
+        f'      <origin xyz="{_row(com)}" rpy="0 0 0"/>',
+        f'      <mass value="{mass!r}"/>',
+        f"      <inertia {moments}/>",
+        "    </inertial>",
+        "  </link>",
+    ]
+
+
+def _joint(
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    place: Sequence[float],
+    turn: Array,
+    more: Sequence[str],
+) -> list[str]:
+    return [
+        f"  <joint name={quoteattr(one_line(name, len(name)))} type={quoteattr(kind)}>",
+        f'    <origin xyz="{_row(np.array(place))}" rpy="{_row(_rpy(turn))}"/>',
+        f"    <parent link={quoteattr(parent)}/>",
+        f"    <child link={quoteattr(child)}/>",
+        *(f"    {line}" for line in more),
+        "  </joint>",
+    ]
+
+
+def _follows(body: BodyEntry, masters: Sequence[str]) -> list[str]:
+    master = masters[body.coordinate]
+    if master == body.joint:
+        return []
+    return [f'<mimic joint={quoteattr(master)} multiplier="{body.ratio!r}"/>']
+
+
+def _upright(tree: RigidTree) -> Array | None:
+    """Axes of the package's base in those where gravity is along -z; None where they are the same."""
+    g = np.array(tree.gravity)
+    size = float(np.linalg.norm(g))
+    if size == 0 or ((g[:2] == 0).all() and g[2] < 0):
+        return None
+    up = -g / size
+    x = np.eye(3)[int(np.abs(up).argmin())]
+    x = x - (x @ up) * up
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(up, x), up])
+
+
+def _rpy(turn: Array) -> Array:
+    """Angles with Rz(yaw) Ry(pitch) Rx(roll) = turn."""
+    pitch = math.atan2(-turn[2, 0], math.hypot(turn[0, 0], turn[1, 0]))
+    if abs(math.cos(pitch)) < 1e-9:  # roll and yaw turn about one axis: all of it is roll
+        return np.array([math.atan2(-turn[1, 2], turn[1, 1]), pitch, 0.0])
+    return np.array([math.atan2(turn[2, 1], turn[2, 2]), pitch, math.atan2(turn[1, 0], turn[0, 0])])
+
+
+def _row(values: Array) -> str:
+    return " ".join(repr(value) for value in values.tolist())
+
+
+def _unused(name: str, taken: Sequence[str]) -> str:
+    while name in taken:
+        name += "_"
+    return name

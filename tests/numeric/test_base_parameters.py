@@ -1,0 +1,50 @@
+"""How many combinations of parameters torques tell, of ten real robots: the rank of Pinocchio's regressor."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from answers import random_states
+from corpus import ROBOTS
+from linkwise import Options, generate, read_system, write_package
+from linkwise.identify.base_parameters import base_parameters
+from linkwise.package.load import open_package
+
+pytest.importorskip("pinocchio")
+
+from numeric.pinocchio_model import PinocchioModel
+
+if not ROBOTS.is_dir():
+    pytest.skip("needs the package example-robot-data", allow_module_level=True)
+
+RANK = 1e-8
+ROBOT: dict[str, tuple[Options, int]] = {
+    "panda": (Options(), 48),
+    "kinova": (Options(), 36),
+    "solo12": (Options(), 68),
+    "allegro_left_hand": (Options(allow_unphysical=True), 94),
+    "iris_simple": (Options(base="floating"), 10),
+    "ur5_robot": (Options(), 36),
+    "double_pendulum": (Options(), 6),
+    "baxter": (Options(), 97),
+    "z1": (Options(), 43),
+    "g1_29dof_rev_1_0": (Options(), 189),
+}
+
+
+@pytest.mark.parametrize("name", ROBOT)
+def test_base_parameters_are_as_many_as_the_rank_of_pinocchios_regressor(name: str, tmp_path: Path) -> None:
+    options, expected = ROBOT[name]
+    path = next(ROBOTS.rglob(f"{name}.urdf"))
+    system = read_system(path, options)
+    write_package(generate(system, ["numpy"], "robot", kernel="loops"), tmp_path / "robot")
+    base = base_parameters(open_package(tmp_path / "robot").load("numpy"))
+    oracle = PinocchioModel(path, system, options.base == "floating")
+    samples = 4 * base.combinations.shape[1] // oracle.n + 4
+    states: Any = zip(*random_states(oracle.n, samples), strict=True)
+    rows = np.concatenate([oracle.regressor(*state).reshape(oracle.n, -1) for state in states])
+    sizes = np.linalg.norm(rows, axis=0)
+    shown = sizes > RANK * sizes.max()
+    values = np.linalg.svd(rows[:, shown] / sizes[shown], compute_uv=False)
+    assert int((values > RANK * values[0]).sum()) == base.count == expected

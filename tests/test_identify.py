@@ -1,0 +1,293 @@
+"""What a log of motion and torques says of a robot's links, and what it does not say in time."""
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from answers import random_states, relative_error
+from conftest import DATA, PANDA
+from linkwise import LinkwiseError, generate, read_system, write_package
+from linkwise.analysis import Lowpass, Processing, Reading
+from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.check.newton_euler import NewtonEuler
+from linkwise.cli.app import app
+from linkwise.identify import identify
+from linkwise.identify.base_parameters import base_parameters
+from linkwise.identify.identification import Fitting
+from linkwise.identify.pseudo_inertia import pseudo_inertia
+from linkwise.identify.urdf_file import urdf_text
+from linkwise.package.load import import_package
+from linkwise.package.manifest import Manifest
+from linkwise.runtime.joint_tree import Bodies
+from linkwise.runtime.regressors import inertial_parameters
+from motion_logs import write_csv
+from typer.testing import CliRunner
+
+JOINTS = ("joint1", "joint2", "joint3")
+TORQUES = tuple(f"tau/{joint}" for joint in JOINTS)
+
+
+def swings(joints: int, seconds: float, rate: float, seed: int = 1) -> tuple[Any, Any, Any, Any]:
+    """Time, and q, qd and qdd of sums of five sines a joint, from 0.1 to 0.5 Hz."""
+    generator = np.random.default_rng(seed)
+    t = np.arange(round(seconds * rate)) / rate
+    w = 0.2 * np.pi * np.arange(1, 6)
+    size, phase = generator.uniform(0.1, 0.5, (joints, 5)), generator.uniform(0, 2 * np.pi, (joints, 5))
+    at = w * t[:, None, None] + phase
+    return (
+        t,
+        (size * np.sin(at)).sum(-1),
+        (size * w * np.cos(at)).sum(-1),
+        (-size * w**2 * np.sin(at)).sum(-1),
+    )
+
+
+def own_parameters(robot: LoadedRobot) -> Any:
+    """Parameters of the links as the robot has them."""
+    bodies = {body.link: body for body in robot.bodies or ()}
+    chosen = [bodies[link] for link in robot.links]
+    values = ([b.mass for b in chosen], [b.com for b in chosen], [b.inertia for b in chosen])
+    return inertial_parameters(Bodies(*map(np.array, values)))
+
+
+def other_bodies(pi: Any, seed: int = 2) -> Any:
+    """Bodies that can exist, some 30 % off: masses and places of four points each."""
+    generator = np.random.default_rng(seed)
+    j = pseudo_inertia(pi)
+    shift = np.eye(4) + 0.1 * generator.standard_normal((len(pi), 4, 4)) * [[1], [1], [1], [0]]
+    moved = shift @ j @ shift.transpose(0, 2, 1) * generator.uniform(0.8, 1.3, (len(pi), 1, 1))
+    second, inertia = moved[:, :3, :3], np.trace(moved[:, :3, :3], axis1=1, axis2=2)[:, None, None]
+    about = inertia * np.eye(3) - second
+    rows = [about[:, a, b] for a, b in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))]
+    return np.column_stack([moved[:, 3, 3], moved[:, :3, 3], *rows])
+
+
+@pytest.fixture(scope="module")
+def planar3(directory_of: Callable[[str], Path]) -> LoadedRobot:
+    return load_robot(directory_of("planar3"), "numpy")
+
+
+@pytest.fixture(scope="module")
+def panda(directory_of: Callable[[str], Path]) -> LoadedRobot:
+    return load_robot(directory_of(str(PANDA)), "numpy")
+
+
+def test_a_minute_of_panda_is_identified_to_the_noise_of_its_torques(
+    panda: LoadedRobot, tmp_path: Path
+) -> None:
+    """200 Hz x 60 s, joints of other bodies than the package's, with friction; encoders of 1e-5 rad."""
+    t, q, qd, qdd = swings(7, 60, 200)
+    generator = np.random.default_rng(3)
+    noise = generator.uniform(0.02, 0.2, 7)
+    friction = generator.uniform(0.2, 1.0, (7, 2))
+    pi = other_bodies(own_parameters(panda))
+    torque = np.einsum("sijp,jp->si", panda.model.regressor(q, qd, qdd), pi)
+    torque += friction[:, 0] * qd + friction[:, 1] * np.sign(qd)
+    torque += noise * generator.standard_normal(torque.shape)
+    q = q + 1e-5 * generator.standard_normal(q.shape)
+    names = [*panda.joints, *(f"tau/{joint}" for joint in panda.joints)]
+    log = write_csv(tmp_path / "log.csv", np.column_stack([t, q, torque]), names)
+    start = time.process_time()
+    found = identify(log, panda, processing=Processing(lowpass=Lowpass(10.0)))
+    assert time.process_time() - start <= 20
+    assert found.warnings == ()
+    assert found.base.count == 43
+    errors = found.errors(found.unseen)
+    for what in ("fit", "bodies"):
+        assert (errors[what] <= 1.1 * noise).all(), what
+    assert (errors["package"] >= 3 * noise).all()
+    off = (found.fit.beta - found.base.combinations @ pi.reshape(-1)) / found.fit.beta_errors
+    assert np.sqrt(np.mean(off**2)) <= 1.5
+    assert (np.abs(found.fit.friction - friction) <= 5 * found.fit.friction_errors).all()
+    assert found.fit.noise == pytest.approx(noise, rel=0.1)
+    assert (np.linalg.eigvalsh(pseudo_inertia(found.physical.pi)) > 0).all()
+
+
+def test_base_parameters_of_a_planar_arm_are_the_textbooks(planar3: LoadedRobot) -> None:
+    base = base_parameters(planar3.model)
+    assert base.texts() == [
+        "mcx(link1) + 0.25 m(link2) + 0.25 m(link3)",
+        "mcy(link1)",
+        "Izz(link1) + 0.0625 m(link2) + 0.0625 m(link3)",
+        "mcx(link2) + 0.25 m(link3)",
+        "mcy(link2)",
+        "Izz(link2) + 0.0625 m(link3)",
+        "mcx(link3)",
+        "mcy(link3)",
+        "Izz(link3)",
+    ]
+    assert base.units[:3] == ("kg m", "kg m", "kg m^2")
+
+
+def test_bodies_can_exist_where_least_squares_has_none(planar3: LoadedRobot, tmp_path: Path) -> None:
+    """Noise as large as what the last link asks for: its inertia comes out negative without the condition."""
+    for seed in range(20):
+        log = planar_log(planar3, tmp_path, noise=2.0, seed=seed)
+        found = identify(log, planar3, fitting=Fitting(friction=False))
+        if found.fit.beta[-1] < 0:
+            break
+    assert found.fit.beta[-1] < 0
+    assert (np.linalg.eigvalsh(pseudo_inertia(found.physical.pi)) > 0).all()
+    assert found.errors(found.seen)["bodies"] == pytest.approx(found.errors(found.seen)["fit"], rel=0.05)
+
+
+def planar_log(
+    robot: LoadedRobot,
+    folder: Path,
+    seconds: float = 10,
+    noise: float = 0.0,
+    seed: int = 1,
+    factor: float = 1.0,
+    rate: float = 100,
+    slow: float = 1.0,
+    swing: Sequence[float] = (1, 1, 1),
+) -> Path:
+    t, *motion = swings(3, seconds, rate, seed)
+    q, qd, qdd = (a * swing / slow**order for order, a in enumerate(motion))
+    torque = robot.model.inverse_dynamics(q, qd, qdd)
+    torque = factor * (torque + noise * np.random.default_rng(seed).standard_normal(torque.shape))
+    return write_csv(folder / "log.csv", np.column_stack([t * slow, q, torque]), (*JOINTS, *TORQUES))
+
+
+@pytest.mark.parametrize("robot", ["crane", "planar3", "skew"])
+def test_the_urdf_file_makes_the_same_torques(robot: str, tmp_path: Path) -> None:
+    """Slides, a part without mass, joints that follow another; gravity along another axis, and askew."""
+    path = {"crane": DATA / "crane.urdf", "skew": DATA / "skew.toml"}.get(robot, robot)
+    write_package(generate(read_system(path), ["numpy"], "robot"), tmp_path / "robot")
+    manifest = Manifest.read(tmp_path / "robot")
+    assert manifest.tree is not None
+    gravity = np.array(manifest.tree.gravity)
+    x, y, z = (gravity * 9.81 / np.linalg.norm(gravity)).tolist()
+    tree = replace(manifest.tree, gravity=(x, y, z))
+    loaded = load_robot(tmp_path / "robot")
+    pi = dict(
+        zip(
+            loaded.robot_links if hasattr(loaded, "robot_links") else loaded.links,
+            own_parameters(loaded),
+            strict=True,
+        )
+    )
+    text = urdf_text("again", tree, manifest.joints, pi, {manifest.joints[0].name: np.array([0.5, 0.25])})
+    (tmp_path / "again.urdf").write_text(text)
+    assert '<dynamics damping="0.5" friction="0.25"/>' in text
+    write_package(generate(read_system(tmp_path / "again.urdf"), ["numpy"], "again"), tmp_path / "again")
+    again = import_package(tmp_path / "again").load("numpy")
+    assert again.joint_names == loaded.joints
+    states = random_states(again.n, 20)
+    expected = NewtonEuler(manifest, tree).partial_torque(*states)
+    order = [again.link_names.index(link) for link in loaded.links]
+    assert relative_error(again.partial_torque(*states)[:, :, order], expected) <= 1e-12
+
+
+def test_the_command_writes_a_page_a_record_and_a_robot(
+    planar3: LoadedRobot, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    log, package = planar_log(planar3, tmp_path, noise=0.01), str(directory_of("planar3"))
+    command = [
+        "identify",
+        str(log),
+        "--robot",
+        package,
+        "--out",
+        str(tmp_path / "out"),
+        "--backend",
+        "numpy",
+    ]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    assert "9 combinations of 30 parameters, condition number" in done.output
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
+        "identified.json",
+        "identified.md",
+        "planar3.urdf",
+    ]
+    record = json.loads((tmp_path / "out/identified.json").read_text())
+    first = record["base_parameters"][0]
+    assert abs(first["value"] - first["package"]) <= 5 * first["standard_error"]
+    assert record["choices"]["fitting"]["unseen"] == 0.2
+    page = (tmp_path / "out/identified.md").read_text()
+    assert "| mcx(link1) + 0.25 m(link2) + 0.25 m(link3) |" in page
+    assert "A URDF file has no gravity" in page
+    read_system(tmp_path / "out/planar3.urdf")
+
+
+BAD: dict[str, tuple[Callable[[LoadedRobot, Path], dict[str, Any]], str]] = {
+    "a joint that stands still": (
+        lambda robot, folder: {"log": planar_log(robot, folder, swing=(1, 1e-3, 1))},
+        "too little excitation: joint 'joint2' moves by 0.0018 rad in all; record a motion of every joint, "
+        "or generate the robot with --lock joint2=",
+    ),
+    "a motion so slow that only weights count": (
+        lambda robot, folder: {"log": planar_log(robot, folder, noise=0.01, slow=300.0)},
+        "too little excitation: the log does not tell",
+    ),
+    "no torque": (
+        lambda robot, folder: {
+            "log": write_csv(folder / "log.csv", np.zeros((30, 4)) + np.arange(30)[:, None])
+        },
+        "no torque column for joint 'joint1', 'joint2', 'joint3'; call it 'tau/joint1' or 'joint1_moment', "
+        "or name it with --torque COLUMN=joint1",
+    ),
+    "a torque of no joint": (
+        lambda robot, folder: {
+            "log": planar_log(robot, folder),
+            "fitting": Fitting((("tau/joint1", "elbow"),)),
+        },
+        "--torque tau/joint1=elbow: there is no such joint; there are 'joint1', 'joint2', 'joint3'",
+    ),
+    "few samples": (
+        lambda robot, folder: {"log": planar_log(robot, folder, rate=1)},
+        "samples are too few for 15 unknowns; give a longer log, or lower --unseen",
+    ),
+    "too short for the filter": (
+        lambda robot, folder: {
+            "log": planar_log(robot, folder, seconds=1),
+            "processing": Processing(lowpass=Lowpass(2.0)),
+        },
+        "100 samples are too few for --cutoff 2, which blurs 150 at either end; give a longer log, or "
+        "raise it",
+    ),
+    "energies": (
+        lambda robot, folder: {"log": planar_log(robot, folder), "robot": energies(folder)},
+        "cart_pendulum is made of energies; only rigid links have parameters to identify",
+    ),
+    "all unseen": (
+        lambda robot, folder: {"fitting": Fitting(unseen=1.0)},
+        "--unseen 1: give a share of the log from 0 to 0.9",
+    ),
+}
+
+
+def energies(folder: Path) -> Path:
+    write_package(generate(read_system(DATA / "cart_pendulum.py"), ["numpy"]), folder / "cart_pendulum")
+    return folder / "cart_pendulum"
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_identified_is_said_in_a_line(case: str, planar3: LoadedRobot, tmp_path: Path) -> None:
+    made, message = BAD[case]
+    with pytest.raises(LinkwiseError) as raised:
+        identify(**({"robot": planar3} | made(planar3, tmp_path)))
+    assert message in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_torques_of_another_unit_are_asked_about(planar3: LoadedRobot, tmp_path: Path) -> None:
+    log = planar_log(planar3, tmp_path, noise=0.01, factor=1000.0)
+    (warning,) = identify(log, planar3).warnings
+    assert "if it is in another unit, pass --torque-factor, 0.001 for N mm" in warning
+    assert identify(log, planar3, fitting=Fitting(factor=0.001)).warnings == ()
+
+
+def test_degrees_and_other_names_are_taken_as_told(planar3: LoadedRobot, tmp_path: Path) -> None:
+    table = np.loadtxt(planar_log(planar3, tmp_path, noise=0.01), delimiter=",", skiprows=1)
+    table[:, 1:4] *= 180 / np.pi
+    log = write_csv(tmp_path / "deg.csv", table, ("a", "b", "joint3", "joint1_moment", "joint2_effort", "u"))
+    reading = Reading(units="deg", mapping=(("a", "joint1"), ("b", "joint2")))
+    found = identify(log, planar3, reading, fitting=Fitting((("u", "joint3"),)))
+    assert found.fit.noise == pytest.approx([0.01] * 3, rel=0.1)
