@@ -7,7 +7,7 @@
 See `load` for the back ends, `Dynamics` for all calls and `names.py` for the robot's joints and links.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from .names import ROBOT
@@ -15,6 +15,7 @@ from .runtime.dynamics import Dynamics
 from .runtime.interface import Backend
 from .runtime.joint_tree import Bodies
 from .runtime.quantities import Coefficients, GradientPropagation, Packed, Propagation
+from .runtime.regressors import inertial_parameters
 from .runtime.structure import Layout
 
 joint_names = ROBOT.joint_names
@@ -30,6 +31,7 @@ def load(
     allow_unphysical: bool = False,
     kernel: str = "auto",
     bodies: Bodies[Any] | None = None,
+    requires_grad: bool | str | Iterable[str] = False,
 ) -> Dynamics:
     """Return the robot on a back end; all of them answer the same calls.
 
@@ -50,6 +52,10 @@ def load(
     numpy and torch: arrays or, for torch, tensors, through which gradients flow; one for all samples or one for each.
     Any values are taken, also such as no body has.
 
+    requires_grad: for autograd, whose robots and links are torch modules, what of their numbers are
+    nn.Parameters: True for all, or names, of run-time parameters or mass, com, inertia and place, which stand for those
+    numbers of each link that hang on no run-time parameter. The others are buffers.
+
     check_finite: whether every call looks at q, qd and qdd first and raises ValueError for NaN and infinity.
 
     The calls take q, qd and qdd as arrays, tensors, lists or tuples. Back ends of arrays (numpy) answer with
@@ -64,9 +70,10 @@ def load(
         raise ValueError("this package has no back end to load; generate it with --backend numpy, say")
     if backend not in BACKENDS:
         raise ValueError(f"no back end {backend!r} in this package; choose one of {', '.join(BACKENDS)}")
-    made = _MAKERS[backend](ROBOT.values(parameters, allow_unphysical), kernel, bodies)
-    asked = backend, dict(parameters or {}), check_finite, allow_unphysical, kernel, bodies
-    return Dynamics(ROBOT, made, load, asked, check_finite)
+    made = _MAKERS[backend](ROBOT.values(parameters, allow_unphysical), kernel, bodies, requires_grad)
+    asked = backend, dict(parameters or {}), check_finite, allow_unphysical, kernel, bodies, requires_grad
+    robot: Dynamics = (made.face or Dynamics)(ROBOT, made, load, asked, check_finite)
+    return robot
 
 
 def bodies() -> Bodies[Any]:
@@ -76,44 +83,50 @@ def bodies() -> Bodies[Any]:
     return RULE.bodies()
 
 
-def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any) -> Backend[Any]:
+def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from .forms import LINKS
     from .runtime.numpy_backend import NumpyBackend
     from .tree import RULE
+    from .runtime.array_kernels import refuse_learning
 
+    refuse_learning("numpy", requires_grad)
     return NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
 
 
-def _torch(values: Mapping[str, Any], kernel: str, bodies: Any) -> Backend[Any]:
+def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from .forms import LINKS
     from .runtime.torch_backend import TorchBackend
     from .tree import RULE
+    from .runtime.array_kernels import refuse_learning
 
+    refuse_learning("torch", requires_grad)
     return TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
 
 
-def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any) -> Backend[Any]:
-    from .energies import links
-    from .runtime.autograd_backend import AutogradBackend
+def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
+    from .energies import LAGRANGIANS
+    from .runtime.link_modules import backend_of_links
     from .runtime.array_kernels import refuse_choice
 
     refuse_choice("autograd", kernel, bodies)
-    return AutogradBackend(ROBOT, links, values)
+    return backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad)
 
 
-def _native(values: Mapping[str, Any], kernel: str, bodies: Any) -> Backend[Any]:
+def _native(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from pathlib import Path
     from .forms import LINKS
     from .runtime.native_backend import NativeBackend
     from .tree import RULE
     from .runtime.array_kernels import refuse_choice
+    from .runtime.array_kernels import refuse_learning
 
     refuse_choice("native", kernel, bodies)
+    refuse_learning("native", requires_grad)
     return NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values, RULE)
 
 
 # Libraries are imported, and C is compiled, for the back end that is loaded.
-_MAKERS: dict[str, Callable[[Mapping[str, Any], str, Any], Backend[Any]]] = {
+_MAKERS: dict[str, Callable[[Mapping[str, Any], str, Any, Any], Backend[Any]]] = {
     "numpy": _numpy,
     "torch": _torch,
     "autograd": _autograd,
@@ -140,6 +153,7 @@ __all__ = [
     "Packed",
     "Propagation",
     "bodies",
+    "inertial_parameters",
     "joint_names",
     "link_names",
     "load",

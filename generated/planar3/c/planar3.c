@@ -11,14 +11,17 @@
 
 enum { N = 3, LINKS = 3, LONGEST = 3, C2 = 10, C1 = 14, G = 6 };
 
-#if !PART(SINES) || PART(BLOCKS)
-/* The joints on each link's path, counted from 0; where each path begins; which links have h1. */
+#if !defined(LINKWISE_PART) || !PART(SINES)
+/* The joints on each link's path, counted from 0; where each path begins. */
 static const short path[] = {
     0,
     0, 1,
     0, 1, 2,
 };
 static const int path_start[] = {0, 1, 3, 6};
+#endif
+#if PART(ONE_SAMPLE) || PART(BLOCKS) || PART(POSITION_GRADIENT)
+/* Which links have h1. */
 static const char linear[] = {0, 0, 0};
 #endif
 
@@ -427,3 +430,13 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 #define AT_REST const real *q, const real *qd
 #define PASSED_AT_REST q, qd, qd
 #include "calls.h"
+
+/* ---- Regressors of rows, in loops over links and joints ---- */
+#if PART(REGRESSORS)
+#undef W
+#undef SIZED
+#undef KERNEL
+#include "planar3_tree.h"
+
+#include "regressors.h"
+#endif

@@ -1,6 +1,6 @@
 """The calls of `Dynamics` behind its face: motion is checked, answers computed and put where `out` says."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,7 +9,7 @@ from .arguments import check_numbers
 from .composed import Composed
 from .interface import Backend
 from .outputs import accepted
-from .quantities import Coefficients, GradientPropagation, Packed, Propagation
+from .quantities import PARAMETERS, Coefficients, GradientPropagation, Packed, Propagation
 from .structure import Structure
 
 KINDS: dict[str, Any] = {
@@ -17,6 +17,7 @@ KINDS: dict[str, Any] = {
     "coefficients": Coefficients,
     "propagation": Propagation,
     "gradient_propagation": GradientPropagation,
+    "coefficient_regressors": Coefficients,
 }
 """What calls with several results answer with; the others answer with one array or tensor."""
 
@@ -41,6 +42,8 @@ def answer_shapes(structure: Structure) -> dict[str, Shapes]:
         "position_gradient": ((n, links, n),),
         "packed_position_gradient": ((sizes.c1,),),
         "masked": ((n, links),),
+        "regressor": ((n, links, PARAMETERS),),
+        "coefficient_regressors": tuple((*shape, PARAMETERS) for shape in cubes),
     }
 
 
@@ -62,6 +65,11 @@ class Answers:
     def direct(self) -> Mapping[str, Callable[..., Any]]:
         """Calls by name that are quicker than these, given first an object whose class has all calls."""
         return {}
+
+    def read_beside_motion(self) -> Iterable[Any]:
+        """Arrays or tensors that results hang on, beside the motion."""
+        values: Iterable[Any] = self._backend.parameters.values()
+        return values
 
     def packed(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
         """See `Dynamics.packed`."""
@@ -94,6 +102,16 @@ class Answers:
         """See `Dynamics.position_gradient`."""
         return self._answer("position_gradient", (q, qd, qdd), out)
 
+    def regressor(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
+        """See `Dynamics.regressor`."""
+        self._check_rigid()
+        return self._answer("regressor", (q, qd, qdd), out)
+
+    def coefficient_regressors(self, q: Any, qd: Any, out: Any = None) -> Any:
+        """See `Dynamics.coefficient_regressors`."""
+        self._check_rigid()
+        return self._answer("coefficient_regressors", (q, qd), out)
+
     def masked(self, q: Any, qd: Any, qdd: Any, mask: Any, out: Any = None) -> Any:
         """See `Dynamics.masked`."""
         n, motion = self._structure.n, self._motion((q, qd, qdd))
@@ -116,6 +134,13 @@ class Answers:
             return torque
         into[0][...] = torque
         return out
+
+    def _check_rigid(self) -> None:
+        if self._backend.rule is None:
+            raise ValueError(
+                f"{self._structure.name} on {self._backend.name} has no regressors, which come from the rule "
+                "for rigid links; load numpy, torch or native of a robot of rigid links"
+            )
 
     def _answer(self, call: str, given: Sequence[Any], out: Any) -> Any:
         """Answer to q, qd and, for most calls, qdd, as they were given."""
@@ -140,8 +165,8 @@ class Answers:
         if out is None:
             return None
         kind, named = KINDS.get(call), dict(zip(MOTION, motion, strict=False))
-        fields, parameters = kind._fields if kind else (), self._backend.parameters.values()
-        return accepted(out, fields, self._shapes[call], named, parameters, self.contiguous)
+        fields = kind._fields if kind else ()
+        return accepted(out, fields, self._shapes[call], named, self.read_beside_motion(), self.contiguous)
 
     def _computed(self, call: str, motion: Any) -> Any:
         """Results of a call in order."""

@@ -48,6 +48,17 @@ class Composed:
         """c0."""
         return (self._dense.spread(self._backend.position_gradient(q, qd, qdd), "velocity"),)
 
+    def regressor(self, q: Any, qd: Any, qdd: Any) -> tuple[Any, ...]:
+        """Y of tau_ij."""
+        return (self._dense.spread_rows(self._backend.regressor(q, qd, qdd), "torque"),)
+
+    def coefficient_regressors(self, q: Any, qd: Any) -> tuple[Any, ...]:
+        """Y of c2, c1, g."""
+        at_rest = self._backend.zeros(q, self._n)
+        rows = self._backend.coefficient_regressors(q, qd, at_rest)
+        fields = ("acceleration", "velocity", "gravity")
+        return tuple(self._dense.spread_rows(a, field) for a, field in zip(rows, fields, strict=True))
+
     def _propagated(self, q: Any, qd: Any, qdd: Any, slopes: bool) -> tuple[Any, ...]:
         c2, c1, g, _, h1 = self._backend.decomposition(q, qd, qdd)
         spread = self._dense.spread

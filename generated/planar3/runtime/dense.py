@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .interface import Array, Backend
+from .quantities import PARAMETERS
 from .structure import Structure
 
 
@@ -32,6 +33,13 @@ class Dense:
         dense: Array = entries.reshape(*values.shape[:-1], *self._shapes[field])
         return dense
 
+    def spread_rows(self, values: Array, field: str) -> Array:
+        """Rows of 10 (..., 10 count) of a field over (..., n, N[, n], 10), zeros elsewhere."""
+        padded = self._backend.concatenate([values, self._backend.zeros(values, PARAMETERS)])
+        entries = padded[..., self._table(f"rows of {field}", values)]
+        dense: Array = entries.reshape(*values.shape[:-1], *self._shapes[field], PARAMETERS)
+        return dense
+
     def summed(self, tau: Array) -> Array:
         """Packed torques (..., count), summed over the links: (..., n)."""
         total: Array = tau @ self._table("joint sums", tau)
@@ -42,6 +50,10 @@ class Dense:
         if key not in self._tables:
             if name == "joint sums":
                 self._tables[key] = self._backend.constant(self._joint_sums(), like)
+            elif name.startswith("rows of "):
+                starts = self._positions(name.removeprefix("rows of ")) * PARAMETERS
+                each = (starts[:, None] + np.arange(PARAMETERS)).reshape(-1)
+                self._tables[key] = self._backend.index(each, like)
             else:
                 self._tables[key] = self._backend.index(self._positions(name), like)
         return self._tables[key]

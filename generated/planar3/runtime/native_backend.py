@@ -88,6 +88,16 @@ class NativeBackend(NumpyBackend):
             return self.on_torch().position_gradient(q, qd, qdd)
         return self.calls.run("packed_position_gradient", (q, qd, qdd))[0]
 
+    def regressor(self, q: Any, qd: Any, qdd: Any) -> Any:
+        """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
+        return self.on_torch().regressor(q, qd, qdd) if has_tensors([q]) else super().regressor(q, qd, qdd)
+
+    def coefficient_regressors(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
+        """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
+        if has_tensors([q]):
+            return self.on_torch().coefficient_regressors(q, qd, qdd)
+        return super().coefficient_regressors(q, qd, qdd)
+
     def constant(self, values: NDArray[Any], like: Any) -> Any:
         """A table of numbers, to compute with `like`."""
         return (

@@ -17,8 +17,12 @@ from .native_cache import ELSEWHERE, cache_directory, is_whole, keep, locked
 from .native_compiler import Compiler, find_compiler, processor
 from .native_process import Tell, run_all, told
 
-PARTS = {"decomposition": ("BLOCKS", "ONE_SAMPLE", "SINES"), "gradient": ("POSITION_GRADIENT", "SINES")}
-"""Parts of a robot's file (see numbers.h) in its two libraries; what nobody asks for is not compiled."""
+PARTS = {
+    "decomposition": ("BLOCKS", "ONE_SAMPLE", "SINES"),
+    "gradient": ("POSITION_GRADIENT", "SINES"),
+    "regressors": ("REGRESSORS", "SINES"),
+}
+"""Parts of a robot's file (see numbers.h) in its libraries; what nobody asks for is not compiled."""
 
 MADE = "library.so"
 
@@ -51,7 +55,7 @@ def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
 
     It cannot be where the sources are not those that were loaded.
 
-    real: double or float; what: decomposition, which holds the torques alone too, or gradient.
+    real: double or float; what: decomposition, which holds the torques alone too, gradient or regressors.
     A terminal is told of the wait on stderr.
     """
     digest = sources.digest or digest_of(sources.directory)

@@ -34,10 +34,15 @@ FUNCTIONS = {
             "coefficients",
             "propagation",
             "gradient_propagation",
+            "regressor",
+            "coefficient_regressors",
         )
     },
 }
 """What the calls are called in C."""
+
+AT_REST = ("coefficients", "coefficient_regressors")
+"""Calls that take no qdd."""
 
 
 @cache
@@ -129,7 +134,7 @@ class NativeCalls:
     def _desk(self, call: str, kind: "np.dtype[Any]") -> Desk:
         """Memory for one sample of a call."""
         compute = self._functions.get((call, kind)) or self._function(call, kind)
-        motion = np.empty((2 if call == "coefficients" else 3, self.structure.n), kind)
+        motion = np.empty((2 if call in AT_REST else 3, self.structure.n), kind)
         constants = [self._constants[kind]] if self.parameters else []
         return new_desk(compute, motion, constants, [np.empty(shape, kind) for shape in self.shapes[call]])
 
@@ -143,7 +148,7 @@ class NativeCalls:
 
     def _function(self, call: str, kind: "np.dtype[Any]") -> Any:
         """C function of a call for a dtype, compiled if it is not there yet."""
-        reads = 2 if call == "coefficients" else 3
+        reads = 2 if call in AT_REST else 3
         arrays = reads + bool(self.parameters) + sum(size > 0 for size in self.sizes[call])
         found = self._functions[call, kind] = function(self.sources, FUNCTIONS[call], kind.str[1:], arrays)
         return found

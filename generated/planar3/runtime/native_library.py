@@ -30,7 +30,7 @@ def function(sources: Sources, call: str, kind: str, arrays: int) -> Any:
     call: its name in C; kind: f8 or f4. Raises RuntimeError if it cannot be had.
     """
     real, suffix = {"f8": ("double", ""), "f4": ("float", "f")}[kind]
-    path = library(sources, real, "gradient" if call.endswith("position_gradient") else "decomposition")
+    path = library(sources, real, _library_of(call))
     try:
         found = getattr(ctypes.CDLL(str(path)), f"{sources.name}_{call}{suffix}")
     except (OSError, AttributeError) as error:
@@ -43,6 +43,13 @@ def function(sources: Sources, call: str, kind: str, arrays: int) -> Any:
     found.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * arrays
     found.restype = None
     return found
+
+
+def _library_of(call: str) -> str:
+    """Which of a robot's libraries has a function."""
+    if call.endswith("position_gradient"):
+        return "gradient"
+    return "regressors" if "regressor" in call else "decomposition"
 
 
 def address(array: NumberArray) -> int:

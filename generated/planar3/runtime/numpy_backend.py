@@ -32,6 +32,7 @@ class NumpyBackend:
 
     name: ClassVar = "numpy"
     takes_tensors: ClassVar = False
+    face: ClassVar[Any] = None
     xp: ClassVar[Any] = np
     fuses: ClassVar = False
 
@@ -115,6 +116,17 @@ class NumpyBackend:
         for link in self.links:
             columns.fill(link.position_gradient(np, q, qd, qdd, p))
         return columns.array
+
+    def regressor(self, q: Any, qd: Any, qdd: Any) -> Any:
+        """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
+        assert self.rule is not None  # Answers has seen to it
+        rows: Any = self.rule.regressor(self, (q, qd, qdd), self._values(q))
+        return rows
+
+    def coefficient_regressors(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
+        """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
+        assert self.rule is not None  # Answers has seen to it
+        return self.rule.coefficient_regressors(self, (q, qd, qdd), self._values(q))
 
     def constant(self, values: NDArray[Any], like: Any) -> Any:
         """A table of numbers, to compute with `like`."""

@@ -1,23 +1,25 @@
 """The Lagrangian of one link as a torch module."""
 
-from collections.abc import Mapping
-from typing import Any, ClassVar, Protocol
+from collections.abc import Collection
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
 
-Parameters = Mapping[str, Tensor]
-"""Values by name."""
-
-
-class Values(Protocol):
-    """One tensor for each coordinate: values[k] belongs to coordinate k, counted from 0."""
-
-    def __getitem__(self, k: int, /) -> Tensor: ...
+from .autograd_backend import AutogradBackend
+from .energy_interface import Parameters, Values
+from .functional_sweeps import lagrangians
+from .quantities import Coefficients
+from .run_time_values import RunTimeValues
+from .structure import Structure
 
 
 class PartialLagrangian(torch.nn.Module):
-    """Lagrangian of one link as a module; a subclass writes down `kinetic` and `potential`."""
+    """Lagrangian of one link as a module; a subclass writes down `kinetic` and `potential`.
+
+    A call link(q, qd) goes through hooks of torch; `torque`, `coefficients` and the calls of the whole robot
+    differentiate kinetic and potential energy apart, and call no module.
+    """
 
     path: ClassVar[tuple[int, ...]] = ()
     """Coordinates that the energies depend on, ascending, counted from 0."""
@@ -26,21 +28,47 @@ class PartialLagrangian(torch.nn.Module):
     parent: ClassVar["type[PartialLagrangian] | None"] = None
     """Lagrangian of the link that carries this one, if their energies share work."""
 
-    def __init__(self, p: Parameters) -> None:
-        super().__init__()
-        self.p = p
+    def __init__(
+        self,
+        alone: Structure,
+        given: RunTimeValues,
+        before: "PartialLagrangian | None" = None,
+        learned: Collection[str] = (),
+    ) -> None:
+        """`alone` is the robot with this link only, `given` holds its run-time parameters.
 
-    def kinetic(self, q: Values, qd: Values) -> Any:
+        `learned` names constants that are nn.Parameters. Modules of others that this one needs are no parts
+        of it, as each tensor has one owner.
+        """
+        super().__init__()
+        self._before = (before,)
+        self._backend = AutogradBackend(alone, (self,), given)
+        self._answers = self._backend.answers(check_finite=False)
+
+    @property
+    def before(self) -> Any:
+        """Module of the link that carries this one, None where their energies share no work."""
+        return self._before[0]
+
+    def kinetic(self, q: Values, qd: Values, p: Parameters) -> Any:
         """Kinetic energy in J."""
         raise NotImplementedError
 
-    def potential(self, q: Values) -> Any:
+    def potential(self, q: Values, p: Parameters) -> Any:
         """Potential energy in J."""
         raise NotImplementedError
 
     def forward(self, q: Tensor, qd: Tensor) -> Tensor:
         """Lagrangian in J, shape (...); q and qd of shape (..., n)."""
-        x, v = q.unbind(-1), qd.unbind(-1)
-        energy = self.kinetic(x, v) - self.potential(x)
-        value: Tensor = energy + torch.zeros_like(x[0])
-        return value
+        q, qd = self._backend.arrays({"q": q, "qd": qd}, self._backend.structure.n)
+        return lagrangians((self,), q, qd, self._backend.seen_by(q))[0]
+
+    def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+        """tau_ij of this link j, the torque on each joint i through it, shape (..., n)."""
+        tau: Tensor = self._answers.partial_torque(q, qd, qdd)
+        return tau[..., 0]
+
+    def coefficients(self, q: Tensor, qd: Tensor) -> Coefficients[Tensor]:
+        """c2_ik and c1_ik (..., n, n) and g_i (..., n) of this link, in the closing convention."""
+        c2, c1, g = self._answers.coefficients(q, qd)
+        return Coefficients(c2[..., 0, :], c1[..., 0, :], g[..., 0])

@@ -62,23 +62,23 @@ def rule_layout(tree: JointTree) -> RuleLayout:
     blocks, total = dict[int, _Block](), 0
     for group in groups:
         for at, j in enumerate(group.links):
-            blocks[j] = _Block(_members(tree, j), at, group, total)
+            blocks[j] = _Block(members(tree, j), at, group, total)
         total += 2 * len(group.links) * len(group.path) ** 2
     ordered = [blocks[j] for j in range(len(tree.links))]
     links, joints = len(tree.links), len(tree.joints)
-    single = [_members(tree, j) for j in range(links)]
+    single = [members(tree, j) for j in range(links)]
     chains = [np.array(tree.chain(link.joint)) for link in tree.links]
 
     def torque(kind: int) -> NDArray[np.intp]:
         rows = [np.where(m < 0, -1, (chains[j][m] * 2 + kind) * links + j).T for j, m in enumerate(single)]
-        return _joined(rows, joints * links * 2)
+        return joined(rows, joints * links * 2)
 
     upper = [b.entries(0)[:, np.triu(np.ones((b.count, b.count), bool)).reshape(-1)] for b in ordered]
     return RuleLayout(
         groups,
-        _joined(upper, total),
-        _joined([b.entries(1) for b in ordered], total),
-        _joined([b.slopes() for b in ordered], total),
+        joined(upper, total),
+        joined([b.entries(1) for b in ordered], total),
+        joined([b.slopes() for b in ordered], total),
         total,
         torque(0),
         torque(1),
@@ -153,7 +153,7 @@ class _Block:
         return self.entries(np.triu(np.ones((d, d), dtype=np.intp)))
 
 
-def _members(tree: JointTree, link: int) -> NDArray[np.intp]:
+def members(tree: JointTree, link: int) -> NDArray[np.intp]:
     """For each coordinate of a link's path, ascending, where its joints stand on the way; -1 behind them."""
     chain = tree.chain(tree.links[link].joint)
     found: dict[int, list[int]] = {}
@@ -163,7 +163,7 @@ def _members(tree: JointTree, link: int) -> NDArray[np.intp]:
     return np.array([found[k] + [-1] * (most - len(found[k])) for k in sorted(found)], dtype=np.intp)
 
 
-def _joined(blocks: Sequence[NDArray[np.intp]], zero: int) -> NDArray[np.intp]:
+def joined(blocks: Sequence[NDArray[np.intp]], zero: int) -> NDArray[np.intp]:
     """Rows of all links side by side, the missing ones those of a zero."""
     most = max(len(block) for block in blocks)
     filled = [np.pad(block, ((0, most - len(block)), (0, 0)), constant_values=-1) for block in blocks]

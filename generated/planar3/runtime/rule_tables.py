@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from .joint_tree import JointTree
 from .kinematics import KinematicTables, kinematic_tables
+from .regressors import RegressorTables, regressor_tables
 from .rigid_rule import LinkNumbers, LinkTables, link_numbers
 from .rule_layout import RuleLayout, pair_layout
 from .spatial_tables import SpatialNumbers, SpatialTables, spatial_numbers, spatial_tables
@@ -57,6 +58,7 @@ class RuleTables(NamedTuple):
     """Links and joints of the pairs of `PairLayout`."""
     entries: tuple[tuple[tuple[Any, Any], ...], ...]
     """Of c2, c1 and c0, its rows, and of g and tau those of joint and of kind and link."""
+    regressors: RegressorTables
 
 
 def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
@@ -87,6 +89,7 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
         tuple(tuple(getattr(layout, field)) for field in fields),
         (pairs.links, pairs.joints),
         (*each, *pairs.entries[2:], *singles),
+        regressor_tables(tree),
     )
 
 

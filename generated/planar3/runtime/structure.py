@@ -1,7 +1,7 @@
 """What a robot consists of: names, units, paths, parameters, and where its packed values belong."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -83,6 +83,17 @@ class Structure:
     def sizes(self) -> Sizes:
         """Number of packed values of one sample: c2, c1, g, tau, h1."""
         return Sizes(*map(len, self.layout))
+
+    def only(self, link: int) -> "Structure":
+        """The robot as if this link alone were there, its parameters aside."""
+        return replace(
+            self,
+            link_names=self.link_names[link : link + 1],
+            paths=self.paths[link : link + 1],
+            linear=(0,) if link in self.linear else (),
+            parameters={},
+            bodies=(),
+        )
 
     def values(self, given: Mapping[str, Any] | None, allow_unphysical: bool = False) -> dict[str, Any]:
         """All parameters, those `given` in place of their own, checked as the package's `load` says."""

@@ -11,8 +11,8 @@
 
 enum { N = 6, LINKS = 6, LONGEST = 6, C2 = 56, C1 = 91, G = 21 };
 
-#if !PART(SINES) || PART(BLOCKS)
-/* The joints on each link's path, counted from 0; where each path begins; which links have h1. */
+#if !defined(LINKWISE_PART) || !PART(SINES)
+/* The joints on each link's path, counted from 0; where each path begins. */
 static const short path[] = {
     0,
     0, 1,
@@ -22,6 +22,9 @@ static const short path[] = {
     0, 1, 2, 3, 4, 5,
 };
 static const int path_start[] = {0, 1, 3, 6, 10, 15, 21};
+#endif
+#if PART(ONE_SAMPLE) || PART(BLOCKS) || PART(POSITION_GRADIENT)
+/* Which links have h1. */
 static const char linear[] = {0, 0, 0, 0, 0, 0};
 #endif
 
@@ -514,3 +517,13 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 #define AT_REST const real *q, const real *qd
 #define PASSED_AT_REST q, qd, qd
 #include "calls.h"
+
+/* ---- Regressors of rows, in loops over links and joints ---- */
+#if PART(REGRESSORS)
+#undef W
+#undef SIZED
+#undef KERNEL
+#include "puma560_tree.h"
+
+#include "regressors.h"
+#endif

@@ -1,6 +1,8 @@
 /* Rows of samples to blocks, and blocks of results to rows. The same in every package of linkwise.
 
    In rows, the values of a sample lie together; in a block, entry e of its sample b is at e * BLOCK + b. */
+#ifndef LINKWISE_ROWS_H
+#define LINKWISE_ROWS_H
 
 /* Rows of `entries` values to a block; the last sample fills it up. */
 static void gather(size_t samples, size_t entries, const real *RESTRICT rows, real *RESTRICT block)
@@ -107,3 +109,5 @@ APART void scatter(size_t samples, size_t entries, size_t stride, const real *RE
         for (size_t e = 0; e < entries; ++e)
             rows[b * stride + e] = block[e * BLOCK + b];
 }
+
+#endif

@@ -69,6 +69,15 @@ def refuse_choice(backend: str, kernel: str, bodies: Any) -> None:
         raise ValueError(f"{backend} computes with the package's own bodies; load numpy or torch with bodies")
 
 
+def refuse_learning(backend: str, requires_grad: Any) -> None:
+    """Raise ValueError where a back end without torch modules is asked for nn.Parameters."""
+    if not isinstance(requires_grad, bool) or requires_grad:
+        raise ValueError(
+            f"{backend} has no torch modules; load autograd with requires_grad, or torch with tensors that "
+            "require a gradient as parameters or bodies"
+        )
+
+
 def operations(links: Sequence[ClosedForms]) -> Mapping[str, int]:
     """Operations of each call of the closed forms."""
     calls = ("decomposition", "torque", "position_gradient")

@@ -45,7 +45,12 @@ class Backend(Protocol[Kind]):
     name: ClassVar[str]
     takes_tensors: ClassVar[bool]
     """Whether motion is given as torch tensors only."""
-    parameters: dict[str, Any]
+    face: ClassVar[Any]
+    """Class of the robots that compute with it; None for `Dynamics`."""
+    parameters: Any
+    """Values of the run-time parameters by name."""
+    rule: Any
+    """The vectorised rule of rigid links, None without it."""
 
     def arrays(self, named: Mapping[str, Kind], n: int) -> Sequence[Kind]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
@@ -58,6 +63,12 @@ class Backend(Protocol[Kind]):
 
     def position_gradient(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
         """c0 (..., count) in the order of `Layout.velocity`."""
+
+    def regressor(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
+        """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
+
+    def coefficient_regressors(self, q: Kind, qd: Kind, qdd: Kind) -> Sequence[Kind]:
+        """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
 
     def answers(self, check_finite: bool) -> Any:
         """The calls of `Dynamics` on this back end: an `Answers`."""

@@ -1,11 +1,12 @@
 """Differentiating by torch inside a call, whatever grad mode the caller is in."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import torch
 from torch import Tensor
+from torch.autograd import forward_ad
 
 
 @dataclass(frozen=True)
@@ -18,10 +19,10 @@ class Recording:
     """Whether the caller may differentiate the results."""
 
     @classmethod
-    def of(cls, motion: Sequence[Tensor], parameters: Iterable[Tensor]) -> "Recording":
-        """Begin a call in the caller's grad mode."""
-        recorded = any(t.requires_grad for t in (*motion, *parameters))
-        return cls(motion[0][..., 0], recorded and torch.is_grad_enabled())
+    def of(cls, motion: Sequence[Tensor], wanted: bool) -> "Recording":
+        """Begin a call whose results, where `wanted`, may be differentiated by more than the motion."""
+        recorded = torch.is_grad_enabled() and any(t.requires_grad for t in motion)
+        return cls(motion[0][..., 0], recorded or wanted)
 
     def lanes(self, values: Tensor) -> Tensor:
         """One value a lane, (lanes,), for every sample: shape (lanes, ...)."""
@@ -31,6 +32,15 @@ class Recording:
         """Values (count, ...) as (..., count), as the caller's grad mode wants them."""
         packed = values.movedim(0, -1).contiguous()
         return packed if self.wanted else packed.detach()
+
+
+def transformed() -> bool:
+    """Whether torch.func, torch.compile or forward mode follows this call: sweeps would hide it from them."""
+    return (
+        torch.compiler.is_compiling()
+        or torch._C._are_functorch_transforms_active()
+        or forward_ad._current_level >= 0
+    )
 
 
 def variable(a: Tensor) -> Tensor:

@@ -22,19 +22,21 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
+from .energy_interface import Energies, Parameters
 from .lane_entries import NOWHERE, Indices, LaneEntries, Rows, pick
 from .lanes import Leaf, Motion, Plan
-from .partial_lagrangian import PartialLagrangian
 from .recording import Recording, gradient, variable
 
-Links = Sequence[PartialLagrangian]
+Links = Sequence[Energies]
 
 
 class Sweep:
     """The motion of one call in the lanes of a plan: what can be asked of the Lagrangians there."""
 
-    def __init__(self, links: Links, plan: Plan, motion: Sequence[Tensor], record: Recording) -> None:
-        self.links, self.plan, self.motion, self.record = links, plan, motion, record
+    def __init__(
+        self, links: Links, p: Parameters, plan: Plan, motion: Sequence[Tensor], record: Recording
+    ) -> None:
+        self.links, self.p, self.plan, self.motion, self.record = links, p, plan, motion, record
         self.x, self.v, self.a = (part.unbind(-1) for part in motion)
         self.n, self.dim = len(self.x), record.like.dim() + 1
 
@@ -49,7 +51,8 @@ class Sweep:
     def kinetic(self, velocity: Leaf) -> tuple[Motion, Motion, Sequence[Tensor], Sequence[Tensor]]:
         """q and qd in lanes, and the gradient of the kinetic energy with respect to their variables."""
         q, qd = self.lay(self.same(self.x)), self.lay(velocity)
-        energies = [link.kinetic(*at) for link, *at in zip(self.links, q.own, qd.own, strict=True)]
+        moved = zip(self.links, q.own, qd.own, strict=True)
+        energies = [link.kinetic(position, speed, self.p) for link, position, speed in moved]
         x, v = q.variables(), qd.variables()
         slopes = gradient(energies, None, [*x, *v], keep=True, last=False)
         return q, qd, slopes[: len(x)], slopes[len(x) :]
@@ -57,7 +60,7 @@ class Sweep:
     def potential(self, keep: bool) -> tuple[Motion, Sequence[Tensor]]:
         """q in lanes, and the gradient of the potential energy with respect to its variables."""
         q = self.lay(self.same(self.x))
-        energies = [link.potential(at) for link, at in zip(self.links, q.own, strict=True)]
+        energies = [link.potential(at, self.p) for link, at in zip(self.links, q.own, strict=True)]
         return q, gradient(energies, None, q.variables(), keep, last=True)
 
     def rows(self, motion: Motion, values: Sequence[Tensor]) -> Rows:
@@ -83,19 +86,21 @@ class Sweep:
         return (qd, q, place), (rate, force, gravity)
 
 
-@lru_cache(maxsize=64)
-def entries_of(kinds: tuple[type[PartialLagrangian], ...]) -> LaneEntries:
+def entries_of(links: Links) -> LaneEntries:
     """Where the entries of these links are."""
-    numbers = {kind: j for j, kind in enumerate(kinds)}
-    parents = tuple(None if kind.parent is None else numbers.get(kind.parent) for kind in kinds)
-    return LaneEntries(tuple(k.path for k in kinds), parents, tuple(k.linear for k in kinds))
+    numbers = {id(link): j for j, link in enumerate(links)}
+    parents = tuple(numbers.get(id(link.before)) for link in links)
+    return _entries(tuple(link.path for link in links), parents, tuple(link.linear for link in links))
 
 
-def decomposition(links: Links, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Tensor]:
+_entries = lru_cache(maxsize=64)(LaneEntries)
+
+
+def decomposition(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Tensor]:
     """c2 (i <= k), c1, g, tau and h1, the part of c1 linear in qd, packed link by link: (..., count) each."""
-    entries, record = _begin(links, q, qd, qdd)
+    entries, record = _begin(links, p, q, qd, qdd)
     with torch.enable_grad():
-        sweep = Sweep(links, entries.plan, (q, qd, qdd), record)
+        sweep = Sweep(links, p, entries.plan, (q, qd, qdd), record)
         mass, c1, h1 = _second_derivatives(sweep, entries)
         gravity = _gravity(sweep, entries)
         k = entries.pairs[:, 1]
@@ -104,11 +109,11 @@ def decomposition(links: Links, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Tens
         return [record.finish(part) for part in (pick(mass, entries.upper), c1, gravity, tau, h1)]
 
 
-def torque(links: Links, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+def torque(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
     """tau of every link over its path, shape (..., count)."""
-    entries, record = _begin(links, q, qd, qdd)
+    entries, record = _begin(links, p, q, qd, qdd)
     with torch.enable_grad():
-        sweep = Sweep(links, entries.single, (q, qd, qdd), record)
+        sweep = Sweep(links, p, entries.single, (q, qd, qdd), record)
         rate, force, gravity = (
             sweep.rows(motion, values)(*entries.paths_in_lanes)
             for motion, values in zip(*sweep.torque(record.wanted), strict=True)
@@ -116,13 +121,13 @@ def torque(links: Links, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         return record.finish(rate - force + gravity)
 
 
-def position_gradient(links: Links, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+def position_gradient(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
     """d(tau_i)/d(q_k) of every link over its path, row by row, shape (..., count)."""
-    entries, record = _begin(links, q, qd, qdd)
+    entries, record = _begin(links, p, q, qd, qdd)
     resting = LaneEntries(entries.paths, entries.parents, (False,) * len(links))
     with torch.enable_grad():
         # Lane e_i of a link is there for its tau_i.
-        sweep = Sweep(links, resting.plan, (q, qd, qdd), record)
+        sweep = Sweep(links, p, resting.plan, (q, qd, qdd), record)
         (qd_, q_, place), (rate, force, gravity) = sweep.torque(keep=True)
         mine = sweep.marks(lambda k: resting.lanes[:, 1] == k)
         weights = [*sweep.along(qd_, mine), *(-m for m in sweep.along(q_, mine)), *sweep.along(place, mine)]
@@ -132,9 +137,8 @@ def position_gradient(links: Links, q: Tensor, qd: Tensor, qdd: Tensor) -> Tenso
         return record.finish(found(resting.pairs[:, 1], resting.pairs[:, 2]))
 
 
-def _begin(links: Links, *motion: Tensor) -> tuple[LaneEntries, Recording]:
-    parameters = (value for link in links for value in link.p.values())
-    return entries_of(tuple(map(type, links))), Recording.of(motion, parameters)
+def _begin(links: Links, p: Parameters, *motion: Tensor) -> tuple[LaneEntries, Recording]:
+    return entries_of(links), Recording.of(motion, p.wanted)
 
 
 def _second_derivatives(sweep: Sweep, entries: LaneEntries) -> tuple[Tensor, Tensor, Tensor]:
@@ -168,7 +172,7 @@ def _second_derivatives(sweep: Sweep, entries: LaneEntries) -> tuple[Tensor, Ten
 
 def _gravity(sweep: Sweep, entries: LaneEntries) -> Tensor:
     """dP/dq_i of every link over its path, in one lane for each link."""
-    sweep = Sweep(sweep.links, entries.single, sweep.motion, sweep.record)
+    sweep = Sweep(sweep.links, sweep.p, entries.single, sweep.motion, sweep.record)
     place, slopes = sweep.potential(sweep.record.wanted)
     return sweep.rows(place, slopes)(*entries.paths_in_lanes)
 

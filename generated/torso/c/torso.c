@@ -11,8 +11,8 @@
 
 enum { N = 7, LINKS = 5, LONGEST = 5, C2 = 56, C1 = 91, G = 21 };
 
-#if !PART(SINES) || PART(BLOCKS)
-/* The joints on each link's path, counted from 0; where each path begins; which links have h1. */
+#if !defined(LINKWISE_PART) || !PART(SINES)
+/* The joints on each link's path, counted from 0; where each path begins. */
 static const short path[] = {
     0, 1, 2,
     0, 1, 2, 3,
@@ -21,6 +21,9 @@ static const short path[] = {
     0, 1, 2, 5, 6,
 };
 static const int path_start[] = {0, 3, 7, 12, 16, 21};
+#endif
+#if PART(ONE_SAMPLE) || PART(BLOCKS) || PART(POSITION_GRADIENT)
+/* Which links have h1. */
 static const char linear[] = {0, 0, 0, 0, 0};
 #endif
 
@@ -485,3 +488,13 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 #define AT_REST const real *q, const real *qd
 #define PASSED_AT_REST q, qd, qd
 #include "calls.h"
+
+/* ---- Regressors of rows, in loops over links and joints ---- */
+#if PART(REGRESSORS)
+#undef W
+#undef SIZED
+#undef KERNEL
+#include "torso_tree.h"
+
+#include "regressors.h"
+#endif

@@ -121,6 +121,18 @@ void torso_position_gradient(size_t count, const double *q, const double *qd, co
 /* The same with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
 void torso_dense_position_gradient(size_t count, const double *q, const double *qd, const double *qdd, double *gradient);
 
+/* Regressors, with their zeros: entry (i - 1, j - 1) of a row is the Y of which tau(i, j) = Y . pi(j), whatever link j
+   carries: pi(j) = (m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz), mass, first moment, and inertia about the
+   origin of the link's frame, in whose axes they are; torso_tree.h has these frames.
+   Reads q, qd, qdd (count, JOINTS); writes regressor (count, JOINTS, LINKS, 10). */
+void torso_regressor(size_t count, const double *q, const double *qd, const double *qdd, double *regressor);
+
+/* The same of c2(i, j, k), c1(i, j, k) and g(i, j).
+   Reads q, qd (count, JOINTS);
+   writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
+void torso_coefficient_regressors(size_t count, const double *q, const double *qd,
+    double *acceleration, double *velocity, double *gravity);
+
 /* All quantities but c0 of one link, for one sample. Each function reads q, qd, qdd (JOINTS). */
 
 /* Writes c2 (6), c1 (9), g, tau (3). */
@@ -193,6 +205,18 @@ void torso_position_gradientf(size_t count, const float *q, const float *qd, con
 
 /* The same with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
 void torso_dense_position_gradientf(size_t count, const float *q, const float *qd, const float *qdd, float *gradient);
+
+/* Regressors, with their zeros: entry (i - 1, j - 1) of a row is the Y of which tau(i, j) = Y . pi(j), whatever link j
+   carries: pi(j) = (m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz), mass, first moment, and inertia about the
+   origin of the link's frame, in whose axes they are; torso_tree.h has these frames.
+   Reads q, qd, qdd (count, JOINTS); writes regressor (count, JOINTS, LINKS, 10). */
+void torso_regressorf(size_t count, const float *q, const float *qd, const float *qdd, float *regressor);
+
+/* The same of c2(i, j, k), c1(i, j, k) and g(i, j).
+   Reads q, qd (count, JOINTS);
+   writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
+void torso_coefficient_regressorsf(size_t count, const float *q, const float *qd,
+    float *acceleration, float *velocity, float *gravity);
 
 /* All quantities but c0 of one link, for one sample. Each function reads q, qd, qdd (JOINTS). */
 

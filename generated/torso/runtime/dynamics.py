@@ -52,8 +52,6 @@ class Dynamics:
     """Names of the links, in the order of j."""
     layout: Layout
     """Indices that packed values belong to."""
-    parameters: Mapping[str, Any]
-    """Values of the run-time parameters."""
     backend: Backend[Any]
     """What computes; of the native one `threads` may be set."""
     check_finite: bool
@@ -72,11 +70,17 @@ class Dynamics:
         self.n, self.N = structure.n, structure.N
         self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
         self.link_names, self.layout = structure.link_names, structure.layout
-        self.backend, self.parameters = backend, backend.parameters
+        self.backend = backend
         self._load, self._asked = load, asked
         self._answers = backend.answers(check_finite)
         # They stand before the methods of the class, which they pass on to what is no plain array.
         vars(self).update({name: MethodType(call, self) for name, call in self._answers.direct.items()})
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Values of the run-time parameters."""
+        values: Mapping[str, Any] = self.backend.parameters
+        return values
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}
@@ -157,6 +161,27 @@ class Dynamics:
         """c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
         c0: Array = self._answers.position_gradient(q, qd, qdd, out)
         return c0
+
+    def regressor(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
+        """Y_ij, what tau_ij multiplies link j's inertial parameters by, shape (..., n, N, 10).
+
+        tau_ij = Y_ij . pi_j, whatever the link carries: pi_j = (m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz,
+        I_yz, I_zz) in kg, kg m and kg m^2, I about the origin of the link's frame and in its axes, as the
+        package's inertial_parameters(bodies()) are. For numpy, torch and native, and for rigid links; raises
+        ValueError for others.
+        """
+        rows: Array = self._answers.regressor(q, qd, qdd, out)
+        return rows
+
+    def coefficient_regressors(
+        self, q: Array, qd: Array, out: Sequence[Array] | None = None
+    ) -> Coefficients[Array]:
+        """The same of c2 and c1 (..., n, N, n, 10) and of g (..., n, N, 10), closing: Y split by k and order.
+
+        c2_ijk = Y_ijk . pi_j, c1_ijk and g_ij likewise. Raises as `regressor` does.
+        """
+        answer: Coefficients[Array] = self._answers.coefficient_regressors(q, qd, out)
+        return answer
 
     def masked(
         self, q: Array, qd: Array, qdd: Array, mask: ArrayLike | Array, out: Array | None = None

@@ -34,7 +34,7 @@ class Lanes:
     whole: "Lanes | None" = None
     part: int = 0
     variables: dict[int, Tensor] = field(default_factory=dict)
-    states: dict[Callable[..., Any], Sequence[tuple[Any, ...]]] = field(default_factory=dict)
+    states: dict[Callable[..., Any], Sequence[Any]] = field(default_factory=dict)
 
     def __getitem__(self, k: int) -> Tensor:
         if k not in self.path:
@@ -43,23 +43,37 @@ class Lanes:
             self.variables[k] = self.leaf(k, self.rows)
         return self.variables[k]
 
-    def divided(self, state: tuple[Any, ...]) -> Sequence[tuple[Any, ...]]:
-        """Values in all these lanes as one tuple for each part; numbers and parameters have no lanes."""
-        columns = [
-            value.split_with_sizes(self.parts)
-            if torch.is_tensor(value) and value.dim() == self.dim
-            else [value] * len(self.parts)
-            for value in state
-        ]
-        return list(zip(*columns, strict=True)) if columns else [()] * len(self.parts)
+    def divided(self, state: Any) -> Sequence[Any]:
+        """Values in all these lanes, nested in tuples, for each part; what has no lanes is every part's."""
+        if state.__class__ is tuple:
+            columns = [self.divided(value) for value in state]
+            return list(zip(*columns, strict=True)) if columns else [()] * len(self.parts)
+        if torch.is_tensor(state) and state.dim() == self.dim:
+            return state.split_with_sizes(self.parts)
+        return [state] * len(self.parts)
+
+
+@dataclass(frozen=True, eq=False)
+class SharedValues:
+    """One tensor for each coordinate, shared by all links whose energies are looked at."""
+
+    values: Sequence[Tensor]
+    states: dict[Callable[..., Any], Any] = field(default_factory=dict)
+
+    def __getitem__(self, k: int) -> Tensor:
+        return self.values[k]
 
 
 def carried(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Let a function of (q, ...) or (q, qd, ...), called for part of a link's lanes, run once for all."""
+    """Let a method of (q, ...) or (q, qd, ...), called for part of a link's lanes, run once for all."""
 
     @wraps(function)
     def part(*arguments: Any) -> Any:
-        q = arguments[0]
+        q = arguments[1]
+        if isinstance(q, SharedValues):
+            if function not in q.states:
+                q.states[function] = function(*arguments)
+            return q.states[function]
         if not isinstance(q, Lanes) or q.whole is None:
             return function(*arguments)
         if function not in q.whole.states:

@@ -9,6 +9,9 @@ from typing import Generic, NamedTuple
 
 from .interface import Array
 
+PARAMETERS = 10
+"""Inertial parameters of a link: m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz."""
+
 
 class Coefficients(NamedTuple, Generic[Array]):
     """Coefficients of the closing convention: tau_ij = sum_k c2_ijk qdd_k + sum_k c1_ijk qd_k + g_ij."""

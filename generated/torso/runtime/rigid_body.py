@@ -10,24 +10,54 @@ Number = Any
 """A number, or a tensor of one value or of one a sample."""
 Vector = Sequence[Number]
 
+CROSS = (
+    (0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0),
+    (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0),
+    (0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+)
+"""c·CROSS are the entries of the matrix [c]× with [c]× a = c × a, row by row."""
 
-def kinetic_energy(w: Vector, v: Vector, *, mass: Number, com: Vector, inertia: Sequence[Vector]) -> Tensor:
+
+def kinetic_energy(body: Sequence[Any], w: Vector, v: Vector) -> Any:
     """m v·v/2 + m v·(w × c) + w·I w/2 in J, with I = inertia + m (c·c 1 - c cᵀ) about the frame's origin.
 
-    w, v: angular velocity in rad/s and velocity of the frame's origin in m/s, tensors of one shape; those
-    components that are always zero are numbers
-    mass in kg, com = c in m, inertia about it in kg m², in the axes of w and v
+    body: mass m in kg, centre of mass c in m, inertia about it in kg m^2: tensors, or numbers where nobody
+    differentiates by them
+    w, v: angular velocity in rad/s and velocity of the frame's origin in m/s, in the body's axes; tensors of
+    one shape, and the number 0.0 for components that are always zero
     """
     twist = (*w, *v)
     moving = [a for a, value in enumerate(twist) if torch.is_tensor(value)]
+    if not moving:
+        return 0.0
     speeds = torch.stack([twist[a] for a in moving])
-    whole = _spatial_inertia(mass, com, inertia)
-    momentum = _product([[whole[a][b] for b in moving] for a in moving], speeds)
-    return 0.5 * (speeds * momentum).sum(0)
+    if _holds_tensors(body):
+        parts = (_tensor(part, axes, speeds) for axes, part in enumerate(body))
+        whole = _spatial_inertia(*parts)
+        if len(moving) < 6:
+            kept = torch.tensor(moving, device=whole.device)
+            whole = whole[..., kept[:, None], kept]
+    else:
+        rows = _spatial_numbers(*body)
+        table = [[rows[a][b] for b in moving] for a in moving]
+        whole = torch.tensor(table, dtype=speeds.dtype, device=speeds.device)
+    return 0.5 * (speeds * _product(whole, speeds)).sum(0)
 
 
-def _spatial_inertia(m: Number, c: Vector, inertia: Sequence[Vector]) -> list[list[Number]]:
-    """Return H with K = (w, v)·H (w, v)/2: the blocks I, m [c]×, its transpose and m 1."""
+def _spatial_inertia(m: Tensor, c: Tensor, inertia: Tensor) -> Tensor:
+    """Return H (..., 6, 6) with K = (w, v)·H (w, v)/2: the blocks I, m [c]×, its transpose and m 1."""
+    cross = c @ c.new_tensor(CROSS)
+    cross = cross.reshape(*c.shape, 3)
+    mass = m[..., None, None]
+    moment = mass * cross
+    about = inertia + moment @ cross.mT
+    moment = moment.expand(about.shape)
+    weight = (mass * torch.eye(3, dtype=c.dtype, device=c.device)).expand(about.shape)
+    return torch.cat([torch.cat([about, moment], -1), torch.cat([moment.mT, weight], -1)], -2)
+
+
+def _spatial_numbers(m: float, c: Sequence[float], inertia: Sequence[Sequence[float]]) -> list[list[float]]:
+    """Return the same of numbers."""
     x, y, z = c
     cross = ((0.0, -m * z, m * y), (m * z, 0.0, -m * x), (-m * y, m * x, 0.0))
     squares = (y * y + z * z, x * x + z * z, x * x + y * y)
@@ -35,20 +65,32 @@ def _spatial_inertia(m: Number, c: Vector, inertia: Sequence[Vector]) -> list[li
     for i in range(3):
         about = [inertia[i][k] + m * (squares[i] if i == k else -c[i] * c[k]) for k in range(3)]
         rows.append([*about, *cross[i]])
-    rows += [[*(cross[k][i] for k in range(3)), *(m if i == k else 0.0 for k in range(3))] for i in range(3)]
-    return rows
+    return rows + [
+        [*(cross[k][i] for k in range(3)), *(m if i == k else 0.0 for k in range(3))] for i in range(3)
+    ]
 
 
-def _product(matrix: list[list[Number]], vector: Tensor) -> Tensor:
-    """Matrix times vector (m, ...); its entries are numbers or tensors that broadcast to the shape (...)."""
-    size, entries = len(matrix), [entry for row in matrix for entry in row]
-    if not any(map(torch.is_tensor, entries)):
-        table = torch.tensor(matrix, dtype=vector.dtype, device=vector.device)
-    else:
-        given = [torch.as_tensor(e, dtype=vector.dtype, device=vector.device) for e in entries]
-        table = torch.stack(torch.broadcast_tensors(*given))  # type: ignore[no-untyped-call]
-        table = table.reshape(size, size, *table.shape[1:])
-    if table.dim() == 2:
-        return (table @ vector.reshape(size, -1)).reshape(vector.shape)
+def _product(matrix: Tensor, vector: Tensor) -> Tensor:
+    """Matrix (m, m), behind axes of samples if each has its own, times vector (m, ...)."""
+    if matrix.dim() == 2:
+        return (matrix @ vector.reshape(len(vector), -1)).reshape(vector.shape)
+    table = matrix.movedim((-2, -1), (0, 1))
     ones = [1] * (vector.dim() + 1 - table.dim())
-    return (table.reshape(size, size, *ones, *table.shape[2:]) * vector).sum(1)
+    return (table.reshape(*table.shape[:2], *ones, *table.shape[2:]) * vector).sum(1)
+
+
+def _holds_tensors(value: Any) -> bool:
+    """Whether a number, or what is nested in a list of numbers, is a tensor."""
+    if isinstance(value, list | tuple):
+        return any(map(_holds_tensors, value))
+    return value.__class__ is not float
+
+
+def _tensor(value: Any, axes: int, like: Tensor) -> Tensor:
+    """A number, a vector or a matrix, `axes` axes of 3, behind axes of samples if entries have these."""
+    if torch.is_tensor(value) or not _holds_tensors(value):
+        return torch.as_tensor(value, dtype=like.dtype, device=like.device)
+    entries = value if axes == 1 else [entry for row in value for entry in row]
+    given = [torch.as_tensor(entry, dtype=like.dtype, device=like.device) for entry in entries]
+    stacked: Tensor = torch.stack(torch.broadcast_tensors(*given), -1)  # type: ignore[no-untyped-call]
+    return stacked.reshape(*stacked.shape[:-1], *[3] * axes)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from .fused_products import FusedMoment
 from .joint_tree import Bodies, JointTree
 from .kinematics import poses, taken, twists
+from .quantities import PARAMETERS
+from .regressors import coefficient_rows, torque_rows
 from .rigid_rule import LinkNumbers, link_numbers, link_states
 from .rule_layout import RuleLayout, rule_layout
 from .rule_products import Moment
@@ -23,6 +25,8 @@ CACHE = 1 << 22
 """Bytes of the arrays of one chunk of samples, which are to stay in the processor's cache."""
 LINK_NUMBERS = 200
 """Numbers that a link and its joint have of one sample, beside the products."""
+ROW_NUMBERS = 6 * PARAMETERS
+"""Numbers that a row of a regressor takes while it is computed."""
 
 
 class Answering(Protocol):
@@ -100,6 +104,31 @@ class RigidRule:
 
         return self._answers(space, motion, p, bodies, answer)[0]
 
+    def regressor(self, space: Space, motion: Sequence[Any], p: Mapping[str, Any]) -> Any:
+        """Y of tau, (..., count · 10)."""
+        return self._regressed(space, motion, p, torque_rows, len(self.layout.torque[0]))[0]
+
+    def coefficient_regressors(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any]
+    ) -> Sequence[Any]:
+        """Y of c2, c1 and g, (..., count · 10) each."""
+        rows = len(self.layout.acceleration[0]) + len(self.layout.velocity[0])
+        return self._regressed(space, motion, p, coefficient_rows, rows)
+
+    def _regressed(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], made: Any, rows: int
+    ) -> list[Any]:
+        """Regressors that `made` computes, so many rows of them a sample."""
+        batch, tables = tuple(motion[0].shape[:-1]), self.tables(space, motion[0])
+        numbers = with_formulas(space.xp, self.tree, tables.own, tables.sources, p, batch)
+
+        def answer(own: Sequence[Any], some: TreeArrays, carried: LinkNumbers) -> list[Any]:
+            found: list[Any] = made(space.xp, tables.frames, tables.regressors, some, own)
+            return found
+
+        parts = self._in_pieces(space, motion, numbers, tables.numbers, answer, ROW_NUMBERS * rows)
+        return [a.reshape(*batch, a.shape[-1]) for a in parts]
+
     def _answers(
         self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], bodies: Any, answer: Any
     ) -> list[Any]:
@@ -119,23 +148,37 @@ class RigidRule:
             parts = answer(spatial_moment(space.xp, tables, matrices, flat))
         else:
             links = link_numbers(space.xp, tables.links.eye, *numbers[2:]) if given else tables.numbers
-            parts = self._in_pieces(space, motion, numbers, links, answer)
+
+            def innermost(own: Sequence[Any], some: TreeArrays, carried: LinkNumbers) -> list[Any]:
+                found: list[Any] = answer(_moment(space, tables, own, some, carried))
+                return found
+
+            parts = self._in_pieces(space, motion, numbers, links, innermost, 2 * self.layout.zero)
         return [a.reshape(*batch, a.shape[-1]) for a in parts]
 
     def _in_pieces(
-        self, space: Space, motion: Sequence[Any], numbers: TreeArrays, links: LinkNumbers, answer: Any
+        self,
+        space: Space,
+        motion: Sequence[Any],
+        numbers: TreeArrays,
+        links: LinkNumbers,
+        answer: Any,
+        products: int,
     ) -> list[Any]:
-        """What `answer` gives with the samples innermost, as many at once as the back end wants."""
-        xp, tables, n = space.xp, self.tables(space, motion[0]), motion[0].shape[-1]
+        """What `answer` gives with the samples innermost, as many at once as the back end wants.
+
+        products: numbers of one sample that it computes beside those of joints and links
+        """
+        xp, n = space.xp, motion[0].shape[-1]
         # A copy: with views a compiler would gather from rows of samples in every loop.
         samples = math.prod(motion[0].shape[:-1])
         flat = xp.stack([xp.swapaxes(a.reshape(samples, n), 0, 1) for a in motion], 0)
         joined: list[Any] = []
-        for piece in self._pieces(space, motion, samples):
+        for piece in self._pieces(space, motion, samples, products):
             own = [a[:, piece] for a in flat]
             some = TreeArrays(*(_samples(a, piece) for a in numbers))
             carried = LinkNumbers(*(_samples(a, piece) for a in links))
-            part: list[Any] = answer(_moment(space, tables, own, some, carried))
+            part: list[Any] = answer(own, some, carried)
             if piece == slice(None):
                 return part
             joined = joined or [xp.empty((samples, a.shape[1]), dtype=a.dtype) for a in part]
@@ -143,10 +186,10 @@ class RigidRule:
                 whole[piece] = a
         return joined
 
-    def _pieces(self, space: Space, motion: Sequence[Any], samples: int) -> Sequence[slice]:
+    def _pieces(self, space: Space, motion: Sequence[Any], samples: int, products: int) -> Sequence[slice]:
         """Slices of the samples, each to be computed at once."""
         links = len(self.tree.links)
-        most = CACHE // (motion[0].itemsize * (2 * self.layout.zero + LINK_NUMBERS * links)) + 1
+        most = CACHE // (motion[0].itemsize * (products + LINK_NUMBERS * links)) + 1
         size = space.chunk(motion, max(most, 16))
         if size is None or samples <= size:
             return [slice(None)]

@@ -35,6 +35,7 @@ class TorchBackend:
 
     name: ClassVar = "torch"
     takes_tensors: ClassVar = True
+    face: ClassVar[Any] = None
     xp: ClassVar[Any] = torch
 
     def __init__(
@@ -112,6 +113,17 @@ class TorchBackend:
         return self.concatenate(
             _stacked(q, link.position_gradient(torch, q, qd, qdd, p)) for link in self.links
         )
+
+    def regressor(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+        """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
+        assert self.rule is not None  # Answers has seen to it
+        rows: Tensor = self.rule.regressor(self, (q, qd, qdd), self._values(q))
+        return rows
+
+    def coefficient_regressors(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
+        """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
+        assert self.rule is not None  # Answers has seen to it
+        return self.rule.coefficient_regressors(self, (q, qd, qdd), self._values(q))
 
     def constant(self, values: Any, like: Tensor) -> Tensor:
         """A table of numbers, to compute with `like`."""

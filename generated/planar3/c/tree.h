@@ -1,0 +1,48 @@
+/* A robot in tables: a tree of joints, and the links that it carries. The same in every package of linkwise.
+
+   Frame 0 is the base, and frame f what joint f moves, counted from 1: its z is the joint's axis. It stands in its
+   parent's frame at `place`, turned by `turn`, and then turns about z, or slides along it, by `ratio` times a coordinate.
+   Several joints may follow one coordinate. So a link's motion has a column for each coordinate of its path: column f - 1
+   is joint f, and columns from FRAMES on are sums of two others, for joints of one path that follow the same coordinate.
+
+   The file that includes this one says how many there are: N coordinates, LINKS, FRAMES but for the base, COLUMNS, and
+   LONGEST, the coordinates of the longest path. */
+#ifndef LINKWISE_TREE_H
+#define LINKWISE_TREE_H
+
+enum { REVOLUTE, PRISMATIC };
+
+/* A joint: its parent's frame, its coordinate, counted from 0, its kind, and whether its place matters: what no joint
+   before it turns may as well stand at the origin. */
+struct joint {
+    short parent, coordinate, kind, placed;
+};
+
+/* A column that is the sum of another and of a joint's. */
+struct sum {
+    short column, joint;
+};
+
+/* A link: its frame, and where its results begin among those of the robot. */
+struct link {
+    int frame, c2, c1, g;
+};
+
+/* Numbers of a joint; turn is row by row. */
+struct placing {
+    real turn[9], place[3], ratio;
+};
+
+/* Numbers of a link, in its frame: mass, centre of mass, and the inertia about it, as xx, yy, zz, xy, xz, yz. */
+struct body {
+    real mass, com[3], inertia[6];
+};
+
+/* Numbers of a robot; gravity in the base's axes. */
+struct numbers {
+    struct placing placings[FRAMES];
+    struct body bodies[LINKS];
+    real gravity[3];
+};
+
+#endif

@@ -1,0 +1,84 @@
+"""What the energies of a link are asked with: coordinates, and the run-time parameters of the robot."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor
+from torch.utils._python_dispatch import _get_current_dispatch_mode
+
+from .recording import transformed
+
+
+class Values(Protocol):
+    """One tensor for each coordinate: values[k] belongs to coordinate k, counted from 0."""
+
+    def __getitem__(self, k: int, /) -> Tensor: ...
+
+
+class Parameters(Mapping[str, Tensor]):
+    """The robot's run-time parameters by name, and constants of links, as one call computes with them.
+
+    like: one value a sample, shape (...), of the call's dtype and device
+    wanted: whether the call's results may be differentiated by constants
+    """
+
+    def __init__(self, values: Mapping[str, Tensor], like: Tensor, wanted: bool) -> None:
+        self._values, self.like, self.wanted = values, like, wanted
+        self._followed = transformed() or _get_current_dispatch_mode() is not None
+        self._constants: dict[torch.nn.Module, dict[str, Any]] = {}
+
+    def __getitem__(self, name: str) -> Tensor:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def constants(self, module: torch.nn.Module) -> Mapping[str, Any]:
+        """Constants of a link: Python's numbers, nested as they are; tensors where somebody follows them.
+
+        With numbers, what a zero stands before is left out, so that a shoulder without offset costs nothing.
+        """
+        if module not in self._constants:
+            held = (*module._parameters.items(), *module._buffers.items())
+            self._constants[module] = {
+                name: self._seen(tensor) for name, tensor in held if tensor is not None
+            }
+        return self._constants[module]
+
+    def _seen(self, tensor: Tensor) -> Any:
+        followed = self._followed or (self.wanted and tensor.requires_grad)
+        return tensor.to(self.like) if followed or tensor.device.type != "cpu" else tensor.tolist()
+
+
+class Energies(Protocol):
+    """Kinetic and potential energy of one link in J."""
+
+    @property
+    def path(self) -> tuple[int, ...]:
+        """Coordinates that the energies depend on, ascending, counted from 0."""
+
+    @property
+    def linear(self) -> bool:
+        """Whether the kinetic energy has terms linear in the velocities."""
+
+    @property
+    def before(self) -> Any:
+        """The link that carries this one, None where their energies share no work."""
+
+    def kinetic(self, q: Values, qd: Values, p: Parameters) -> Any:
+        """Kinetic energy: a tensor of the coordinates' shape, or one number for all."""
+
+    def potential(self, q: Values, p: Parameters) -> Any:
+        """Potential energy, likewise."""
+
+
+def numbers_of(sources: "tuple[torch.nn.Module, ...]") -> Iterator[Tensor]:
+    """Every tensor that these modules hold, their own modules' too."""
+    for source in sources:
+        for module in source.modules() if source._modules else (source,):
+            for held in (module._parameters, module._buffers):
+                yield from (tensor for tensor in held.values() if tensor is not None)
