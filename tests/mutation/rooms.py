@@ -103,6 +103,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_runtime.py",
             "tests/test_user_energies.py",
             CHECK,
+            "tests/numeric/test_regressors.py",
         ),
         leave=("*/native_*.py",),
         only=UNTYPED,
@@ -156,6 +157,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_analysis_page.py",
         ),
     ),
+    "identify": Room(_house("identify"), ("tests/test_identify.py", "tests/numeric/test_base_parameters.py")),
     "robot": Room(
         (*_house("robot"), "generator/linkwise/robot/readers/*.py"),
         (

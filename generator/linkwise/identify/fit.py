@@ -17,7 +17,7 @@ from linkwise.package.load import Array
 ROUNDS = 3
 """From equal weights to the joints' own, and twice again."""
 LEAST = 1e-9
-"""Of a joint's torque: the noise of a log that has none."""
+"""Of the largest joint's torque: the noise of a log that has none."""
 POOR, WORST = 30.0, 1000.0
 """Times the condition number of random motions: there a log tells some combinations badly, or not at all."""
 
@@ -48,7 +48,7 @@ def weighted_fit(equations: JointEquations, base: BaseParameters, friction: bool
         beta, rubbing = _solved(triangle, base, n, friction)
         free = max(equations.rows - len(triangle) / n, 1.0)
         left = equations.errors(beta, rubbing) * np.sqrt(equations.rows / free)
-        noise = np.maximum(left, LEAST * np.maximum(equations.sizes(), 1e-300))
+        noise = np.maximum(left, LEAST * (equations.sizes().max() or 1.0))
     triangle = stacked(equations, noise, friction)
     beta, rubbing = _solved(triangle, base, n, friction)
     inverse = np.linalg.inv(triangle[:-1, :-1])

@@ -76,12 +76,14 @@ def page(found: Identification, gravity: bool) -> str:
 
 
 def _head(found: Identification) -> Iterator[str]:
+    rest = found.unseen.rows
     yield f"# {markdown(found.robot.name)}, identified from {markdown(found.log.source)}"
     yield ""
     yield (
-        f"{found.seen.rows:,} samples at {found.log.rate:.6g} Hz were fitted, the {found.unseen.rows:,} "
-        "after them were not: they are what *unseen* means. Condition number of the equations: "
-        f"{found.fit.condition:.3g}, where random motions have {found.base.condition:.3g}."
+        f"{found.seen.rows:,} samples at {found.log.rate:.6g} Hz were fitted"
+        f"{f', the {rest:,} after them were not: they are what *unseen* means' if rest else ''}. "
+        f"Condition number of the equations: {found.fit.condition:.3g}, where random motions have "
+        f"{found.base.condition:.3g}."
     )
 
 
@@ -94,16 +96,12 @@ def _joints(found: Identification) -> Iterator[str]:
     yield "|---|---|---|---|---|---|---|---|---|"
     seen, unseen = found.errors(found.seen), found.errors(found.unseen)
     shown = unseen if found.unseen.rows else seen
+    columns = (found.seen.sizes(), seen["fit"], unseen["fit"], shown["bodies"], shown["package"])
     for i, (name, unit) in enumerate(zip(found.robot.joints, found.robot.units, strict=True)):
-        numbers = (
-            found.seen.sizes()[i],
-            seen["fit"][i],
-            unseen["fit"][i],
-            shown["bodies"][i],
-            shown["package"][i],
-        )
+        numbers = [f"{column[i]:.3g}" for column in columns]
+        numbers[2] = numbers[2] if found.unseen.rows else "-"
         rubs = zip(found.fit.friction[i], found.fit.friction_errors[i], strict=True)
-        cells = [markdown(name), *(f"{x:.3g}" for x in numbers), *(f"{f:.4g} ± {e:.1g}" for f, e in rubs)]
+        cells = [markdown(name), *numbers, *(f"{f:.4g} ± {e:.1g}" for f, e in rubs)]
         yield f"| {' | '.join([*cells, ', '.join(COEFFICIENTS[unit])])} |"
 
 

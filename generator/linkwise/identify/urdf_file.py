@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from linkwise.escape import one_line
+from linkwise.escape import printable
 from linkwise.identify.pseudo_inertia import central
 from linkwise.package.entries import BodyEntry, JointEntry, RigidTree
 from linkwise.package.load import Array
@@ -32,11 +32,15 @@ def urdf_text(
 ) -> str:
     """The file; pi: inertial parameters (10,) by link, friction: viscous and Coulomb (2,) by joint."""
     base = _unused("base", [body.link for body in tree.bodies])
-    lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>", f"  <link name={quoteattr(base)}/>"]
+    lines = [
+        '<?xml version="1.0"?>',
+        f"<robot name={_attribute(name)}>",
+        f"  <link name={_attribute(base)}/>",
+    ]
     root = base
     if (turn := _upright(tree)) is not None:
         root = _unused(f"{base}_upright", [body.link for body in tree.bodies])
-        lines += [f"  <link name={quoteattr(root)}/>"]
+        lines += [f"  <link name={_attribute(root)}/>"]
         mount = _unused("mount", [body.joint for body in tree.bodies])
         lines += _joint(mount, "fixed", base, root, (0.0, 0.0, 0.0), turn, [])
     masters = [joint.name for joint in joints]
@@ -58,12 +62,12 @@ def urdf_text(
 
 def _link(body: BodyEntry, pi: Mapping[str, Array]) -> list[str]:
     if body.link not in pi:
-        return [f"  <link name={quoteattr(body.link)}/>"]
+        return [f"  <link name={_attribute(body.link)}/>"]
     mass, com, inertia = central(pi[body.link])
     entries = zip(("xx", "xy", "xz", "yy", "yz", "zz"), inertia[np.triu_indices(3)].tolist(), strict=True)
     moments = " ".join(f'i{key}="{value!r}"' for key, value in entries)
     return [
-        f"  <link name={quoteattr(body.link)}>",
+        f"  <link name={_attribute(body.link)}>",
         "    <inertial>",
         f'      <origin xyz="{_row(com)}" rpy="0 0 0"/>',
         f'      <mass value="{mass!r}"/>',
@@ -83,10 +87,10 @@ def _joint(
     more: Sequence[str],
 ) -> list[str]:
     return [
-        f"  <joint name={quoteattr(one_line(name, len(name)))} type={quoteattr(kind)}>",
+        f"  <joint name={_attribute(name)} type={_attribute(kind)}>",
         f'    <origin xyz="{_row(np.array(place))}" rpy="{_row(_rpy(turn))}"/>',
-        f"    <parent link={quoteattr(parent)}/>",
-        f"    <child link={quoteattr(child)}/>",
+        f"    <parent link={_attribute(parent)}/>",
+        f"    <child link={_attribute(child)}/>",
         *(f"    {line}" for line in more),
         "  </joint>",
     ]
@@ -96,7 +100,7 @@ def _follows(body: BodyEntry, masters: Sequence[str]) -> list[str]:
     master = masters[body.coordinate]
     if master == body.joint:
         return []
-    return [f'<mimic joint={quoteattr(master)} multiplier="{body.ratio!r}"/>']
+    return [f'<mimic joint={_attribute(master)} multiplier="{body.ratio!r}"/>']
 
 
 def _upright(tree: RigidTree) -> Array | None:
@@ -122,6 +126,11 @@ def _rpy(turn: Array) -> Array:
 
 def _row(values: Array) -> str:
     return " ".join(repr(value) for value in values.tolist())
+
+
+def _attribute(text: str) -> str:
+    """A name in quotes, without what XML cannot hold."""
+    return quoteattr(printable(text))
 
 
 def _unused(name: str, taken: Sequence[str]) -> str:
