@@ -33,15 +33,15 @@ def kinetic_energy(body: Sequence[Any], w: Vector, v: Vector) -> Any:
     speeds = torch.stack([twist[a] for a in moving])
     if _holds_tensors(body):
         parts = (_tensor(part, axes, speeds) for axes, part in enumerate(body))
-        whole = _spatial_inertia(*parts)
+        half = 0.5 * _spatial_inertia(*parts)
         if len(moving) < 6:
-            kept = torch.tensor(moving, device=whole.device)
-            whole = whole[..., kept[:, None], kept]
+            kept = torch.tensor(moving, device=half.device)
+            half = half[..., kept[:, None], kept]
     else:
         rows = _spatial_numbers(*body)
-        table = [[rows[a][b] for b in moving] for a in moving]
-        whole = torch.tensor(table, dtype=speeds.dtype, device=speeds.device)
-    return 0.5 * (speeds * _product(whole, speeds)).sum(0)
+        table = [[0.5 * rows[a][b] for b in moving] for a in moving]
+        half = torch.tensor(table, dtype=speeds.dtype, device=speeds.device)
+    return (speeds * _product(half, speeds)).sum(0)
 
 
 def _spatial_inertia(m: Tensor, c: Tensor, inertia: Tensor) -> Tensor:
@@ -72,6 +72,8 @@ def _spatial_numbers(m: float, c: Sequence[float], inertia: Sequence[Sequence[fl
 
 def _product(matrix: Tensor, vector: Tensor) -> Tensor:
     """Matrix (m, m), behind axes of samples if each has its own, times vector (m, ...)."""
+    if matrix.dim() == vector.dim() == 2:
+        return matrix @ vector
     if matrix.dim() == 2:
         return (matrix @ vector.reshape(len(vector), -1)).reshape(vector.shape)
     table = matrix.movedim((-2, -1), (0, 1))
