@@ -80,6 +80,7 @@ def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
     return {
         "n": len(system.coordinates),
         "links": len(links),
+        "longest": max(map(len, paths)),
         "path_starts": ", ".join(map(str, accumulate(map(len, paths), initial=0))),
         "paths": [", ".join(map(str, path)) for path in paths],
         "totals": totals(robot.size),

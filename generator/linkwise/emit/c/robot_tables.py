@@ -60,11 +60,9 @@ def path_spans(system: RigidSystem) -> tuple[Span, ...]:
 def table_view(system: RigidSystem) -> dict[str, Any]:
     """Fields of NAME_tree.h but for its name."""
     found, robot, links = columns(system), system.robot, path_spans(system)
-    paths = [system.path(j) for j in range(len(links))]
     return {
         "frames": len(robot.links),
         "columns": len(robot.links) + len(found.sums),
-        "longest": max(map(len, paths)),
         "joints": list(_joints(system)),
         "sums": [f"{{{a}, {b}}}" for a, b in found.sums],
         "links": [
