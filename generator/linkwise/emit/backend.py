@@ -148,13 +148,17 @@ BACKENDS: dict[str, BackendFiles] = {
             emits=(_energies,),
             runtime=(
                 "autograd_backend.py",
+                "graph_calls.py",
                 "lane_entries.py",
                 "lanes.py",
+                "operation_recorder.py",
                 "partial_lagrangian.py",
+                "recorded_torques.py",
                 "recording.py",
                 "rigid_body.py",
                 "sweeps.py",
                 "torch_backend.py",
+                "torque_graph.py",
                 *RULE_FILES,
             ),
             loading=Loading(

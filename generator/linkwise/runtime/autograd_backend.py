@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
+from . import graph_calls
 from .partial_lagrangian import PartialLagrangian
 from .structure import Structure
 from .sweeps import decomposition, position_gradient, torque
@@ -57,6 +58,14 @@ class AutogradBackend(TorchBackend):
         """c0 (..., count) in the order of `Layout.velocity`."""
         c0: Tensor = self._of_links(position_gradient, q, qd, qdd)
         return c0
+
+    def graph(self, *asked: Any) -> Any:
+        """See `Dynamics.graph`."""
+        return graph_calls.graph(self, *asked)
+
+    def graph_parts(self, *asked: Any) -> Any:
+        """See `Dynamics.graph_parts`."""
+        return graph_calls.graph_parts(self, *asked)
 
     def _of_links(self, call: Callable[..., Any], q: Tensor, qd: Tensor, qdd: Tensor) -> Any:
         """What a function of sweeps.py makes of the Lagrangians."""

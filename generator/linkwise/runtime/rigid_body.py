@@ -11,7 +11,7 @@ Number = Any
 Vector = Sequence[Number]
 
 
-def kinetic_energy(w: Vector, v: Vector, *, mass: Number, com: Vector, inertia: Sequence[Vector]) -> Tensor:
+def kinetic_energy(w: Vector, v: Vector, *, mass: Number, com: Vector, inertia: Sequence[Vector]) -> Any:
     """m v·v/2 + m v·(w × c) + w·I w/2 in J, with I = inertia + m (c·c 1 - c cᵀ) about the frame's origin.
 
     w, v: angular velocity in rad/s and velocity of the frame's origin in m/s, tensors of one shape; those
@@ -20,10 +20,37 @@ def kinetic_energy(w: Vector, v: Vector, *, mass: Number, com: Vector, inertia: 
     """
     twist = (*w, *v)
     moving = [a for a, value in enumerate(twist) if torch.is_tensor(value)]
+    if not twist[moving[0]].dim():
+        return _written_out(w, v, mass, com, inertia)
     speeds = torch.stack([twist[a] for a in moving])
     whole = _spatial_inertia(mass, com, inertia)
     momentum = _product([[whole[a][b] for b in moving] for a in moving], speeds)
     return 0.5 * (speeds * momentum).sum(0)
+
+
+def _written_out(w: Vector, v: Vector, m: Number, c: Vector, inertia: Sequence[Vector]) -> Any:
+    """m u·u/2 + w·inertia w/2 with u = v + w × c, of single numbers.
+
+    Whoever looks at what is recorded of one sample sees products and sums of numbers, and those with zeros
+    left out.
+    """
+    u = [
+        _dot((1.0, c[2], -c[1]), (v[0], w[1], w[2])),
+        _dot((1.0, c[0], -c[2]), (v[1], w[2], w[0])),
+        _dot((1.0, c[1], -c[0]), (v[2], w[0], w[1])),
+    ]
+    return 0.5 * _dot((m, 1.0), (_dot(u, u), _dot(w, [_dot(row, w) for row in inertia])))
+
+
+def _dot(a: Vector, b: Vector) -> Number:
+    """a·b without the products with the number 0."""
+    pairs = ((x, y) for x, y in zip(a, b, strict=True) if not (_is(x, 0.0) or _is(y, 0.0)))
+    products = [y if _is(x, 1.0) else x * y for x, y in pairs]
+    return sum(products[1:], products[0]) if products else 0.0
+
+
+def _is(value: Number, number: float) -> bool:
+    return not torch.is_tensor(value) and value == number
 
 
 def _spatial_inertia(m: Number, c: Vector, inertia: Sequence[Vector]) -> list[list[Number]]:
