@@ -8,6 +8,7 @@ from linkwise.errors import LinkwiseError
 BROUGHT_BY = {
     "matplotlib": "motion",
     "mujoco": "mjcf",
+    "networkx": "torch",
     "plotly": "motion",
     "pyarrow": "motion",
     "scipy": "motion",
