@@ -172,7 +172,8 @@ class Dynamics:
     def graph(self, i: Any, j: Any = None, k: Any = None, m: int | None = None) -> Any:
         """Autograd's graph of tau_ij, or of a part of it, as a `TorqueGraph`; on the autograd back end only.
 
-        i, j, k: joint, link and joint by number from 0 or by name; without j, of the sum over all links
+        i, j, k: joint, link and joint by number from 0 or by name; several links, or without
+        j all of them, are summed
         k and m: the part c_m,ijk q_k^(m) of the closing convention, m = 2 acceleration, 1 velocity, and for 0
         the stiffness c0 times the position; k alone is both shares of a motion, m alone all of an order, 0
         gravity

@@ -1,6 +1,6 @@
 """What `Dynamics.graph` and `Dynamics.graph_parts` answer on the autograd back end."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from torch import Tensor
@@ -9,10 +9,11 @@ from .recorded_torques import LinkEnergies, Part
 from .torque_graph import TorqueGraph, torque_graphs
 
 Name = int | str
+Links = Name | Iterable[Name] | None
 ORDERS = "2 for acceleration, 1 for velocity, 0 for position and gravity"
 
 
-def graph(backend: Any, i: Name, j: Name | None, k: Name | None, m: int | None) -> TorqueGraph:
+def graph(backend: Any, i: Name, j: Links, k: Name | None, m: int | None) -> TorqueGraph:
     """See `Dynamics.graph`."""
     joint, through = _place(backend, i, j)
     if m not in (None, 0, 1, 2):
@@ -21,7 +22,7 @@ def graph(backend: Any, i: Name, j: Name | None, k: Name | None, m: int | None) 
     return torque_graphs(backend, _energies(backend), joint, through, [(coordinate, m)])[0]
 
 
-def graph_parts(backend: Any, i: Name, j: Name | None) -> tuple[TorqueGraph, ...]:
+def graph_parts(backend: Any, i: Name, j: Links) -> tuple[TorqueGraph, ...]:
     """See `Dynamics.graph_parts`."""
     joint, through = _place(backend, i, j)
     paths = [path for at in through if joint in (path := backend.structure.paths[at])]
@@ -39,12 +40,13 @@ def _energies(backend: Any) -> Any:
     return links
 
 
-def _place(backend: Any, i: Name, j: Name | None) -> tuple[int, tuple[int, ...]]:
+def _place(backend: Any, i: Name, j: Links) -> tuple[int, tuple[int, ...]]:
     structure = backend.structure
     joint = _index("i", i, structure.joint_names, "joint")
     if j is None:
         return joint, tuple(range(structure.N))
-    return joint, (_index("j", j, structure.link_names, "link"),)
+    chosen = (j,) if isinstance(j, int | str) else j
+    return joint, tuple(_index("j", link, structure.link_names, "link") for link in chosen)
 
 
 def _index(argument: str, given: Name, names: Sequence[str], kind: str) -> int:
