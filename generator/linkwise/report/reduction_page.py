@@ -262,9 +262,10 @@ def _operations_verdict(last: CurvePoint) -> str:
 def _graph_verdict(result: Study) -> str:
     """Say what is saved in the graph itself, and where that ends."""
     last, dof = result.recorded[-1], result.dof[-1]
+    verdict = "Weaker" if last.reduction < result.points[-1].reduction else "Stronger"
     text = (
-        f"**Weaker: the graph itself.** Of the {last.total} operations that autograd's graph of τ_1 has at "
-        f"{dof} DoF, its q̈_1 part needs {last.kept}: {last.reduction:.1%} are saved, where "
+        f"**{verdict}: the graph itself.** Of the {last.total} operations that autograd's graph of τ_1 "
+        f"has at {dof} DoF, its q̈_1 part needs {last.kept}: {last.reduction:.1%} are saved, where "
         f"{result.points[-1].reduction:.1%} of the terms are"
     )
     # One joint is different: it has no velocity forces.
