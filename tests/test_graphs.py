@@ -22,7 +22,8 @@ from linkwise.errors import LinkwiseError
 from linkwise.graphs import FOLDS, dot_text, folded, graph_files, graph_json, overlay
 from linkwise.package.load import import_package
 from linkwise.progress import silent
-from linkwise.report import reduction_json, reduction_markdown, study
+from linkwise.report import count_polynomial, reduction_json, reduction_markdown, study
+from linkwise.report.recorded_operations import recorded_operations
 from linkwise.robot import read_robot
 from linkwise.symbolic.system import rigid_system
 from test_names import HOSTILE, chain
@@ -136,15 +137,34 @@ def edited(directory: Path, energy: str) -> Any:
         sys.path.pop(0)
 
 
-def test_an_edited_energy_may_compute_with_vectors(tmp_path: Path) -> None:
-    energy = "(__import__('torch').stack([qd[0], 2.0 * qd[0] * q[0]]) ** 2).sum()"
-    robot = edited(tmp_path / "vectors", energy)
+@pytest.mark.parametrize(
+    ("name", "energy", "inertia", "slope"),
+    [
+        (
+            "vectors",
+            "(torch.stack([qd[0], 2.0 * qd[0] * q[0]]) ** 2).sum()",
+            lambda q: 2 + 8 * q**2,
+            lambda q: 16 * q,
+        ),
+        (
+            "special",
+            "qd[0] ** 2 * torch.hypot(q[0], torch.tensor(2.0, dtype=q[0].dtype))",
+            lambda q: 2 * np.hypot(q, 2),
+            lambda q: 2 * q / np.hypot(q, 2),
+        ),
+    ],
+)
+def test_an_edited_energy_may_compute_by_any_operation(
+    name: str, energy: str, inertia: Callable[[Any], Any], slope: Callable[[Any], Any], tmp_path: Path
+) -> None:
+    robot = edited(tmp_path / name, energy)
     q, qd, qdd = random_states(1, 5)
-    part = robot.graph(0, 0, 0, 2)
-    assert {node.shape for node in part.operations} > {()}
-    np.testing.assert_allclose(
-        part.evaluate(q, qd, qdd), ((2 + 8 * q**2) * qdd)[:, 0], rtol=1e-14, atol=0, strict=False
-    )
+    part, force = robot.graph(0, 0, 0, 2), robot.graph(0, 0, 0, 1)
+    np.testing.assert_allclose(part.evaluate(q, qd, qdd), (inertia(q) * qdd)[:, 0], rtol=1e-14, atol=0)
+    np.testing.assert_allclose(force.evaluate(q, qd, qdd), (slope(q) * qd**2 / 2)[:, 0], rtol=1e-14, atol=0)
+    assert any(node.shape for node in part.operations) is (name == "vectors")
+    with torch.inference_mode():
+        assert robot.graph(0, 0, 0, 2).evaluate(q[0], qd[0], qdd[0]).shape == ()
 
 
 def test_an_energy_that_writes_in_place_is_refused(tmp_path: Path) -> None:
@@ -277,7 +297,7 @@ def test_the_command_counts_and_writes(
         (("--joint", "4"), "--joint '4' is not there; choose 1..3"),
         (("--joint", "2", "--link", "1"), "through link link1 has no such part: it is always zero"),
         (("--order", "3"), "--order '3' is not there; choose among all, 0, 1, 2"),
-        (("--format", "png"), "--format 'png' is not there; choose among svg, dot, graphml, json"),
+        (("--format", "pdf"), "--format 'pdf' is not there; choose among svg, png, dot, graphml, json"),
     ],
 )
 def test_a_mistake_is_one_line(
@@ -300,18 +320,34 @@ def test_a_package_without_autograd_is_told_how_to_get_it(command: Command, tmp_
     assert "generate it with --backend autograd" in said
 
 
+README = " ".join((Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8").split())
+
+
 def test_the_reduction_in_nodes_of_the_graph() -> None:
-    """By hand for one joint: (m r² + I) q̈ is one product; m g r cos q two operations, and a sum."""
-    arm = rigid_system(read_robot("planar9", Options("symbolic")))
-    result = study("arm", arm, 1, 9, 9, 10**6, silent, graphs=True)
-    counts = [(pair.total, pair.kept) for pair in result.recorded]
-    assert counts[0] == (4, 1)
-    assert reduction_json(result)["recorded"]["points"][1] == {
-        "dof": 2,
-        "operations": counts[1][0],
-        "kept": counts[1][1],
-        "reduction": round(1 - counts[1][1] / counts[1][0], 6),
-    }
-    page = reduction_markdown(result)
-    assert f"| 9 | {counts[8][0]} | {counts[8][1]} |" in page
-    assert "both counts are polynomials of degree 2, so that it tends to 79.5%, and not to all" in page
+    """By hand for one joint: (m r² + I) q̈ is one product, m g r cos q a cosine and one, and a sum is left."""
+    arm = rigid_system(read_robot("planar10", Options("symbolic")))
+    pairs = list(recorded_operations(arm, 10, silent))
+    assert (pairs[0].total, pairs[0].kept) == (4, 1)
+    stated = re.search(
+        r"at 10 joints the part saves (\d+) % of the nodes of autograd's graph, .* tends to ([\d.]+) %",
+        README,
+    )
+    assert stated is not None
+    assert round(100 * pairs[9].reduction) == int(stated[1])
+    total, kept = (count_polynomial([getattr(p, name) for p in pairs[1:]]) for name in ("total", "kept"))
+    assert total is not None
+    assert kept is not None
+    assert round(float(100 * (1 - kept.leading / total.leading)), 1) == float(stated[2])
+
+
+def test_the_page_shows_the_nodes_where_they_were_counted() -> None:
+    arm = rigid_system(read_robot("planar3", Options("symbolic")))
+    result = study("arm", arm, 2, 3, 3, 10**6, silent, graphs=True)
+    two, three = result.recorded
+    page, data = reduction_markdown(result), reduction_json(result)
+    assert f"| 3 | {three.total} | {three.kept} | {three.reduction:.4f} |" in page
+    assert f"autograd's graph of τ_1 has at 3 DoF, its q̈_1 part needs {three.kept}" in page
+    assert [(row["dof"], row["operations"], row["kept"]) for row in data["recorded"]["points"]] == [
+        (2, two.total, two.kept),
+        (3, three.total, three.kept),
+    ]

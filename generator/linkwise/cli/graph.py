@@ -31,7 +31,7 @@ def graph(
         str, typer.Option(help="What a picture draws as one node: none, line, link, or auto")
     ] = "auto",
     formats: Annotated[
-        list[str] | None, typer.Option("--format", help="svg, dot, graphml or json; may be repeated")
+        list[str] | None, typer.Option("--format", help="svg, png, dot, graphml or json; may be repeated")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Directory that gets the files")] = None,
     as_json: Json = False,

@@ -106,8 +106,8 @@ def _legend(graph: Overlay) -> str:
     for number, part in enumerate(graph.parts):
         fill = part_colour(graph, number)
         name = "" if part.coordinate is None else f", {short(part.coordinate)}"
-        text = f"{_written(part_label(graph, number))}{html_text(name)}: {len(part.operations)} operations, "
-        text += f"{graph.own(number)} of its own"
+        text = f"{_written(part_label(graph, number))}{html_text(name)}: {len(part.operations)} operations"
+        text += f", {graph.own(number)} of its own" if len(graph.parts) > 1 else ""
         rows.append(f'<TR><TD BGCOLOR="{fill}" WIDTH="18"> </TD><TD ALIGN="LEFT">{text}</TD></TR>')
     if len(graph.parts) > 1:
         shared = sum(len(users) > 1 for key, users in graph.users.items() if _computed(graph, key))

@@ -12,7 +12,7 @@ from linkwise.graphs.dot_text import dot_text
 from linkwise.graphs.folding import folded
 from linkwise.graphs.overlay import KINDS, Overlay
 
-FORMATS = ("svg", "dot", "graphml", "json")
+FORMATS = ("svg", "png", "dot", "graphml", "json")
 MOTIONS = {order: name for name, order in KINDS.items()}
 
 
@@ -25,8 +25,8 @@ def graph_files(graph: Overlay, formats: Iterable[str], fold: str | None = None)
     dot = dot_text(graph, folded(graph, fold))
     for kind in formats:
         match kind:
-            case "svg":
-                content = _drawn(dot)
+            case "svg" | "png":
+                content = _drawn(dot, kind)
             case "dot":
                 content = dot.encode()
             case "graphml":
@@ -108,14 +108,14 @@ def _graphml(graph: Overlay) -> bytes:
     return "\n".join([*networkx.generate_graphml(found, named_key_ids=True), ""]).encode()
 
 
-def _drawn(dot: str) -> bytes:
+def _drawn(dot: str, kind: str) -> bytes:
     program = shutil.which("dot")
     if program is None:
         raise LinkwiseError(
             "the program dot of Graphviz, which draws graphs, is missing: install Graphviz, or take "
             "--format dot, graphml or json"
         )
-    done = subprocess.run([program, "-Tsvg"], input=dot.encode(), capture_output=True, check=False)
+    done = subprocess.run([program, f"-T{kind}"], input=dot.encode(), capture_output=True, check=False)
     if done.returncode:
         raise LinkwiseError(f"dot draws nothing: {one_line(done.stderr.decode(errors='replace'), 200)}")
     return done.stdout

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
-from . import graph_calls
+from .graph_calls import graph_of, graph_parts_of
 from .partial_lagrangian import PartialLagrangian
 from .structure import Structure
 from .sweeps import decomposition, position_gradient, torque
@@ -61,11 +61,11 @@ class AutogradBackend(TorchBackend):
 
     def graph(self, *asked: Any) -> Any:
         """See `Dynamics.graph`."""
-        return graph_calls.graph(self, *asked)
+        return graph_of(self, *asked)
 
     def graph_parts(self, *asked: Any) -> Any:
         """See `Dynamics.graph_parts`."""
-        return graph_calls.graph_parts(self, *asked)
+        return graph_parts_of(self, *asked)
 
     def _of_links(self, call: Callable[..., Any], q: Tensor, qd: Tensor, qdd: Tensor) -> Any:
         """What a function of sweeps.py makes of the Lagrangians."""

@@ -13,7 +13,7 @@ Links = Name | Iterable[Name] | None
 ORDERS = "2 for acceleration, 1 for velocity, 0 for position and gravity"
 
 
-def graph(backend: Any, i: Name, j: Links, k: Name | None, m: int | None) -> TorqueGraph:
+def graph_of(backend: Any, i: Name, j: Links, k: Name | None, m: int | None) -> TorqueGraph:
     """See `Dynamics.graph`."""
     joint, through = _place(backend, i, j)
     if m not in (None, 0, 1, 2):
@@ -22,7 +22,7 @@ def graph(backend: Any, i: Name, j: Links, k: Name | None, m: int | None) -> Tor
     return torque_graphs(backend, _energies(backend), joint, through, [(coordinate, m)])[0]
 
 
-def graph_parts(backend: Any, i: Name, j: Links) -> tuple[TorqueGraph, ...]:
+def graph_parts_of(backend: Any, i: Name, j: Links) -> tuple[TorqueGraph, ...]:
     """See `Dynamics.graph_parts`."""
     joint, through = _place(backend, i, j)
     paths = [path for at in through if joint in (path := backend.structure.paths[at])]

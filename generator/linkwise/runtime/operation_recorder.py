@@ -108,14 +108,14 @@ class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
         finally:
             self._derivative = former
 
-    def operand(self, value: Any) -> Any:
-        """A value as an operand: a `Ref`, or a constant as it is; a number if it is one."""
+    def operand(self, value: Any, number: bool = True) -> Any:
+        """A value as an operand: a `Ref`, or a constant, of a single number as such where that will do."""
         if not torch.is_tensor(value):
             return value
         known = self._known.get(_place(value))
         if known is not None:
             return known[0]
-        return value.detach().clone() if value.dim() else value.item()
+        return value.item() if number and not value.dim() else value.detach().clone()
 
     def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
         """Compute an operation and write it down."""
@@ -124,7 +124,9 @@ class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
         options = dict(kwargs or {})
         result = func(*args, **options)
         name = func.overloadpacket.__name__
-        arguments = tuple(mapped(self.operand, args))
+        # What is not in CALLS, or adds a multiple (alpha), takes tensors where it was given tensors.
+        number = name in CALLS and not options
+        arguments = tuple(mapped(lambda value: self.operand(value, number), args))
         if name in FILLED or not any(flat(arguments)):
             return result  # a constant
         single = torch.is_tensor(result)
@@ -147,8 +149,7 @@ class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
         key = _key(name, arguments, options)
         source = self._source(arguments)
         if key not in self.operations:
-            # With a factor of its own (alpha), a sum is not what Python's operator computes.
-            call = CALLS.get(name, func) if not options and len(arguments) <= 2 else func
+            call = func if options else CALLS.get(name, func)
             pointwise = torch.Tag.pointwise in getattr(func, "tags", ())
             self.operations[key] = Operation(
                 key, name, arguments, options, shape, source, self._derivative, pointwise, call

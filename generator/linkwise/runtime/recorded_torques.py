@@ -55,21 +55,22 @@ def record(
 
     def leaf(key: str, kind: str, name: str, value: float, varies: bool) -> Tensor:
         leaves[key] = Leaf(key, kind, name)
-        tensor = torch.tensor(value, dtype=torch.float64, requires_grad=varies)
+        tensor = torch.tensor(value, dtype=torch.float64, device="cpu", requires_grad=varies)
         return recorder.leaf(leaves[key], tensor)
 
     names = structure.joint_names
-    motion = [
-        [leaf(f"{kind}[{k}]", kind, name, 0.3 + 0.1 * k, kind != "qdd") for k, name in enumerate(names)]
-        for kind in MOTIONS
-    ]
-    values = {
-        name: leaf(name, "parameter", name, float(value.detach().reshape(-1)[0]), False)
-        for name, value in parameters.items()
-    }
-    with torch.inference_mode(False), torch.enable_grad(), recorder:
-        recorded = _Torque(recorder, list(links(values)), joint, motion)
-        found = {part: recorder.operand(recorded.part(*part)) for part in parts}
+    with torch.inference_mode(False), torch.enable_grad():
+        motion = [
+            [leaf(f"{kind}[{k}]", kind, name, 0.3 + 0.1 * k, kind != "qdd") for k, name in enumerate(names)]
+            for kind in MOTIONS
+        ]
+        values = {
+            name: leaf(f"p[{name}]", "parameter", name, value.detach().reshape(-1)[0].item(), False)
+            for name, value in parameters.items()
+        }
+        with recorder:
+            recorded = _Torque(recorder, list(links(values)), joint, motion)
+            found = {part: recorder.operand(recorded.part(*part)) for part in parts}
     return RecordedParts(recorder.operations, leaves, found)
 
 

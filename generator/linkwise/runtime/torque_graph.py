@@ -69,13 +69,14 @@ class TorqueGraph:
             return torch.full_like(like, self.output)
         columns = {kind: values.unbind(-1) for kind, values in motion.items()}
         named = {f"{kind}[{k}]": column for kind in columns for k, column in enumerate(columns[kind])}
-        given = [(named | values)[leaf.key] for leaf in self.leaves]
+        named |= {f"p[{name}]": value for name, value in values.items()}
+        given = [named[leaf.key] for leaf in self.leaves]
         if all(node.pointwise for node in self.operations):
             result = self.module(*given)
         else:
             wide = [value.expand(like.shape).reshape(-1) for value in given]
             result = torch.func.vmap(self.module)(*wide).reshape(like.shape)
-        return result.expand(like.shape)  # type: ignore[no-any-return]
+        return result.to(like.dtype).expand(like.shape)  # type: ignore[no-any-return]
 
     @cached_property
     def module(self) -> torch.fx.GraphModule:
