@@ -68,8 +68,9 @@ def record(
             name: leaf(f"p[{name}]", "parameter", name, value.detach().reshape(-1)[0].item(), False)
             for name, value in parameters.items()
         }
+        energies = list(links(values))
         with recorder:
-            recorded = _Torque(recorder, list(links(values)), joint, motion)
+            recorded = _Torque(recorder, energies, joint, motion)
             found = {part: recorder.operand(recorded.part(*part)) for part in parts}
     return RecordedParts(recorder.operations, leaves, found)
 
