@@ -43,7 +43,7 @@ lint: $(READY)
 
 # The paper's cost-reduction figure.
 report: $(READY)
-	$(BIN)/linkwise report reduction --out out/report
+	$(BIN)/linkwise report reduction --graphs --out out/report
 
 # Every real robot at hand, beside Pinocchio: minutes.
 corpus: $(READY)

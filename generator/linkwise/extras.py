@@ -9,6 +9,7 @@ BROUGHT_BY = {
     "clarabel": "identify",
     "matplotlib": "motion",
     "mujoco": "mjcf",
+    "networkx": "torch",
     "plotly": "motion",
     "pyarrow": "motion",
     "scipy": "motion",

@@ -19,6 +19,7 @@ COMMANDS = {
     "inspect": "Show a robot's joints, links, parameters, and what was merged, locked, ignored or left out.",
     "analyze": "Who loads whom: every torque term of a recorded movement, as a table, figures and a page.",
     "identify": "What a log of motion and torques says of the links: masses, centres, inertias, friction.",
+    "graph": "Show autograd's graph of a partial torque, or of the part that one motion needs.",
     "motion": "Write two motions modelled on the paper's Fig. 5 and 10, for the arm of Table 2, `planar3`.",
 }
 REPORTS = {

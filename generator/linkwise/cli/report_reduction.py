@@ -46,6 +46,9 @@ def reduction(
         typer.Option(help=f"planar: an arm as the paper's; or a serial robot: {DESCRIPTIONS}"),
     ] = "planar",
     dof: Annotated[str, typer.Option(help="Degrees of freedom, FIRST..LAST")] = "1..10",
+    graphs: Annotated[
+        bool, typer.Option("--graphs", help="Count nodes of autograd's graphs too; needs torch")
+    ] = False,
     measured: Annotated[bool, typer.Option("--measure", help="Time generated code too; needs torch")] = False,
     seconds: Annotated[Path | None, typer.Option(help="Draw the times of an earlier measured.json")] = None,
     budget: Budget = BUDGET,
@@ -60,7 +63,7 @@ def reduction(
         refuse_inside_package(out)
         require_writable(out)
     with progress() as advance:
-        result = study(name, system, first, last, beyond, budget, advance)
+        result = study(name, system, first, last, beyond, budget, advance, graphs)
         if measured and found is None:
             derivations = measure_derivations(system, result.dof, advance)
             found = seconds_json(name, measure(system, result.dof, advance), derivations)

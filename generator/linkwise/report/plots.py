@@ -92,6 +92,11 @@ def savings_lines(result: Study, timings: Sequence[Timing] = ()) -> tuple[Saving
     if pairs:
         label = "terms, sin² + cos² left"
         lines.insert(0, SavingsLine("terms", label, dof[: len(pairs)], pairs, BROWN, "P", (0, (2, 1))))
+    if result.recorded:
+        found = tuple(pair.reduction for pair in result.recorded)
+        lines.append(
+            SavingsLine("operations", "nodes of autograd's graph", dof, found, INK, "x", (0, (3, 1)))
+        )
     for method, look in zip(METHODS, ((GREEN, "^", "-."), (PURPLE, "D", ":")), strict=True):
         chosen = [t for t in timings if t.method == method]
         if chosen:

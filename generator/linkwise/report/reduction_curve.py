@@ -16,6 +16,7 @@ from linkwise.report.curve_fit import (
 from linkwise.report.expanded_torques import form_of, link_torques
 from linkwise.report.laurent import BudgetExceededError
 from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations, link_operations, summed
+from linkwise.report.recorded_operations import recorded_operations
 from linkwise.report.term_count import RunningCount, TermPair, TermQuery
 from linkwise.report.uncombined_terms import uncombined_terms
 from linkwise.symbolic.system import RigidSystem, System
@@ -55,6 +56,7 @@ class Study:
 
     uncombined: the points by the convention of `uncombined_terms`, as far as the budget reaches; none for
     energies that a user wrote
+    recorded: operations of autograd's graphs, where they were asked for
     """
 
     robot: str
@@ -66,6 +68,7 @@ class Study:
     kept: CountPolynomial | None
     uncombined: tuple[TermPair, ...]
     uncombined_fit: Saturation | None
+    recorded: tuple[TermPair, ...] = ()
 
     @property
     def dof(self) -> tuple[int, ...]:
@@ -74,9 +77,19 @@ class Study:
 
 
 def study(
-    name: str, system: System, first: int, last: int, beyond: int, budget: int, progress: Progress
+    name: str,
+    system: System,
+    first: int,
+    last: int,
+    beyond: int,
+    budget: int,
+    progress: Progress,
+    graphs: bool = False,
 ) -> Study:
-    """Count the links of a serial arm, to `beyond` where possible, and report on first..last under `name`."""
+    """Count the links of a serial arm, to `beyond` where possible, and report on first..last under `name`.
+
+    With `graphs`, which needs torch, operations of autograd's graphs are counted too.
+    """
     every = curve(system, last, budget, progress, beyond)
     points = every[first - 1 : last]
     dof, y = [p.dof for p in points], [p.reduction for p in points]
@@ -93,6 +106,7 @@ def study(
         count_polynomial([p.kept for p in every]),
         uncombined,
         fit(dof[: len(uncombined)], [pair.reduction for pair in uncombined]),
+        tuple(recorded_operations(system, last, progress))[first - 1 :] if graphs else (),
     )
 
 

@@ -4,7 +4,15 @@ from collections.abc import Iterator
 from typing import Any
 
 from linkwise.emit.render import render
-from linkwise.report.curve_fit import PAPER_A, PAPER_RATE, CountPolynomial, Saturation, held_against
+from linkwise.report.curve_fit import (
+    PAPER_A,
+    PAPER_RATE,
+    CountPolynomial,
+    Saturation,
+    count_polynomial,
+    held_against,
+)
+from linkwise.report.recorded_operations import FORM as RECORDED
 from linkwise.report.reduction_curve import CurvePoint, Study
 from linkwise.report.term_count import TermPair
 from linkwise.report.uncombined_terms import FORM as UNCOMBINED
@@ -34,9 +42,16 @@ def reduction_json(result: Study) -> dict[str, Any]:
             "points": [pair_row(dof, pair) for dof, pair in zip(result.dof, result.uncombined, strict=False)],
             "fit": _saturation(result.uncombined_fit),
         },
+        **({"recorded": _recorded_json(result)} if result.recorded else {}),
         "polynomials": {"total": _polynomial(result.total), "kept": _polynomial(result.kept)},
         "verdicts": [text.replace("**", "") for text in verdicts(result)],
     }
+
+
+def _recorded_json(result: Study) -> dict[str, Any]:
+    pairs = zip(result.dof, result.recorded, strict=True)
+    rows = ({k.replace("terms", "operations"): v for k, v in pair_row(*pair).items()} for pair in pairs)
+    return {"form": RECORDED, "points": list(rows)}
 
 
 def point_row(point: CurvePoint) -> dict[str, Any]:
@@ -103,6 +118,8 @@ def reduction_markdown(result: Study, pictures: bool = False) -> str:
         ],
         "uncombined": UNCOMBINED,
         "pairs": [_pair(dof, pair) for dof, pair in zip(result.dof, result.uncombined, strict=False)],
+        "recorded": RECORDED,
+        "graphs": [_pair(dof, pair) for dof, pair in zip(result.dof, result.recorded, strict=False)],
         "costs": [_costs(point) for point in result.points],
     }
     return render("report/reduction.md.j2", view)
@@ -155,6 +172,8 @@ def verdicts(result: Study) -> Iterator[str]:
     if result.uncombined:
         yield _convention_verdict(result)
     yield _operations_verdict(result.points[-1])
+    if result.recorded:
+        yield _graph_verdict(result)
 
 
 def _curve_verdict(result: Study) -> str:
@@ -237,4 +256,24 @@ def _operations_verdict(last: CurvePoint) -> str:
         f"{last.operations_reduction:.1%} are saved, against {last.reduction:.1%} of the terms. "
         "Emitted code computes once what an expanded sum repeats; with nothing shared "
         f"{last.written_reduction:.1%} of the operations would be saved."
+    )
+
+
+def _graph_verdict(result: Study) -> str:
+    """Say what is saved in the graph itself, and where that ends."""
+    last, dof = result.recorded[-1], result.dof[-1]
+    verdict = "Weaker" if last.reduction < result.points[-1].reduction else "Stronger"
+    text = (
+        f"**{verdict}: the graph itself.** Of the {last.total} operations that autograd's graph of τ_1 "
+        f"has at {dof} DoF, its q̈_1 part needs {last.kept}: {last.reduction:.1%} are saved, where "
+        f"{result.points[-1].reduction:.1%} of the terms are"
+    )
+    # One joint is different: it has no velocity forces.
+    pairs = [pair for n, pair in zip(result.dof, result.recorded, strict=True) if n > 1]
+    total, kept = (count_polynomial([getattr(p, name) for p in pairs]) for name in ("total", "kept"))
+    if total is None or kept is None or total.degree != kept.degree:
+        return f"{text}."
+    return (
+        f"{text}; from 2 DoF on both counts are polynomials of degree {total.degree}, so that it tends to "
+        f"{float(1 - kept.leading / total.leading):.1%}, and not to all."
     )

@@ -1,0 +1,24 @@
+"""Autograd's graphs of partial torques, laid over each other, as pictures, tables and files.
+
+A generated package records them (`Dynamics.graph`); here they are told: `overlay` joins the graphs of several
+parts, `graph_summary` counts them, `graph_files` writes and draws them.
+"""
+
+from linkwise.graphs.dot_text import dot_text
+from linkwise.graphs.folding import FOLDS, folded
+from linkwise.graphs.graph_files import FORMATS, graph_files, graph_json
+from linkwise.graphs.graph_summary import graph_summary
+from linkwise.graphs.overlay import Overlay, overlay, part_label
+
+__all__ = [
+    "FOLDS",
+    "FORMATS",
+    "Overlay",
+    "dot_text",
+    "folded",
+    "graph_files",
+    "graph_json",
+    "graph_summary",
+    "overlay",
+    "part_label",
+]

@@ -1,0 +1,84 @@
+"""Graphs of several parts of one torque in one: what each part has for itself, and what they share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from linkwise.runtime.torque_graph import TorqueGraph
+
+DOTS = {0: "q", 1: "q\N{COMBINING DOT ABOVE}", 2: "q\N{COMBINING DIAERESIS}"}
+"""Letters of a motion by its order."""
+KINDS = {"q": 0, "qd": 1, "qdd": 2}
+"""Order of a motion by the name that calls give it."""
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """Parts of the torque on one joint; indices count from 0.
+
+    nodes: leaves and operations by key, operands first
+    users: for each of them the numbers of the parts that need it
+    """
+
+    robot: str
+    joints: tuple[str, ...]
+    joint: int
+    links: tuple[str, ...]
+    """Names of the links through which it is loaded: one, or all."""
+    link: int | None
+    parts: tuple[TorqueGraph, ...]
+    nodes: dict[str, Any]
+    users: dict[str, tuple[int, ...]]
+
+    @property
+    def torque(self) -> str:
+        """The torque as it is written, τ_1,2."""
+        return f"τ_{self.joint + 1}" + ("" if self.link is None else f",{self.link + 1}")
+
+    @property
+    def operations(self) -> int:
+        """Number of operations of all parts together."""
+        return sum(hasattr(node, "operands") for node in self.nodes.values())
+
+    def own(self, part: int) -> int:
+        """Operations that only this part needs."""
+        return sum(self.users[node.key] == (part,) for node in self.parts[part].operations)
+
+    def coordinate(self, part: int) -> int | None:
+        """Coordinate k of a part."""
+        name = self.parts[part].coordinate
+        return None if name is None else self.joints.index(name)
+
+
+def overlay(robot: Any, joint: int, link: int | None, parts: Sequence[TorqueGraph]) -> Overlay:
+    """Lay graphs over each other; `robot` is the package's, on its autograd back end."""
+    nodes: dict[str, Any] = {}
+    users: dict[str, list[int]] = {}
+    for number, part in enumerate(parts):
+        for node in part.nodes:
+            nodes.setdefault(node.key, node)
+            users.setdefault(node.key, []).append(number)
+    return Overlay(
+        robot.name,
+        tuple(robot.joint_names),
+        joint,
+        tuple(robot.link_names) if link is None else (robot.link_names[link],),
+        link,
+        tuple(parts),
+        nodes,
+        {key: tuple(numbers) for key, numbers in users.items()},
+    )
+
+
+def part_label(graph: Overlay, part: int) -> str:
+    """A part as it is written: c2 q̈_1, or gravity."""
+    order, k = graph.parts[part].order, graph.coordinate(part)
+    if k is None:
+        return {None: graph.torque, 0: "gravity", 1: "all velocities", 2: "all accelerations"}[order]
+    if order is None:
+        return f"motion of joint {k + 1}"
+    through = "" if graph.link is None else f"{graph.link + 1},"
+    return f"c{order}_{graph.joint + 1},{through}{k + 1} {DOTS[order]}_{k + 1}"
