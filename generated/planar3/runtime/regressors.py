@@ -101,7 +101,7 @@ def regressor_tables(tree: JointTree) -> RegressorTables:
 def torque_rows(
     xp: Any, frames: KinematicTables, tables: RegressorTables, numbers: TreeArrays, motion: Sequence[Any]
 ) -> list[Any]:
-    """Y of tau, (samples, pairs · 10), for q, qd and qdd (n, samples)."""
+    """Y of tau, (samples, pairs * 10), for q, qd and qdd (n, samples)."""
     moved, turn, link, _ = _moved(xp, frames, tables, numbers, motion)
     rate = turn(taken(moved.accelerations, tables.frames))
     # a = vd + omega-dot x p + omega x v: where the origin is stands in `turn`.
@@ -112,7 +112,7 @@ def torque_rows(
 def coefficient_rows(
     xp: Any, frames: KinematicTables, tables: RegressorTables, numbers: TreeArrays, motion: Sequence[Any]
 ) -> list[Any]:
-    """Y of c2, c1 and g, (samples, entries · 10) each, for q, qd and qdd (n, samples)."""
+    """Y of c2, c1 and g, (samples, entries * 10) each, for q, qd and qdd (n, samples)."""
     moved, turn, link, gravity = _moved(xp, frames, tables, numbers, motion)
     zd, fixed = (around(xp, a) for a in turn(_of_pairs(moved.rates, tables)))
     # About the moving origin: u-dot = sd + zd x p + z x v.
@@ -161,7 +161,7 @@ def _taken(link: LinkAxes, pairs: Any) -> LinkAxes:
 
 
 def _rows(xp: Any, link: LinkAxes, a: Any, alpha: Any, beta: Any) -> Any:
-    """Y of the links' pairs, (samples, rows · 10), for vectors (5, rows, samples) or (3, rows, samples)."""
+    """Y of the links' pairs, (samples, rows * 10), for vectors (5, rows, samples) or (3, rows, samples)."""
     z, u = link.z, link.u
     y = cross(z, link.omega)
     h = cross(a, z) + cross(u, alpha) + cross(around(xp, cross(u, beta)), link.omega)

@@ -193,3 +193,27 @@ class Dynamics:
         """
         torque: Array = self._answers.masked(q, qd, qdd, mask, out)
         return torque
+
+    def graph(self, i: Any, j: Any = None, k: Any = None, m: int | None = None) -> Any:
+        """Autograd's graph of tau_ij, or of a part of it, as a `TorqueGraph`; on the autograd back end only.
+
+        i, j, k: joint, link and joint by number from 0 or by name; several links, or without
+        j all of them, are summed
+        k and m: the part c_m,ijk q_k^(m) of the closing convention, m = 2 acceleration, 1 velocity, and for 0
+        the stiffness c0 times the position; k alone is both shares of a motion, m alone all of an order, 0
+        gravity
+
+        What torch computes while it differentiates the energies is recorded; nothing was derived beforehand.
+        Raises TypeError on another back end, ValueError for a joint, a link or an order that is not there.
+        """
+        return self._recording("graph")(i, j, k, m)
+
+    def graph_parts(self, i: Any, j: Any = None) -> Any:
+        """Graphs of all parts (k, m) of tau_ij that are not zero, and of gravity: they sum to it."""
+        return self._recording("graph_parts")(i, j)
+
+    def _recording(self, call: str) -> Callable[..., Any]:
+        found: Callable[..., Any] | None = getattr(self.backend, call, None)
+        if found is None:
+            raise TypeError(f"{self.backend.name} records no operations; load autograd for graphs")
+        return found

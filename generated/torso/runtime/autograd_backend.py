@@ -10,6 +10,7 @@ from .answers import Answers
 from .dynamics_module import DynamicsModule
 from .energy_interface import Energies, Parameters, numbers_of
 from .functional_sweeps import decomposition_followed, position_gradient_followed, torque_followed
+from .graph_calls import graph_of, graph_parts_of
 from .recording import transformed
 from .run_time_values import RunTimeValues
 from .structure import Structure
@@ -69,6 +70,14 @@ class AutogradBackend(TorchBackend):
         """c0 (..., count) in the order of `Layout.velocity`."""
         c0: Tensor = self._of_links((position_gradient, position_gradient_followed), q, qd, qdd)
         return c0
+
+    def graph(self, *asked: Any) -> Any:
+        """See `Dynamics.graph`."""
+        return graph_of(self, *asked)
+
+    def graph_parts(self, *asked: Any) -> Any:
+        """See `Dynamics.graph_parts`."""
+        return graph_parts_of(self, *asked)
 
     def _of_links(self, calls: tuple[Call, Call], q: Tensor, qd: Tensor, qdd: Tensor) -> Any:
         """What a function of sweeps.py makes of the Lagrangians, or its like where the call is followed."""

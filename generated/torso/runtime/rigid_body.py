@@ -30,6 +30,8 @@ def kinetic_energy(body: Sequence[Any], w: Vector, v: Vector) -> Any:
     moving = [a for a, value in enumerate(twist) if torch.is_tensor(value)]
     if not moving:
         return 0.0
+    if not twist[moving[0]].dim():
+        return _written_out(body, w, v)
     speeds = torch.stack([twist[a] for a in moving])
     if _holds_tensors(body):
         parts = (_tensor(part, axes, speeds) for axes, part in enumerate(body))
@@ -42,6 +44,32 @@ def kinetic_energy(body: Sequence[Any], w: Vector, v: Vector) -> Any:
         table = [[0.5 * rows[a][b] for b in moving] for a in moving]
         half = torch.tensor(table, dtype=speeds.dtype, device=speeds.device)
     return (speeds * _product(half, speeds)).sum(0)
+
+
+def _written_out(body: Sequence[Any], w: Vector, v: Vector) -> Any:
+    """m u·u/2 + w·inertia w/2 with u = v + w × c, of single numbers.
+
+    Whoever looks at what is recorded of one sample sees products and sums of numbers, and those with zeros
+    left out.
+    """
+    m, c, inertia = body
+    u = [
+        _dot((1.0, c[2], -c[1]), (v[0], w[1], w[2])),
+        _dot((1.0, c[0], -c[2]), (v[1], w[2], w[0])),
+        _dot((1.0, c[1], -c[0]), (v[2], w[0], w[1])),
+    ]
+    return 0.5 * _dot((m, 1.0), (_dot(u, u), _dot(w, [_dot(row, w) for row in inertia])))
+
+
+def _dot(a: Vector, b: Vector) -> Number:
+    """a·b without the products with the number 0."""
+    pairs = ((x, y) for x, y in zip(a, b, strict=True) if not (_is(x, 0.0) or _is(y, 0.0)))
+    products = [y if _is(x, 1.0) else x * y for x, y in pairs]
+    return sum(products[1:], products[0]) if products else 0.0
+
+
+def _is(value: Number, number: float) -> bool:
+    return not torch.is_tensor(value) and value == number
 
 
 def _spatial_inertia(m: Tensor, c: Tensor, inertia: Tensor) -> Tensor:
