@@ -102,7 +102,7 @@ class TorqueGraph:
 
 def torque_graphs(
     backend: Any,
-    links: Callable[[Mapping[str, Tensor]], Iterable[LinkEnergies]],
+    links: Callable[[Mapping[str, Tensor], Tensor], Iterable[LinkEnergies]],
     joint: int,
     through: Sequence[int],
     parts: Sequence[Part],
