@@ -110,8 +110,8 @@ def torque_graphs(
     """Graphs of parts (k, m) of the torque on a joint through the sum of some links, counted from 0."""
     structure: Structure = backend.structure
 
-    def chosen(values: Mapping[str, Tensor], like: Tensor) -> list[LinkEnergies]:
-        every = list(links(values, like))
+    def chosen(values: Mapping[str, Tensor]) -> list[LinkEnergies]:
+        every = list(links(values))
         return [every[j] for j in through]
 
     recorded = record(structure, chosen, backend.parameters, joint, parts)

@@ -45,7 +45,7 @@ class RecordedParts:
 
 def record(
     structure: Structure,
-    links: Callable[[Mapping[str, Tensor], Tensor], Iterable[LinkEnergies]],
+    links: Callable[[Mapping[str, Tensor]], Iterable[LinkEnergies]],
     parameters: Mapping[str, Tensor],
     joint: int,
     parts: Iterable[Part],
@@ -68,7 +68,7 @@ def record(
             name: leaf(f"p[{name}]", "parameter", name, value.detach().reshape(-1)[0].item(), False)
             for name, value in parameters.items()
         }
-        energies = list(links(values, motion[0][0]))
+        energies = list(links(values))
         with recorder:
             recorded = _Torque(recorder, energies, joint, motion)
             found = {part: recorder.operand(recorded.part(*part)) for part in parts}

@@ -105,13 +105,13 @@ class RigidRule:
         return self._answers(space, motion, p, bodies, answer)[0]
 
     def regressor(self, space: Space, motion: Sequence[Any], p: Mapping[str, Any]) -> Any:
-        """Y of tau, (..., count · 10)."""
+        """Y of tau, (..., count * 10)."""
         return self._regressed(space, motion, p, torque_rows, len(self.layout.torque[0]))[0]
 
     def coefficient_regressors(
         self, space: Space, motion: Sequence[Any], p: Mapping[str, Any]
     ) -> Sequence[Any]:
-        """Y of c2, c1 and g, (..., count · 10) each."""
+        """Y of c2, c1 and g, (..., count * 10) each."""
         rows = len(self.layout.acceleration[0]) + len(self.layout.velocity[0])
         return self._regressed(space, motion, p, coefficient_rows, rows)
 

@@ -1,11 +1,13 @@
 """What `Dynamics.graph` and `Dynamics.graph_parts` answer on the autograd back end."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
+import torch
 from torch import Tensor
 
-from .energy_interface import Energies, Parameters
+from .energy_interface import Parameters
 from .recorded_torques import LinkEnergies, Part
 from .torque_graph import TorqueGraph, torque_graphs
 
@@ -34,23 +36,15 @@ def graph_parts_of(backend: Any, i: Name, j: Links) -> tuple[TorqueGraph, ...]:
 
 
 def _energies(backend: Any) -> Any:
-    def links(values: Mapping[str, Tensor], like: Tensor) -> list[LinkEnergies]:
-        p = Parameters(values, like, wanted=False)
-        return [_asked(link, p) for link in backend.modules]
+    def links(values: Mapping[str, Tensor]) -> list[LinkEnergies]:
+        # With numbers for constants: what is learned is seen as it is now.
+        p = Parameters(values, torch.zeros((), dtype=torch.float64), wanted=False)
+        return [
+            LinkEnergies(link.path, link.linear, partial(link.kinetic, p=p), partial(link.potential, p=p))
+            for link in backend.modules
+        ]
 
     return links
-
-
-def _asked(link: Energies, p: Parameters) -> LinkEnergies:
-    """The link's energies with these parameters."""
-
-    def kinetic(q: Any, qd: Any) -> Any:
-        return link.kinetic(q, qd, p)
-
-    def potential(q: Any) -> Any:
-        return link.potential(q, p)
-
-    return LinkEnergies(link.path, link.linear, kinetic, potential)
 
 
 def _place(backend: Any, i: Name, j: Links) -> tuple[int, tuple[int, ...]]:

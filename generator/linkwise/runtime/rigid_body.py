@@ -6,6 +6,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from .recording import transformed
+
 Number = Any
 """A number, or a tensor of one value or of one a sample."""
 Vector = Sequence[Number]
@@ -30,8 +32,8 @@ def kinetic_energy(body: Sequence[Any], w: Vector, v: Vector) -> Any:
     moving = [a for a, value in enumerate(twist) if torch.is_tensor(value)]
     if not moving:
         return 0.0
-    if not twist[moving[0]].dim():
-        return _written_out(body, w, v)
+    if not twist[moving[0]].dim() and not transformed():
+        return _written_out(w, v, *body)
     speeds = torch.stack([twist[a] for a in moving])
     if _holds_tensors(body):
         parts = (_tensor(part, axes, speeds) for axes, part in enumerate(body))
@@ -46,13 +48,12 @@ def kinetic_energy(body: Sequence[Any], w: Vector, v: Vector) -> Any:
     return (speeds * _product(half, speeds)).sum(0)
 
 
-def _written_out(body: Sequence[Any], w: Vector, v: Vector) -> Any:
+def _written_out(w: Vector, v: Vector, m: Number, c: Vector, inertia: Sequence[Vector]) -> Any:
     """m u·u/2 + w·inertia w/2 with u = v + w × c, of single numbers.
 
     Whoever looks at what is recorded of one sample sees products and sums of numbers, and those with zeros
     left out.
     """
-    m, c, inertia = body
     u = [
         _dot((1.0, c[2], -c[1]), (v[0], w[1], w[2])),
         _dot((1.0, c[0], -c[2]), (v[1], w[2], w[0])),
