@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
-from linkwise.expression.graph import FUNCTIONS, Graph, Node, reachable
+from linkwise.expression.expression_graph import FUNCTIONS, Graph, Node, reachable
 
 
 def evaluate(graph: Graph, outputs: Iterable[Node], inputs: Mapping[str, float]) -> list[float]:

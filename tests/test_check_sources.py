@@ -24,7 +24,7 @@ from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.text_reader import NAMES, NUMPY, TextFormula, torch_functions
 from linkwise.check.torque_reference import states_of_torques, torque_reference
 from linkwise.emit.definition import rigid_tree
-from linkwise.expression.graph import FUNCTIONS
+from linkwise.expression.expression_graph import FUNCTIONS
 from linkwise.package.manifest import EnergyEntry, Manifest
 
 LEG, TURNTABLE = str(DATA / "leg.toml"), str(DATA / "turntable.py")

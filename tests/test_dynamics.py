@@ -16,7 +16,7 @@ from linkwise.dynamics.kernel import lowering
 from linkwise.dynamics.link_motion import Origin
 from linkwise.dynamics.screws import CommonAxes, Orientation
 from linkwise.expression.count import count_operations
-from linkwise.expression.graph import Graph
+from linkwise.expression.expression_graph import Graph
 from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.system import RigidSystem, System
 

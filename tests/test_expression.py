@@ -8,8 +8,8 @@ import sympy as sp
 from evaluation import evaluate
 from linkwise.expression.count import count_operations, in_words
 from linkwise.expression.differentiate import derivative, substitute
+from linkwise.expression.expression_graph import FUNCTIONS, Graph, Node
 from linkwise.expression.from_sympy import Lowering
-from linkwise.expression.graph import FUNCTIONS, Graph, Node
 from linkwise.expression.vector import named
 
 SMOOTH_AT_HALF = sorted(FUNCTIONS)

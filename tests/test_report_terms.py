@@ -11,7 +11,7 @@ import sympy as sp
 from linkwise.dynamics.derive import link_kernel
 from linkwise.dynamics.kernel import Kernel
 from linkwise.errors import LinkwiseError
-from linkwise.expression.graph import FUNCTIONS, Node, reachable
+from linkwise.expression.expression_graph import FUNCTIONS, Node, reachable
 from linkwise.progress import silent
 from linkwise.report import (
     LinkTorques,

@@ -97,8 +97,8 @@ def test_no_circle_of_modules_even_inside_a_room() -> None:
 
 
 def test_every_module_name_is_used_once() -> None:
-    # A room may be named like its main module: robot/robot.py. Files of cli/ have the names of commands.
-    counts = Counter(path.stem for path in MODULES if path.parent.name != "cli")
+    # A room may be named like its main module: robot/robot.py.
+    counts = Counter(path.stem for path in MODULES)
     assert not [name for name, count in counts.items() if count > 1]
 
 

@@ -1,7 +1,7 @@
 """Run-time parameters of a robot as a module that owns their tensors; links that share one ask it."""
 
 from collections.abc import Collection, ItemsView, Iterable, Iterator, KeysView, Mapping, ValuesView
-from typing import Any
+from typing import Any, cast
 
 import torch
 from torch import Tensor
@@ -19,8 +19,7 @@ class RunTimeValues(torch.nn.Module):
     def __getitem__(self, name: str) -> Tensor:
         key = self._keys[name]
         tensor = self._parameters.get(key)
-        value: Any = self._buffers[key] if tensor is None else tensor
-        return value  # type: ignore[no-any-return]
+        return cast(Tensor, self._buffers[key]) if tensor is None else tensor
 
     def __setitem__(self, name: str, value: Tensor) -> None:
         setattr(self, self._keys[name], value)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from linkwise.expression.graph import Graph, Node
+from linkwise.expression.expression_graph import Graph, Node
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ H₀ is there where L has terms b(q)·q̇, b = ∂L/∂q̇ at q̇ = 0, though ze
 
 from linkwise.dynamics.coefficients import Inputs, LinkForms
 from linkwise.expression.differentiate import derivative, substitute
-from linkwise.expression.graph import Graph, Node
+from linkwise.expression.expression_graph import Graph, Node
 
 
 def euler_lagrange(graph: Graph, lagrangian: Node, path: tuple[int, ...], x: Inputs) -> LinkForms:

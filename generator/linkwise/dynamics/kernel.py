@@ -8,8 +8,8 @@ import sympy as sp
 from linkwise.dynamics.coefficients import Inputs, LinkForms, inputs
 from linkwise.escape import identifiers
 from linkwise.expression.count import count_operations
+from linkwise.expression.expression_graph import Graph, Node
 from linkwise.expression.from_sympy import Lowering
-from linkwise.expression.graph import Graph, Node
 from linkwise.symbolic.system import System
 
 

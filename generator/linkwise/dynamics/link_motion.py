@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from linkwise.dynamics.screws import Orientation, Spatial, motion_cross
 from linkwise.expression import vector as vec
-from linkwise.expression.graph import Node, Vector
+from linkwise.expression.expression_graph import Node, Vector
 from linkwise.symbolic.system import RigidLink
 
 

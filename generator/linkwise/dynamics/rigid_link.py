@@ -33,7 +33,7 @@ from linkwise.dynamics.link_motion import LinkMotion, Origin, Screw, link_motion
 from linkwise.dynamics.screws import Orientation, Spatial, force_cross, pair_product, spatial_add
 from linkwise.dynamics.torque_sums import TorqueSums
 from linkwise.expression import vector as vec
-from linkwise.expression.graph import Graph, Matrix, Node, Vector
+from linkwise.expression.expression_graph import Graph, Matrix, Node, Vector
 from linkwise.symbolic.system import RigidLink
 
 ROUNDING = 1e-14

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from linkwise.dynamics.coefficients import Inputs
 from linkwise.expression import vector as vec
+from linkwise.expression.expression_graph import Graph, Matrix, Node, Vector
 from linkwise.expression.from_sympy import Lowering
-from linkwise.expression.graph import Graph, Matrix, Node, Vector
 from linkwise.robot.robot import Joint, Rotation, Scalar
 
 Spatial = tuple[Vector, Vector]

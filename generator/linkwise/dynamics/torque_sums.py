@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from linkwise.dynamics.coefficients import Inputs
 from linkwise.expression.count import count_operations
-from linkwise.expression.graph import Graph, Node
+from linkwise.expression.expression_graph import Graph, Node
 
 Pairs = Mapping[tuple[int, int], Node]
 

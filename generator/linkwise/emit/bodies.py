@@ -9,8 +9,8 @@ import sympy as sp
 from linkwise.emit.printer import PythonPrinter, Text
 from linkwise.emit.shared_texts import BodyText
 from linkwise.escape import python_docstring, python_literal
+from linkwise.expression.expression_graph import Graph, Node, operands, reachable
 from linkwise.expression.from_sympy import Lowering
-from linkwise.expression.graph import Graph, Node, operands, reachable
 from linkwise.robot.robot import Link, Scalar
 from linkwise.runtime.parameter_values import faults
 from linkwise.symbolic.system import RigidSystem, System

@@ -10,7 +10,7 @@ from linkwise.emit.render import render
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal
 from linkwise.expression.count import count_operations, in_words
-from linkwise.expression.graph import Node
+from linkwise.expression.expression_graph import Node
 from linkwise.symbolic.system import System
 from linkwise.version import VERSION
 

@@ -1,6 +1,6 @@
 """One node to text, in the syntax of each target language."""
 
-from linkwise.expression.graph import Entry
+from linkwise.expression.expression_graph import Entry
 
 ATOM, PRODUCT, SUM = 3, 2, 1
 Text = tuple[str, int]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.printer import ATOM, Printer, Text
 from linkwise.escape import python_literal
-from linkwise.expression.graph import Entry, Graph, Node, operands, reachable
+from linkwise.expression.expression_graph import Entry, Graph, Node, operands, reachable
 from linkwise.symbolic.system import System
 
 MAX_WIDTH = 88

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
-from linkwise.expression.graph import Graph, Node, reachable
+from linkwise.expression.expression_graph import Graph, Node, reachable
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from linkwise.expression.graph import Graph, Node, reachable
+from linkwise.expression.expression_graph import Graph, Node, reachable
 
 
 def derivative(graph: Graph, output: Node, symbol: Node) -> Node:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import sympy as sp
 
 from linkwise.errors import LinkwiseError
-from linkwise.expression.graph import FUNCTIONS, Graph, Node
+from linkwise.expression.expression_graph import FUNCTIONS, Graph, Node
 from linkwise.robot.robot import Scalar
 from linkwise.symbolic.link_energy import Definition
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from linkwise.expression.graph import Graph, Matrix, Node, Vector
+from linkwise.expression.expression_graph import Graph, Matrix, Node, Vector
 
 
 def dot(g: Graph, a: Sequence[Node], b: Sequence[Node]) -> Node:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from linkwise.dynamics.derive import link_kernel
 from linkwise.dynamics.kernel import Kernel
 from linkwise.expression.count import count_operations
-from linkwise.expression.graph import Graph, Node, operands, reachable
+from linkwise.expression.expression_graph import Graph, Node, operands, reachable
 from linkwise.report.term_count import TermQuery
 from linkwise.symbolic.system import System
 

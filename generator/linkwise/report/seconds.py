@@ -19,7 +19,7 @@ from linkwise.emit.derivation import Derivation
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
 from linkwise.emit.straight_line import fetched, straight_line
-from linkwise.expression.graph import Node
+from linkwise.expression.expression_graph import Node
 from linkwise.extras import extra
 from linkwise.package.load import Package, open_package
 from linkwise.package.write import write_package

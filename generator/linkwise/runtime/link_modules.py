@@ -1,7 +1,7 @@
 """The modules of a robot's links, by number or by name."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import torch
 
@@ -33,8 +33,7 @@ class LinkModules(torch.nn.Module):
             link = self.names.index(link)
         if not -len(self.names) <= link < len(self.names):
             raise IndexError(f"no link {link}; there are {len(self.names)}, counted from 0")
-        found: Any = self._modules[self._keys[link]]
-        return found  # type: ignore[no-any-return]
+        return cast(PartialLagrangian, self._modules[self._keys[link]])
 
     def __len__(self) -> int:
         return len(self.names)

@@ -76,7 +76,8 @@ class TorqueGraph:
         else:
             wide = [value.expand(like.shape).reshape(-1) for value in given]
             result = torch.func.vmap(self.module)(*wide).reshape(like.shape)
-        return result.to(like.dtype).expand(like.shape)  # type: ignore[no-any-return]
+        torque: Tensor = result.to(like.dtype).expand(like.shape)
+        return torque
 
     @cached_property
     def module(self) -> torch.fx.GraphModule:

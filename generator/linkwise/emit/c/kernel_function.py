@@ -8,7 +8,7 @@ from linkwise.dynamics.kernel import Kernel, parameter_names
 from linkwise.emit.printer import CPrinter
 from linkwise.emit.straight_line import Code, straight_line
 from linkwise.expression.count import count_operations
-from linkwise.expression.graph import Node
+from linkwise.expression.expression_graph import Node
 from linkwise.symbolic.system import System
 
 READS = ("q", "qd", "qdd", "sine", "cosine", "p")

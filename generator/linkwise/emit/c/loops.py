@@ -2,14 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 from importlib.resources import files
-from itertools import accumulate
 from typing import Any
 
 from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
 from linkwise.emit.c.loop_costs import decomposition_cost, gradient_cost, torque_cost
 from linkwise.emit.c.prototypes import pointers
-from linkwise.emit.c.robot_files import given, header_view, totals
+from linkwise.emit.c.robot_files import given, header_view, path_fields, totals
 from linkwise.emit.c.robot_tables import path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
 from linkwise.emit.c.stack import loops_stack
@@ -63,10 +62,7 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
         "gradient_cost": gradient_cost(system),
         "stack": f"{loops_stack(system):,}",
     }
-    yield (
-        f"c/{name}.h",
-        render("c/robot.h.j2", names | header_view(system, links, name) | costs),
-    )
+    yield f"c/{name}.h", render("c/robot.h.j2", names | header_view(system, links, name) | costs)
     tables = {"tables": list(header.index_tables(system, links))}
     yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)
     for file in FIXED:
@@ -76,13 +72,9 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
 def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
     """Fields of NAME.c but for its name."""
     robot, motion = whole(links), given(system)
-    paths = [system.path(j) for j in range(len(links))]
-    return {
+    return path_fields(system) | {
         "n": len(system.coordinates),
         "links": len(links),
-        "longest": max(map(len, paths)),
-        "path_starts": ", ".join(map(str, accumulate(map(len, paths), initial=0))),
-        "paths": [", ".join(map(str, path)) for path in paths],
         "totals": totals(robot.size),
         "parameters": list(enumerate(parameter_names(system).values())),
         "inputs": pointers("const real", motion),

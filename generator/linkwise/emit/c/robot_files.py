@@ -18,18 +18,14 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
     robot = whole(links)
     arrays = robot.size.arrays
     n = len(system.coordinates)
-    paths = [system.path(link.first - 1) for link in links]
     one = most_counts([link.size for link in links])
     parts = tuple(groups(links))
     waiting = waiting_counts(links)
     names = list(parameter_names(system).values())
     motion = given(system)
     calls = [link_calls(link, k) for link, k in zip(links, kernels, strict=True)]
-    return {
+    return path_fields(system) | {
         "n": n,
-        "paths": [", ".join(map(str, path)) for path in paths if path],
-        "path_starts": ", ".join(map(str, accumulate(map(len, paths), initial=0))),
-        "longest": max(map(len, paths)),
         "linear": ", ".join("1" if link.size.h1 else "0" for link in links),
         "totals": totals(robot.size),
         "total": robot.size.total,
@@ -56,6 +52,16 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
         "largest": max(waiting.of(array) for array in arrays),
         "rigid": isinstance(system, RigidSystem),
         "largest_gradient": max(link.size.c1 for link in links),
+    }
+
+
+def path_fields(system: System) -> dict[str, Any]:
+    """Fields of NAME.c that say which joints move each link."""
+    paths = [system.path(j) for j in range(len(system.links))]
+    return {
+        "paths": [", ".join(map(str, path)) for path in paths if path],
+        "path_starts": ", ".join(map(str, accumulate(map(len, paths), initial=0))),
+        "longest": max(map(len, paths)),
     }
 
 
