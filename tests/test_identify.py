@@ -23,8 +23,8 @@ from linkwise.identify.pseudo_inertia import pseudo_inertia
 from linkwise.identify.urdf_file import urdf_text
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
-from linkwise.runtime.joint_tree import Bodies
-from linkwise.runtime.regressors import inertial_parameters
+from linkwise.runtime.rule.joint_tree import Bodies
+from linkwise.runtime.rule.regressors import inertial_parameters
 from motion_logs import write_csv
 from typer.testing import CliRunner
 

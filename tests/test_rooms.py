@@ -35,6 +35,9 @@ ROOMS = (
 )
 """From the top of the house to its ground: a room imports from rooms below it only."""
 
+RUNTIME = ("native", "lagrangians", "recorded", "arrays", "rule", "")
+"""The rooms inside runtime, by the same rule; at the ground, what every package has."""
+
 FACE = {"__init__", "__main__"}
 """Public names and nothing else: they may look into every room."""
 
@@ -110,3 +113,13 @@ def test_every_class_name_is_used_once() -> None:
         if isinstance(node, ast.ClassDef)
     )
     assert not [name for name, count in counts.items() if count > 1]
+
+
+@pytest.mark.parametrize("path", sorted((HOUSE / "runtime").rglob("*.py")), ids=name_of)
+def test_inside_the_runtime_too_imports_run_downwards_only(path: Path) -> None:
+    folder = HOUSE / "runtime"
+    own = path.parent.relative_to(folder).as_posix().removeprefix(".")
+    for module in imports(path):
+        inner = module.split(".")[2:]
+        other = inner[0] if (folder / inner[0]).is_dir() else ""
+        assert RUNTIME.index(other) >= RUNTIME.index(own), f"{name_of(path)} imports {module}"

@@ -17,8 +17,8 @@ from conftest import DATA
 from linkwise import check_package, generate, read_system, write_package
 from linkwise.emit.backend import BACKENDS
 from linkwise.package.load import import_package
+from linkwise.runtime.arrays.numpy_backend import NumpyBackend
 from linkwise.runtime.dynamics import Dynamics
-from linkwise.runtime.numpy_backend import NumpyBackend
 from linkwise.runtime.structure import Structure
 
 torch = pytest.importorskip("torch")
@@ -55,13 +55,17 @@ def test_given_parameters_replace_built_in_ones_by_name() -> None:
         replace(FORK, parameters={}).values({"k": 1.0})
 
 
-@pytest.mark.parametrize("file", sorted(path.name for path in RUNTIME.glob("*.py")))
+FILES = sorted(path.relative_to(RUNTIME).as_posix() for path in RUNTIME.rglob("*.py"))
+
+
+@pytest.mark.parametrize("file", FILES)
 def test_the_runtime_imports_numpy_torch_and_its_own_files_only(file: str) -> None:
-    for node in ast.walk(ast.parse((RUNTIME / file).read_text(encoding="utf-8"))):
+    path = RUNTIME / file
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
-            assert node.level <= 1
             name = node.module or ""
-            assert (RUNTIME / f"{name}.py").is_file() if node.level else name.split(".")[0] in ALLOWED
+            own = path.parents[max(node.level - 1, 0)].joinpath(*name.split(".")).relative_to(RUNTIME)
+            assert f"{own.as_posix()}.py" in FILES if node.level else name.split(".")[0] in ALLOWED
         elif isinstance(node, ast.Import):
             assert all(alias.name.split(".")[0] in ALLOWED for alias in node.names)
 
@@ -69,8 +73,7 @@ def test_the_runtime_imports_numpy_torch_and_its_own_files_only(file: str) -> No
 def test_packages_of_different_robots_hold_the_same_runtime_byte_for_byte() -> None:
     for robot in ("planar2", DATA / "turntable.py"):
         files = generate(read_system(robot))
-        copied = {path.name for path in RUNTIME.glob("*.py")}
-        for name in copied:
+        for name in FILES:
             assert files[f"runtime/{name}"].encode() == (RUNTIME / name).read_bytes(), name
 
 
@@ -131,10 +134,10 @@ def pendulum(backend: str) -> Dynamics:
     """The pendulum on one of the back ends, put together by hand."""
     if backend == "numpy":
         return Dynamics(ROD, NumpyBackend(ROD, [Pendulum()], ROD.values(None)), pendulum, (backend,))
-    from linkwise.runtime.dynamics_module import DynamicsModule
-    from linkwise.runtime.link_modules import backend_of_links
-    from linkwise.runtime.partial_lagrangian import PartialLagrangian
-    from linkwise.runtime.torch_backend import TorchBackend
+    from linkwise.runtime.arrays.torch_backend import TorchBackend
+    from linkwise.runtime.lagrangians.dynamics_module import DynamicsModule
+    from linkwise.runtime.lagrangians.link_modules import backend_of_links
+    from linkwise.runtime.lagrangians.partial_lagrangian import PartialLagrangian
 
     class Lagrangian(PartialLagrangian):
         path = (0,)
@@ -171,7 +174,7 @@ def test_a_pendulum_is_that_of_the_textbook(backend: str, batch: tuple[int, ...]
 def test_lagrangians_are_differentiated_a_part_of_a_large_batch_at_a_time(
     call: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from linkwise.runtime import autograd_backend
+    from linkwise.runtime.lagrangians import autograd_backend
 
     robot = pendulum("autograd")
     robot.backend.parameters["m"] = torch.rand(2, 1, dtype=torch.float64, requires_grad=True)
@@ -184,9 +187,9 @@ def test_lagrangians_are_differentiated_a_part_of_a_large_batch_at_a_time(
 
 
 def test_what_a_link_hands_on_is_worked_out_once_for_all_that_it_carries() -> None:
-    from linkwise.runtime.lanes import carried
-    from linkwise.runtime.link_modules import backend_of_links
-    from linkwise.runtime.partial_lagrangian import PartialLagrangian
+    from linkwise.runtime.lagrangians.lanes import carried
+    from linkwise.runtime.lagrangians.link_modules import backend_of_links
+    from linkwise.runtime.lagrangians.partial_lagrangian import PartialLagrangian
 
     calls = []
 
@@ -232,8 +235,8 @@ def test_what_a_link_hands_on_is_worked_out_once_for_all_that_it_carries() -> No
 
 
 def test_an_energy_off_its_path_is_refused() -> None:
-    from linkwise.runtime.link_modules import backend_of_links
-    from linkwise.runtime.partial_lagrangian import PartialLagrangian
+    from linkwise.runtime.lagrangians.link_modules import backend_of_links
+    from linkwise.runtime.lagrangians.partial_lagrangian import PartialLagrangian
 
     class Stray(PartialLagrangian):
         path = (1,)

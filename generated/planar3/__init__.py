@@ -13,9 +13,9 @@ from typing import Any
 from .names import ROBOT
 from .runtime.dynamics import Dynamics
 from .runtime.interface import Backend
-from .runtime.joint_tree import Bodies
+from .runtime.rule.joint_tree import Bodies
 from .runtime.quantities import Coefficients, GradientPropagation, Packed, Propagation
-from .runtime.regressors import inertial_parameters
+from .runtime.rule.regressors import inertial_parameters
 from .runtime.structure import Layout
 
 joint_names = ROBOT.joint_names
@@ -85,9 +85,9 @@ def bodies() -> Bodies[Any]:
 
 def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from .forms import LINKS
-    from .runtime.numpy_backend import NumpyBackend
+    from .runtime.arrays.numpy_backend import NumpyBackend
     from .tree import RULE
-    from .runtime.array_kernels import refuse_learning
+    from .runtime.arrays.array_kernels import refuse_learning
 
     refuse_learning("numpy", requires_grad)
     return NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
@@ -95,9 +95,9 @@ def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: A
 
 def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from .forms import LINKS
-    from .runtime.torch_backend import TorchBackend
+    from .runtime.arrays.torch_backend import TorchBackend
     from .tree import RULE
-    from .runtime.array_kernels import refuse_learning
+    from .runtime.arrays.array_kernels import refuse_learning
 
     refuse_learning("torch", requires_grad)
     return TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
@@ -105,8 +105,8 @@ def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: A
 
 def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from .energies import LAGRANGIANS
-    from .runtime.link_modules import backend_of_links
-    from .runtime.array_kernels import refuse_choice
+    from .runtime.lagrangians.link_modules import backend_of_links
+    from .runtime.arrays.array_kernels import refuse_choice
 
     refuse_choice("autograd", kernel, bodies)
     return backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad)
@@ -115,10 +115,10 @@ def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad
 def _native(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from pathlib import Path
     from .forms import LINKS
-    from .runtime.native_backend import NativeBackend
+    from .runtime.native.native_backend import NativeBackend
     from .tree import RULE
-    from .runtime.array_kernels import refuse_choice
-    from .runtime.array_kernels import refuse_learning
+    from .runtime.arrays.array_kernels import refuse_choice
+    from .runtime.arrays.array_kernels import refuse_learning
 
     refuse_choice("native", kernel, bodies)
     refuse_learning("native", requires_grad)

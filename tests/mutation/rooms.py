@@ -105,11 +105,11 @@ ROOMS: dict[str, Room] = {
             CHECK,
             "tests/numeric/test_regressors.py",
         ),
-        leave=("*/native_*.py",),
+        leave=("*/runtime/native/*.py",),
         only=UNTYPED,
     ),
     "native": Room(
-        ("generator/linkwise/runtime/native_*.py",),
+        ("generator/linkwise/runtime/native/*.py",),
         (
             "tests/test_native.py",
             "tests/test_native_cache.py",

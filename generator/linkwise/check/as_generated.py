@@ -80,7 +80,7 @@ def check_runtime(package: Package) -> Result:
 
 def _own(path: str) -> bytes | None:
     """The file of linkwise that a package has a copy of at this path; None where that is no copy."""
-    folder, _, name = path.rpartition("/")
+    folder, _, name = path.partition("/")
     places = {"runtime": files("linkwise.runtime"), "c": files("linkwise.runtime").joinpath("c")}
     if folder in places and (file := places[folder].joinpath(name)).is_file():
         return file.read_bytes()

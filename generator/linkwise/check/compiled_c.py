@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError
-from linkwise.runtime.native_compiler import Compiler, find_compiler
-from linkwise.runtime.native_process import run_all
+from linkwise.runtime.native.native_compiler import Compiler, find_compiler
+from linkwise.runtime.native.native_process import run_all
 
 Numbers = NDArray[Any]
 

@@ -103,9 +103,18 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     linear = derivation.linear
     yield "names.py", names_text(derivation.package, joints, links, linear, parameters, bodies)
     yield "py.typed", ""
-    copied = {name for backend in loadable for name in backend.runtime}
+    copied = {name for backend in loadable for place in backend.runtime for name in _files_at(place)}
     for name in sorted(copied.union(SHARED_RUNTIME)):
         yield f"runtime/{name}", resources.files(runtime).joinpath(name).read_text(encoding="utf-8")
+
+
+def _files_at(place: str) -> Iterator[str]:
+    """A file of linkwise/runtime, or all files of a folder there."""
+    found = resources.files(runtime).joinpath(place)
+    if found.is_file():
+        yield place
+        return
+    yield from (f"{place}/{file.name}" for file in found.iterdir() if file.name.endswith((".py", ".c")))
 
 
 def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:

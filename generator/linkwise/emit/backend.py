@@ -67,7 +67,7 @@ class BackendFiles:
     emits: tuple[Emitter, ...]
     """What is written for the robot; two back ends with one emitter share its files."""
     runtime: tuple[str, ...] = ()
-    """Files copied from linkwise/runtime, beside those of every package."""
+    """Files and whole folders copied from linkwise/runtime, beside the files of every package."""
     loading: Loading | None = None
     """None where nothing loads."""
     needs: tuple[str, ...] = ()
@@ -114,21 +114,7 @@ def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
     return formula_files(d)
 
 
-RULE_FILES = (
-    "joint_tree.py",
-    "array_kernels.py",
-    "fused_products.py",
-    "kinematics.py",
-    "regressors.py",
-    "rigid_rule.py",
-    "rule_calls.py",
-    "rule_layout.py",
-    "rule_products.py",
-    "rule_tables.py",
-    "spatial_rule.py",
-    "spatial_tables.py",
-    "tree_arrays.py",
-)
+RULE = ("arrays/__init__.py", "arrays/array_kernels.py", "rule")
 """Of linkwise/runtime: the vectorised rule."""
 
 BACKENDS: dict[str, BackendFiles] = {
@@ -138,9 +124,9 @@ BACKENDS: dict[str, BackendFiles] = {
             "numpy",
             "closed forms, or the vectorised rule, on NumPy arrays",
             emits=(_forms, _tree),
-            runtime=("numpy_backend.py", *RULE_FILES),
+            runtime=("arrays/numpy_backend.py", *RULE),
             loading=Loading(
-                "numpy_backend",
+                "arrays.numpy_backend",
                 "NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
                 (),
                 speed=2,
@@ -153,9 +139,9 @@ BACKENDS: dict[str, BackendFiles] = {
             "torch",
             "closed forms, or the vectorised rule, on torch tensors",
             emits=(_forms, _tree),
-            runtime=("torch_backend.py", *RULE_FILES),
+            runtime=("arrays/torch_backend.py", *RULE),
             loading=Loading(
-                "torch_backend",
+                "arrays.torch_backend",
                 "TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
                 (),
                 speed=3,
@@ -168,30 +154,9 @@ BACKENDS: dict[str, BackendFiles] = {
             "autograd",
             "each link's Lagrangian, differentiated by torch",
             emits=(_energies,),
-            runtime=(
-                "autograd_backend.py",
-                "dynamics_module.py",
-                "energy_interface.py",
-                "frame_motion.py",
-                "functional_sweeps.py",
-                "graph_calls.py",
-                "lane_entries.py",
-                "lanes.py",
-                "link_modules.py",
-                "operation_recorder.py",
-                "partial_lagrangian.py",
-                "recorded_torques.py",
-                "recording.py",
-                "rigid_body.py",
-                "rigid_lagrangian.py",
-                "run_time_values.py",
-                "sweeps.py",
-                "torch_backend.py",
-                "torque_graph.py",
-                *RULE_FILES,
-            ),
+            runtime=("arrays/torch_backend.py", "lagrangians", "recorded", *RULE),
             loading=Loading(
-                "link_modules",
+                "lagrangians.link_modules",
                 "backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad)",
                 ("from .energies import LAGRANGIANS",),
                 speed=4,
@@ -202,26 +167,9 @@ BACKENDS: dict[str, BackendFiles] = {
             "native",
             "the C code, compiled by this system's compiler",
             emits=(_tree,),
-            runtime=(
-                "native_answers.py",
-                "native_backend.py",
-                "native_build.py",
-                "native_cache.py",
-                "native_calls.py",
-                "native_compiler.py",
-                "native_desk.py",
-                "native_library.py",
-                "native_memory.py",
-                "native_module.c",
-                "native_module.py",
-                "native_process.py",
-                "native_torch.py",
-                "numpy_backend.py",
-                "torch_backend.py",
-                *RULE_FILES,
-            ),
+            runtime=("arrays/numpy_backend.py", "arrays/torch_backend.py", "native", *RULE),
             loading=Loading(
-                "native_backend",
+                "native.native_backend",
                 'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values, RULE)',
                 ("from pathlib import Path",),
                 speed=1,

@@ -16,8 +16,8 @@ from linkwise.identify.physical_fit import PhysicalFit, physical_fit
 from linkwise.identify.torque_log import TorqueLog, read_torque_log
 from linkwise.package.load import Array
 from linkwise.progress import Progress, silent
-from linkwise.runtime.joint_tree import Bodies
-from linkwise.runtime.regressors import inertial_parameters
+from linkwise.runtime.rule.joint_tree import Bodies
+from linkwise.runtime.rule.regressors import inertial_parameters
 
 LARGE = 100.0
 """Times: torques so much larger, or smaller, than the robot's own are perhaps in another unit."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from linkwise.emit.c.sizes import Span
 from linkwise.escape import c_comment
-from linkwise.runtime.native_compiler import FLAGS, TUNING
+from linkwise.runtime.native.native_compiler import FLAGS, TUNING
 from linkwise.symbolic.system import System
 
 BLOCK = {"double": 8, "float": 16}

@@ -1,0 +1,1 @@
+"""Back ends that compute with arrays: NumPy, torch."""

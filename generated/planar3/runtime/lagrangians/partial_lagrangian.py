@@ -1,0 +1,74 @@
+"""The Lagrangian of one link as a torch module."""
+
+from collections.abc import Collection
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from ..quantities import Coefficients
+from ..structure import Structure
+from .autograd_backend import AutogradBackend
+from .energy_interface import Parameters, Values
+from .functional_sweeps import lagrangians
+from .run_time_values import RunTimeValues
+
+
+class PartialLagrangian(torch.nn.Module):
+    """Lagrangian of one link as a module; a subclass writes down `kinetic` and `potential`.
+
+    A call link(q, qd) goes through hooks of torch; `torque`, `coefficients` and the calls of the whole robot
+    differentiate kinetic and potential energy apart, and call no module.
+    """
+
+    path: ClassVar[tuple[int, ...]] = ()
+    """Coordinates that the energies depend on, ascending, counted from 0."""
+    linear: ClassVar[bool] = False
+    """Whether the kinetic energy has terms linear in the velocities."""
+    parent: ClassVar["type[PartialLagrangian] | None"] = None
+    """Lagrangian of the link that carries this one, if their energies share work."""
+
+    def __init__(
+        self,
+        alone: Structure,
+        given: RunTimeValues,
+        before: "PartialLagrangian | None" = None,
+        learned: Collection[str] = (),
+    ) -> None:
+        """`alone` is the robot with this link only, `given` holds its run-time parameters.
+
+        `learned` names constants that are nn.Parameters. Modules of others that this one needs are no parts
+        of it, as each tensor has one owner.
+        """
+        super().__init__()
+        self._before = (before,)
+        self._backend = AutogradBackend(alone, (self,), given)
+        self._answers = self._backend.answers(check_finite=False)
+
+    @property
+    def before(self) -> Any:
+        """Module of the link that carries this one, None where their energies share no work."""
+        return self._before[0]
+
+    def kinetic(self, q: Values, qd: Values, p: Parameters) -> Any:
+        """Kinetic energy in J."""
+        raise NotImplementedError
+
+    def potential(self, q: Values, p: Parameters) -> Any:
+        """Potential energy in J."""
+        raise NotImplementedError
+
+    def forward(self, q: Tensor, qd: Tensor) -> Tensor:
+        """Lagrangian in J, shape (...); q and qd of shape (..., n)."""
+        q, qd = self._backend.arrays({"q": q, "qd": qd}, self._backend.structure.n)
+        return lagrangians((self,), q, qd, self._backend.seen_by(q))[0]
+
+    def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+        """tau_ij of this link j, the torque on each joint i through it, shape (..., n)."""
+        tau: Tensor = self._answers.partial_torque(q, qd, qdd)
+        return tau[..., 0]
+
+    def coefficients(self, q: Tensor, qd: Tensor) -> Coefficients[Tensor]:
+        """c2_ik and c1_ik (..., n, n) and g_i (..., n) of this link, in the closing convention."""
+        c2, c1, g = self._answers.coefficients(q, qd)
+        return Coefficients(c2[..., 0, :], c1[..., 0, :], g[..., 0])

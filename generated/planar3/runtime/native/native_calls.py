@@ -1,0 +1,205 @@
+"""Calls of the compiled C: arrays in, arrays out, large batches on several threads."""
+
+import ctypes
+import math
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..answers import answer_shapes
+from ..arguments import has_tensors
+from ..structure import Structure
+from .native_build import loaded
+from .native_desk import Desk, Desks, new_desk
+from .native_library import NumberArray, address, function, memory, place
+
+PER_THREAD = 1 << 20
+"""Bytes of results below which another thread costs more than it saves."""
+
+FUNCTIONS = {
+    "packed": "decomposition",
+    "packed_torque": "torque",
+    "packed_position_gradient": "position_gradient",
+    "position_gradient": "dense_position_gradient",
+    **{
+        call: call
+        for call in (
+            "partial_torque",
+            "inverse_dynamics",
+            "coefficients",
+            "propagation",
+            "gradient_propagation",
+            "regressor",
+            "coefficient_regressors",
+        )
+    },
+}
+"""What the calls are called in C."""
+
+AT_REST = ("coefficients", "coefficient_regressors")
+"""Calls that take no qdd."""
+
+
+@cache
+def pool(threads: int) -> ThreadPoolExecutor:
+    """Worker threads, shared by all robots; ctypes lets go of Python's lock while C runs."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="linkwise")
+
+
+# Threads don't survive a fork; the child starts its own.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=pool.cache_clear)
+
+
+def checked_threads(count: Any) -> int:
+    """How many threads a large batch may use; raises TypeError or ValueError for what is no such number."""
+    if isinstance(count, bool) or not isinstance(count, int | np.integer):
+        raise TypeError(f"threads is a {type(count).__name__}; give a whole number from 1 on")
+    if count < 1:
+        raise ValueError(f"threads is {count}; give a whole number from 1 on")
+    return int(count)
+
+
+class NativeCalls:
+    """The C functions of a package for given parameters; each parameter is one number for all samples.
+
+    `threads` is how many a large batch may use.
+    """
+
+    def __init__(
+        self, structure: Structure, sources: Path, parameters: Mapping[str, Any], threads: int | None = None
+    ) -> None:
+        """Compile at the first call for this package; raises RuntimeError where that cannot be.
+
+        threads: as many as there are cores unless given
+        """
+        self.structure, self.parameters = structure, dict(parameters)
+        self.sources = loaded(structure.name, sources)
+        self.threads_set, self._cores = threads, os.cpu_count() or 1
+        self.shapes = answer_shapes(structure)
+        self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
+        self._complete = {call: all(sizes) for call, sizes in self.sizes.items()}
+        self._widths = {call: sum(sizes) for call, sizes in self.sizes.items()}
+        self.learned = has_tensors(parameters.values())
+        self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
+        self.desks = Desks(structure.n, self._desk)
+        self._functions: dict[tuple[str, np.dtype[Any]], Any] = {}
+        self._function("packed", np.dtype("f8"))
+
+    @property
+    def threads(self) -> int:
+        """How many threads a large batch may use."""
+        return self.threads_set or self._cores
+
+    def run(
+        self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
+    ) -> Sequence[NumberArray]:
+        """Results of a call for arrays of one shape (..., n), written to `into`, or to new memory."""
+        q = motion[0]
+        kind, batch = q.dtype, q.shape[:-1]
+        count = q.size // q.shape[-1]
+        if count == 1 and into is None and not self.learned:
+            results = self.desks.results(call, motion)
+            return [a.reshape(*batch, *a.shape) for a in results] if batch else results
+        shapes = self.shapes[call]
+        if into is None:
+            into = [memory((*batch, *shape), kind) for shape in shapes]
+        if not count:
+            return into
+        compute = self._functions.get((call, kind)) or self._function(call, kind)
+        read = [plain(a) for a in motion]
+        if self.parameters:
+            read.append(self._numbers(kind) if self.learned else self._constants[kind])
+        sizes = self.sizes[call]
+        # A robot may have none of a kind; its functions then take no array for it.
+        written = into if self._complete[call] else [a for a, size in zip(into, sizes, strict=True) if size]
+        parts = min(self.threads, count * self._widths[call] * kind.itemsize // PER_THREAD)
+        if parts <= 1:
+            compute(count, *[place(a) for a in read], *[place(a) for a in written])
+            return into
+        width = kind.itemsize
+        arrays = [
+            *((address(a), q.shape[-1] * width) for a in read[: len(motion)]),
+            *((address(a), 0) for a in read[len(motion) :]),
+            *((address(a), size * width) for a, size in zip(written, filter(None, sizes), strict=True)),
+        ]
+        self._share(compute, count, arrays, parts, (read, into))
+        return into
+
+    def _desk(self, call: str, kind: "np.dtype[Any]") -> Desk:
+        """Memory for one sample of a call."""
+        compute = self._functions.get((call, kind)) or self._function(call, kind)
+        motion = np.empty((2 if call in AT_REST else 3, self.structure.n), kind)
+        constants = [self._constants[kind]] if self.parameters else []
+        return new_desk(compute, motion, constants, [np.empty(shape, kind) for shape in self.shapes[call]])
+
+    def constants(self, kind: "np.dtype[Any]") -> NumberArray:
+        """Values of parameters that stay as they are, in the order of the structure."""
+        return self._constants[kind]
+
+    def address(self, call: str, kind: "np.dtype[Any]") -> int:
+        """Where the C function of a call that has been made stands in memory."""
+        return ctypes.cast(self._functions[call, kind], ctypes.c_void_p).value or 0
+
+    def _function(self, call: str, kind: "np.dtype[Any]") -> Any:
+        """C function of a call for a dtype, compiled if it is not there yet."""
+        reads = 2 if call in AT_REST else 3
+        arrays = reads + bool(self.parameters) + sum(size > 0 for size in self.sizes[call])
+        found = self._functions[call, kind] = function(self.sources, FUNCTIONS[call], kind.str[1:], arrays)
+        return found
+
+    def _share(
+        self, compute: Any, count: int, arrays: Sequence[tuple[int, int]], parts: int, held: Any
+    ) -> None:
+        """Call a C function in several parts; `arrays` are addresses, and bytes from one sample to the next.
+
+        Threads take shares of the samples; shares of 16 fill blocks of either type. `held` are the arrays:
+        each part holds them, so that their memory lasts as long as it runs.
+        """
+        share = -(-count // parts // 16) * 16
+
+        def run(first: int, held: Any = held) -> None:
+            compute(min(share, count - first), *(start + first * step for start, step in arrays))
+
+        first, *others = range(0, count, share)
+        waiting: list[Future[None]] = []
+        try:
+            for start in others:
+                try:
+                    waiting.append(pool(self.threads).submit(run, start))
+                except RuntimeError:  # Python is ending, and starts no threads any more
+                    run(start)
+            run(first)
+        except BaseException:  # a signal, say
+            for future in waiting:
+                future.cancel()
+            raise
+        finally:
+            wait(waiting)  # nobody may write to memory that has been given back
+        for future in waiting:
+            future.result()
+
+    def _numbers(self, kind: "np.dtype[Any]") -> NumberArray:
+        """Parameters in the order of the structure; a tensor's value is the one it has now."""
+        for name in self.structure.parameters:
+            if np.shape(self.parameters[name]) != ():
+                raise ValueError(
+                    f"parameter {name!r} must be one number here; "
+                    "the numpy and torch back ends take one per sample"
+                )
+        return np.array([_number(self.parameters[name]) for name in self.structure.parameters], dtype=kind)
+
+
+def plain(a: NumberArray) -> NumberArray:
+    """An array, or a copy of it that lies in memory as C reads it."""
+    return a if a.flags.c_contiguous and a.flags.aligned else np.array(a, order="C")
+
+
+def _number(value: Any) -> float:
+    """A parameter's value as it is now, without its gradient."""
+    return float(value.detach() if has_tensors([value]) else value)

@@ -1,0 +1,202 @@
+"""Compiled C as torch operators, with gradients.
+
+Forward runs the C code; backward differentiates closed forms or rule in torch, which are there for that.
+"""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from ..answers import MOTION
+from ..arguments import too_many_axes
+from ..arrays.torch_backend import TorchBackend
+from ..interface import ClosedForms
+from ..rule.rule_calls import RigidRule
+from .native_build import Sources
+from .native_calls import NativeCalls
+from .native_library import NumberArray
+
+FLOATS = (torch.float64, torch.float32)
+
+Run = Callable[[str, Sequence[NumberArray], Sequence[NumberArray] | None], Sequence[NumberArray]]
+"""A call by name: motion, and where results go, or None."""
+
+OPERATED = {
+    "decomposition": "packed",
+    "torque": "packed_torque",
+    "position_gradient": "packed_position_gradient",
+}
+"""What torch is given as operators, from which all answers are composed, and what `NativeCalls` calls it."""
+
+OPERATORS: dict[tuple[Sources, str], Any] = {}
+"""Operators made so far; torch wants each to be made once."""
+
+
+class TorchSide(TorchBackend):
+    """What the native back end does with tensors."""
+
+    name: ClassVar = "native"
+
+    def __init__(
+        self, calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None
+    ) -> None:
+        super().__init__(calls.structure, links, calls.parameters, rule)
+        self.calls = calls
+        self._given = [value for value in calls.parameters.values() if torch.is_tensor(value)]
+        self.operators = {call: operator(calls, links, rule, call) for call in OPERATED}
+
+    def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
+        """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
+        motion = list(named.values())
+        q = motion[0]
+        plain = all(
+            type(t) is Tensor and t.is_cpu and t.layout is torch.strided and not t.is_nested for t in motion
+        )
+        alike = plain and q.dtype in FLOATS and q.shape[-1:] == (n,)
+        if not alike or not all(t.dtype == q.dtype and t.shape == q.shape for t in motion[1:]):
+            motion = list(super().arrays(named, n))
+            if not motion[0].is_cpu:
+                raise TypeError(
+                    f"the tensors lie on {motion[0].device}; this back end takes CPU tensors, torch takes all"
+                )
+        if _transformed(motion):
+            raise TypeError(
+                "this back end does not run inside torch.func or forward-mode differentiation; take torch"
+            )
+        return motion
+
+    def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
+        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
+        return list(self._run("decomposition", q, qd, qdd))
+
+    def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+        """tau (..., count) in the order of `Layout.torque`."""
+        return self._run("torque", q, qd, qdd)[0]
+
+    def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+        """c0 (..., count) in the order of `Layout.velocity`."""
+        return self._run("position_gradient", q, qd, qdd)[0]
+
+    def _run(self, call: str, q: Tensor, qd: Tensor, qdd: Tensor) -> tuple[Tensor, ...]:
+        if not self.needs_operators((q, qd, qdd)):
+            results: tuple[Tensor, ...] = compute(self.calls.run, OPERATED[call], (q, qd, qdd))
+            return results
+        names = self.structure.parameters
+        values = [self.parameters[name].to(q).reshape(()) for name in names]
+        p = torch.stack(values) if values else q.new_empty(0)
+        operated = self.operators[call](q, qd, qdd, p, self.calls.threads)
+        return operated if isinstance(operated, tuple) else (operated,)
+
+    def needs_operators(self, motion: Sequence[Tensor]) -> bool:
+        """Whether torch has to know what is computed: a gradient is recorded, or a program compiled."""
+        if torch.compiler.is_compiling():
+            return True
+        return torch.is_grad_enabled() and any(t.requires_grad for t in (*motion, *self._given))
+
+
+def compute(run: Run, call: str, motion: Sequence[Tensor], into: Sequence[Tensor] | None = None) -> Any:
+    """Results of the C code, which `run` calls with arrays, as tensors that share its memory."""
+    try:
+        arrays = [as_numbers(t) for t in motion]
+    except ValueError:  # of more than 64 axes
+        raise too_many_axes(dict(zip(MOTION, motion, strict=False)), motion[0].shape[-1]) from None
+    if into is None:
+        return tuple(torch.from_numpy(result) for result in run(call, arrays, None))
+    for t in into:
+        torch.autograd.graph.increment_version(t)  # so that no gradient is taken of what stood there
+    run(call, arrays, [as_numbers(t) for t in into])
+    return into
+
+
+def as_numbers(t: Tensor) -> NumberArray:
+    """The array that a CPU tensor's numbers are; it shares its memory, unless they are to be negated."""
+    return (t.detach() if t.requires_grad else t).resolve_neg().numpy()
+
+
+def operator(
+    calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
+) -> Any:
+    """Torch operator of a C function, with a gradient, made when first asked for."""
+    key = (calls.sources, call)
+    if key not in OPERATORS:
+        OPERATORS[key] = _define(calls, links, rule, call)
+    return OPERATORS[key]
+
+
+def _define(
+    calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
+) -> Any:
+    """Operator (q, qd, qdd, p, threads) -> results; p holds the parameters in the structure's order."""
+    structure, sources, sizes = calls.structure, calls.sources, calls.sizes[OPERATED[call]]
+
+    def values(p: Tensor) -> dict[str, Tensor]:
+        return dict(zip(structure.parameters, p.unbind(), strict=True))
+
+    def forward(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, threads: int) -> Any:
+        present = NativeCalls(structure, sources.directory, values(p.detach()), threads)
+        return _bare(compute(present.run, OPERATED[call], (q, qd, qdd)))
+
+    def fake(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, threads: int) -> Any:
+        return _bare(tuple(q.new_empty((*q.shape[:-1], size)) for size in sizes))
+
+    def setup(ctx: Any, inputs: Any, output: Any) -> None:
+        ctx.save_for_backward(*inputs[:-1])
+
+    def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
+        def again(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
+            return getattr(TorchBackend(structure, links, values(p), rule), call)(q, qd, qdd)
+
+        return (*_backward(again, ctx.saved_tensors, ctx.needs_input_grad[:-1], slopes), None)
+
+    results = ", ".join(["Tensor"] * len(sizes))
+    schema = f"(Tensor q, Tensor qd, Tensor qdd, Tensor p, int threads) -> ({results})"
+    made = torch.library.custom_op(f"{_namespace(sources)}::{call}", forward, mutates_args=(), schema=schema)
+    made.register_fake(fake)
+    made.register_autograd(backward, setup_context=setup)
+    return made
+
+
+def _backward(
+    again: Any, inputs: Sequence[Tensor], needed: Sequence[bool], slopes: Sequence[Tensor]
+) -> tuple[Tensor | None, ...]:
+    """Slopes of the inputs from those of the results, by computing these once more in torch."""
+    differentiable = torch.is_grad_enabled()
+    with torch.enable_grad():
+        fresh = [t if differentiable else t.detach().requires_grad_() for t in inputs]
+        results = again(*fresh)
+        results = results if isinstance(results, list) else [results]
+        pairs = [(r, s) for r, s in zip(results, slopes, strict=True) if r.requires_grad and s is not None]
+        wanted = [t for t, need in zip(fresh, needed, strict=True) if need]
+        reached, given = zip(*pairs, strict=True)
+        found = iter(
+            torch.autograd.grad(reached, wanted, given, create_graph=differentiable, allow_unused=True)
+        )
+    return tuple(next(found) if need else None for need in needed)
+
+
+def _transformed(motion: Sequence[Tensor]) -> bool:
+    """Whether a transformation that needs more than values is under way; it would be lost without a word."""
+    if torch.compiler.is_compiling():
+        return False
+    if torch._C._are_functorch_transforms_active():
+        return True
+    inside = torch.autograd.forward_ad._current_level >= 0
+    return inside and any(_has_tangent(t) for t in motion)
+
+
+def _has_tangent(t: Tensor) -> bool:
+    return torch.autograd.forward_ad.unpack_dual(t).tangent is not None  # type: ignore[no-untyped-call]
+
+
+def _bare(results: tuple[Tensor, ...]) -> Any:
+    """An operator with one result returns it by itself."""
+    return results if len(results) > 1 else results[0]
+
+
+def _namespace(sources: Sources) -> str:
+    """A namespace of torch operators for this package alone, also beside another of the same name."""
+    place = hashlib.sha256(f"{__name__} {sources.directory}".encode()).hexdigest()[:12]
+    return f"linkwise_{sources.name}_{place}"

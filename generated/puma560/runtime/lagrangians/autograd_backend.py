@@ -1,0 +1,119 @@
+"""Lagrangians differentiated by torch."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from ..answers import Answers
+from ..arrays.torch_backend import TorchBackend
+from ..structure import Structure
+from .dynamics_module import DynamicsModule
+from .energy_interface import Energies, Parameters, numbers_of
+from .functional_sweeps import decomposition_followed, position_gradient_followed, torque_followed
+from .graph_calls import graph_of, graph_parts_of
+from .recording import transformed
+from .run_time_values import RunTimeValues
+from .sweeps import decomposition, position_gradient, torque
+
+Call = Callable[..., Any]
+
+AT_A_TIME = 1 << 16
+"""Samples times lanes in one sweep, so that memory does not grow with the batch."""
+
+
+class AutogradBackend(TorchBackend):
+    """Partial torques and coefficients by differentiating each link's Lagrangian.
+
+    modules: of the links, in the order of j; given: the run-time parameters, which these share
+    """
+
+    name: ClassVar = "autograd"
+    face: ClassVar[Any] = DynamicsModule
+
+    def __init__(self, structure: Structure, modules: Iterable[Energies], given: RunTimeValues) -> None:
+        super().__init__(structure, (), {})
+        self.modules, self.given = modules, given
+        self.parameters: Any = given
+
+    def answers(self, check_finite: bool) -> Answers:
+        """The calls of `Dynamics`."""
+        return _Answers(self.structure, self, check_finite)
+
+    def numbers(self) -> Iterable[Tensor]:
+        """All tensors that the energies hang on, beside the motion."""
+        sources: dict[int, Any] = {id(self.given): self.given}
+        for link in self.modules:
+            at: Any = link
+            while at is not None and id(at) not in sources:
+                sources[id(at)] = at
+                at = at.before
+        return numbers_of(tuple(sources.values()))
+
+    def seen_by(self, q: Tensor) -> Parameters:
+        """Parameters and constants as a call computes with them."""
+        wanted = torch.is_grad_enabled() and any(t.requires_grad for t in self.numbers())
+        return Parameters(self._values(q), q[..., 0], wanted)
+
+    def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
+        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
+        parts: Sequence[Tensor] = self._of_links((decomposition, decomposition_followed), q, qd, qdd)
+        return parts
+
+    def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+        """tau (..., count) in the order of `Layout.torque`."""
+        tau: Tensor = self._of_links((torque, torque_followed), q, qd, qdd)
+        return tau
+
+    def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+        """c0 (..., count) in the order of `Layout.velocity`."""
+        c0: Tensor = self._of_links((position_gradient, position_gradient_followed), q, qd, qdd)
+        return c0
+
+    def graph(self, *asked: Any) -> Any:
+        """See `Dynamics.graph`."""
+        return graph_of(self, *asked)
+
+    def graph_parts(self, *asked: Any) -> Any:
+        """See `Dynamics.graph_parts`."""
+        return graph_parts_of(self, *asked)
+
+    def _of_links(self, calls: tuple[Call, Call], q: Tensor, qd: Tensor, qdd: Tensor) -> Any:
+        """What a function of sweeps.py makes of the Lagrangians, or its like where the call is followed."""
+        links, (sweep, followed) = tuple(self.modules), calls
+        if transformed():
+            return followed(links, self.seen_by(q), q, qd, qdd)
+        if torch.is_inference_mode_enabled():
+            # Nothing can be differentiated in that mode, and the answer would be zeros.
+            with torch.inference_mode(False), torch.no_grad():
+                return self._of_links(calls, q.clone(), qd.clone(), qdd.clone())
+        p, most = self.seen_by(q), max(1, AT_A_TIME // self.structure.sizes.tau)
+        if q[..., 0].numel() <= most:
+            return sweep(links, p, q, qd, qdd)
+        return _in_pieces(lambda some, *motion: sweep(links, some, *motion), p, (q, qd, qdd), most)
+
+
+def _in_pieces(call: Callable[..., Any], p: Parameters, motion: Sequence[Tensor], most: int) -> Any:
+    """What `call` makes of all samples, so many at a time."""
+    batch = motion[0].shape[:-1]
+    flat = [a.reshape(-1, a.shape[-1]) for a in motion]
+    values = {name: v.expand(batch).reshape(-1) if v.dim() else v for name, v in p.items()}
+    parts = []
+    for at in range(0, len(flat[0]), most):
+        own = [a[at : at + most] for a in flat]
+        some = {name: v[at : at + most] if v.dim() else v for name, v in values.items()}
+        parts.append(call(Parameters(some, own[0][..., 0], p.wanted), *own))
+    if torch.is_tensor(parts[0]):
+        return torch.cat(parts).reshape(*batch, -1)
+    return [torch.cat(part).reshape(*batch, part[0].shape[-1]) for part in zip(*parts, strict=True)]
+
+
+class _Answers(Answers):
+    """Calls that refuse `out` also where a constant of a link is learned."""
+
+    def read_beside_motion(self) -> Iterable[Any]:
+        """Tensors that results hang on, beside the motion."""
+        backend: Any = self._backend
+        tensors: Iterable[Any] = backend.numbers()
+        return tensors

@@ -1,0 +1,83 @@
+"""A robot whose links are torch modules, itself one."""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ..dynamics import Dynamics
+from ..interface import Backend
+from ..structure import Structure
+
+MADE_ANEW = ("backend", "layout", "_load", "_asked", "_answers")
+"""What a copy does not take over: it has its own."""
+
+
+class DynamicsModule(Dynamics, torch.nn.Module):
+    """`Dynamics` as an nn.Module: robot(q, qd, qdd) is `partial_torque`, links[j] is the module of link j.
+
+    A state_dict holds the numbers of each link as links.NAME.mass and so on, and run-time parameters as
+    values.NAME. What is changed there, or by `load_state_dict`, counts from the next call on. Calls compute
+    in the motion's dtype and on its device, wherever the modules are. Hooks see robot(q, qd, qdd) and
+    links[j](q, qd); the calls that have names go past them.
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        backend: Backend[Any],
+        load: Callable[..., Dynamics],
+        asked: tuple[Any, ...],
+        check_finite: bool = False,
+    ) -> None:
+        torch.nn.Module.__init__(self)
+        own: Any = backend
+        self.links, self.values = own.modules, own.given
+        Dynamics.__init__(self, structure, backend, load, asked, check_finite)
+
+    def forward(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+        """tau_ij, shape (..., n, N)."""
+        return self.partial_torque(q, qd, qdd)
+
+    @property
+    def parameters(self) -> Any:
+        """Run-time parameters by name; called, as of every nn.Module, the tensors to be learned."""
+        return _Parameters(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled, copied or sent to another process, it is loaded again there, with this one's modules."""
+        name, _, *asked = self._asked
+        state = {key: value for key, value in vars(self).items() if key not in MADE_ANEW}
+        return self._load, (name, None, *asked), state
+
+    def __setstate__(self, state: Any) -> None:
+        """Take over the modules of the robot that this one is a copy of, and whatever else was set there."""
+        vars(self).update(state)
+        kind: Any = type(self.backend)
+        own: Any = self.backend
+        self.backend = kind(own.structure, self.links, self.values)
+        self._answers = self.backend.answers(self.check_finite)
+
+
+class _Parameters(Mapping[str, Tensor]):
+    """`parameters` of Dynamics, a mapping, and of nn.Module, a call."""
+
+    def __init__(self, robot: DynamicsModule) -> None:
+        self._robot = robot
+
+    def __call__(self, recurse: bool = True) -> Iterator[torch.nn.Parameter]:
+        return torch.nn.Module.parameters(self._robot, recurse)
+
+    def __getitem__(self, name: str) -> Tensor:
+        value: Tensor = self._robot.values[name]
+        return value
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._robot.values.keys())
+
+    def __len__(self) -> int:
+        return len(self._robot.values.keys())
+
+    def __repr__(self) -> str:
+        return repr(dict(self))

@@ -1,0 +1,72 @@
+"""The modules of a robot's links, by number or by name."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, cast
+
+import torch
+
+from ..structure import Structure
+from .autograd_backend import AutogradBackend
+from .partial_lagrangian import PartialLagrangian
+from .rigid_lagrangian import RigidLagrangian
+from .run_time_values import RunTimeValues, attribute_names
+
+KINDS = ("mass", "com", "inertia", "place")
+"""Constants of rigid links."""
+
+
+class LinkModules(torch.nn.Module):
+    """links[j] with j from 0, or links["name"]; in a state_dict they have their names, without dots."""
+
+    def __init__(self, names: Iterable[str], modules: Iterable[PartialLagrangian]) -> None:
+        super().__init__()
+        self.names = tuple(names)
+        self._keys = attribute_names(self.names, self)
+        for key, module in zip(self._keys, modules, strict=True):
+            self.add_module(key, module)
+
+    def __getitem__(self, link: int | str) -> PartialLagrangian:
+        """Raises IndexError or KeyError for a link that is not there."""
+        if isinstance(link, str):
+            if link not in self.names:
+                raise KeyError(f"no link {link!r}; the links are {', '.join(self.names)}")
+            link = self.names.index(link)
+        if not -len(self.names) <= link < len(self.names):
+            raise IndexError(f"no link {link}; there are {len(self.names)}, counted from 0")
+        return cast(PartialLagrangian, self._modules[self._keys[link]])
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __iter__(self) -> Iterator[PartialLagrangian]:
+        return (self[j] for j in range(len(self)))
+
+
+def backend_of_links(
+    structure: Structure,
+    kinds: Sequence[type[PartialLagrangian]],
+    values: Mapping[str, Any],
+    requires_grad: bool | str | Iterable[str] = False,
+) -> AutogradBackend:
+    """The back end of one module a link, and these with it; `requires_grad` as the package's `load` says."""
+    rigid = any(issubclass(kind, RigidLagrangian) for kind in kinds)
+    learned = learned_names(requires_grad, values, rigid)
+    given, made = RunTimeValues(values, learned), dict[Any, PartialLagrangian]()
+    for j, kind in enumerate(kinds):
+        made[kind] = kind(structure.only(j), given, made.get(kind.parent), learned)
+    return AutogradBackend(structure, LinkModules(structure.link_names, made.values()), given)
+
+
+def learned_names(asked: bool | str | Iterable[str], parameters: Iterable[str], rigid: bool) -> set[str]:
+    """Names of constants and run-time parameters that become nn.Parameters.
+
+    Raises ValueError for a name that is none of them.
+    """
+    known = [*(KINDS if rigid else ()), *parameters]
+    if isinstance(asked, bool):
+        return set(known) if asked else set()
+    names = {asked} if isinstance(asked, str) else set(asked)
+    for name in sorted(names.difference(known), key=str):
+        there = f"choose among {', '.join(known)}" if known else "this package has no number to learn"
+        raise ValueError(f"requires_grad names {name!r}; {there}")
+    return names

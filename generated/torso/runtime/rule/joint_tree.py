@@ -1,0 +1,81 @@
+"""A robot's joints and what its links carry, as a package's tree.py lists them, and bodies in their place.
+
+A joint moves a frame whose z axis lies on the joint's axis. With q its coordinate, a revolute joint places
+the frame at `translation` in the frame of its parent, turned by `rotation` Rz(ratio q); a prismatic one at
+`translation` + `rotation` z ratio q.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Generic, NamedTuple
+
+from ..interface import Array
+
+Triple = tuple[float, float, float]
+Formula = Callable[[Any, Mapping[str, Any]], Any]
+"""A number's value, from the array namespace (numpy or torch) and the run-time parameters by name."""
+
+
+class TreeJoint(NamedTuple):
+    """A joint and the frame that it moves; joints that follow one coordinate share it, as mimic joints do."""
+
+    parent: int | None
+    """Index of the joint that carries it, None for the ground."""
+    kind: str
+    """revolute or prismatic."""
+    coordinate: int
+    """Index of q."""
+    ratio: float
+    rotation: tuple[Triple, Triple, Triple]
+    translation: Triple
+    """In m."""
+
+
+class TreeLink(NamedTuple):
+    """A rigid body, in the axes of the frame that its joint moves."""
+
+    name: str
+    joint: int
+    """Index of the joint that moves it."""
+    mass: float
+    """In kg."""
+    centre: Triple
+    """Centre of mass in m."""
+    inertia: tuple[Triple, Triple, Triple]
+    """About the centre of mass, in kg m^2."""
+
+
+@dataclass(frozen=True)
+class JointTree:
+    """Joints, parents first, links in the order of j, and gravity in m/s^2 in the axes of the base.
+
+    The numbers are those of the parameters' own values; those that hang on parameters have formulas, by their
+    place, such as links[2].mass or joints[0].translation[1].
+    """
+
+    gravity: Triple
+    joints: tuple[TreeJoint, ...]
+    links: tuple[TreeLink, ...]
+    formulas: Mapping[str, Formula] = field(default_factory=dict)
+
+    def chain(self, joint: int | None) -> tuple[int, ...]:
+        """Indices of the joints from the ground to `joint`, itself included."""
+        chain: list[int] = []
+        while joint is not None:
+            chain.append(joint)
+            joint = self.joints[joint].parent
+        return tuple(reversed(chain))
+
+
+class Bodies(NamedTuple, Generic[Array]):
+    """What the links carry, in the order of j; an axis of samples may stand before each shape.
+
+    Axes and origin are those of the link's own frame, z on the axis of its joint, as tree.py has them.
+    """
+
+    masses: Array
+    """In kg, (N,)."""
+    centres: Array
+    """Centres of mass in m, (N, 3)."""
+    inertias: Array
+    """About the centres of mass in kg m^2, (N, 3, 3); of each the symmetric part counts."""

@@ -1,0 +1,129 @@
+"""The numbers of a tree of joints as arrays: its own, formulas of run-time parameters, bodies in their place.
+
+Samples are innermost; what all of them share has one. See `kinematics` for `xp`.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arguments import precision
+from ..parameter_values import fits
+from .joint_tree import Bodies, JointTree
+
+SHAPES = {"masses": (), "centres": (3,), "inertias": (3, 3)}
+"""What `Bodies` holds of each link."""
+
+
+class TreeArrays(NamedTuple):
+    """The numbers of a tree."""
+
+    gravity: Any
+    """(3, 1, samples), in the base's axes."""
+    translations: Any
+    """Of each frame, and none of the ground, (3, frames, samples)."""
+    masses: Any
+    """(N, samples)"""
+    centres: Any
+    """(3, N, samples)"""
+    inertias: Any
+    """(3, 3, N, samples)"""
+
+
+def own_numbers(tree: JointTree) -> TreeArrays:
+    """The numbers as listed, in float64."""
+    return TreeArrays(
+        np.array(tree.gravity)[:, None, None],
+        np.array([*(joint.translation for joint in tree.joints), (0.0, 0.0, 0.0)]).T[..., None],
+        np.array([link.mass for link in tree.links])[:, None],
+        np.array([link.centre for link in tree.links]).T[..., None],
+        np.array([link.inertia for link in tree.links]).transpose(1, 2, 0)[..., None],
+    )
+
+
+def formula_sources(tree: JointTree) -> Any:
+    """For every number where it stands in all the listed ones followed by those of the formulas, flat."""
+    listed = {place: at for at, place in enumerate(_places(tree))}
+    sources = np.arange(len(listed))
+    for number, place in enumerate(tree.formulas):
+        sources[listed[place]] = len(listed) + number
+    return sources
+
+
+def _places(tree: JointTree) -> Iterator[str]:
+    """Names of the numbers in the order of `own_numbers`."""
+    frames, links = range(len(tree.joints) + 1), range(len(tree.links))
+    yield from (f"gravity[{i}]" for i in range(3))
+    yield from (f"joints[{f}].translation[{i}]" for i in range(3) for f in frames)
+    yield from (f"links[{j}].mass" for j in links)
+    yield from (f"links[{j}].centre[{i}]" for i in range(3) for j in links)
+    yield from (f"links[{j}].inertia[{i}][{k}]" for i in range(3) for k in range(3) for j in links)
+
+
+def with_formulas(
+    xp: Any, tree: JointTree, own: TreeArrays, sources: Any, p: Mapping[str, Any], batch: tuple[int, ...]
+) -> TreeArrays:
+    """The numbers for values of the parameters, each one for all samples or one for each, (...)."""
+    if not tree.formulas:
+        return own
+    values = [formula(xp, p) for formula in tree.formulas.values()]
+    if any(value.ndim for value in values):
+        columns = xp.stack([xp.broadcast_to(value, batch).reshape(-1) for value in values], 0)
+    else:
+        columns = xp.stack(values, 0)[:, None]
+    listed = xp.concat([a.reshape(-1, 1) for a in own], 0)
+    flat = xp.concat([xp.broadcast_to(listed, (len(listed), columns.shape[1])), columns], 0)[sources]
+    found, at = [], 0
+    for a in own:
+        shape = tuple(a.shape[:-1])
+        size = math.prod(shape)
+        found.append(flat[at : at + size].reshape(*shape, flat.shape[1]))
+        at += size
+    return TreeArrays(*found)
+
+
+def with_bodies(xp: Any, numbers: TreeArrays, bodies: Bodies[Any], batch: tuple[int, ...]) -> TreeArrays:
+    """The numbers with bodies in place of the tree's; they may have an axis for each of the batch."""
+    given = {}
+    for name, value in bodies._asdict().items():
+        own = len(SHAPES[name]) + 1
+        shape = tuple(value.shape[len(value.shape) - own :])
+        if value.ndim > own:
+            fits(f"bodies.{name}", value.shape[: value.ndim - own], batch)
+            value = xp.broadcast_to(value, (*batch, *shape)).reshape(-1, *shape)
+        else:
+            value = value[None]
+        # (samples, N, ...) -> (..., N, samples): N to the front, then both to the end, one axis after another
+        for axis in range(value.ndim - 1):
+            value = xp.swapaxes(value, axis, axis + 1)
+        for axis in range(value.ndim - 2):
+            value = xp.swapaxes(value, axis, axis + 1)
+        given[name] = value
+    return numbers._replace(**given)
+
+
+def checked_bodies(given: Any, links: int, read: Callable[[str, Any], Any]) -> Bodies[Any]:
+    """Bodies as `read` makes arrays or tensors of them by name; arrays are copied, tensors may be learned.
+
+    Raises TypeError for what is no number, and ValueError for a wrong shape.
+    """
+    if not isinstance(given, tuple) or len(given) != len(SHAPES):
+        raise TypeError(
+            f"bodies is {type(given).__name__}; give Bodies(masses, centres, inertias), such as the "
+            "package's bodies()"
+        )
+    values = {f"bodies.{name}": value for name, value in zip(SHAPES, given, strict=True)}
+    for (name, value), inner in zip(values.items(), SHAPES.values(), strict=True):
+        if value is None:
+            raise TypeError(f"{name} is None; give an array or a tensor of shape {(links, *inner)}")
+    values = {name: read(name, value) for name, value in values.items()}
+    precision(values, values)
+    for (name, value), inner in zip(values.items(), SHAPES.values(), strict=True):
+        shape = (links, *inner)
+        if tuple(value.shape[-len(shape) :]) != shape:
+            raise ValueError(
+                f"{name} has shape {tuple(value.shape)}; it must be {shape}, or that behind axes of samples"
+            )
+    return Bodies(*(a.copy() if isinstance(a, np.ndarray) else a for a in values.values()))

@@ -1,0 +1,65 @@
+"""What `Dynamics.graph` and `Dynamics.graph_parts` answer on the autograd back end."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ..recorded.recorded_torques import LinkEnergies, Part
+from ..recorded.torque_graph import TorqueGraph, torque_graphs
+from .energy_interface import Parameters
+
+Name = int | str
+Links = Name | Iterable[Name] | None
+ORDERS = "2 for acceleration, 1 for velocity, 0 for position and gravity"
+
+
+def graph_of(backend: Any, i: Name, j: Links, k: Name | None, m: int | None) -> TorqueGraph:
+    """See `Dynamics.graph`."""
+    joint, through = _place(backend, i, j)
+    if m not in (None, 0, 1, 2):
+        raise ValueError(f"m is {m!r}; choose {ORDERS}, or leave it away for all of them")
+    coordinate = None if k is None else _index("k", k, backend.structure.joint_names, "joint")
+    return torque_graphs(backend, _energies(backend), joint, through, [(coordinate, m)])[0]
+
+
+def graph_parts_of(backend: Any, i: Name, j: Links) -> tuple[TorqueGraph, ...]:
+    """See `Dynamics.graph_parts`."""
+    joint, through = _place(backend, i, j)
+    paths = [path for at in through if joint in (path := backend.structure.paths[at])]
+    coordinates = sorted({k for path in paths for k in path})
+    parts: list[Part] = [(k, m) for m in (2, 1) for k in coordinates]
+    found = torque_graphs(backend, _energies(backend), joint, through, [*parts, (None, 0)])
+    return tuple(one for one in found if one.output != 0.0)
+
+
+def _energies(backend: Any) -> Any:
+    def links(values: Mapping[str, Tensor]) -> list[LinkEnergies]:
+        # With numbers for constants: what is learned is seen as it is now.
+        p = Parameters(values, torch.zeros((), dtype=torch.float64), wanted=False)
+        return [
+            LinkEnergies(link.path, link.linear, partial(link.kinetic, p=p), partial(link.potential, p=p))
+            for link in backend.modules
+        ]
+
+    return links
+
+
+def _place(backend: Any, i: Name, j: Links) -> tuple[int, tuple[int, ...]]:
+    structure = backend.structure
+    joint = _index("i", i, structure.joint_names, "joint")
+    if j is None:
+        return joint, tuple(range(structure.N))
+    chosen = (j,) if isinstance(j, int | str) else j
+    return joint, tuple(_index("j", link, structure.link_names, "link") for link in chosen)
+
+
+def _index(argument: str, given: Name, names: Sequence[str], kind: str) -> int:
+    if isinstance(given, str) and given in names:
+        return names.index(given)
+    if isinstance(given, int) and not isinstance(given, bool) and 0 <= given < len(names):
+        return given
+    choice = f"by number, 0..{len(names) - 1}, or by name: {', '.join(names)}"
+    raise ValueError(f"{argument} is {given!r}; choose a {kind} {choice}")

@@ -1,0 +1,1 @@
+"""What torch computes while it differentiates, recorded operation by operation."""
