@@ -18,7 +18,7 @@ import torch
 from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode
 
-ENERGIES = str(Path(__file__).parents[1] / "energies")
+ENERGIES = str(Path(__file__).parents[2] / "energies")
 """Where the lines stand that operations come from."""
 FILLED = {"ones_like", "zeros_like", "full_like", "new_zeros", "new_ones", "new_full", "new_empty_strided"}
 """Operations whose results have a tensor's shape, and nothing of its values."""
