@@ -217,7 +217,8 @@ def test_json_and_graphml_hold_the_whole_graph(package_of: Packages) -> None:
     assert files.keys() == {"tau_1_2.json", "tau_1_2.graphml", "tau_1_2.dot"}
     data = json.loads(files["tau_1_2.json"])
     assert data == graph_json(graph)
-    assert [(p["coordinate"], p["order"], p["operations"]) for p in data["parts"]] == [
+    parts = data["graph"]["parts"]
+    assert [(p["coordinate"], p["order"], p["operations"]) for p in parts] == [
         (part.coordinate, part.order, len(part.operations)) for part in graph.parts
     ]
     values = {"q[0]": 0.3, "q[1]": 0.5, "qd[0]": 1.0, "qd[1]": 2.0, "qdd[0]": 3.0, "qdd[1]": 4.0}
@@ -228,14 +229,42 @@ def test_json_and_graphml_hold_the_whole_graph(package_of: Packages) -> None:
         "add": np.add,
         "mul": np.multiply,
     }
-    for node in data["nodes"]:
-        if node["kind"] == "operation":
-            values[node["key"]] = calls[node["name"]](*(values.get(a, a) for a in node["arguments"]))
-    torque = robot.partial_torque([0.3, 0.5, 0.0], [1.0, 2.0, 0.0], [3.0, 4.0, 0.0])[0, 1]
-    assert sum(values[part["output"]] for part in data["parts"]) == pytest.approx(float(torque), abs=1e-13)
     read = networkx.parse_graphml(files["tau_1_2.graphml"].decode(), force_multigraph=True)
-    assert set(read.nodes) == {node["key"] for node in data["nodes"]}
-    assert sorted(map(list, read.edges())) == sorted(data["edges"])
+    for key, node in read.nodes.items():
+        if node["kind"] == "operation":
+            values[key] = calls[node["name"]](*(values.get(a, a) for a in json.loads(node["arguments"])))
+    torque = robot.partial_torque([0.3, 0.5, 0.0], [1.0, 2.0, 0.0], [3.0, 4.0, 0.0])[0, 1]
+    assert json.loads(read.graph["parts"]) == parts
+    assert sum(values[part["output"]] for part in parts) == pytest.approx(float(torque), abs=1e-13)
+    linked = networkx.node_link_graph(data, edges="edges")
+    assert set(read.nodes) == set(linked.nodes)
+    assert sorted(read.edges(data="position")) == sorted(linked.edges(data="position"))
+
+
+@pytest.mark.parametrize(
+    ("k", "m", "name"),
+    [
+        (None, None, "tau_1_2"),
+        (0, None, "tau_1_2_motion_1"),
+        (0, 2, "tau_1_2_qdd_1"),
+        (None, 2, "tau_1_2_qdd"),
+    ],
+)
+def test_what_is_asked_for_names_the_files(
+    package_of: Packages, k: int | None, m: int | None, name: str
+) -> None:
+    robot = package_of("planar3").load("autograd")
+    wanted = None if k is None else robot.joint_names[k]
+    parts = [p for p in robot.graph_parts(0, 1) if wanted in (None, p.coordinate) and m in (None, p.order)]
+    assert graph_files(overlay(robot, 0, 1, parts), ["dot"]).keys() == {f"{name}.dot"}
+
+
+def test_a_value_added_to_itself_is_drawn_with_two_arrows(package_of: Packages) -> None:
+    robot = package_of("planar3").load("autograd")
+    graph = overlay(robot, 0, 1, robot.graph_parts(0, 1))
+    drawing = folded(graph, "none")
+    arrows = re.findall(r"^(n\d+ -> n\d+)", dot_text(graph, drawing), re.MULTILINE)
+    assert len(arrows) == sum(count for _, _, count in drawing.edges()) > len(set(arrows))
 
 
 @needs_graphviz

@@ -19,6 +19,8 @@ PLACES = {0: "", 1: "∂", 2: "∂²", 3: "∂³"}
 LIGHT = 0.6
 """Share of white in the colour of a velocity."""
 FONT = "DejaVu Sans"
+LOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+"""Letters of their own: browsers differ in how they set an SVG's text low, and all in how wide."""
 
 
 def dot_text(graph: Overlay, drawing: Drawing) -> str:
@@ -36,8 +38,12 @@ def dot_text(graph: Overlay, drawing: Drawing) -> str:
     lines.append(f"{{rank=same; {'; '.join(leaves)}}}")
     for a, b, count in drawing.edges():
         second = _subtracted(drawing.nodes[b], drawing, a)
-        marks = [f"penwidth={min(0.7 + 0.1 * (count - 1), 3):.2g}"] * (count > 1) + ["arrowhead=tee"] * second
-        lines.append(f"n{a} -> n{b} [{', '.join(marks)}];" if marks else f"n{a} -> n{b};")
+        # x + x and x · x have an arrow for each operand; of what is folded, one stands for all.
+        whole = len(drawing.nodes[b].inner) == 1
+        width = [f"penwidth={min(0.7 + 0.1 * (count - 1), 3):.2g}"] * (count > 1 and not whole)
+        marks = width + ["arrowhead=tee"] * second
+        arrow = f"n{a} -> n{b} [{', '.join(marks)}];" if marks else f"n{a} -> n{b};"
+        lines += [arrow] * (count if whole else 1)
     lines += _results(graph, drawing)
     return "\n".join([*lines, "}", ""])
 
@@ -151,8 +157,13 @@ def _subtracted(node: DrawnNode, drawing: Drawing, before: int) -> bool:
 
 
 def _written(text: str) -> str:
-    """A formula with its indices set low."""
-    return re.sub(r"_([\d,]+)", r"<SUB>\1</SUB>", html_text(text))
+    """A formula with its indices set low, and commas between them only where one has two digits."""
+
+    def low(found: re.Match[str]) -> str:
+        indices = found[1].split(",")
+        return ("," if any(len(index) > 1 for index in indices) else "").join(indices).translate(LOW)
+
+    return re.sub(r"_([\d,]+)", low, html_text(text))
 
 
 def _quoted(text: str) -> str:

@@ -40,18 +40,36 @@ def graph_files(graph: Overlay, formats: Iterable[str], fold: str | None = None)
 
 
 def file_name(graph: Overlay) -> str:
-    """tau_1_2 for τ_1,2; tau_1_2_qdd_1 for a part of it."""
+    """tau_1_2 for τ_1,2; tau_1_2_qdd_1 for a part of it, tau_1_2_motion_1 and tau_1_2_qdd for several."""
     words = ["tau", str(graph.joint + 1), *([] if graph.link is None else [str(graph.link + 1)])]
-    if len(graph.parts) == 1:
-        k, order = graph.coordinate(0), graph.parts[0].order
-        words += ["gravity"] if k is None else [MOTIONS[order or 0], str(k + 1)]
-    return "_".join(words)
+    coordinates = {graph.coordinate(number) for number in range(len(graph.parts))}
+    orders = {part.order for part in graph.parts}
+    k = coordinates.pop() if len(coordinates) == 1 else None
+    order = orders.pop() if len(orders) == 1 else None
+    if order is not None:
+        words.append("gravity" if k is None and order == 0 else MOTIONS[order])
+    elif k is not None:
+        words.append("motion")
+    return "_".join([*words, *([] if k is None else [str(k + 1)])])
 
 
 def graph_json(graph: Overlay) -> dict[str, Any]:
-    """The graph as JSON values: nodes have keys, the same in every graph of the robot; edges join these."""
+    """The graph as JSON values, in the node-link format that networkx and D3 read.
+
+    An id is the same in every graph of the robot; `position` numbers an operation's operands from 0.
+    """
     return {
-        "schema": 1,
+        "directed": True,
+        "multigraph": True,
+        "graph": _about(graph),
+        "nodes": [_node(graph, node) for node in graph.nodes.values()],
+        "edges": [{"source": a, "target": b, "position": at} for a, b, at in _edges(graph)],
+    }
+
+
+def _about(graph: Overlay) -> dict[str, Any]:
+    return {
+        "schema": 2,
         "robot": graph.robot,
         "torque": graph.torque,
         "joint": graph.joints[graph.joint],
@@ -66,13 +84,11 @@ def graph_json(graph: Overlay) -> dict[str, Any]:
             }
             for number, part in enumerate(graph.parts)
         ],
-        "nodes": [_node(graph, node) for node in graph.nodes.values()],
-        "edges": [[a, b] for a, b in _edges(graph)],
     }
 
 
 def _node(graph: Overlay, node: Any) -> dict[str, Any]:
-    shared = {"key": node.key, "shape": list(node.shape), "parts": list(graph.users[node.key])}
+    shared = {"id": node.key, "shape": list(node.shape), "parts": list(graph.users[node.key])}
     if not hasattr(node, "operands"):
         return shared | {"kind": node.kind, "name": node.name}
     return shared | {
@@ -93,19 +109,33 @@ def _argument(value: Any) -> Any:
     return value if value is None or isinstance(value, bool | int | float) else str(value)
 
 
-def _edges(graph: Overlay) -> list[tuple[str, str]]:
-    return [(a, key) for key, node in graph.nodes.items() for a in getattr(node, "operands", ())]
+def _edges(graph: Overlay) -> list[tuple[str, str, int]]:
+    """From, to, and which of the operands it is."""
+    return [
+        (a, key, at)
+        for key, node in graph.nodes.items()
+        for at, a in enumerate(getattr(node, "operands", ()))
+    ]
 
 
 def _graphml(graph: Overlay) -> bytes:
+    """Attributes that are lists, as the parts and an operation's arguments, are JSON texts."""
     networkx = extra("networkx")
-    found = networkx.MultiDiGraph(robot=printable(graph.robot), torque=graph.torque)
+    found = networkx.MultiDiGraph(**_flat(_about(graph)))
     for node in graph.nodes.values():
-        values = {k: v for k, v in _node(graph, node).items() if k not in ("key", "arguments")}
-        texts = {k: v if isinstance(v, int) else printable(str(v)) for k, v in values.items()}
-        found.add_node(printable(node.key), **texts)
-    found.add_edges_from((printable(a), b) for a, b in _edges(graph))
+        values = _flat(_node(graph, node))
+        found.add_node(values.pop("id"), **values)
+    found.add_edges_from((printable(a), b, {"position": at}) for a, b, at in _edges(graph))
     return "\n".join([*networkx.generate_graphml(found, named_key_ids=True), ""]).encode()
+
+
+def _flat(values: dict[str, Any]) -> dict[str, int | str]:
+    return {
+        key: value
+        if isinstance(value, int)
+        else printable(value if isinstance(value, str) else json_text(value))
+        for key, value in values.items()
+    }
 
 
 def _drawn(dot: str, kind: str) -> bytes:
