@@ -477,6 +477,23 @@ def test_a_lagrangian_that_is_not_the_one_that_a_user_wrote_fails(tmp_path: Path
     } <= failing
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("_times(_sum(column), 0.5)", "_times(_sum(column), 0.4)"),
+        ("self._at(self.inertia, k), self._qdd[k]) if m != 1", "0.0, 0.0) if m != 1"),
+    ],
+    ids=["a wrong factor", "a part left out"],
+)
+def test_graphs_of_parts_are_run_against_the_recursion(
+    old: str, new: str, every_text: Path, tmp_path: Path
+) -> None:
+    package = shutil.copytree(every_text, tmp_path / "planar2")
+    change_file(package, "runtime/recorded_torques.py", old, new)
+    failing = {name for name, mark in marks(package).items() if mark == "FAIL"}
+    assert failing == {"runtime", "autograd: graphs of parts of tau_ij against Newton-Euler recursion"}
+
+
 def test_without_torch_a_users_energies_are_held_against_their_own_torques_which_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

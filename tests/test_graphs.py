@@ -112,6 +112,34 @@ def test_parameters_are_leaves_and_get_gradients(package_of: Packages) -> None:
         torch.testing.assert_close(one, other, rtol=0, atol=1e-13)
 
 
+def test_what_is_learned_of_a_link_is_a_leaf_as_it_is_now_and_gets_gradients(package_of: Packages) -> None:
+    package = package_of("planar3")
+    robot, motion = package.load("autograd", requires_grad=("mass", "com")), random_states(3, 2)
+    part = robot.graph(0, 1, 0, 2)
+    assert [leaf.name for leaf in part.leaves if leaf.kind == "parameter"] == [
+        "links.link2.mass",
+        "links.link2.com[0]",
+        "links.link2.com[1]",
+    ]
+    learned = dict(robot.named_parameters())
+    with torch.no_grad():
+        learned["links.link2.mass"].fill_(0.9)
+        learned["links.link2.com"].copy_(torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64))
+    value = part.evaluate(*motion)
+    bodies = package.bodies()
+    bodies.masses[1], bodies.centres[1] = 0.9, [0.1, 0.2, 0.3]
+    bodies = type(bodies)(*(torch.from_numpy(a).requires_grad_() for a in bodies))
+    expected = package.load("torch", bodies=bodies).propagation(*motion).acceleration[:, 0, 1, 0]
+    torch.testing.assert_close(value, expected, rtol=0, atol=1e-13)
+    slopes = torch.autograd.grad(expected.sum(), bodies[:2])
+    names = ("links.link2.mass", "links.link2.com")
+    found = torch.autograd.grad(value.sum(), [learned[name] for name in names])
+    for one, other in zip(found, slopes, strict=True):
+        torch.testing.assert_close(one, other[1], rtol=0, atol=1e-13)
+    graph = overlay(robot, 0, 1, [part])
+    assert "links.link2.mass" in dot_text(graph, folded(graph))
+
+
 def test_any_batch_and_either_precision(package_of: Packages) -> None:
     robot, motion, share = held(package_of("planar3"), 6)
     part = robot.graph("joint1", "link3", "joint2", 1)

@@ -11,16 +11,22 @@ import numpy as np
 import pytest
 from answers import random_states, relative_error
 from conftest import DATA, PANDA
-from linkwise import LinkwiseError, generate, read_system, write_package
+from linkwise import (
+    Fitting,
+    LinkwiseError,
+    Options,
+    generate,
+    identify,
+    read_system,
+    write_package,
+)
 from linkwise.analysis import Lowpass, Processing, Reading
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.cli.app import app
-from linkwise.identify import identify
-from linkwise.identify.base_parameters import base_parameters
-from linkwise.identify.identification import Fitting
-from linkwise.identify.pseudo_inertia import pseudo_inertia
-from linkwise.identify.urdf_file import urdf_text
+from linkwise.identification.base_parameters import base_parameters
+from linkwise.identification.pseudo_inertia import pseudo_inertia
+from linkwise.identification.urdf_file import urdf_text
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 from linkwise.runtime.rule.joint_tree import Bodies
@@ -122,6 +128,46 @@ def test_base_parameters_of_a_planar_arm_are_the_textbooks(planar3: LoadedRobot)
         "Izz(link3)",
     ]
     assert base.units[:3] == ("kg m", "kg m", "kg m^2")
+
+
+def test_without_the_shoulders_torque_its_link_is_not_told(planar3: LoadedRobot, tmp_path: Path) -> None:
+    table = np.loadtxt(planar_log(planar3, tmp_path, noise=0.01), delimiter=",", skiprows=1)
+    log = write_csv(tmp_path / "two.csv", np.delete(table, 4, axis=1), (*JOINTS, *TORQUES[1:]))
+    found = identify(log, planar3, fitting=Fitting(unmeasured=("joint1",)))
+    whole = base_parameters(planar3.model)
+    assert found.base.hidden == tuple(whole.texts()[:3])
+    assert found.base.texts() == whole.texts()[3:]
+    assert (found.joints, found.unmeasured) == (("joint2", "joint3"), ("joint1",))
+    assert found.fit.noise == pytest.approx([0.01] * 2, rel=0.1)
+    off = found.fit.beta - found.base.combinations @ found.own.reshape(-1)
+    assert (np.abs(off) <= 5 * found.fit.beta_errors).all()
+    # What no torque tells of a link stays as the package has it.
+    assert found.physical.pi[0] == pytest.approx(found.own[0], rel=1e-3, abs=1e-6)
+
+
+def test_a_robot_on_a_floating_base_is_identified_without_the_grounds_forces(tmp_path: Path) -> None:
+    write_package(
+        generate(read_system(DATA / "crane.urdf", Options(base="floating")), ["numpy"]), tmp_path / "crane"
+    )
+    robot = load_robot(tmp_path / "crane")
+    base, joints = robot.joints[:6], robot.joints[6:]
+    t, q, qd, qdd = swings(9, 30, 100)
+    generator = np.random.default_rng(4)
+    pi, noise = other_bodies(own_parameters(robot)), np.array([0.01, 0.02, 0.03])
+    torque = np.einsum("sijp,jp->si", robot.model.regressor(q, qd, qdd)[:, 6:], pi)
+    torque += noise * generator.standard_normal(torque.shape)
+    names = [*robot.joints, *(f"{joint}_effort" for joint in joints)]
+    log = write_csv(tmp_path / "log.csv", np.column_stack([t, q, torque]), names)
+    found = identify(log, robot, fitting=Fitting(friction=False, unmeasured=base))
+    # All that joints do not tell of is one body: the base.
+    assert len(found.base.hidden) == 10
+    assert all("(ground)" in text.split()[0] for text in found.base.hidden)
+    assert found.base.count + 10 == base_parameters(robot.model).count
+    assert (found.errors(found.unseen)["fit"] <= 1.1 * noise).all()
+    assert (found.errors(found.unseen)["bodies"] <= 1.1 * noise).all()
+    off = (found.fit.beta - found.base.combinations @ pi.reshape(-1)) / found.fit.beta_errors
+    assert np.sqrt(np.mean(off**2)) <= 1.5
+    assert found.fit.noise == pytest.approx(noise, rel=0.1)
 
 
 def test_bodies_can_exist_where_least_squares_has_none(planar3: LoadedRobot, tmp_path: Path) -> None:
@@ -231,7 +277,29 @@ BAD: dict[str, tuple[Callable[[LoadedRobot, Path], dict[str, Any]], str]] = {
             "log": write_csv(folder / "log.csv", np.zeros((30, 4)) + np.arange(30)[:, None])
         },
         "no torque column for joint 'joint1', 'joint2', 'joint3'; call it 'tau/joint1' or 'joint1_moment', "
-        "or name it with --torque COLUMN=joint1",
+        "or name it with --torque COLUMN=joint1; where nothing measures it, as of a floating base, say so "
+        "with --unmeasured joint1",
+    ),
+    "no such joint to leave out": (
+        lambda robot, folder: {
+            "log": planar_log(robot, folder),
+            "fitting": Fitting(unmeasured=("elbow",)),
+        },
+        "--unmeasured elbow: there is no such joint; there are 'joint1', 'joint2', 'joint3'",
+    ),
+    "a torque of a joint that has none": (
+        lambda robot, folder: {
+            "log": planar_log(robot, folder),
+            "fitting": Fitting((("tau/joint1", "joint2"),), unmeasured=("joint2",)),
+        },
+        "--torque tau/joint1=joint2 and --unmeasured joint2 contradict each other; leave one out",
+    ),
+    "no joint with a torque": (
+        lambda robot, folder: {
+            "log": planar_log(robot, folder),
+            "fitting": Fitting(unmeasured=JOINTS),
+        },
+        "--unmeasured names every joint; at least one torque must be there",
     ),
     "a torque of no joint": (
         lambda robot, folder: {
@@ -261,6 +329,29 @@ BAD: dict[str, tuple[Callable[[LoadedRobot, Path], dict[str, Any]], str]] = {
         "--unseen 1: give a share of the log from 0 to 0.9",
     ),
 }
+
+
+def test_the_command_says_what_a_missing_torque_leaves_open(
+    planar3: LoadedRobot, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    log, out = planar_log(planar3, tmp_path, noise=0.01), tmp_path / "out"
+    package = str(directory_of("planar3"))
+    command = ["identify", str(log), "--robot", package, "--out", str(out), "--backend", "numpy"]
+    done = CliRunner().invoke(app, [*command, "--unmeasured", "joint1"])
+    assert "no joint for column 'tau/joint1'; leave such columns out with --ignore-extra" in str(
+        done.exception
+    )
+    done = CliRunner().invoke(app, [*command, "--unmeasured", "joint1", "--ignore-extra"])
+    assert done.exit_code == 0, done.output
+    hidden = "mcx(link1) + 0.25 m(link2) + 0.25 m(link3), mcy(link1), Izz(link1) + 0.0625 m(link2)"
+    assert f"no torque of joint1; not told without: {hidden}" in done.output
+    record = json.loads((out / "identified.json").read_text())
+    assert (record["unmeasured_joints"], len(record["hidden"])) == (["joint1"], 3)
+    assert list(record["joints"]) == ["joint2", "joint3"]
+    page = (out / "identified.md").read_text()
+    assert "Not measured, and left out of the fit: joint1." in page
+    assert f"which those measured do not tell by themselves: {hidden}" in page
+    assert (out / "planar3.urdf").read_text().count("<dynamics") == 2
 
 
 def energies(folder: Path) -> Path:

@@ -13,7 +13,7 @@ ROOMS = (
     "cli",
     "pipeline",
     "report",
-    "identify",
+    "identification",
     "analysis",
     "graphs",
     "check",

@@ -13,6 +13,7 @@ from linkwise.version import VERSION as __version__
 if TYPE_CHECKING:
     from linkwise.analysis import Analysis, Lowpass, Processing, Reading, analyze
     from linkwise.check import check_package
+    from linkwise.identification import Fitting, Identification, identify
     from linkwise.package.write import write_package
     from linkwise.pipeline import generate, read_system
     from linkwise.robot import Coordinate, Options, read_robot
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 __all__ = [
     "Analysis",
     "Coordinate",
+    "Fitting",
+    "Identification",
     "LinkEnergy",
     "LinkwiseError",
     "Lowpass",
@@ -34,6 +37,7 @@ __all__ = [
     "check_package",
     "energy_system",
     "generate",
+    "identify",
     "read_robot",
     "read_system",
     "write_package",
@@ -42,6 +46,8 @@ __all__ = [
 _ROOM_OF = {
     "Analysis": "analysis",
     "Coordinate": "robot",
+    "Fitting": "identification",
+    "Identification": "identification",
     "LinkEnergy": "symbolic.system",
     "Lowpass": "analysis",
     "Options": "robot",
@@ -52,6 +58,7 @@ _ROOM_OF = {
     "check_package": "check",
     "energy_system": "symbolic.user_energies",
     "generate": "pipeline",
+    "identify": "identification",
     "read_robot": "robot",
     "read_system": "pipeline",
     "write_package": "package.write",

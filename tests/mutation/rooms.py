@@ -157,7 +157,9 @@ ROOMS: dict[str, Room] = {
             "tests/test_analysis_page.py",
         ),
     ),
-    "identify": Room(_house("identify"), ("tests/test_identify.py", "tests/numeric/test_base_parameters.py")),
+    "identification": Room(
+        _house("identification"), ("tests/test_identify.py", "tests/numeric/test_base_parameters.py")
+    ),
     "robot": Room(
         (*_house("robot"), "generator/linkwise/robot/readers/*.py"),
         (

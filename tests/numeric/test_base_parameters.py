@@ -8,7 +8,7 @@ import pytest
 from answers import random_states
 from corpus import ROBOTS
 from linkwise import Options, generate, read_system, write_package
-from linkwise.identify.base_parameters import base_parameters
+from linkwise.identification.base_parameters import base_parameters
 from linkwise.package.load import open_package
 
 pytest.importorskip("pinocchio")

@@ -22,6 +22,7 @@ from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.own_process import Ended, in_own_process
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.parametric_tree import changed_values, check_bodies, tree_with
+from linkwise.check.recorded_parts import recorded_parts
 from linkwise.check.reference import Reference
 from linkwise.check.regressor_reference import regressor_calls, regressor_reference
 from linkwise.check.states import random_states
@@ -161,6 +162,8 @@ class _Checks:
                 yield Skipped(f"{way.label}{label}: not called", "its C is wrong, see above")
             else:
                 yield from against_reference(Named(f"{way.label}{label}", model, rows, reference), manifest)
+                if way.backend == "autograd":
+                    yield recorded_parts(Named(f"{way.label}{label}", model, rows, reference))
                 if regressors is not None and model.backend.rule is not None:
                     yield from regressor_calls(f"{way.label}{label}", model, regressors)
         if manifest.tree is not None:

@@ -73,7 +73,8 @@ def compare(
         errors = np.where(np.isnan(errors), np.inf, errors)
         if errors.max() > worst:
             worst, (_, *at) = float(errors.max()), np.unravel_index(errors.argmax(), errors.shape)
-            place = f"{entries.what}({', '.join(str(index + 1) for index in at)})"
+            indices = f"({', '.join(str(index + 1) for index in at)})" if at else ""
+            place = f"{entries.what}{indices}"
     detail = f"largest relative error {worst:.1e}"
     return Result(name, worst <= tolerance, worst, detail if worst <= tolerance else f"{detail} at {place}")
 

@@ -31,10 +31,9 @@ from linkwise.cli.log_options import (
     pairs,
 )
 from linkwise.escape import json_text, listed
-from linkwise.identify import Identification
-from linkwise.identify import identify as identified
-from linkwise.identify.identification import Fitting
-from linkwise.identify.identified_files import identified_files, record
+from linkwise.identification import Fitting, Identification
+from linkwise.identification import identify as identified
+from linkwise.identification.identified_files import identified_files, record
 from linkwise.output import require_writable, write_files
 from linkwise.package.manifest import Manifest
 from linkwise.package.write import refuse_inside_package
@@ -46,6 +45,10 @@ Torque = Annotated[
     typer.Option("--torque", metavar="COLUMN=JOINT", help="Column of a joint's torque; may be repeated"),
 ]
 Factor = Annotated[float, typer.Option(help="What brings torques to N m and forces to N: 0.001 for N mm")]
+Unmeasured = Annotated[
+    list[str] | None,
+    typer.Option("--unmeasured", metavar="JOINT", help="Joint without a torque; may be repeated"),
+]
 Friction = Annotated[bool, typer.Option("--friction/--no-friction", help="Viscous and Coulomb friction")]
 Unseen = Annotated[float, typer.Option(help="Share of the log, its end, to predict and not to fit")]
 
@@ -61,6 +64,7 @@ def identify(
     time: Time = None,
     mapping: Map = None,
     torque: Torque = None,
+    unmeasured: Unmeasured = None,
     torque_factor: Factor = 1.0,
     ignore_extra: IgnoreExtra = False,
     resample: Resample = None,
@@ -79,7 +83,8 @@ def identify(
     reading = Reading(units, time, pairs("--map", mapping or []), ignore_extra, resample)
     lowpass = chosen_lowpass(cutoff, filter_order, padding)
     processing = chosen_processing(derivative, window, degree, lowpass, "trim")
-    fitting = Fitting(pairs("--torque", torque or []), torque_factor, friction, unseen)
+    without = tuple(unmeasured or [])
+    fitting = Fitting(pairs("--torque", torque or []), torque_factor, friction, unseen, without)
     package = load_robot(robot, backend)
     refuse_inside_package(out)
     require_writable(out)
@@ -104,7 +109,10 @@ def _told(found: Identification, files: Sequence[Path]) -> Iterator[str]:
         f"{found.seen.rows:,} samples at {found.log.rate:.6g} Hz: {found.base.count} combinations of "
         f"{found.own.size} parameters, condition number {found.fit.condition:.3g}"
     )
-    for i, joint in enumerate(found.robot.joints):
+    if found.unmeasured:
+        hidden = f"; not told without: {listed(found.base.hidden)}" if found.base.hidden else ""
+        yield f"no torque of {listed(found.unmeasured)}{hidden}"
+    for i, joint in enumerate(found.joints):
         yield (
             f"{joint}: torque {sizes[i]:.3g}, error {errors['fit'][i]:.3g} {what}, by the bodies "
             f"{errors['bodies'][i]:.3g}, by the package {errors['package'][i]:.3g} (root mean squares)"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from linkwise.runtime.recorded.torque_graph import TorqueGraph
+    from linkwise.runtime.lagrangians.torque_graph import TorqueGraph
 
 DOTS = {0: "q", 1: "q\N{COMBINING DOT ABOVE}", 2: "q\N{COMBINING DIAERESIS}"}
 """Letters of a motion by its order."""

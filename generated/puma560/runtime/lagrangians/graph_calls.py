@@ -4,12 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-import torch
 from torch import Tensor
 
 from ..recorded.recorded_torques import LinkEnergies, Part
-from ..recorded.torque_graph import TorqueGraph, torque_graphs
-from .energy_interface import Parameters
+from .graph_leaves import seen_as_leaves
+from .torque_graph import TorqueGraph, torque_graphs
 
 Name = int | str
 Links = Name | Iterable[Name] | None
@@ -37,8 +36,7 @@ def graph_parts_of(backend: Any, i: Name, j: Links) -> tuple[TorqueGraph, ...]:
 
 def _energies(backend: Any) -> Any:
     def links(values: Mapping[str, Tensor]) -> list[LinkEnergies]:
-        # With numbers for constants: what is learned is seen as it is now.
-        p = Parameters(values, torch.zeros((), dtype=torch.float64), wanted=False)
+        p = seen_as_leaves(backend, values)
         return [
             LinkEnergies(link.path, link.linear, partial(link.kinetic, p=p), partial(link.potential, p=p))
             for link in backend.modules

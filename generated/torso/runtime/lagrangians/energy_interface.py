@@ -21,10 +21,17 @@ class Parameters(Mapping[str, Tensor]):
 
     like: one value a sample, shape (...), of the call's dtype and device
     wanted: whether the call's results may be differentiated by constants
+    learned: constants of links that are seen as these values, nested in lists, and not as what is held
     """
 
-    def __init__(self, values: Mapping[str, Tensor], like: Tensor, wanted: bool) -> None:
-        self._values, self.like, self.wanted = values, like, wanted
+    def __init__(
+        self,
+        values: Mapping[str, Tensor],
+        like: Tensor,
+        wanted: bool,
+        learned: Mapping[torch.nn.Module, Mapping[str, Any]] | None = None,
+    ) -> None:
+        self._values, self.like, self.wanted, self._learned = values, like, wanted, learned or {}
         self._followed = transformed() or _get_current_dispatch_mode() is not None
         self._constants: dict[torch.nn.Module, dict[str, Any]] = {}
 
@@ -44,8 +51,11 @@ class Parameters(Mapping[str, Tensor]):
         """
         if module not in self._constants:
             held = (*module._parameters.items(), *module._buffers.items())
+            known = self._learned.get(module, {})
             self._constants[module] = {
-                name: self._seen(tensor) for name, tensor in held if tensor is not None
+                name: known[name] if name in known else self._seen(tensor)
+                for name, tensor in held
+                if tensor is not None
             }
         return self._constants[module]
 

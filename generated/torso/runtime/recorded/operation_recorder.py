@@ -43,14 +43,14 @@ class Ref(NamedTuple):
 
 @dataclass(frozen=True)
 class Leaf:
-    """A motion, q[k], qd[k] or qdd[k] with k from 0, or a run-time parameter."""
+    """A motion, q[k], qd[k] or qdd[k] with k from 0, or one number that is a parameter."""
 
     key: str
     """The same for the same leaf of every graph."""
     kind: str
     """q, qd, qdd or parameter."""
     name: str
-    """Of the joint or the parameter."""
+    """Of the joint, the run-time parameter, or the entry of a link's nn.Parameter: links.link2.com[0]."""
     shape: tuple[int, ...] = ()
     """Of one sample."""
 
@@ -93,6 +93,11 @@ class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
         self._known: dict[Any, tuple[Ref, Tensor]] = {}
         self._sources: dict[int, str] = {}
         self._derivative = 0
+
+    @classmethod
+    def _should_skip_dynamo(cls) -> bool:
+        """Torch would import its compiler, for seconds, to hide this from it; nothing here is compiled."""
+        return False
 
     def leaf(self, leaf: Leaf, value: Tensor) -> Tensor:
         """Take a tensor for the value of a leaf; others that no operation made are constants."""

@@ -46,27 +46,32 @@ class RecordedParts:
 def record(
     structure: Structure,
     links: Callable[[Mapping[str, Tensor]], Iterable[LinkEnergies]],
-    parameters: Mapping[str, Tensor],
+    beside: Mapping[Leaf, Tensor],
     joint: int,
     parts: Iterable[Part],
 ) -> RecordedParts:
-    """Record parts of the torque on a joint, through the sum of these links, for run-time parameters."""
+    """Record parts of the torque on a joint, through the sum of some links.
+
+    links: energies, for the values of leaves by their keys; beside: those leaves that are no motion
+    """
     recorder, leaves = OperationRecorder(), dict[str, Leaf]()
 
-    def leaf(key: str, kind: str, name: str, value: float, varies: bool) -> Tensor:
-        leaves[key] = Leaf(key, kind, name)
+    def taken(leaf: Leaf, value: float, varies: bool = False) -> Tensor:
+        leaves[leaf.key] = leaf
         tensor = torch.tensor(value, dtype=torch.float64, device="cpu", requires_grad=varies)
-        return recorder.leaf(leaves[key], tensor)
+        return recorder.leaf(leaf, tensor)
 
     names = structure.joint_names
     with torch.inference_mode(False), torch.enable_grad():
         motion = [
-            [leaf(f"{kind}[{k}]", kind, name, 0.3 + 0.1 * k, kind != "qdd") for k, name in enumerate(names)]
+            [
+                taken(Leaf(f"{kind}[{k}]", kind, name), 0.3 + 0.1 * k, kind != "qdd")
+                for k, name in enumerate(names)
+            ]
             for kind in MOTIONS
         ]
         values = {
-            name: leaf(f"p[{name}]", "parameter", name, value.detach().reshape(-1)[0].item(), False)
-            for name, value in parameters.items()
+            leaf.key: taken(leaf, value.detach().reshape(-1)[0].item()) for leaf, value in beside.items()
         }
         energies = list(links(values))
         with recorder:

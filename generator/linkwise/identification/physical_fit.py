@@ -15,9 +15,9 @@ import numpy as np
 
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
-from linkwise.identify.base_parameters import NAMES, BaseParameters
-from linkwise.identify.fit import Fit
-from linkwise.identify.pseudo_inertia import pseudo_inertia
+from linkwise.identification.base_parameters import NAMES, BaseParameters
+from linkwise.identification.fit import Fit
+from linkwise.identification.pseudo_inertia import pseudo_inertia
 from linkwise.package.load import Array
 
 SPECK = 1e-6
@@ -29,7 +29,10 @@ SOLVED = ("Solved", "AlmostSolved")
 
 @dataclass(frozen=True, eq=False)
 class PhysicalFit:
-    """Parameters of links (N, 10), each of a body that can exist, and friction (n, 2), nowhere below 0."""
+    """Parameters of links (N, 10), each of a body that can exist, and friction (n, 2), nowhere below 0.
+
+    n are the joints whose torques are measured, as in `Fit`.
+    """
 
     pi: Array
     friction: Array

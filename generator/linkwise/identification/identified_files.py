@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from linkwise.escape import json_text, markdown
-from linkwise.identify.base_parameters import NAMES, UNITS
-from linkwise.identify.identification import Identification
-from linkwise.identify.pseudo_inertia import central
-from linkwise.identify.urdf_file import gravity_differs, urdf_text
+from linkwise.identification.base_parameters import NAMES, UNITS
+from linkwise.identification.identified_links import Identification
+from linkwise.identification.pseudo_inertia import central
+from linkwise.identification.urdf_file import gravity_differs, urdf_text
 from linkwise.package.manifest import Manifest
 
 COEFFICIENTS = {"rad": ("N m s/rad", "N m"), "m": ("N s/m", "N")}
@@ -20,7 +20,7 @@ def identified_files(found: Identification, manifest: Manifest, choices: dict[st
     """The files, by name; `choices` are recorded."""
     assert manifest.tree is not None
     pi = dict(zip(found.robot.links, found.physical.pi, strict=True))
-    friction = dict(zip(found.robot.joints, found.physical.friction, strict=True))
+    friction = dict(zip(found.joints, found.physical.friction, strict=True))
     urdf = urdf_text(manifest.name, manifest.tree, manifest.joints, pi, friction)
     texts = {
         "identified.json": json_text(record(found) | {"choices": choices}, indent=1) + "\n",
@@ -43,7 +43,7 @@ def record(found: Identification) -> dict[str, Any]:
             **{f"unseen_error_{what}": e[i] for what, e in found.errors(found.unseen).items()},
             **{f"seen_error_{what}": e[i] for what, e in found.errors(found.seen).items()},
         }
-        for i, name in enumerate(robot.joints)
+        for i, name in enumerate(found.joints)
     }
     own = found.base.combinations @ found.own.reshape(-1)
     base = [
@@ -65,6 +65,8 @@ def record(found: Identification) -> dict[str, Any]:
         "condition_number": fit.condition,
         "base_parameters": base,
         "joints": joints,
+        "unmeasured_joints": list(found.unmeasured),
+        "hidden": list(found.base.hidden),
         "links": links,
         "warnings": list(found.warnings),
     }
@@ -97,12 +99,16 @@ def _joints(found: Identification) -> Iterator[str]:
     seen, unseen = found.errors(found.seen), found.errors(found.unseen)
     shown = unseen if found.unseen.rows else seen
     columns = (found.seen.sizes(), seen["fit"], unseen["fit"], shown["bodies"], shown["package"])
-    for i, (name, unit) in enumerate(zip(found.robot.joints, found.robot.units, strict=True)):
+    units = [found.robot.units[i] for i in found.log.measured]
+    for i, (name, unit) in enumerate(zip(found.joints, units, strict=True)):
         numbers = [f"{column[i]:.3g}" for column in columns]
         numbers[2] = numbers[2] if found.unseen.rows else "-"
         rubs = zip(found.fit.friction[i], found.fit.friction_errors[i], strict=True)
         cells = [markdown(name), *numbers, *(f"{f:.4g} ± {e:.1g}" for f, e in rubs)]
         yield f"| {' | '.join([*cells, ', '.join(COEFFICIENTS[unit])])} |"
+    if found.unmeasured:
+        yield ""
+        yield f"Not measured, and left out of the fit: {', '.join(map(markdown, found.unmeasured))}."
 
 
 def _base(found: Identification) -> Iterator[str]:
@@ -113,6 +119,12 @@ def _base(found: Identification) -> Iterator[str]:
     rows = zip(found.base.texts(), found.fit.beta, found.fit.beta_errors, own, found.base.units, strict=True)
     for text, value, error, before, unit in rows:
         yield f"| {markdown(text)} | {value:.5g} | {error:.1g} | {before:.5g} | {unit} |"
+    if found.base.hidden:
+        yield ""
+        yield (
+            "Torques of all joints would tell these too, which those measured do not tell by themselves: "
+            f"{', '.join(map(markdown, found.base.hidden))}."
+        )
     yield ""
     yield (
         f"{', '.join(NAMES)}(link): mass, first moment, and inertia about the origin of the link's frame, "

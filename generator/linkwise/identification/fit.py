@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from linkwise.errors import LinkwiseError
-from linkwise.identify.base_parameters import SPEED, BaseParameters
-from linkwise.identify.normal_factors import JointEquations
+from linkwise.identification.base_parameters import SPEED, BaseParameters
+from linkwise.identification.normal_factors import JointEquations
 from linkwise.package.load import Array
 
 ROUNDS = 3
@@ -24,7 +24,10 @@ POOR, WORST = 30.0, 1000.0
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What a log says of base parameters (base,) and friction (n, 2), viscous and Coulomb, zeros for none."""
+    """What a log says of base parameters (base,) and friction (n, 2), viscous and Coulomb, zeros for none.
+
+    n are the joints whose torques are measured, in the robot's order.
+    """
 
     beta: Array
     friction: Array

@@ -11,8 +11,8 @@ import numpy as np
 
 from linkwise.analysis.derivatives import derivatives
 from linkwise.analysis.settings import Processing
-from linkwise.identify.base_parameters import BaseParameters
-from linkwise.identify.torque_log import TorqueLog
+from linkwise.identification.base_parameters import BaseParameters
+from linkwise.identification.torque_log import TorqueLog
 from linkwise.package.load import Array, Model
 from linkwise.progress import Progress
 
@@ -22,7 +22,10 @@ NUMBERS = 1 << 23
 
 @dataclass(frozen=True)
 class JointEquations:
-    """Triangles (n, base + 3, base + 3) of every joint's equations, and how many rows each stands for."""
+    """Triangles (n, base + 3, base + 3) of equations, and how many rows each stands for.
+
+    n here and below are the joints whose torques are measured, in the robot's order.
+    """
 
     triangles: Array
     rows: int
@@ -50,20 +53,20 @@ def joint_equations(
 ) -> JointEquations:
     """Equations of samples span[0] to span[1] - 1."""
     n, columns, start = log.q.shape[1], base.combinations.shape[1], span[0]
-    triangles = np.zeros((n, base.count + 3, base.count + 3))
+    triangles = np.zeros((len(log.measured), base.count + 3, base.count + 3))
     picked = np.array(base.picked, dtype=np.intp)
     for first, last in _blocks(span, max(1, NUMBERS // (n * columns))):
         q, qd, qdd = derivatives(log.q, log.rate, first, last, processing)
         y = model.regressor(q, qd, qdd).reshape(last - first, n, columns)
-        for i in range(n):
+        for at, i in enumerate(log.measured):
             own = (
                 y[:, i, picked],
                 qd[:, i : i + 1],
                 np.sign(qd[:, i : i + 1]),
-                log.torque[first:last, i : i + 1],
+                log.torque[first:last, at : at + 1],
             )
-            stacked = np.concatenate([triangles[i], np.concatenate(own, axis=1)])
-            triangles[i] = np.linalg.qr(stacked, mode="r")
+            stacked = np.concatenate([triangles[at], np.concatenate(own, axis=1)])
+            triangles[at] = np.linalg.qr(stacked, mode="r")
         progress("fitting", last - start, span[1] - start)
     return JointEquations(triangles, span[1] - start)
 

@@ -5,8 +5,12 @@
 The regressor of many random motions has dependent columns. QR with column pivoting picks independent ones,
 Y P = Q [R1 R2], and the others are their combinations, Y2 = Y1 R1^-1 R2: so with pi1 the picked parameters
 Y pi = Y1 beta, beta = pi1 + R1^-1 R2 pi2, whatever the motion.
+
+Where some joints' torques are not measured, their rows are left out: Y1 of the others, in turn, has dependent
+columns, and the same is done once more, with beta for pi.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +48,8 @@ class BaseParameters:
     """Root mean square of the picked columns of the regressor over random motions, (base,)."""
     condition: float
     """Condition number of these columns, each divided by its size: that of a good motion."""
+    hidden: tuple[str, ...]
+    """Combinations, as texts, that torques of all joints would tell, and the measured ones do not alone."""
 
     @property
     def count(self) -> int:
@@ -57,42 +63,52 @@ class BaseParameters:
 
     def texts(self) -> list[str]:
         """Each as a sum of the links' parameters, such as m(upper) + 2.5 mcx(lower)."""
-        return [self._text(row, own) for row, own in zip(self.combinations, self.picked, strict=True)]
-
-    def _text(self, row: Array, own: int) -> str:
-        others = [at for at in np.flatnonzero(row).tolist() if at != own]
-        return " ".join([self.name(own), *(_term(row[at], self.name(at)) for at in others)])
-
-    def name(self, at: int) -> str:
-        """Name of a parameter of pi."""
-        link, which = divmod(at, len(NAMES))
-        return f"{NAMES[which]}({self.links[link]})"
+        rows = zip(self.combinations, self.picked, strict=True)
+        return [combination_text(self.links, row, own) for row, own in rows]
 
 
-def base_parameters(model: Model) -> BaseParameters:
-    """Base parameters of a robot, by random motions of up to SPEED; raises as its `regressor` does."""
+def base_parameters(model: Model, measured: Sequence[int] | None = None) -> BaseParameters:
+    """Base parameters of a robot, by random motions of up to SPEED; raises as its `regressor` does.
+
+    measured: joints, counted from 0, whose torques there are, in any order; all if not given
+    """
     links, n = tuple(model.link_names), len(model.joint_names)
     columns = len(NAMES) * len(links)
     generator = np.random.default_rng(0)
     q = generator.uniform(-np.pi, np.pi, (-(-ROWS * columns // n) + ROWS, n))
     qd, qdd = generator.uniform(-SPEED, SPEED, (2, *q.shape))
-    rows = model.regressor(q, qd, qdd).reshape(-1, columns)
-    picked, rest, shares = _independent(rows)
-    combinations = np.zeros((len(picked), columns))
+    rows = model.regressor(q, qd, qdd).reshape(len(q), n, columns)
+    picked, combinations = _combinations(rows.reshape(-1, columns), np.arange(columns))
+    hidden: tuple[str, ...] = ()
+    if measured is not None and len(measured) < n:
+        every, rows = picked, rows[:, list(measured)]
+        among, shares = _combinations(rows[:, :, every].reshape(-1, len(every)), every)
+        lost = np.setdiff1d(np.arange(len(every)), among)
+        hidden = tuple(combination_text(links, combinations[at], int(every[at])) for at in lost)
+        picked, combinations = every[among], shares @ combinations
+    shown = rows.reshape(-1, columns)[:, picked]
+    sizes = np.sqrt(np.mean(shown**2, axis=0))
+    condition = float(np.linalg.cond(shown / sizes))
+    return BaseParameters(links, tuple(picked.tolist()), combinations, sizes, condition, hidden)
+
+
+def _combinations(rows: Array, names: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
+    """Independent columns, ascending, and which combinations of all they stand for, (independent, columns).
+
+    names: positions in pi of what the columns are named after
+    """
+    picked, rest, shares = _independent(rows, np.where(names % len(NAMES), 1.0, LATER))
+    combinations = np.zeros((len(picked), rows.shape[1]))
     combinations[np.arange(len(picked)), picked] = 1.0
     combinations[:, rest] = shares
     order = np.argsort(picked)
-    shown = rows[:, picked[order]]
-    sizes = np.sqrt(np.mean(shown**2, axis=0))
-    condition = float(np.linalg.cond(shown / sizes))
-    return BaseParameters(links, tuple(picked[order].tolist()), combinations[order], sizes, condition)
+    return picked[order], combinations[order]
 
 
-def _independent(rows: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+def _independent(rows: Array, weights: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Independent columns, the others, and these as combinations of those, (picked, others)."""
     sizes = np.sqrt(np.mean(rows**2, axis=0))
     sizes[sizes <= NOTHING * sizes.max(initial=0.0)] = np.inf  # what no motion shows
-    weights = np.where(np.arange(len(sizes)) % len(NAMES), 1.0, LATER)
     sizes = sizes / weights
     r, order = extra("scipy.linalg").qr(rows / sizes, mode="r", pivoting=True)
     diagonal = np.abs(np.diag(r))
@@ -102,6 +118,17 @@ def _independent(rows: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array
     shares[np.abs(shares) < NOTHING] = 0.0
     scaled = shares * np.where(np.isinf(sizes[rest]), 0.0, sizes[rest]) / sizes[picked][:, None]
     return picked, rest, scaled
+
+
+def combination_text(links: Sequence[str], row: Array, own: int) -> str:
+    """A combination (10 N,) named after the parameter at `own`."""
+
+    def name(at: int) -> str:
+        link, which = divmod(at, len(NAMES))
+        return f"{NAMES[which]}({links[link]})"
+
+    others = [at for at in np.flatnonzero(row).tolist() if at != own]
+    return " ".join([name(own), *(_term(row[at], name(at)) for at in others)])
 
 
 def _term(factor: float, name: str) -> str:

@@ -9,9 +9,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from ..recorded.operation_recorder import Leaf, Operation, Ref, mapped
+from ..recorded.recorded_torques import LinkEnergies, Part, RecordedParts, record
 from ..structure import Structure
-from .operation_recorder import Leaf, Operation, Ref, mapped
-from .recorded_torques import LinkEnergies, Part, RecordedParts, record
+from .graph_leaves import learned_entries, leaves_beside_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +61,8 @@ class TorqueGraph:
     def evaluate(self, q: Any, qd: Any, qdd: Any) -> Tensor:
         """The torque (...) for a motion (..., n), by these operations alone; gradients flow through it.
 
-        Motion is what the calls of the robot take, and refused likewise.
+        Motion is what the calls of the robot take, and refused likewise. Parameters, which are leaves, have
+        the values that they have now; all other numbers of the links those of when the graph was made.
         """
         backend, n = self.backend, self.backend.structure.n
         motion = dict(zip(("q", "qd", "qdd"), backend.arrays({"q": q, "qd": qd, "qdd": qdd}, n), strict=True))
@@ -70,6 +72,7 @@ class TorqueGraph:
         columns = {kind: values.unbind(-1) for kind, values in motion.items()}
         named = {f"{kind}[{k}]": column for kind in columns for k, column in enumerate(columns[kind])}
         named |= {f"p[{name}]": value for name, value in values.items()}
+        named |= {name: value.to(like) for name, value in learned_entries(backend).items()}
         given = [named[leaf.key] for leaf in self.leaves]
         if all(node.pointwise for node in self.operations):
             result = self.module(*given)
@@ -115,7 +118,7 @@ def torque_graphs(
         every = list(links(values))
         return [every[j] for j in through]
 
-    recorded = record(structure, chosen, backend.parameters, joint, parts)
+    recorded = record(structure, chosen, leaves_beside_motion(backend), joint, parts)
     names = structure.joint_names
     return tuple(
         TorqueGraph(

@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from linkwise.escape import printable
-from linkwise.identify.pseudo_inertia import central
+from linkwise.identification.pseudo_inertia import central
 from linkwise.package.entries import BodyEntry, JointEntry, RigidTree
 from linkwise.package.load import Array
 

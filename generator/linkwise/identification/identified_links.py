@@ -9,11 +9,11 @@ import numpy as np
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.analysis.settings import Processing, Reading
 from linkwise.errors import LinkwiseError, within
-from linkwise.identify.base_parameters import BaseParameters, base_parameters
-from linkwise.identify.fit import POOR, Fit, weighted_fit
-from linkwise.identify.normal_factors import JointEquations, joint_equations
-from linkwise.identify.physical_fit import PhysicalFit, physical_fit
-from linkwise.identify.torque_log import TorqueLog, read_torque_log
+from linkwise.identification.base_parameters import BaseParameters, base_parameters
+from linkwise.identification.fit import POOR, Fit, weighted_fit
+from linkwise.identification.normal_factors import JointEquations, joint_equations
+from linkwise.identification.physical_fit import PhysicalFit, physical_fit
+from linkwise.identification.torque_log import TorqueLog, read_torque_log
 from linkwise.package.load import Array
 from linkwise.progress import Progress, silent
 from linkwise.runtime.rule.joint_tree import Bodies
@@ -28,13 +28,15 @@ class Fitting:
     """What is fitted: which columns of the log are torques, as (column, joint) pairs, and how.
 
     factor: what brings torques to N m, and forces to N; unseen: share of the log, at its end, that is left
-    out of the fit and predicted by it. Raises LinkwiseError for values that cannot be.
+    out of the fit and predicted by it; unmeasured: joints whose torques nobody knows, such as the coordinates
+    of a floating base, on which the ground acts. Raises LinkwiseError for values that cannot be.
     """
 
     torques: tuple[tuple[str, str], ...] = ()
     factor: float = 1.0
     friction: bool = True
     unseen: float = 0.2
+    unmeasured: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 <= self.unseen <= 0.9:
@@ -60,6 +62,16 @@ class Identification:
     unseen: JointEquations
     """Equations of the part of the log that was fitted, and of the rest."""
     warnings: tuple[str, ...]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints whose torques are measured, in the robot's order: those of fit, friction and errors."""
+        return tuple(self.robot.joints[i] for i in self.log.measured)
+
+    @property
+    def unmeasured(self) -> tuple[str, ...]:
+        """The other joints."""
+        return tuple(joint for joint in self.robot.joints if joint not in self.joints)
 
     def errors(self, equations: JointEquations) -> dict[str, Array]:
         """Root mean square error of each joint's torque: of the fit, of its bodies, and of the package."""
@@ -88,8 +100,9 @@ def identify(
     loaded = robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot))
     own = _own_parameters(loaded)
     reading, processing, fitting = reading or Reading(), processing or Processing(), fitting or Fitting()
-    read = read_torque_log(Path(log), loaded, reading, processing, fitting.torques, fitting.factor, progress)
-    base = base_parameters(loaded.model)
+    torques = fitting.torques, fitting.unmeasured, fitting.factor
+    read = read_torque_log(Path(log), loaded, reading, processing, *torques, progress)
+    base = base_parameters(loaded.model, read.measured)
     end = read.stop - round(fitting.unseen * (read.stop - read.start))
     seen, unseen = (
         joint_equations(read, span, loaded.model, base, processing, progress)
@@ -98,7 +111,8 @@ def identify(
     with within(str(log)):
         _refuse_few(seen, base, fitting)
         fit = weighted_fit(seen, base, fitting.friction)
-        warnings = (*_units(seen, base, own, loaded.joints), *_poor(fit, base))
+        joints = [loaded.joints[i] for i in read.measured]
+        warnings = (*_units(seen, base, own, joints), *_poor(fit, base))
         physical = physical_fit(fit, base, own, fitting.friction)
     return Identification(loaded, read, base, fit, physical, own, seen, unseen, (*read.warnings, *warnings))
 

@@ -27,12 +27,15 @@ STILL = 0.01
 
 @dataclass(frozen=True, eq=False)
 class TorqueLog:
-    """Evenly spaced samples: positions `q` (S, n) in rad or m, filtered, and torques (S, n) as measured."""
+    """Evenly spaced samples: positions `q` (S, n) in rad or m, filtered, and torques as measured."""
 
     source: str
     rate: float
     q: Array
+    measured: tuple[int, ...]
+    """Joints, counted from 0 and ascending, whose torques there are."""
     torque: Array
+    """(S, measured)."""
     start: int
     stop: int
     """First sample to use, and the one after the last: derivatives may need those beyond."""
@@ -46,16 +49,21 @@ def read_torque_log(
     reading: Reading,
     processing: Processing,
     torques: Sequence[tuple[str, str]],
+    unmeasured: Sequence[str],
     factor: float,
     progress: Progress,
 ) -> TorqueLog:
     """Read a log; `torques` are (column, joint) pairs, and `factor` brings these columns to N m (N).
 
-    Raises LinkwiseError for a joint without a torque, or one that stands still.
+    Raises LinkwiseError for a joint without a torque that is not `unmeasured`, and for one with a torque that
+    stands still.
     """
+    measured = _measured(robot.joints, torques, unmeasured)
     with within(str(path)):
-        columns = _torque_columns(open_log(path).columns, robot.joints, torques)
-    names = tuple(f"torque of {joint}" for joint in robot.joints)
+        columns = _torque_columns(
+            open_log(path).columns, robot.joints, [robot.joints[i] for i in measured], torques
+        )
+    names = tuple(f"torque of {robot.joints[i]}" for i in measured)
     mapping = (*reading.mapping, *zip(columns, names, strict=True))
     samples = read_samples(
         path,
@@ -71,8 +79,29 @@ def read_torque_log(
         if processing.lowpass is not None:
             lowpass(q, samples.rate, processing.lowpass)
             start, stop = _settled(start, stop, samples.rate, processing.lowpass)
-        _refuse_still(q[start:stop], robot)
-    return TorqueLog(path.name, samples.rate, q, torque, start, stop, samples.warnings, samples.ignored)
+        _refuse_still(q[start:stop], robot, measured)
+    told = samples.warnings, samples.ignored
+    return TorqueLog(path.name, samples.rate, q, measured, torque, start, stop, *told)
+
+
+def _measured(
+    joints: Sequence[str], torques: Sequence[tuple[str, str]], unmeasured: Sequence[str]
+) -> tuple[int, ...]:
+    """Joints that must have a torque, from 0; LinkwiseError where what is asked for cannot be."""
+    for joint in unmeasured:
+        if joint not in joints:
+            raise LinkwiseError(
+                f"--unmeasured {joint}: there is no such joint; there are {listed(map(repr, joints))}"
+            )
+    for column, joint in torques:
+        if joint in unmeasured:
+            raise LinkwiseError(
+                f"--torque {column}={joint} and --unmeasured {joint} contradict each other; leave one out"
+            )
+    found = tuple(i for i, joint in enumerate(joints) if joint not in unmeasured)
+    if not found:
+        raise LinkwiseError("--unmeasured names every joint; at least one torque must be there")
+    return found
 
 
 def _settled(start: int, stop: int, rate: float, filtered: Lowpass) -> tuple[int, int]:
@@ -87,9 +116,9 @@ def _settled(start: int, stop: int, rate: float, filtered: Lowpass) -> tuple[int
 
 
 def _torque_columns(
-    columns: Sequence[str], joints: Sequence[str], torques: Sequence[tuple[str, str]]
+    columns: Sequence[str], joints: Sequence[str], measured: Sequence[str], torques: Sequence[tuple[str, str]]
 ) -> list[str]:
-    """Name of each joint's torque column, in the robot's order."""
+    """Name of the torque column of each joint that is measured, in order."""
     given = {joint: column for column, joint in torques}
     for joint, column in given.items():
         if joint not in joints or column not in columns:
@@ -98,7 +127,7 @@ def _torque_columns(
                 f"--torque {column}={joint}: there is no such {what}; there are {listed(map(repr, there))}"
             )
     found, missing = [], []
-    for joint in joints:
+    for joint in measured:
         names = [given[joint]] if joint in given else [spelling.format(joint) for spelling in SPELLINGS]
         there = [name for name in names if name in columns]
         found += there[:1]
@@ -107,14 +136,15 @@ def _torque_columns(
         example = missing[0]
         raise LinkwiseError(
             f"no torque column for joint {listed(map(repr, missing))}; call it 'tau/{example}' or "
-            f"'{example}_moment', or name it with --torque COLUMN={example}"
+            f"'{example}_moment', or name it with --torque COLUMN={example}; where nothing measures it, as "
+            f"of a floating base, say so with --unmeasured {example}"
         )
     return found
 
 
-def _refuse_still(q: Array, robot: LoadedRobot) -> None:
+def _refuse_still(q: Array, robot: LoadedRobot, measured: Sequence[int]) -> None:
     ranges = np.ptp(q, axis=0)
-    still = [at for at in range(len(ranges)) if ranges[at] < STILL]
+    still = [at for at in measured if ranges[at] < STILL]
     if still:
         at = still[0]
         joint = robot.joints[at]

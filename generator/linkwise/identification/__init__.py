@@ -1,0 +1,5 @@
+"""From a log of motion and torques to what the links carry: masses, centres, inertias, friction."""
+
+from linkwise.identification.identified_links import Fitting, Identification, identify
+
+__all__ = ["Fitting", "Identification", "identify"]
