@@ -47,11 +47,13 @@ class Analysis(AnalysisResult):
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which files to write: the table's format, figures by name, and whether the page."""
+    """Which files to write, and what in them: the table's format, figures by name, whether the page."""
 
     table: Format = "parquet"
     figures: tuple[str, ...] = ()
     page: bool = True
+    power_terms: bool = False
+    """Power by cause and order, too: as many columns again as torques have."""
 
 
 def analyze(
@@ -91,7 +93,7 @@ def analyze_to(
     if os.path.realpath(log).startswith(os.path.join(os.path.realpath(out), "")):
         raise LinkwiseError(f"--out {out} is to be replaced and holds the log {log}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
-        job = _prepared(log, robot, reading, processing, progress, draft)
+        job = _prepared(log, robot, reading, processing, progress, draft, wanted.power_terms)
         columns = job.decomposer.columns
         kept = KeptSamples(len(columns), stride_for(job.count, len(columns), NUMBERS, SAMPLES))
         note = json_text({"log": log.name, "robot": robot.name, **choices(reading, processing)})
@@ -183,6 +185,8 @@ class Job:
             self.decomposer.columns,
             kept.values,
             done.totals,
+            done.work,
+            done.joint_work,
             done.closure,
             self.samples.ignored,
             self.samples.warnings,
@@ -198,6 +202,7 @@ def _prepared(
     processing: Processing,
     progress: Progress,
     buffer: Path | None = None,
+    power_terms: bool = False,
 ) -> Job:
     """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
     samples = read_samples(log, robot.joints, robot.units, reading, progress, buffer)
@@ -205,4 +210,5 @@ def _prepared(
         span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
-    return Job(log.name, reading, processing, samples, Decomposer.of(robot, processing.convention))
+    decomposer = Decomposer.of(robot, processing.convention, power_terms)
+    return Job(log.name, reading, processing, samples, decomposer)
