@@ -13,7 +13,7 @@ from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import check_figure, draw, figure_png
-from linkwise.analysis.show.page import NUMBERS, SAMPLES, report
+from linkwise.analysis.show.page import NUMBERS, SAMPLES, on_page, report
 from linkwise.analysis.stream import KeptSamples, Sink, Streamed, span_of, stream, stride_for
 from linkwise.analysis.tables import Format, open_table
 from linkwise.analysis.torques import Decomposer
@@ -95,7 +95,8 @@ def analyze_to(
     with whole_directory(out, _refuse_unless_result) as draft:
         job = _prepared(log, robot, reading, processing, progress, draft, wanted.power_terms)
         columns = job.decomposer.columns
-        kept = KeptSamples(len(columns), stride_for(job.count, len(columns), NUMBERS, SAMPLES))
+        shown = sum(map(on_page, columns))
+        kept = KeptSamples(len(columns), stride_for(job.count, shown, NUMBERS, SAMPLES))
         note = json_text({"log": log.name, "robot": robot.name, **choices(reading, processing)})
         with open_table(draft / f"analysis.{wanted.table}", columns, note) as table:
 
