@@ -37,7 +37,7 @@ class Analysis(AnalysisResult):
     """What `analyze` returns: an `AnalysisResult` that draws itself."""
 
     def figure(self, name: str = "paper") -> "Figure":
-        """A matplotlib figure: "paper", "paper:JOINT" for another loaded joint than the first, or "shares".
+        """A matplotlib figure: "paper", or "paper:JOINT" for another joint than the first; "shares"; "power".
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """

@@ -41,7 +41,9 @@ Terms = Annotated[
     Convention, typer.Option(help="Velocity terms: closing sums to the torque, gradient is Eq. 1")
 ]
 TableFormat = Annotated[Format, typer.Option(help="Format of the table")]
-Figures = Annotated[list[str] | None, typer.Option(help="paper, paper:JOINT or shares; may be repeated")]
+Figures = Annotated[
+    list[str] | None, typer.Option(help="paper, paper:JOINT, shares or power; may be repeated")
+]
 PowerTerms = Annotated[bool, typer.Option("--power-terms", help="Write power by cause and order too")]
 Page = Annotated[bool, typer.Option("--page/--no-page", help="Write report.html")]
 
