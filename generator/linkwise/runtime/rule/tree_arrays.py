@@ -113,6 +113,22 @@ def with_bodies(xp: Any, numbers: TreeArrays, bodies: Bodies[Any], batch: tuple[
     return numbers._replace(**given)
 
 
+def given_numbers(
+    xp: Any,
+    tree: JointTree,
+    own: tuple[TreeArrays, Any],
+    p: Mapping[str, Any],
+    bodies: Bodies[Any] | None,
+    batch: tuple[int, ...],
+) -> TreeArrays:
+    """The numbers for values of the parameters and, where they are given, bodies.
+
+    own: `own_numbers` and `formula_sources` of the tree, to compute with
+    """
+    numbers = with_formulas(xp, tree, *own, p, batch)
+    return numbers if bodies is None else with_bodies(xp, numbers, bodies, batch)
+
+
 def checked_bodies(given: Any, links: int, read: Callable[[str, Any], Any]) -> Bodies[Any]:
     """Bodies as `read` makes arrays or tensors of them by name; arrays are copied, tensors may be learned.
 
