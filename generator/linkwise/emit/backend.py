@@ -153,13 +153,14 @@ BACKENDS: dict[str, BackendFiles] = {
         BackendFiles(
             "autograd",
             "each link's Lagrangian, differentiated by torch",
-            emits=(_energies,),
+            emits=(_energies, _tree),
             runtime=("arrays/torch_backend.py", "lagrangians", "recorded", *RULE),
             loading=Loading(
                 "lagrangians.link_modules",
-                "backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad)",
+                "backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad, RULE)",
                 ("from .energies import LAGRANGIANS",),
                 speed=4,
+                uses_rule=True,
                 learns=True,
             ),
         ),

@@ -40,7 +40,7 @@ def frame_tables(tree: JointTree, n: int, frames: Sequence[int]) -> FrameTables:
 def link_tables(tree: JointTree, n: int) -> FrameTables:
     """Tables of all links, whose frames are those of their joints."""
     links = tree.links
-    rotations = np.broadcast_to(np.eye(3), (len(links), 3, 3))
+    rotations = np.array([np.eye(3)] * len(links))
     return _tables(tree, n, [link.joint for link in links], range(len(links)), rotations)
 
 

@@ -1,5 +1,6 @@
 """The calls of `Kinematics` behind its face: motion is checked, answers computed and put where `out` says."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -78,7 +79,9 @@ class KinematicAnswers:
         """See `Kinematics.poses`."""
 
         def answer(at: Asked) -> Any:
-            return at.xp.moveaxis(arrays.homogeneous(at.xp, at.frame(from_world=True)), 2, 0)
+            matrices = arrays.homogeneous(at.xp, at.frame(from_world=True))
+            # (4, 4, F, samples) -> (F, 4, 4, samples)
+            return at.xp.swapaxes(at.xp.swapaxes(matrices, 0, 2), 1, 2)
 
         return self._answer((q,), ALL, None, answer, (len(self.frames), 4, 4), out)
 
@@ -167,12 +170,10 @@ class KinematicAnswers:
             read |= {} if point is None else {"point": point}
             accepted(out, (), (shape,), read, self._read_beside_motion(), False)
         value = answer(self._asked(own, part, motion, point))
-        # Samples first, and each number beside the next: what follows may look into it.
-        value = own.xp.moveaxis(value, -1, 0)
-        value = value.copy() if isinstance(value, np.ndarray) else value.contiguous()
+        value = own.xp.swapaxes(value.reshape(math.prod(shape), value.shape[-1]), 0, 1)
         value = value.reshape(*motion[0].shape[:-1], *shape)
-        if out is None:
-            return value
+        if out is None:  # its numbers side by side
+            return value.copy() if isinstance(value, np.ndarray) else value.contiguous()
         out[...] = value
         return out
 

@@ -129,6 +129,9 @@ class NativeBackend(NumpyBackend):
         parts = list(parts)
         return self.on_torch().concatenate(parts) if has_tensors(parts) else super().concatenate(parts)
 
+    def _values(self, q: Any) -> dict[str, Any]:
+        return self.calls.values(q.dtype)
+
     def on_torch(self) -> "TorchSide":
         """What computes with tensors."""
         if self._torch_side is None:
