@@ -99,6 +99,26 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda data: bodies(data)[1].update(inertia=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]),
         "the inertia of body 1 of the tree is not symmetric",
     ),
+    "frame twice": (
+        lambda data: data["tree"]["frames"][1].update(name=data["tree"]["frames"][0]["name"]),
+        "tree.frames has 'base' twice",
+    ),
+    "frame on nothing": (
+        lambda data: data["tree"]["frames"][0].update(body=2),
+        "frame 0 of the tree is on a body that is not there",
+    ),
+    "mirrored frame": (
+        lambda data: data["tree"]["frames"][0].update(rotation=[[1, 0, 0], [0, 1, 0], [0, 0, -1]]),
+        "the rotation of frame 0 of the tree is not a rotation",
+    ),
+    "frame of a link": (
+        lambda data: data["tree"]["frames"][2].update(body=0),
+        "tree.frames has no frame 'link2' on the body of that link",
+    ),
+    "formula of no frame": (
+        lambda data: data["tree"]["formulas"].update({"frames[9].translation[0]": "m"}),
+        "tree.formulas has 'frames[9].translation[0]', which is not a place of the tree",
+    ),
     "joint twice": (
         lambda data: data["joints"][1].update(name="joint1"),
         "joints has 'joint1' twice",

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,11 @@ def tree_with(tree: RigidTree, values: Mapping[str, float]) -> RigidTree:
         BodyEntry(**{name: at(f"bodies[{b}].{name}", value) for name, value in body.items()})
         for b, body in enumerate(data["bodies"])
     ]
-    return RigidTree(at("gravity", tree.gravity), tuple(bodies), tree.formulas)
+    frames = [
+        replace(frame, translation=at(f"frames[{f}].translation", frame.translation))
+        for f, frame in enumerate(tree.frames)
+    ]
+    return RigidTree(at("gravity", tree.gravity), tuple(bodies), tuple(frames), tree.formulas)
 
 
 def changed_values(values: Mapping[str, float], tree: RigidTree | None) -> dict[str, float]:
@@ -61,6 +65,8 @@ def _neighbours(values: Mapping[str, float], tree: RigidTree) -> dict[str, float
             entry = tree.bodies[int(b)]
             lengths = (*entry.translation, *entry.com)
             numbers = entry.inertia if "inertia" in place else entry.mass if "mass" in place else lengths
+        elif body and body["frame"]:
+            numbers = tree.frames[int(body["frame"])].translation
         for name in TextFormula(text).names():
             sizes[own[name]] = max(sizes.get(own[name], 0.0), float(np.abs(numbers).max()))
     return sizes
@@ -81,6 +87,11 @@ def check_bodies(
             for number, formula in zip(tree.bodies, varied.bodies, strict=True)
             for name in ("translation", "mass", "com", "inertia")
             if not _alike(getattr(number, name), getattr(formula, name))
+        ]
+        wrong += [
+            f"translation of frame {number.name!r}"
+            for number, formula in zip(tree.frames, varied.frames, strict=True)
+            if not _alike(number.translation, formula.translation)
         ]
         wrong += [] if _alike(tree.gravity, varied.gravity) else ["gravity"]
         yield _result("parameters: formulas of the bodies give their numbers", wrong)

@@ -35,6 +35,7 @@ SHARED_RUNTIME = (
     "outputs.py",
     "parameter_values.py",
     "quantities.py",
+    "robot_kinematics.py",
     "structure.py",
 )
 """Files of linkwise/runtime that every package has."""

@@ -114,8 +114,8 @@ def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
     return formula_files(d)
 
 
-RULE = ("arrays/__init__.py", "arrays/array_kernels.py", "rule")
-"""Of linkwise/runtime: the vectorised rule."""
+RULE = ("arrays/__init__.py", "arrays/array_kernels.py", "kinematics", "rule")
+"""Of linkwise/runtime: the vectorised rule, and the kinematics of frames on its arrays."""
 
 BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend
@@ -153,13 +153,14 @@ BACKENDS: dict[str, BackendFiles] = {
         BackendFiles(
             "autograd",
             "each link's Lagrangian, differentiated by torch",
-            emits=(_energies,),
+            emits=(_energies, _tree),
             runtime=("arrays/torch_backend.py", "lagrangians", "recorded", *RULE),
             loading=Loading(
                 "lagrangians.link_modules",
-                "backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad)",
+                "backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad, RULE)",
                 ("from .energies import LAGRANGIANS",),
                 speed=4,
+                uses_rule=True,
                 learns=True,
             ),
         ),

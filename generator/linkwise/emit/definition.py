@@ -6,7 +6,7 @@ import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from linkwise.emit.formula_symbols import motion_symbol, parameter_symbols
-from linkwise.package.manifest import BodyEntry, EnergyEntry, RigidTree
+from linkwise.package.manifest import BodyEntry, EnergyEntry, FrameEntry, RigidTree
 from linkwise.robot.robot import Robot, Scalar, Vec3
 from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
@@ -45,6 +45,15 @@ def rigid_tree(system: System) -> RigidTree | None:
             )
             for link in robot.links
         ),
+        tuple(
+            FrameEntry(
+                frame.name,
+                frame.link,
+                frame.rotation,  # type: ignore[arg-type]
+                numbers(frame.translation),
+            )
+            for frame in robot.frames
+        ),
         {
             place: text(value)
             for place, value in _places(robot)
@@ -70,6 +79,8 @@ def _places(robot: Robot) -> Iterator[tuple[str, Scalar]]:
         yield from _entries(f"bodies[{b}].com", link.com)
         for i, row in enumerate(link.inertia):
             yield from _entries(f"bodies[{b}].inertia[{i}]", row)
+    for f, frame in enumerate(robot.frames):
+        yield from _entries(f"frames[{f}].translation", frame.translation)
 
 
 def _entries(place: str, vector: Vec3) -> Iterator[tuple[str, Scalar]]:

@@ -54,6 +54,8 @@ class RigidEnergy:
 
     parent: int | None
     constants: tuple[Constant, ...]
+    places: tuple[tuple[int, str], ...]
+    """Joints, counted from 0 as in tree.py, whose places are constants, and the names of these."""
     steps: tuple[Step, ...]
     gravity: tuple[Lines, str]
     """Lines, and the expression, of gravity in the axes of the base; for a link that hangs on the ground."""
@@ -73,7 +75,7 @@ def rigid_energy(system: RigidSystem, link: int) -> RigidEnergy:
     before = [str(parent + 1 if parent is not None else 0), *labels]
     placed = [a for a, joint in enumerate(joints) if a == 0 or any(e != 0 for e in joint.translation)]
     constants, body = _numbers(system, link)
-    steps = []
+    steps, places = list[Step](), list[tuple[int, str]]()
     for a, joint in enumerate(joints):
         name = "place" if a == placed[-1] else f"place_{letters(a)}"
         step = _step(system, joint, (before[a], labels[a]), name if a in placed else "")
@@ -81,10 +83,16 @@ def rigid_energy(system: RigidSystem, link: int) -> RigidEnergy:
             frame = "the base" if before[a] == "0" else f"frame {before[a]}"
             doc = f"of {python_literal(joint.name)} in {frame}, in m"
             constants.append(Constant(name, (_vector(joint.translation),), doc))
+            places.append((passed[a], name))
         steps.append(step)
     lines, gravity = _inline(system, system.robot.gravity)
     return RigidEnergy(
-        parent + 1 if parent is not None else None, tuple(constants), tuple(steps), (lines, gravity), body
+        parent + 1 if parent is not None else None,
+        tuple(constants),
+        tuple(places),
+        tuple(steps),
+        (lines, gravity),
+        body,
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from linkwise.emit.formula_symbols import parameter_symbols
 from linkwise.emit.render import render
 from linkwise.escape import python_literal
-from linkwise.package.entries import PLACE, BodyEntry, RigidTree
+from linkwise.package.entries import PLACE, BodyEntry, FrameEntry, RigidTree
 from linkwise.version import VERSION
 
 WORD = re.compile(r"\b([A-Za-z_]\w*)(\(?)")
@@ -16,7 +16,7 @@ WORD = re.compile(r"\b([A-Za-z_]\w*)(\(?)")
 
 @dataclass(frozen=True)
 class TreeText:
-    """One joint, or one link: its name, and its other entries as Python expressions."""
+    """One joint, link or frame: its name, and its other entries as Python expressions."""
 
     name: str
     entries: tuple[str, ...]
@@ -32,6 +32,7 @@ def tree_text(tree: RigidTree, links: Sequence[str], parameters: Sequence[str]) 
         "gravity": repr(tuple(tree.gravity)),
         "joints": [_joint(body) for body in tree.bodies],
         "links": [_link(b, tree.bodies[b]) for b in carriers],
+        "frames": [_frame(frame) for frame in tree.frames],
         "formulas": [
             (place, expression(text))
             for found, text in tree.formulas.items()
@@ -51,6 +52,11 @@ def _link(b: int, body: BodyEntry) -> TreeText:
     return TreeText(
         python_literal(body.link), (f"{b}", f"{body.mass!r}", f"{body.com!r}", f"{body.inertia!r}")
     )
+
+
+def _frame(frame: FrameEntry) -> TreeText:
+    entries = f"{frame.body!r}", f"{frame.rotation!r}", f"{frame.translation!r}"
+    return TreeText(python_literal(frame.name), entries)
 
 
 def _place(place: str, carriers: dict[int, int]) -> Iterator[str]:

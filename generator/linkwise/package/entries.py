@@ -17,6 +17,7 @@ ROUNDING = 1e-6
 
 PLACE = re.compile(
     r"(?:gravity|bodies\[(?P<body>\d+)\]\.(?:translation|com))\[[0-2]\]"
+    r"|frames\[(?P<frame>\d+)\]\.translation\[[0-2]\]"
     r"|bodies\[(?P<whole>\d+)\]\.(?:mass|inertia\[[0-2]\]\[[0-2]\])"
 )
 """Numbers of a tree that may hang on parameters."""
@@ -61,8 +62,21 @@ class BodyEntry:
 
 
 @dataclass(frozen=True)
+class FrameEntry:
+    """A named frame that a body carries, or the ground where `body` is None: a body of the file, or a site.
+
+    rotation, translation (in m): from its coordinates to those of the body's frame, or of the world
+    """
+
+    name: str
+    body: int | None
+    rotation: tuple[Row, Row, Row]
+    translation: Row
+
+
+@dataclass(frozen=True)
 class RigidTree:
-    """The rigid bodies, parents before children, and gravity in m/s² in the base's axes.
+    """The rigid bodies, parents before children, the frames, and gravity in m/s² in the base's axes.
 
     formulas: by its place, such as bodies[2].com[0], each number that hangs on run-time parameters, as text
     in their symbols; the numbers themselves are those of the parameters' own values
@@ -70,6 +84,7 @@ class RigidTree:
 
     gravity: Row
     bodies: tuple[BodyEntry, ...]
+    frames: tuple[FrameEntry, ...]
     formulas: Mapping[str, str]
 
 
@@ -91,8 +106,8 @@ def check_tree(tree: RigidTree, joints: Sequence[JointEntry], links: Sequence[Li
         if body.parent is not None and not body.parent < index:
             raise ValueError(f"the parent of body {index} of the tree is not an earlier body")
         paths.append({body.coordinate, *(() if body.parent is None else paths[body.parent])})
-        turn, inertia = np.array(body.rotation), np.array(body.inertia)
-        if not np.allclose(turn @ turn.T, np.eye(3), rtol=0, atol=ROUNDING) or np.linalg.det(turn) < 0:
+        inertia = np.array(body.inertia)
+        if not _is_rotation(body.rotation):
             raise ValueError(f"the rotation of body {index} of the tree is not a rotation")
         if not np.array_equal(inertia, inertia.T):
             raise ValueError(f"the inertia of body {index} of the tree is not symmetric")
@@ -103,10 +118,38 @@ def check_tree(tree: RigidTree, joints: Sequence[JointEntry], links: Sequence[Li
         if set(link.path) != by_link[link.name]:
             raise ValueError(f"the path of link {link.name!r} is not that of the tree")
     _check_joints(tree, joints)
+    _check_frames(tree, links)
     for place in tree.formulas:
         found = PLACE.fullmatch(place)
-        if not found or int(found["body"] or found["whole"] or 0) >= len(tree.bodies):
+        known = found and (
+            int(found["frame"]) < len(tree.frames)
+            if found["frame"]
+            else int(found["body"] or found["whole"] or 0) < len(tree.bodies)
+        )
+        if not known:
             raise ValueError(f"tree.formulas has {place[:80]!a}, which is not a place of the tree")
+
+
+def _is_rotation(rows: tuple[Row, Row, Row]) -> bool:
+    turn = np.array(rows)
+    return np.allclose(turn @ turn.T, np.eye(3), rtol=0, atol=ROUNDING) and np.linalg.det(turn) > 0
+
+
+def _check_frames(tree: RigidTree, links: Sequence[LinkEntry]) -> None:
+    """Raise ValueError for a frame that nothing carries, or that is none, and for a link without one."""
+    carriers: dict[str, int | None] = {}
+    for index, frame in enumerate(tree.frames):
+        if frame.body is not None and not frame.body < len(tree.bodies):
+            raise ValueError(f"frame {index} of the tree is on a body that is not there")
+        if frame.name in carriers:
+            raise ValueError(f"tree.frames has {frame.name[:80]!a} twice")
+        if not _is_rotation(frame.rotation):
+            raise ValueError(f"the rotation of frame {index} of the tree is not a rotation")
+        carriers[frame.name] = frame.body
+    at = {body.link: b for b, body in enumerate(tree.bodies)}
+    for link in links:
+        if carriers.get(link.name) != at[link.name]:
+            raise ValueError(f"tree.frames has no frame {link.name[:80]!a} on the body of that link")
 
 
 def _check_joints(tree: RigidTree, joints: Sequence[JointEntry]) -> None:

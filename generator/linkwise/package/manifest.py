@@ -15,6 +15,7 @@ from linkwise.package.decode import decoded, parsed, require
 from linkwise.package.entries import (
     BodyEntry,
     EnergyEntry,
+    FrameEntry,
     JointEntry,
     KernelKind,
     LinkEntry,
@@ -22,13 +23,14 @@ from linkwise.package.entries import (
     check_tree,
 )
 
-SCHEMA = 6
+SCHEMA = 7
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [
     "FILE",
     "BodyEntry",
     "EnergyEntry",
+    "FrameEntry",
     "JointEntry",
     "LinkEntry",
     "Manifest",

@@ -1,7 +1,9 @@
 """From what a file says to a Robot: expand, cut, substitute, merge, and check."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Literal
+
+import sympy as sp
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.coordinates import AxisRule, check_couplings, movement
@@ -13,7 +15,7 @@ from linkwise.robot.mass_matrix import check_mass_matrix
 from linkwise.robot.naming import Named, Naming
 from linkwise.robot.notes import Note
 from linkwise.robot.parameters import numeric
-from linkwise.robot.robot import Link, Robot, unusable
+from linkwise.robot.robot import Frame, Link, Parameter, Robot, Scalar, unusable
 from linkwise.robot.tree import check_loops, cut, depth_first
 
 
@@ -51,7 +53,7 @@ def build(description: Description, options: Options) -> Robot:
     axes = tuple(axis for _, parts in joints for axis in parts)
     uncoupled = check_couplings(description.couplings, axes, options.lock, options.free_mimic)
     moving = movement(axes, connections, options.lock, options.free_mimic)
-    assembly = moving_links(description.bodies, joints, moving.motion, naming)
+    assembly = moving_links(description.bodies, joints, moving.motion, naming, description.sites)
     check_loops(description.loops, assembly.carrier)
     numbers = assembly.links if naming is None else _links(plain, options, moving.motion)
     named = {body.name for body in plain.bodies if not body.invented}
@@ -71,15 +73,37 @@ def build(description: Description, options: Options) -> Robot:
         *_as_read(connections),
         *_left_out(description, joints, moving.motion, assembly.carrier),
     )
+    parameters = naming.parameters(assembly.links, description.gravity) if naming else ()
     return Robot(
         description.name,
         moving.coordinates,
         assembly.links,
         description.gravity,
-        naming.parameters(assembly.links, description.gravity) if naming else (),
+        parameters,
         (*notes, *naming.notes()) if naming else notes,
         options.allow_unphysical,
+        _with_known(assembly.frames, parameters, dict(description.parameters)),
     )
+
+
+def _with_known(
+    frames: tuple[Frame, ...], parameters: tuple[Parameter, ...], values: dict[str, float]
+) -> tuple[Frame, ...]:
+    """Return the frames in the robot's parameters; a file's own that move no torque are numbers."""
+    kept = {parameter.name for parameter in parameters}
+
+    def known(value: Scalar) -> Scalar:
+        if isinstance(value, (int, float)):
+            return value
+        numbers = {s: sp.Float(values[s.name]) for s in value.free_symbols if s.name not in kept}
+        found = value.xreplace(numbers)
+        return found if found.free_symbols else float(found)
+
+    moved: list[Frame] = []
+    for frame in frames:
+        x, y, z = map(known, frame.translation)
+        moved.append(replace(frame, translation=(x, y, z)))
+    return tuple(moved)
 
 
 def _naming(description: Description, options: Options) -> Naming | None:

@@ -29,6 +29,16 @@ class Body:
 
 
 @dataclass(frozen=True)
+class Site:
+    """A named place on a body, and its axes there, in the body's frame."""
+
+    name: str
+    body: str
+    rotation: Rotation
+    translation: Vec3
+
+
+@dataclass(frozen=True)
 class Mimic:
     """q = ratio · q_master + offset."""
 
@@ -93,4 +103,5 @@ class Description:
     couplings: tuple[Coupling, ...] = ()
     loops: tuple[Loop, ...] = ()
     only_named: bool = False
+    sites: tuple[Site, ...] = ()
     omissions: tuple[Omission, ...] = ()

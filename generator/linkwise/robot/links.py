@@ -4,12 +4,12 @@ from dataclasses import dataclass, field, replace
 
 from linkwise.robot import transforms
 from linkwise.robot.coordinates import AxisRule
-from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection
+from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Site
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.mass import Placed, merge
 from linkwise.robot.naming import Naming
 from linkwise.robot.notes import Note
-from linkwise.robot.robot import Joint, Link, Rotation, Vec3
+from linkwise.robot.robot import Frame, Joint, Link, Rotation, Vec3
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,7 @@ class Assembly:
     links: tuple[Link, ...]
     carrier: dict[str, int | None]
     notes: tuple[Note, ...]
+    frames: tuple[Frame, ...]
 
 
 def moving_links(
@@ -62,6 +63,7 @@ def moving_links(
     joints: list[tuple[Connection, tuple[Axis, ...]]],
     motion: dict[str, AxisRule],
     naming: Naming | None = None,
+    sites: tuple[Site, ...] = (),
 ) -> Assembly:
     """Return the moving links, each with the bodies that are rigidly connected to it merged.
 
@@ -69,6 +71,7 @@ def moving_links(
     their bodies in the file's own frames, where numbers get their names, and only then turn into linkwise's.
     """
     by_name = {body.name: body for body in bodies}
+    between: dict[str, _Place] = {}
     moving: list[_Moving] = []
     places: dict[str, _Place] = {}
     notes: list[Note] = []
@@ -84,6 +87,8 @@ def moving_links(
         place = _Place(before.link, turn, transforms.add(before.position, shift))
         for axis in axes:
             place = _pass(place, axis, motion[axis.name], child, moving, naming is not None)
+            if place.link is not None:
+                between.setdefault(moving[place.link].name, place)
         origin = transforms.rotate(place.rotation, child.origin)
         place = replace(place, position=transforms.add(place.position, origin))
         places[child.name] = place
@@ -94,7 +99,38 @@ def moving_links(
             notes.append(Note("merged", child.name, f"into {onto}"))
     links = tuple(link.link(naming) for link in moving)
     carrier = {body.name: places[body.name].link if body.name in places else None for body in bodies}
-    return Assembly(links, carrier, tuple(notes))
+    of_file = {body.name: places.get(body.name, _Place(None)) for body in bodies if not body.invented}
+    frames, doubles = _frames(between | of_file, sites, moving)
+    return Assembly(links, carrier, (*notes, *doubles), frames)
+
+
+def _frames(
+    places: dict[str, _Place], sites: tuple[Site, ...], moving: list[_Moving]
+) -> tuple[tuple[Frame, ...], list[Note]]:
+    """Return the frames by name, those on the ground first, then link by link; and notes on sites left out.
+
+    A site whose body is not there was cut away.
+    """
+    known, doubles = dict(places), list[Note]()
+    for site in sites:
+        if site.body not in places:
+            continue
+        if site.name in known:
+            doubles.append(Note("ignored", site.name, "a site whose name another frame has"))
+            continue
+        body = places[site.body]
+        at = transforms.add(body.position, transforms.rotate(body.rotation, site.translation))
+        known[site.name] = _Place(body.link, transforms.compose(body.rotation, site.rotation), at)
+    order = sorted(known.items(), key=lambda item: -1 if item[1].link is None else item[1].link)
+    return tuple(_frame(name, place, moving) for name, place in order), doubles
+
+
+def _frame(name: str, place: _Place, moving: list[_Moving]) -> Frame:
+    if place.link is None:
+        return Frame(name, None, place.rotation, place.position)
+    link = moving[place.link]
+    turned = transforms.compose(link.turn, place.rotation)
+    return Frame(name, place.link, turned, link.framed(place.position))
 
 
 def _pass(

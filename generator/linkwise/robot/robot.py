@@ -92,6 +92,21 @@ class Link:
 
 
 @dataclass(frozen=True)
+class Frame:
+    """A named frame that a link carries: a body of the file, also one that was merged away, or a site.
+
+    Of a point with coordinates x in the frame, those in the link's frame are `rotation` x + `translation`.
+    """
+
+    name: str
+    link: int | None
+    """Index among the robot's links; None for the ground, whose frame is the world's."""
+    rotation: Rotation
+    translation: Vec3
+    """In m."""
+
+
+@dataclass(frozen=True)
 class Parameter:
     """A number that stays an argument: its value in the file, unit (empty: as the file has it), meaning."""
 
@@ -105,7 +120,8 @@ class Parameter:
 class Robot:
     """A tree of links, parents before children, moved by `coordinates`; gravity in m/s².
 
-    With `allow_unphysical` its parameters may take values that no body has.
+    With `allow_unphysical` its parameters may take values that no body has. `frames` are the file's own, one
+    for each link among them.
     """
 
     name: str
@@ -115,6 +131,7 @@ class Robot:
     parameters: tuple[Parameter, ...] = ()
     notes: tuple[Note, ...] = field(default=(), compare=False)
     allow_unphysical: bool = False
+    frames: tuple[Frame, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.coordinates:
@@ -125,6 +142,7 @@ class Robot:
         for what, names in (
             ("joint", [c.name for c in self.coordinates]),
             ("link", [link.name for link in self.links]),
+            ("frame", [frame.name for frame in self.frames]),
         ):
             for name, count in Counter(names).items():
                 if not name.strip():

@@ -10,6 +10,7 @@ tensors are a view that is built on request.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from types import MethodType
 from typing import Any, Literal, overload
 
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from .interface import Array, Backend
 from .quantities import Coefficients, GradientPropagation, Packed, Propagation
+from .robot_kinematics import Kinematics
 from .structure import Layout, Structure
 
 
@@ -81,6 +83,12 @@ class Dynamics:
         """Values of the run-time parameters."""
         values: Mapping[str, Any] = self.backend.parameters
         return values
+
+    @cached_property
+    def kinematics(self) -> Kinematics[Any]:
+        """Poses, Jacobians and their rates of the robot's frames; raises ValueError for links of energies."""
+        made: Any = self.backend
+        return Kinematics(made.kinematics(self.check_finite, self._answers.read_beside_motion))
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}

@@ -11,7 +11,7 @@ from typing import Any
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
 from linkwise.robot import transforms
-from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Description
+from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Description, Site
 from linkwise.robot.notes import WARNED, Note
 from linkwise.robot.readers.mjcf_equality import couplings, loops
 from linkwise.robot.readers.mjcf_options import switched_off
@@ -45,6 +45,7 @@ def read_mjcf(path: Path) -> Description:
         couplings=couplings(mujoco, model, joints),
         loops=loops(mujoco, model, links),
         omissions=omissions(mujoco, model, joints, links),
+        sites=_sites(model, links),
     )
 
 
@@ -99,6 +100,20 @@ def _body(model: Any, number: int) -> tuple[list[Connection], Body]:
         turn, position, last, start, snapped = IDENTITY, ZERO3, joint.anchor, child, False
     mass, com = float(model.body_mass[number]), _vector(model.body_ipos[number])
     return chain, Body(name, mass, com, _inertia(model, number), origin=transforms.minus(last))
+
+
+def _sites(model: Any, links: list[str]) -> tuple[Site, ...]:
+    """Return the sites that have names, in the frames of their bodies."""
+    return tuple(
+        Site(
+            model.site(index).name,
+            links[int(model.site_bodyid[index])],
+            transforms.snap(transforms.from_quaternion(*map(float, model.site_quat[index]))),
+            _vector(model.site_pos[index]),
+        )
+        for index in range(model.nsite)
+        if model.site(index).name
+    )
 
 
 def _joints(model: Any, number: int, body: str) -> list[_Joint]:

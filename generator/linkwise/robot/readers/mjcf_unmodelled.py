@@ -23,7 +23,6 @@ COUNTS = {
     "light": "nlight",
     "mocap": "nmocap",
     "sensor": "nsensor",
-    "site": "nsite",
     "tendon": "ntendon",
 }
 """What is counted though it loads no joint by itself."""

@@ -8,6 +8,8 @@ from torch import Tensor
 
 from ..answers import Answers
 from ..arrays.torch_backend import TorchBackend
+from ..rule.joint_tree import JointTree
+from ..rule.tree_arrays import TreeArrays
 from ..structure import Structure
 from .dynamics_module import DynamicsModule
 from .energy_interface import Energies, Parameters, numbers_of
@@ -32,8 +34,14 @@ class AutogradBackend(TorchBackend):
     name: ClassVar = "autograd"
     face: ClassVar[Any] = DynamicsModule
 
-    def __init__(self, structure: Structure, modules: Iterable[Energies], given: RunTimeValues) -> None:
-        super().__init__(structure, (), {})
+    def __init__(
+        self,
+        structure: Structure,
+        modules: Iterable[Energies],
+        given: RunTimeValues,
+        tree: JointTree | None = None,
+    ) -> None:
+        super().__init__(structure, (), {}, tree=tree)
         self.modules, self.given = modules, given
         self.parameters: Any = given
 
@@ -55,6 +63,21 @@ class AutogradBackend(TorchBackend):
         """Parameters and constants as a call computes with them."""
         wanted = torch.is_grad_enabled() and any(t.requires_grad for t in self.numbers())
         return Parameters(self._values(q), q[..., 0], wanted)
+
+    def tree_numbers(self, own: tuple[TreeArrays, Any], q: Tensor) -> TreeArrays:
+        """The tree's numbers, those in place of its own that the modules of the links have."""
+        numbers = super().tree_numbers(own, q)
+        translations, masses, centres = (list(a.unbind(-2)) for a in numbers[1:4])
+        for j, link in enumerate(self.modules):
+            held: Any = link
+            for joint, name in held.places.items():
+                translations[joint] = getattr(held, name).to(q)[:, None]
+            if "mass" in held.constants:
+                masses[j] = held.mass.to(q)[None]
+            if "com" in held.constants:
+                centres[j] = held.com.to(q)[:, None]
+        found = (_side_by_side(rows) for rows in (translations, masses, centres))
+        return numbers._replace(**dict(zip(("translations", "masses", "centres"), found, strict=True)))
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
@@ -92,6 +115,12 @@ class AutogradBackend(TorchBackend):
         if q[..., 0].numel() <= most:
             return sweep(links, p, q, qd, qdd)
         return _in_pieces(lambda some, *motion: sweep(links, some, *motion), p, (q, qd, qdd), most)
+
+
+def _side_by_side(rows: Sequence[Tensor]) -> Tensor:
+    """Tensors (..., samples) as one of shape (..., rows, samples); of one sample is what all share."""
+    samples = max(row.shape[-1] for row in rows)
+    return torch.stack([row.expand(*row.shape[:-1], samples) for row in rows], -2)
 
 
 def _in_pieces(call: Callable[..., Any], p: Parameters, motion: Sequence[Tensor], most: int) -> Any:

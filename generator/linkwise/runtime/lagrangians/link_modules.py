@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import torch
 
+from ..rule.rule_calls import RigidRule
 from ..structure import Structure
 from .autograd_backend import AutogradBackend
 from .partial_lagrangian import PartialLagrangian
@@ -47,14 +48,19 @@ def backend_of_links(
     kinds: Sequence[type[PartialLagrangian]],
     values: Mapping[str, Any],
     requires_grad: bool | str | Iterable[str] = False,
+    rule: RigidRule | None = None,
 ) -> AutogradBackend:
-    """The back end of one module a link, and these with it; `requires_grad` as the package's `load` says."""
+    """The back end of one module a link, and these with it; `requires_grad` as the package's `load` says.
+
+    rule: that of the package's tree, whose frames are to be known; None for energies
+    """
     rigid = any(issubclass(kind, RigidLagrangian) for kind in kinds)
     learned = learned_names(requires_grad, values, rigid)
     given, made = RunTimeValues(values, learned), dict[Any, PartialLagrangian]()
     for j, kind in enumerate(kinds):
         made[kind] = kind(structure.only(j), given, made.get(kind.parent), learned)
-    return AutogradBackend(structure, LinkModules(structure.link_names, made.values()), given)
+    modules = LinkModules(structure.link_names, made.values())
+    return AutogradBackend(structure, modules, given, rule.tree if rule else None)
 
 
 def learned_names(asked: bool | str | Iterable[str], parameters: Iterable[str], rigid: bool) -> set[str]:

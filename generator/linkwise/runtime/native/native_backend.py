@@ -70,6 +70,10 @@ class NativeBackend(NumpyBackend):
         """The calls of `Dynamics`: C writes the answers, but for tensors of which gradients are recorded."""
         return NativeAnswers(self, self.calls, self.on_torch, check_finite)
 
+    def side(self, like: Any) -> Any:
+        """What computes with `like`, an array or a tensor."""
+        return self.on_torch() if has_tensors([like]) else self
+
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         if has_tensors([q]):
@@ -124,6 +128,9 @@ class NativeBackend(NumpyBackend):
         """The parts joined along the last axis."""
         parts = list(parts)
         return self.on_torch().concatenate(parts) if has_tensors(parts) else super().concatenate(parts)
+
+    def _values(self, q: Any) -> dict[str, Any]:
+        return self.calls.values(q.dtype)
 
     def on_torch(self) -> "TorchSide":
         """What computes with tensors."""

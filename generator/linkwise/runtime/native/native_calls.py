@@ -184,6 +184,10 @@ class NativeCalls:
         for future in waiting:
             future.result()
 
+    def values(self, kind: "np.dtype[Any]") -> dict[str, Any]:
+        """Parameters by name, as numbers of this dtype."""
+        return dict(zip(self.structure.parameters, self._numbers(kind), strict=True))
+
     def _numbers(self, kind: "np.dtype[Any]") -> NumberArray:
         """Parameters in the order of the structure; a tensor's value is the one it has now."""
         for name in self.structure.parameters:

@@ -147,7 +147,7 @@ class RigidRule:
             flat = [a.reshape(samples, n) for a in motion]
             parts = answer(spatial_moment(space.xp, tables, matrices, flat))
         else:
-            links = link_numbers(space.xp, tables.links.eye, *numbers[2:]) if given else tables.numbers
+            links = link_numbers(space.xp, tables.links.eye, *numbers.carried) if given else tables.numbers
 
             def innermost(own: Sequence[Any], some: TreeArrays, carried: LinkNumbers) -> list[Any]:
                 found: list[Any] = answer(_moment(space, tables, own, some, carried))
