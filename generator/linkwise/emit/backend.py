@@ -114,8 +114,8 @@ def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
     return formula_files(d)
 
 
-RULE = ("arrays/__init__.py", "arrays/array_kernels.py", "rule")
-"""Of linkwise/runtime: the vectorised rule."""
+RULE = ("arrays/__init__.py", "arrays/array_kernels.py", "rule", "sums")
+"""Of linkwise/runtime: the vectorised rule, and what is summed over the links."""
 
 BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend

@@ -153,18 +153,18 @@ class Answers:
         self._compute_into(call, motion, into)
         return kind(*out) if kind else out
 
-    def _motion(self, given: Sequence[Any]) -> Any:
+    def _motion(self, given: Sequence[Any], names: Sequence[str] = MOTION) -> Any:
         """The motion as the back end computes with it, in one shape, and looked at if that was asked for."""
-        named = dict(zip(MOTION, given, strict=False))
+        named = dict(zip(names, given, strict=False))
         arrays = self._backend.arrays(named, self._structure.n)
         if self._check_finite:
             check_numbers(named, self._structure.joint_names)
         return arrays
 
-    def _accepted(self, call: str, motion: Sequence[Any], out: Any) -> Any:
+    def _accepted(self, call: str, motion: Sequence[Any], out: Any, names: Sequence[str] = MOTION) -> Any:
         if out is None:
             return None
-        kind, named = KINDS.get(call), dict(zip(MOTION, motion, strict=False))
+        kind, named = KINDS.get(call), dict(zip(names, motion, strict=False))
         fields = kind._fields if kind else ()
         return accepted(out, fields, self._shapes[call], named, self.read_beside_motion(), self.contiguous)
 

@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers import Answers
 from ..arguments import as_array, as_weights, check_axes, no_common_shape, precision, too_many_axes
 from ..interface import ClosedForms, Entries
 from ..parameter_values import fits
@@ -14,6 +13,7 @@ from ..rule.joint_tree import Bodies
 from ..rule.rule_calls import RigidRule
 from ..rule.tree_arrays import checked_bodies
 from ..structure import Structure
+from ..sums.sum_answers import SumAnswers
 from .array_kernels import Crossing, known_kernel, operations
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
@@ -81,9 +81,9 @@ class NumpyBackend:
             raise too_many_axes(arrays, n) from None
         return [a if a.shape == shape else np.broadcast_to(a, shape) for a in arrays.values()]
 
-    def answers(self, check_finite: bool) -> Answers:
+    def answers(self, check_finite: bool) -> SumAnswers:
         """The calls of `Dynamics`."""
-        return Answers(self.structure, self, check_finite)
+        return SumAnswers(self.structure, self, check_finite)
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""

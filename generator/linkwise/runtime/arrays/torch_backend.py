@@ -9,7 +9,6 @@ from torch import Tensor
 from torch._subclasses.fake_tensor import unset_fake_temporarily
 from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
-from ..answers import Answers
 from ..arguments import as_array, as_weights, check_axes, check_dense, no_common_shape, precision
 from ..interface import ClosedForms
 from ..parameter_values import fits
@@ -17,6 +16,7 @@ from ..rule.joint_tree import Bodies
 from ..rule.rule_calls import RigidRule
 from ..rule.tree_arrays import checked_bodies
 from ..structure import Structure
+from ..sums.sum_answers import SumAnswers
 from .array_kernels import Crossing, known_kernel, operations
 
 FLOATS = ({torch.float32}, {torch.float64})
@@ -79,9 +79,9 @@ class TorchBackend:
         except RuntimeError:
             raise no_common_shape(named, n) from None
 
-    def answers(self, check_finite: bool) -> Answers:
+    def answers(self, check_finite: bool) -> SumAnswers:
         """The calls of `Dynamics`."""
-        return Answers(self.structure, self, check_finite)
+        return SumAnswers(self.structure, self, check_finite)
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""

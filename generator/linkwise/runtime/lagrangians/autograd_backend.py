@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
-from ..answers import Answers
 from ..arrays.torch_backend import TorchBackend
 from ..structure import Structure
+from ..sums.sum_answers import SumAnswers
 from .dynamics_module import DynamicsModule
 from .energy_interface import Energies, Parameters, numbers_of
 from .functional_sweeps import decomposition_followed, position_gradient_followed, torque_followed
@@ -37,7 +37,7 @@ class AutogradBackend(TorchBackend):
         self.modules, self.given = modules, given
         self.parameters: Any = given
 
-    def answers(self, check_finite: bool) -> Answers:
+    def answers(self, check_finite: bool) -> SumAnswers:
         """The calls of `Dynamics`."""
         return _Answers(self.structure, self, check_finite)
 
@@ -109,7 +109,7 @@ def _in_pieces(call: Callable[..., Any], p: Parameters, motion: Sequence[Tensor]
     return [torch.cat(part).reshape(*batch, part[0].shape[-1]) for part in zip(*parts, strict=True)]
 
 
-class _Answers(Answers):
+class _Answers(SumAnswers):
     """Calls that refuse `out` also where a constant of a link is learned."""
 
     def read_beside_motion(self) -> Iterable[Any]:
