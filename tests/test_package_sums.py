@@ -42,6 +42,8 @@ def calls_of(robot: Any, q: Any, qd: Any, tau: Any) -> dict[str, Callable[..., A
         "coriolis_matrix": lambda **how: robot.coriolis_matrix(q, qd, **how),
         "gravity_torque": lambda **how: robot.gravity_torque(q, **how),
         "christoffel": lambda **how: robot.christoffel(q, **how),
+        "energy": lambda **how: robot.energy(q, qd, **how),
+        "power": lambda **how: robot.power(q, qd, tau, **how),
         "forward_dynamics": lambda **how: robot.forward_dynamics(q, qd, tau, **how),
     }
 
@@ -74,19 +76,55 @@ def test_sums_are_those_of_the_shares(backend: str, robot: str, package_of: Pack
     assert np.abs(symbols - symbols.swapaxes(-1, -2)).max() <= 1e-14 * np.abs(symbols).max()
 
 
+CROOKED = str(DATA / "crane.urdf")
+
+
+@pytest.mark.parametrize(
+    "robot", [CROOKED, "planar3 symbolic", str(DATA / "cart_pendulum.py"), str(DATA / "turntable.py")]
+)
+@pytest.mark.parametrize(
+    "backend", ["numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler)]
+)
+def test_power_into_a_link_is_what_its_energy_gains(backend: str, robot: str, package_of: Packages) -> None:
+    model = package_of(robot).load(backend)
+    q, qd, qdd = motion_of(model, 2, 5)
+    power = model.power(q, qd, qdd)
+    assert relative_error(power.total, np.asarray(model.partial_torque(q, qd, qdd) * qd[..., None])) <= 1e-13
+    step = 1e-4
+    gained = [
+        model.energy(q + s * qd + s * s / 2 * qdd, qd + s * qdd) for s in (step, -step, 2 * step, -2 * step)
+    ]
+    one, other, far, back = (np.asarray(energy.total) for energy in gained)
+    rate = (8 * (one - other) - (far - back)) / (12 * step)
+    if robot.endswith(
+        "turntable.py"
+    ):  # on a moving base, qd . dK/dqd - K = K - (terms linear in the velocities)
+        pairs = [
+            np.asarray(model.energy(q + s * qd, v * (qd + s * qdd)).kinetic)
+            for s in (step, -step)
+            for v in (1, -1)
+        ]
+        rate = rate - (pairs[0] - pairs[1] - pairs[2] + pairs[3]) / 2 / (2 * step)
+    assert relative_error(np.asarray(power.total).sum(-2), rate) <= 1e-6
+
+
 @pytest.mark.parametrize("batch", [(), (4,), (2, 3), (0,)])
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_sums_are_written_where_out_says(backend: str, batch: tuple[int, ...], package_of: Packages) -> None:
     model = loaded(package_of("planar3"), backend)
     for call in calls_of(model, *motion_of(model, *batch, dtype="float32")).values():
         expected = call()
-        place = 0 * expected + 7
-        assert call(out=place) is place
-        assert (place == expected).all()
-        assert str(expected.dtype).endswith("float32")
-        assert tuple(expected.shape[: len(batch)]) == batch
-        with pytest.raises(ValueError, match="out has shape"):
-            call(out=place[..., :2].copy() if isinstance(place, np.ndarray) else place[..., :2].clone())
+        several = isinstance(expected, tuple)
+        parts = expected if several else (expected,)
+        places = [0 * part + 7 for part in parts]
+        found = call(out=tuple(places) if several else places[0])
+        for part, place, one in zip(parts, places, found if several else (found,), strict=True):
+            assert one is place
+            assert (place == part).all()
+            assert str(part.dtype).endswith("float32")
+            assert tuple(part.shape[: len(batch)]) == batch
+        with pytest.raises((ValueError, TypeError), match=r"out(\.\w+)? (has shape|is a)"):
+            call(out=places[0][..., :2])
 
 
 def test_forward_dynamics_names_torque_that_does_not_fit(package_of: Packages) -> None:

@@ -1,12 +1,15 @@
 """Matrices, gravity, forward dynamics and energies against Pinocchio's: ten real robots, every back end."""
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 from answers import random_states, relative_error
+from conftest import LOCKED_FINGERS, PANDA, needs_compiler
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 
@@ -42,7 +45,9 @@ def path_of(name: str) -> Path:
 
 @cache
 def pinocchio_says(name: str) -> dict[str, Any]:
-    path, options = path_of(name), REAL[name]
+    path, options = (
+        (PANDA, Options(lock=LOCKED_FINGERS)) if name == "panda arm" else (path_of(name), REAL[name])
+    )
     system = read_system(path, options)
     oracle = PinocchioModel(path, system, options.base == "floating", dict(options.lock))
     states = [*zip(*random_states(oracle.n, STATES), strict=True)]
@@ -68,6 +73,7 @@ def answers_of(robot: Any) -> dict[str, Any]:
         "coriolis_matrix": robot.coriolis_matrix(q, qd),
         "gravity_torque": robot.gravity_torque(q),
         "forward_dynamics": robot.forward_dynamics(q, qd, tau),
+        "energy": robot.energy(q, qd),
     }
 
 
@@ -79,3 +85,19 @@ def test_sums_of_real_robots_are_pinocchios(name: str, tmp_path: Path) -> None:
     expected = pinocchio_says(name)
     for call, answer in answers_of(robot).items():
         assert relative_error(answer, expected[call]) <= LARGEST_ERROR, call
+
+
+@pytest.mark.parametrize(
+    "backend",
+    [
+        *(f"{backend} by {kernel}" for backend in ("numpy", "torch") for kernel in ("straight", "rule")),
+        "autograd",
+        pytest.param("native", marks=needs_compiler),
+    ],
+)
+def test_every_back_end_has_pinocchios_sums(backend: str, package_of: Callable[[str], ModuleType]) -> None:
+    name, _, kernel = backend.partition(" by ")
+    robot = package_of(str(PANDA)).load(name, kernel=kernel or "auto")
+    expected = pinocchio_says("panda arm")
+    for call, answer in answers_of(robot).items():
+        assert relative_error(answer, expected[call]) <= 1e-13, call

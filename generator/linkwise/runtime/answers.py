@@ -9,7 +9,7 @@ from .arguments import check_numbers
 from .composed import Composed
 from .interface import Backend
 from .outputs import accepted
-from .quantities import PARAMETERS, Coefficients, GradientPropagation, Packed, Propagation
+from .quantities import PARAMETERS, Coefficients, Energy, GradientPropagation, Packed, Power, Propagation
 from .structure import Structure
 
 KINDS: dict[str, Any] = {
@@ -18,6 +18,8 @@ KINDS: dict[str, Any] = {
     "propagation": Propagation,
     "gradient_propagation": GradientPropagation,
     "coefficient_regressors": Coefficients,
+    "energy": Energy,
+    "power": Power,
 }
 """What calls with several results answer with; the others answer with one array or tensor."""
 

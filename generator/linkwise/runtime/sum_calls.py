@@ -1,8 +1,10 @@
 """The calls of `Dynamics` that sum over the links, and names of joints and links as numbers."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from .interface import Array
+from .quantities import Energy, Power
 from .structure import Structure
 
 
@@ -53,6 +55,24 @@ class SumCalls:
         """
         qdd: Array = self._answers.forward_dynamics(q, qd, tau, out)
         return qdd
+
+    def energy(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Energy[Array]:
+        """Kinetic and potential energy of each link in J, (..., N) each.
+
+        The potential energy of rigid links is zero at the world's origin; hand-written energies are as they
+        were written.
+        """
+        answer: Energy[Array] = self._answers.energy(q, qd, out)
+        return answer
+
+    def power(self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None) -> Power[Array]:
+        """P_ij = tau_ij qd_i, the power in W that joint i sends into link j, by whose motion, of which order.
+
+        Shapes (..., n, N, n) twice and (..., n, N); `.total` is P_ij. sum_i P_ij is the rate of link j's
+        energy, sum_j P_ij what actuator i gives.
+        """
+        answer: Power[Array] = self._answers.power(q, qd, qdd, out)
+        return answer
 
     def christoffel(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
         """Gamma_ikl, the velocity share of every pair of motions, (..., n, n, n); by link (..., n, N, n, n).

@@ -117,6 +117,17 @@ class NumpyBackend:
             columns.fill(link.position_gradient(np, q, qd, qdd, p))
         return columns.array
 
+    def energies(self, q: Any, qd: Any) -> tuple[Any, Any]:
+        """Kinetic and potential energies of the links in J, (..., N) each."""
+        p = self._values(q)
+        if self.rule:
+            kinetic, potential = self.rule.energies(self, (q, qd), p, self._bodies(q))
+            return kinetic, potential
+        columns = _Columns(q, 2 * self.structure.N)
+        for link in self.links:
+            columns.fill(link.energy(np, q, qd, p))
+        return columns.array[..., 0::2], columns.array[..., 1::2]
+
     def regressor(self, q: Any, qd: Any, qdd: Any) -> Any:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
         assert self.rule is not None  # Answers has seen to it

@@ -114,6 +114,15 @@ class TorchBackend:
             _stacked(q, link.position_gradient(torch, q, qd, qdd, p)) for link in self.links
         )
 
+    def energies(self, q: Tensor, qd: Tensor) -> tuple[Tensor, Tensor]:
+        """Kinetic and potential energies of the links in J, (..., N) each."""
+        p = self._values(q)
+        if self.rule:
+            kinetic, potential = self.rule.energies(self, (q, qd), p, self._bodies(q))
+            return kinetic, potential
+        both = self.concatenate(_stacked(q, link.energy(torch, q, qd, p)) for link in self.links)
+        return both[..., 0::2], both[..., 1::2]
+
     def regressor(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
         assert self.rule is not None  # Answers has seen to it

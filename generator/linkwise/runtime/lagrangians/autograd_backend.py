@@ -11,7 +11,7 @@ from ..structure import Structure
 from ..sums.sum_answers import SumAnswers
 from .dynamics_module import DynamicsModule
 from .energy_interface import Energies, Parameters, numbers_of
-from .functional_sweeps import decomposition_followed, position_gradient_followed, torque_followed
+from .functional_sweeps import decomposition_followed, energies, position_gradient_followed, torque_followed
 from .graph_calls import graph_of, graph_parts_of
 from .recording import transformed
 from .run_time_values import RunTimeValues
@@ -70,6 +70,11 @@ class AutogradBackend(TorchBackend):
         """c0 (..., count) in the order of `Layout.velocity`."""
         c0: Tensor = self._of_links((position_gradient, position_gradient_followed), q, qd, qdd)
         return c0
+
+    def energies(self, q: Tensor, qd: Tensor) -> tuple[Tensor, Tensor]:
+        """Kinetic and potential energies of the links in J, (..., N) each."""
+        kinetic, potential = energies(tuple(self.modules), q, qd, self.seen_by(q))
+        return kinetic.movedim(0, -1), potential.movedim(0, -1)
 
     def graph(self, *asked: Any) -> Any:
         """See `Dynamics.graph`."""

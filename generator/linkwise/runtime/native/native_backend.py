@@ -87,6 +87,10 @@ class NativeBackend(NumpyBackend):
             return self.on_torch().position_gradient(q, qd, qdd)
         return self.calls.run("packed_position_gradient", (q, qd, qdd))[0]
 
+    def energies(self, q: Any, qd: Any) -> tuple[Any, Any]:
+        """Kinetic and potential energies of the links in J, (..., N) each; C has none."""
+        return self.on_torch().energies(q, qd) if has_tensors([q]) else super().energies(q, qd)
+
     def regressor(self, q: Any, qd: Any, qdd: Any) -> Any:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
         return self.on_torch().regressor(q, qd, qdd) if has_tensors([q]) else super().regressor(q, qd, qdd)
@@ -123,6 +127,9 @@ class NativeBackend(NumpyBackend):
         """The parts joined along the last axis."""
         parts = list(parts)
         return self.on_torch().concatenate(parts) if has_tensors(parts) else super().concatenate(parts)
+
+    def _values(self, q: Any) -> dict[str, Any]:
+        return dict(zip(self.structure.parameters, self.calls.constants(q.dtype), strict=True))
 
     def on_torch(self) -> "TorchSide":
         """What computes with tensors."""

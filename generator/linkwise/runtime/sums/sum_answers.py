@@ -6,6 +6,7 @@ from typing import Any
 from ..answers import KINDS, MOTION, Answers, Shapes
 from ..interface import Backend
 from ..structure import Structure
+from .namespace import side_by_side
 from .summed import Summed
 
 GIVEN = {"forward_dynamics": ("q", "qd", "tau")}
@@ -23,6 +24,8 @@ def sum_shapes(structure: Structure) -> dict[str, Shapes]:
         "gravity_torque": ((n,),),
         "gravity_torque_by_link": ((n, links),),
         "forward_dynamics": ((n,),),
+        "energy": ((links,), (links,)),
+        "power": ((n, links, n), (n, links, n), (n, links)),
         "christoffel": ((n, n, n),),
         "christoffel_by_link": ((n, links, n, n),),
     }
@@ -54,6 +57,14 @@ class SumAnswers(Answers):
         """See `Dynamics.forward_dynamics`."""
         return self._summed("forward_dynamics", (q, qd, tau), out)
 
+    def energy(self, q: Any, qd: Any, out: Any = None) -> Any:
+        """See `Dynamics.energy`."""
+        return self._summed("energy", (q, qd), out)
+
+    def power(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
+        """See `Dynamics.power`."""
+        return self._summed("power", (q, qd, qdd), out)
+
     def christoffel(self, q: Any, by_link: bool, out: Any = None) -> Any:
         """See `Dynamics.christoffel`."""
         return self._summed(_named("christoffel", by_link), (q,), out)
@@ -70,6 +81,7 @@ class SumAnswers(Answers):
         into = self._accepted(call, motion, out, names)
         values = getattr(self._sums, call)(*motion)
         if into is None:
+            values = [side_by_side(value) for value in values]
             return kind(*values) if kind else values[0]
         for place, value in zip(into, values, strict=True):
             place[...] = value

@@ -59,6 +59,16 @@ class Summed:
         mass = self._matrices.summed(c2, "acceleration")
         return (solved(mass, tau - self._dense.summed(bias), self._structure.joint_names),)
 
+    def energy(self, q: Any, qd: Any) -> tuple[Any, ...]:
+        """K_j and P_j."""
+        return self._backend.energies(q, qd)
+
+    def power(self, q: Any, qd: Any, qdd: Any) -> tuple[Any, ...]:
+        """c2_ijk qdd_k qd_i, c1_ijk qd_k qd_i, g_ij qd_i."""
+        acceleration, velocity, gravity = self._compute("propagation", (q, qd, qdd))
+        rate = qd[..., :, None, None]
+        return acceleration * rate, velocity * rate, gravity * rate[..., 0]
+
     def christoffel(self, q: Any) -> tuple[Any, ...]:
         """The sums over j of the next."""
         return self._christoffel(q, lambda c1: self._matrices.summed(c1, "velocity"))
@@ -84,8 +94,7 @@ class Summed:
         if self._structure.linear:
             rest = self._rest(q)
             values = values - self._compute("packed", (q, rest, rest))[1][:, None, :]
-        symbols = namespace(q).moveaxis(made(values), 1, -1)
-        return np.ascontiguousarray(symbols) if isinstance(symbols, np.ndarray) else symbols.contiguous()
+        return namespace(q).moveaxis(made(values), 1, -1)
 
     def _rest(self, q: Any) -> Any:
         return self._backend.zeros(q, self._structure.n)
