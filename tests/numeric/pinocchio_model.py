@@ -29,12 +29,13 @@ class Map(NamedTuple):
     offset: float = 0.0
 
 
-def base_joint() -> Any:
-    """Return the six joints of a floating base as one joint of Pinocchio's."""
-    joint = pin.JointModelComposite()
-    for part in BASE.values():
-        joint.addJoint(part(), pin.SE3.Identity())
-    return joint
+def on_floating_base(model: Any) -> Any:
+    """The model on six joints of one axis: Pinocchio's Coriolis matrix is not right for a composite one."""
+    base, joint = pin.Model(), 0
+    for name, part in BASE.items():
+        joint = base.addJoint(joint, part(), pin.SE3.Identity(), name)
+    frame = base.addFrame(pin.Frame("moved", joint, 0, pin.SE3.Identity(), pin.OP_FRAME))
+    return pin.appendModel(base, model, frame, pin.SE3.Identity())
 
 
 class PinocchioModel:
@@ -48,8 +49,8 @@ class PinocchioModel:
     def __init__(
         self, path: Path, system: Any, floating: bool = False, lock: dict[str, float] | None = None
     ) -> None:
-        base = (base_joint(),) if floating else ()
-        self.model = pin.buildModelFromUrdf(str(path), *base)
+        model = pin.buildModelFromUrdf(str(path))
+        self.model = on_floating_base(model) if floating else model
         self.data = self.model.createData()
         self.model.gravity.linear = np.array(system.robot.gravity, dtype=float)
         self.n = len(system.coordinates)
@@ -63,11 +64,6 @@ class PinocchioModel:
         for number in range(1, self.model.njoints):
             name, joint = self.model.names[number], self.model.joints[number]
             mimic = mimics.get(name)
-            if name == "root_joint":
-                maps += [
-                    Map(joint.idx_q + k, joint.idx_v + k, False, index[part]) for k, part in enumerate(BASE)
-                ]
-                continue
             where = joint.idx_q, joint.idx_v, joint.nq == 2
             if name in lock:
                 maps.append(Map(*where, None, offset=lock[name]))
@@ -101,6 +97,35 @@ class PinocchioModel:
         full = pin.computeJointTorqueRegressor(self.model, self.data, *self._state(q, qd, qdd))
         rows = self.tie.T @ full
         return rows.reshape(self.n, -1, 10)
+
+    def mass(self, q: Any) -> Any:
+        """M (n, n)."""
+        full = np.triu(pin.crba(self.model, self.data, self._state(q, 0 * q, 0 * q)[0]))
+        return self.tie.T @ (full + np.triu(full, 1).T) @ self.tie
+
+    def coriolis(self, q: Any, qd: Any) -> Any:
+        """C (n, n)."""
+        state = self._state(q, qd, 0 * qd)[:2]
+        return self.tie.T @ pin.computeCoriolisMatrix(self.model, self.data, *state) @ self.tie
+
+    def gravity(self, q: Any) -> Any:
+        """g (n,)."""
+        state = self._state(q, 0 * q, 0 * q)[0]
+        return self.tie.T @ pin.computeGeneralizedGravity(self.model, self.data, state)
+
+    def acceleration(self, q: Any, qd: Any, tau: Any) -> Any:
+        """qdd (n,) by the articulated-body algorithm, or where joints follow others, from M."""
+        if self.model.nv > self.n:
+            return np.linalg.solve(self.mass(q), tau - self.torque(q, qd, 0 * qd))
+        back = np.linalg.inv(self.tie)
+        return back @ pin.aba(self.model, self.data, *self._state(q, qd, qd)[:2], back.T @ tau)
+
+    def energies(self, q: Any, qd: Any, link: str) -> tuple[float, float]:
+        """Kinetic and potential energy of one link in J."""
+        at, speed, _ = self._state(q, qd, qd)
+        model = self.alone[link]
+        kinetic = pin.computeKineticEnergy(model, self.data, at, speed)
+        return kinetic, pin.computePotentialEnergy(model, self.data, at)
 
     @property
     def tie(self) -> Any:

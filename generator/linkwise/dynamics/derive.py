@@ -38,9 +38,11 @@ def _energy_kernel(system: System, link: int) -> Kernel:
         lower.define(carrier.twist.definitions)
         lower.define(carrier.height.definitions)
     energy = energies[link]
-    lagrangian = lower.graph.sub(lower(energy.kinetic), lower(energy.potential))
+    kinetic, potential = lower(energy.kinetic), lower(energy.potential)
+    lagrangian = lower.graph.sub(kinetic, potential)
     forms = euler_lagrange(lower.graph, lagrangian, system.path(link), x)
-    return Kernel(lower.graph, x, parameter_nodes(system, lower), (forms,), ())
+    own = (kinetic, potential) if isinstance(system, EnergySystem) else ()
+    return Kernel(lower.graph, x, parameter_nodes(system, lower), (forms,), (), own)
 
 
 def derive(system: System, progress: Progress = silent, method: Method = "rule") -> tuple[Kernel, ...]:

@@ -18,6 +18,7 @@ class Kernel:
     """A graph, its inputs, the nodes of the parameters by symbol, and the forms of the links it computes.
 
     frame: the common frame of its vectors in words, axes and origin; empty for hand-written energies
+    energy: kinetic and potential energy of a link whose energies were written by hand
     """
 
     graph: Graph
@@ -25,6 +26,7 @@ class Kernel:
     parameters: dict[sp.Symbol, Node]
     forms: tuple[LinkForms, ...]
     frame: tuple[str, ...]
+    energy: tuple[Node, ...] = ()
 
 
 def lowering(system: System) -> tuple[Lowering, Inputs]:

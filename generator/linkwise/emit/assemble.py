@@ -28,6 +28,7 @@ SHARED_RUNTIME = (
     "__init__.py",
     "answers.py",
     "arguments.py",
+    "chosen_names.py",
     "composed.py",
     "dense.py",
     "dynamics.py",
@@ -37,6 +38,7 @@ SHARED_RUNTIME = (
     "quantities.py",
     "robot_kinematics.py",
     "structure.py",
+    "sum_calls.py",
 )
 """Files of linkwise/runtime that every package has."""
 TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}

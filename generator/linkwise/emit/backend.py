@@ -114,8 +114,8 @@ def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
     return formula_files(d)
 
 
-RULE = ("arrays/__init__.py", "arrays/array_kernels.py", "kinematics", "rule")
-"""Of linkwise/runtime: the vectorised rule, and the kinematics of frames on its arrays."""
+RULE = ("arrays/__init__.py", "arrays/array_kernels.py", "kinematics", "rule", "sums")
+"""Of linkwise/runtime: the vectorised rule, the kinematics of frames, and what is summed over the links."""
 
 BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend

@@ -17,12 +17,16 @@ from linkwise.version import VERSION
 Rows = Sequence[tuple[str, Node]]
 """Labels of outputs, such as c2(1, 3, 2) for joint, link and coordinate, and their nodes."""
 
+MOTION = ("q", "qd", "qdd")
+
 
 @dataclass(frozen=True)
 class FormFunction:
     """One emitted function; each group of its results is a tuple of (expression, label)."""
 
     name: str
+    arguments: str
+    """The motion that it is given, as its signature has it."""
     doc: str
     cost: str
     operations: int
@@ -58,6 +62,10 @@ def _functions(system: System, kernel: Kernel, j: int) -> Iterator[FormFunction]
     yield _function(system, kernel, "decomposition", doc, whole)
     yield _function(system, kernel, "torque", "Return tau", [groups["torque"]])
     yield _function(system, kernel, "position_gradient", "Return c0 = d(tau)/d(q)", [groups["c0"]])
+    if kernel.energy:
+        energies = [(f"{kind}({j})", node) for kind, node in zip("KP", kernel.energy, strict=True)]
+        doc = "Return kinetic energy K and potential energy P in J"
+        yield _function(system, kernel, "energy", doc, [energies], MOTION[:2])
 
 
 def labelled(kernel: Kernel, forms: LinkForms, j: int) -> dict[str, Rows]:
@@ -80,7 +88,14 @@ def labelled(kernel: Kernel, forms: LinkForms, j: int) -> dict[str, Rows]:
     }
 
 
-def _function(system: System, kernel: Kernel, name: str, doc: str, groups: Sequence[Rows]) -> FormFunction:
+def _function(
+    system: System,
+    kernel: Kernel,
+    name: str,
+    doc: str,
+    groups: Sequence[Rows],
+    motion: Sequence[str] = MOTION,
+) -> FormFunction:
     nodes = [node for rows in groups for _, node in rows]
     code = straight_line(kernel.graph, nodes, PythonPrinter("xp"))
     cost = count_operations(kernel.graph, nodes)
@@ -88,4 +103,5 @@ def _function(system: System, kernel: Kernel, name: str, doc: str, groups: Seque
     results = tuple(tuple((next(texts), label) for label, _ in rows) for rows in groups)
     inputs = fetched(system, code, "[..., {}]")
     operations = cost.arithmetic + cost.functions
-    return FormFunction(name, doc, in_words(cost), operations, inputs, code.assignments, results)
+    arguments = ", ".join(f"{one}: Any" for one in motion)
+    return FormFunction(name, arguments, doc, in_words(cost), operations, inputs, code.assignments, results)

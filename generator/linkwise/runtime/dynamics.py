@@ -20,9 +20,10 @@ from .interface import Array, Backend
 from .quantities import Coefficients, GradientPropagation, Packed, Propagation
 from .robot_kinematics import Kinematics
 from .structure import Layout, Structure
+from .sum_calls import SumCalls
 
 
-class Dynamics:
+class Dynamics(SumCalls):
     """Partial torques of a robot on one back end; made by the package's `load`.
 
     q, qd, qdd: positions, velocities and accelerations of shape (..., n): rad, rad/s, rad/s^2 for a revolute
@@ -54,6 +55,8 @@ class Dynamics:
     """Names of the links, in the order of j."""
     layout: Layout
     """Indices that packed values belong to."""
+    structure: Structure
+    """Names, paths and parameters, as the package's names.py has them."""
     backend: Backend[Any]
     """What computes; of the native one `threads` may be set."""
     check_finite: bool
@@ -72,7 +75,7 @@ class Dynamics:
         self.n, self.N = structure.n, structure.N
         self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
         self.link_names, self.layout = structure.link_names, structure.layout
-        self.backend = backend
+        self.structure, self.backend = structure, backend
         self._load, self._asked = load, asked
         self._answers = backend.answers(check_finite)
         # They stand before the methods of the class, which they pass on to what is no plain array.

@@ -9,7 +9,6 @@ from torch import Tensor
 from torch._subclasses.fake_tensor import unset_fake_temporarily
 from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
-from ..answers import Answers
 from ..arguments import as_array, as_weights, check_axes, check_dense, no_common_shape, precision
 from ..interface import ClosedForms
 from ..kinematics.kinematic_answers import KinematicAnswers
@@ -18,6 +17,7 @@ from ..rule.joint_tree import Bodies, JointTree
 from ..rule.rule_calls import RigidRule
 from ..rule.tree_arrays import TreeArrays, checked_bodies, given_numbers
 from ..structure import Structure
+from ..sums.sum_answers import SumAnswers
 from .array_kernels import Crossing, known_kernel, operations
 
 FLOATS = ({torch.float32}, {torch.float64})
@@ -84,9 +84,9 @@ class TorchBackend:
         except RuntimeError:
             raise no_common_shape(named, n) from None
 
-    def answers(self, check_finite: bool) -> Answers:
+    def answers(self, check_finite: bool) -> SumAnswers:
         """The calls of `Dynamics`."""
-        return Answers(self.structure, self, check_finite)
+        return SumAnswers(self.structure, self, check_finite)
 
     def kinematics(
         self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]
@@ -134,6 +134,15 @@ class TorchBackend:
         return self.concatenate(
             _stacked(q, link.position_gradient(torch, q, qd, qdd, p)) for link in self.links
         )
+
+    def energies(self, q: Tensor, qd: Tensor) -> tuple[Tensor, Tensor]:
+        """Kinetic and potential energies of the links in J, (..., N) each."""
+        p = self._values(q)
+        if self.rule:
+            kinetic, potential = self.rule.energies(self, (q, qd), p, self._bodies(q))
+            return kinetic, potential
+        both = self.concatenate(_stacked(q, link.energy(torch, q, qd, p)) for link in self.links)
+        return both[..., 0::2], both[..., 1::2]
 
     def regressor(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""

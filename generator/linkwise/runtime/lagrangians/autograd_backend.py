@@ -6,14 +6,14 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
-from ..answers import Answers
 from ..arrays.torch_backend import TorchBackend
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays
 from ..structure import Structure
+from ..sums.sum_answers import SumAnswers
 from .dynamics_module import DynamicsModule
 from .energy_interface import Energies, Parameters, numbers_of
-from .functional_sweeps import decomposition_followed, position_gradient_followed, torque_followed
+from .functional_sweeps import decomposition_followed, energies, position_gradient_followed, torque_followed
 from .graph_calls import graph_of, graph_parts_of
 from .recording import transformed
 from .run_time_values import RunTimeValues
@@ -45,7 +45,7 @@ class AutogradBackend(TorchBackend):
         self.modules, self.given = modules, given
         self.parameters: Any = given
 
-    def answers(self, check_finite: bool) -> Answers:
+    def answers(self, check_finite: bool) -> SumAnswers:
         """The calls of `Dynamics`."""
         return _Answers(self.structure, self, check_finite)
 
@@ -94,6 +94,11 @@ class AutogradBackend(TorchBackend):
         c0: Tensor = self._of_links((position_gradient, position_gradient_followed), q, qd, qdd)
         return c0
 
+    def energies(self, q: Tensor, qd: Tensor) -> tuple[Tensor, Tensor]:
+        """Kinetic and potential energies of the links in J, (..., N) each."""
+        kinetic, potential = energies(tuple(self.modules), q, qd, self.seen_by(q))
+        return kinetic.movedim(0, -1), potential.movedim(0, -1)
+
     def graph(self, *asked: Any) -> Any:
         """See `Dynamics.graph`."""
         return graph_of(self, *asked)
@@ -138,7 +143,7 @@ def _in_pieces(call: Callable[..., Any], p: Parameters, motion: Sequence[Tensor]
     return [torch.cat(part).reshape(*batch, part[0].shape[-1]) for part in zip(*parts, strict=True)]
 
 
-class _Answers(Answers):
+class _Answers(SumAnswers):
     """Calls that refuse `out` also where a constant of a link is learned."""
 
     def read_beside_motion(self) -> Iterable[Any]:

@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import torch
 
+from ..chosen_names import position_of
 from ..rule.rule_calls import RigidRule
 from ..structure import Structure
 from .autograd_backend import AutogradBackend
@@ -27,13 +28,10 @@ class LinkModules(torch.nn.Module):
             self.add_module(key, module)
 
     def __getitem__(self, link: int | str) -> PartialLagrangian:
-        """Raises IndexError or KeyError for a link that is not there."""
-        if isinstance(link, str):
-            if link not in self.names:
-                raise KeyError(f"no link {link!r}; the links are {', '.join(self.names)}")
-            link = self.names.index(link)
-        if not -len(self.names) <= link < len(self.names):
-            raise IndexError(f"no link {link}; there are {len(self.names)}, counted from 0")
+        """Raises ValueError for a link that is not there; -1 is the last."""
+        if isinstance(link, int) and -len(self.names) <= link < 0:
+            link += len(self.names)
+        link = position_of(link, self.names, "link", "the link")
         return cast(PartialLagrangian, self._modules[self._keys[link]])
 
     def __len__(self) -> int:
