@@ -208,6 +208,10 @@ def test_walking_with_a_planar_leg(tmp_path):
     assert result.closure.terms_relative < 1e-12
     units = {column.name: column.unit for column in result.columns}
     assert (units["tau/pelvis_ty"], units["tau/knee_angle_r"]) == ("N", "N·m")
+    assert (
+        units["power/pelvis_ty"] == units["power/pelvis_ty/foot"] == units["power/knee_angle_r/foot"] == "W"
+    )
+    assert result.closure.energy_relative < 1e-12
     weight = 9.80665 * (50.85 + 7.5 + 3.49 + 1.09)
     np.testing.assert_allclose(result.gravity[:, 1].sum(-1), weight)
 
