@@ -3,7 +3,7 @@
 runtime/rule/joint_tree.py says what each entry means.
 """
 
-from .runtime.rule.joint_tree import JointTree, TreeJoint, TreeLink
+from .runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint, TreeLink
 from .runtime.rule.rule_calls import RigidRule
 
 TREE = JointTree(
@@ -84,6 +84,51 @@ TREE = JointTree(
             0.09,
             (0.0, 0.0, 0.032),
             ((0.00015, 0.0, 0.0), (0.0, 0.00015, 0.0), (0.0, 0.0, 4e-05)),
+        ),
+    ),
+    # Joint that carries it, None for the ground; rotation and translation in m, both in the axes behind the joint.
+    frames=(
+        TreeFrame(
+            'base',
+            None,
+            ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'link1',
+            0,
+            ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'link2',
+            1,
+            ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'link3',
+            2,
+            ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'link4',
+            3,
+            ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'link5',
+            4,
+            ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'link6',
+            5,
+            ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+            (0.0, 0.0, 0.0),
         ),
     ),
 )

@@ -106,10 +106,11 @@ def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: A
 def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from .energies import LAGRANGIANS
     from .runtime.lagrangians.link_modules import backend_of_links
+    from .tree import RULE
     from .runtime.arrays.array_kernels import refuse_choice
 
     refuse_choice("autograd", kernel, bodies)
-    return backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad)
+    return backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad, RULE)
 
 
 def _native(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:

@@ -3,7 +3,7 @@
 runtime/rule/joint_tree.py says what each entry means.
 """
 
-from .runtime.rule.joint_tree import JointTree, TreeJoint, TreeLink
+from .runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint, TreeLink
 from .runtime.rule.rule_calls import RigidRule
 
 TREE = JointTree(
@@ -82,6 +82,57 @@ TREE = JointTree(
             1.4,
             (-0.132, 0.017, 0.006),
             ((0.0014, 0.0007, -0.0003), (0.0007, 0.0098, 0.0001), (-0.0003, 0.0001, 0.0101)),
+        ),
+    ),
+    # Joint that carries it, None for the ground; rotation and translation in m, both in the axes behind the joint.
+    frames=(
+        TreeFrame(
+            'pelvis',
+            None,
+            ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'lower_yoke',
+            0,
+            ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'upper_yoke',
+            1,
+            ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'chest',
+            2,
+            ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'left_upper_arm',
+            3,
+            ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'left_forearm',
+            4,
+            ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'right_upper_arm',
+            5,
+            ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+            (0.0, 0.0, 0.0),
+        ),
+        TreeFrame(
+            'right_forearm',
+            6,
+            ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+            (0.0, 0.0, 0.0),
         ),
     ),
 )

@@ -39,6 +39,7 @@ class Lagrangian(RigidLagrangian):
         ),
         "place": (0.25, 0.0, 0.0),  # of 'joint2' in frame 1, in m
     }
+    places = {1: "place"}  # of joints of tree.py
 
     @carried
     def twist(self, q: Values, qd: Values, p: Parameters) -> Any:

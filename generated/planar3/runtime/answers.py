@@ -9,7 +9,7 @@ from .arguments import check_numbers
 from .composed import Composed
 from .interface import Backend
 from .outputs import accepted
-from .quantities import PARAMETERS, Coefficients, GradientPropagation, Packed, Propagation
+from .quantities import PARAMETERS, Coefficients, Energy, GradientPropagation, Packed, Power, Propagation
 from .structure import Structure
 
 KINDS: dict[str, Any] = {
@@ -18,6 +18,8 @@ KINDS: dict[str, Any] = {
     "propagation": Propagation,
     "gradient_propagation": GradientPropagation,
     "coefficient_regressors": Coefficients,
+    "energy": Energy,
+    "power": Power,
 }
 """What calls with several results answer with; the others answer with one array or tensor."""
 
@@ -153,18 +155,18 @@ class Answers:
         self._compute_into(call, motion, into)
         return kind(*out) if kind else out
 
-    def _motion(self, given: Sequence[Any]) -> Any:
+    def _motion(self, given: Sequence[Any], names: Sequence[str] = MOTION) -> Any:
         """The motion as the back end computes with it, in one shape, and looked at if that was asked for."""
-        named = dict(zip(MOTION, given, strict=False))
+        named = dict(zip(names, given, strict=False))
         arrays = self._backend.arrays(named, self._structure.n)
         if self._check_finite:
             check_numbers(named, self._structure.joint_names)
         return arrays
 
-    def _accepted(self, call: str, motion: Sequence[Any], out: Any) -> Any:
+    def _accepted(self, call: str, motion: Sequence[Any], out: Any, names: Sequence[str] = MOTION) -> Any:
         if out is None:
             return None
-        kind, named = KINDS.get(call), dict(zip(MOTION, motion, strict=False))
+        kind, named = KINDS.get(call), dict(zip(names, motion, strict=False))
         fields = kind._fields if kind else ()
         return accepted(out, fields, self._shapes[call], named, self.read_beside_motion(), self.contiguous)
 

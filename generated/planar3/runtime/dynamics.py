@@ -10,6 +10,7 @@ tensors are a view that is built on request.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from types import MethodType
 from typing import Any, Literal, overload
 
@@ -17,10 +18,12 @@ from numpy.typing import ArrayLike
 
 from .interface import Array, Backend
 from .quantities import Coefficients, GradientPropagation, Packed, Propagation
+from .robot_kinematics import Kinematics
 from .structure import Layout, Structure
+from .sum_calls import SumCalls
 
 
-class Dynamics:
+class Dynamics(SumCalls):
     """Partial torques of a robot on one back end; made by the package's `load`.
 
     q, qd, qdd: positions, velocities and accelerations of shape (..., n): rad, rad/s, rad/s^2 for a revolute
@@ -52,6 +55,8 @@ class Dynamics:
     """Names of the links, in the order of j."""
     layout: Layout
     """Indices that packed values belong to."""
+    structure: Structure
+    """Names, paths and parameters, as the package's names.py has them."""
     backend: Backend[Any]
     """What computes; of the native one `threads` may be set."""
     check_finite: bool
@@ -70,7 +75,7 @@ class Dynamics:
         self.n, self.N = structure.n, structure.N
         self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
         self.link_names, self.layout = structure.link_names, structure.layout
-        self.backend = backend
+        self.structure, self.backend = structure, backend
         self._load, self._asked = load, asked
         self._answers = backend.answers(check_finite)
         # They stand before the methods of the class, which they pass on to what is no plain array.
@@ -81,6 +86,12 @@ class Dynamics:
         """Values of the run-time parameters."""
         values: Mapping[str, Any] = self.backend.parameters
         return values
+
+    @cached_property
+    def kinematics(self) -> Kinematics[Any]:
+        """Poses, Jacobians and their rates of the robot's frames; raises ValueError for links of energies."""
+        made: Any = self.backend
+        return Kinematics(made.kinematics(self.check_finite, self._answers.read_beside_motion))
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}

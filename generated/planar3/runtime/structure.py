@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .chosen_names import position_of
 from .parameter_values import ParametricBody, checked_values
 
 Indices = NDArray[np.intp]
@@ -83,6 +84,14 @@ class Structure:
     def sizes(self) -> Sizes:
         """Number of packed values of one sample: c2, c1, g, tau, h1."""
         return Sizes(*map(len, self.layout))
+
+    def joint_index(self, given: int | str, argument: str = "joint") -> int:
+        """Index i or k of a joint by number from 0 or by name; raises ValueError with the argument's name."""
+        return position_of(given, self.joint_names, "joint", argument)
+
+    def link_index(self, given: int | str, argument: str = "link") -> int:
+        """Index j of a link by number from 0 or by name; raises ValueError with the argument's name."""
+        return position_of(given, self.link_names, "link", argument)
 
     def only(self, link: int) -> "Structure":
         """The robot as if this link alone were there, its parameters aside."""

@@ -39,6 +39,7 @@ class Lagrangian(RigidLagrangian):
         ),
         "place": (-0.0203, -0.4331, 0.0),  # of 'joint4' in frame 3, in m
     }
+    places = {3: "place"}  # of joints of tree.py
 
     @carried
     def twist(self, q: Values, qd: Values, p: Parameters) -> Any:

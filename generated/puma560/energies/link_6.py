@@ -39,6 +39,7 @@ class Lagrangian(RigidLagrangian):
         ),
         "place": (0.0, 0.0, 0.0),  # of 'joint6' in frame 5, in m
     }
+    places = {5: "place"}  # of joints of tree.py
 
     @carried
     def twist(self, q: Values, qd: Values, p: Parameters) -> Any:

@@ -56,6 +56,42 @@ class GradientPropagation(NamedTuple, Generic[Array]):
         return "gradient"
 
 
+class Energy(NamedTuple, Generic[Array]):
+    """Energies of the links in J."""
+
+    kinetic: Array
+    """(..., N)."""
+    potential: Array
+    """(..., N); a rigid link's centre of mass at the height of the world's origin has none."""
+
+    @property
+    def total(self) -> Array:
+        """Their sums (..., N)."""
+        total: Array = self.kinetic + self.potential
+        return total
+
+
+class Power(NamedTuple, Generic[Array]):
+    """P_ij = tau_ij qd_i in W, the power that joint i sends into link j, by whose motion, of which order.
+
+    What is sent into a link is what its energy gains: sum_i P_ij = d(K_j + P_j)/dt. Where K has terms linear
+    in the velocities or free of them, as on a moving base, qd . dK/dqd - K stands in its place.
+    """
+
+    acceleration: Array
+    """c2_ijk qdd_k qd_i (..., n, N, n)."""
+    velocity: Array
+    """c1_ijk qd_k qd_i (..., n, N, n), of the closing convention."""
+    gravity: Array
+    """g_ij qd_i (..., n, N)."""
+
+    @property
+    def total(self) -> Array:
+        """P_ij (..., n, N)."""
+        total: Array = self.acceleration.sum(-1) + self.velocity.sum(-1) + self.gravity
+        return total
+
+
 class Packed(NamedTuple, Generic[Array]):
     """Full decomposition without its zeros: values (..., count) whose indices are the robot's `layout`."""
 

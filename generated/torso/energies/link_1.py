@@ -47,6 +47,7 @@ class Lagrangian(RigidLagrangian):
         ),
         "place": (0.0, 0.0, 0.11),  # of 'waist_turn' in the base, in m
     }
+    places = {0: "place"}  # of joints of tree.py
 
     @carried
     def twist(self, q: Values, qd: Values, p: Parameters) -> Any:

@@ -39,6 +39,7 @@ class Lagrangian(RigidLagrangian):
         ),
         "place": (0.37, 0.0, 0.195),  # of 'left_shoulder' in frame 1, in m
     }
+    places = {3: "place"}  # of joints of tree.py
 
     @carried
     def twist(self, q: Values, qd: Values, p: Parameters) -> Any:

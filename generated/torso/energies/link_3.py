@@ -39,6 +39,7 @@ class Lagrangian(RigidLagrangian):
         ),
         "place": (-0.28, 0.02, 0.025),  # of 'left_elbow' in frame 2, in m
     }
+    places = {4: "place"}  # of joints of tree.py
 
     @carried
     def twist(self, q: Values, qd: Values, p: Parameters) -> Any:

@@ -39,6 +39,7 @@ class Lagrangian(RigidLagrangian):
         ),
         "place": (-0.28, 0.02, -0.025),  # of 'right_elbow' in frame 4, in m
     }
+    places = {6: "place"}  # of joints of tree.py
 
     @carried
     def twist(self, q: Values, qd: Values, p: Parameters) -> Any:

@@ -38,6 +38,9 @@ class ClosedForms(Protocol):
     def position_gradient(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> Entries:
         """c0_ijk = d(tau_ij)/d(q_k), by i, then k."""
 
+    def energy(self, xp: Any, q: Any, qd: Any, p: Mapping[str, Any]) -> Entries:
+        """Kinetic and potential energy, of links that are energies; the rule has those of rigid links."""
+
 
 class Backend(Protocol[Kind]):
     """What computes: packed values (..., count) in the order of `Layout`, and a few operations on arrays."""
@@ -63,6 +66,9 @@ class Backend(Protocol[Kind]):
 
     def position_gradient(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
         """c0 (..., count) in the order of `Layout.velocity`."""
+
+    def energies(self, q: Kind, qd: Kind) -> tuple[Kind, Kind]:
+        """Kinetic and potential energies of the links in J, (..., N) each."""
 
     def regressor(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""

@@ -1,6 +1,5 @@
 """Values of the run-time parameters: known by name, real numbers, and such as a body can have."""
 
-import difflib
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -11,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .chosen_names import MOST_NAMES, choice, plain, short
+
 TRIANGLE = 1e-6
 """Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
 SPECK = 1e-14
 """m^2: moments below mass times this count as zero; a point mass has only what rounding leaves of them."""
-MOST_NAMES = 6
-LONGEST = 60
 
 
 @dataclass(frozen=True)
@@ -74,10 +73,10 @@ def _number(name: str, value: Any) -> Any:
         real = False
     if not real or isinstance(value, np.ma.MaskedArray):
         raise TypeError(
-            f"parameter {_short(name)} is {_short(value)}; give a number, or an array of one for each sample"
+            f"parameter {short(name)} is {short(value)}; give a number, or an array of one for each sample"
         )
     if not np.isfinite(array).all():
-        raise ValueError(f"parameter {_short(name)} is NaN or infinite; give a finite number")
+        raise ValueError(f"parameter {short(name)} is NaN or infinite; give a finite number")
     return array if array.ndim else float(array)
 
 
@@ -86,7 +85,7 @@ def fits(name: str, shape: Sequence[int], batch: Sequence[int]) -> None:
     missing = len(batch) - len(shape)
     if missing < 0 or any(size not in (1, b) for size, b in zip(shape, batch[missing:], strict=True)):
         raise ValueError(
-            f"parameter {_short(name)} has shape {tuple(shape)}, the motion has samples of shape "
+            f"parameter {short(name)} has shape {tuple(shape)}, the motion has samples of shape "
             f"{tuple(batch)}; give one number, or one for each sample"
         )
 
@@ -133,7 +132,7 @@ def _check_bodies(
         if found_here.any():
             names = [name for name in given if name in body.parameters]
             raise ValueError(
-                f"link {_short(body.link)} would have {REASONS[found_here.max()]}, "
+                f"link {short(body.link)} would have {REASONS[found_here.max()]}, "
                 f"with {_listed(names, given)}; no body has that: correct it, or generate the package with "
                 "--allow-unphysical"
             )
@@ -142,14 +141,11 @@ def _check_bodies(
 def _unknown(name: str, own: Mapping[str, float]) -> str:
     if not own:
         return (
-            f"no parameter {_short(name)}: this package has no parameters; generate it with "
+            f"no parameter {short(name)}: this package has no parameters; generate it with "
             "--parameters symbolic"
         )
-    if len(own) <= MOST_NAMES:
-        return f"no parameter {_short(name)}; the parameters are {', '.join(map(_plain, own))}"
-    near = difflib.get_close_matches(str(name), own, MOST_NAMES, 0.5) or list(own)[:MOST_NAMES]
-    names = ", ".join(map(_plain, near))
-    return f"no parameter {_short(name)}; near it are {names}, and `parameters` has all {len(own)}"
+    known = choice(name, own, "parameters")
+    return f"no parameter {short(name)}; {'' if len(own) > MOST_NAMES else 'the parameters are '}{known}"
 
 
 def _is_tensor(value: Any) -> bool:
@@ -181,18 +177,8 @@ def _looked_at(tensors: Mapping[str, Any]) -> dict[str, Any]:
 def _listed(names: Sequence[str] | Mapping[str, Any], values: Mapping[str, Any]) -> str:
     """The first few parameters with their values."""
     shown = [
-        _plain(name) if np.ndim(values[name]) else f"{_plain(name)} = {values[name]:g}"
+        plain(name) if np.ndim(values[name]) else f"{plain(name)} = {values[name]:g}"
         for name in list(names)[:MOST_NAMES]
     ]
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"{', '.join(shown)}{more}"
-
-
-def _plain(name: str) -> str:
-    """A name as one line may hold it."""
-    return name if name.isprintable() and len(name) <= LONGEST else _short(name)
-
-
-def _short(value: Any) -> str:
-    text = repr(value).replace("\n", " ")
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."

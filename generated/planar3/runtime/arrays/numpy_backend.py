@@ -1,19 +1,20 @@
 """Closed forms and the vectorised rule on NumPy arrays."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers import Answers
 from ..arguments import as_array, as_weights, check_axes, no_common_shape, precision, too_many_axes
 from ..interface import ClosedForms, Entries
+from ..kinematics.kinematic_answers import KinematicAnswers
 from ..parameter_values import fits
 from ..rule.joint_tree import Bodies
 from ..rule.rule_calls import RigidRule
-from ..rule.tree_arrays import checked_bodies
+from ..rule.tree_arrays import TreeArrays, checked_bodies, given_numbers
 from ..structure import Structure
+from ..sums.sum_answers import SumAnswers
 from .array_kernels import Crossing, known_kernel, operations
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
@@ -52,7 +53,7 @@ class NumpyBackend:
         self.structure = structure
         self.links = links or ()
         self.operations = operations(links) if links and rule else {}
-        self.rule = rule
+        self.rule, self.tree = rule, rule.tree if rule else None
         self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
         self.parameters: dict[str, Any] = {
             k: as_array(f"parameter {k!r}", v).astype(float) for k, v in parameters.items()
@@ -81,9 +82,25 @@ class NumpyBackend:
             raise too_many_axes(arrays, n) from None
         return [a if a.shape == shape else np.broadcast_to(a, shape) for a in arrays.values()]
 
-    def answers(self, check_finite: bool) -> Answers:
+    def answers(self, check_finite: bool) -> SumAnswers:
         """The calls of `Dynamics`."""
-        return Answers(self.structure, self, check_finite)
+        return SumAnswers(self.structure, self, check_finite)
+
+    def kinematics(
+        self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]
+    ) -> KinematicAnswers:
+        """The calls of `Kinematics`."""
+        return KinematicAnswers(self.structure, self, check_finite, read_beside_motion)
+
+    def side(self, like: Any) -> Any:
+        """What computes with `like`, an array or a tensor."""
+        return self
+
+    def tree_numbers(self, own: tuple[TreeArrays, Any], q: Any) -> TreeArrays:
+        """The tree's numbers for the parameters and the bodies; see `given_numbers`."""
+        assert self.tree is not None  # KinematicAnswers has seen to it
+        p, bodies = self._values(q), self._bodies(q)
+        return given_numbers(np, self.tree, own, p, bodies, tuple(q.shape[:-1]))
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
@@ -116,6 +133,17 @@ class NumpyBackend:
         for link in self.links:
             columns.fill(link.position_gradient(np, q, qd, qdd, p))
         return columns.array
+
+    def energies(self, q: Any, qd: Any) -> tuple[Any, Any]:
+        """Kinetic and potential energies of the links in J, (..., N) each."""
+        p = self._values(q)
+        if self.rule:
+            kinetic, potential = self.rule.energies(self, (q, qd), p, self._bodies(q))
+            return kinetic, potential
+        columns = _Columns(q, 2 * self.structure.N)
+        for link in self.links:
+            columns.fill(link.energy(np, q, qd, p))
+        return columns.array[..., 0::2], columns.array[..., 1::2]
 
     def regressor(self, q: Any, qd: Any, qdd: Any) -> Any:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""

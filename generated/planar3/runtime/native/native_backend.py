@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers import Answers
 from ..arguments import has_tensors
 from ..arrays.numpy_backend import NumpyBackend
 from ..interface import ClosedForms
@@ -66,9 +65,13 @@ class NativeBackend(NumpyBackend):
             return super().arrays(named, n)
         return self.on_torch().arrays(named, n)
 
-    def answers(self, check_finite: bool) -> Answers:
+    def answers(self, check_finite: bool) -> NativeAnswers:
         """The calls of `Dynamics`: C writes the answers, but for tensors of which gradients are recorded."""
         return NativeAnswers(self, self.calls, self.on_torch, check_finite)
+
+    def side(self, like: Any) -> Any:
+        """What computes with `like`, an array or a tensor."""
+        return self.on_torch() if has_tensors([like]) else self
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
@@ -87,6 +90,10 @@ class NativeBackend(NumpyBackend):
         if has_tensors([q]):
             return self.on_torch().position_gradient(q, qd, qdd)
         return self.calls.run("packed_position_gradient", (q, qd, qdd))[0]
+
+    def energies(self, q: Any, qd: Any) -> tuple[Any, Any]:
+        """Kinetic and potential energies of the links in J, (..., N) each; C has none."""
+        return self.on_torch().energies(q, qd) if has_tensors([q]) else super().energies(q, qd)
 
     def regressor(self, q: Any, qd: Any, qdd: Any) -> Any:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
@@ -124,6 +131,9 @@ class NativeBackend(NumpyBackend):
         """The parts joined along the last axis."""
         parts = list(parts)
         return self.on_torch().concatenate(parts) if has_tensors(parts) else super().concatenate(parts)
+
+    def _values(self, q: Any) -> dict[str, Any]:
+        return self.calls.values(q.dtype)
 
     def on_torch(self) -> "TorchSide":
         """What computes with tensors."""

@@ -45,6 +45,18 @@ class TreeLink(NamedTuple):
     """About the centre of mass, in kg m^2."""
 
 
+class TreeFrame(NamedTuple):
+    """A frame that has a name: a body of the file, also one without mass or merged away, or a site."""
+
+    name: str
+    joint: int | None
+    """Index of the joint that moves it, None for the ground."""
+    rotation: tuple[Triple, Triple, Triple]
+    """From its axes to those of the frame that the joint moves, or of the world."""
+    translation: Triple
+    """Of its origin there, in m."""
+
+
 @dataclass(frozen=True)
 class JointTree:
     """Joints, parents first, links in the order of j, and gravity in m/s^2 in the axes of the base.
@@ -56,6 +68,7 @@ class JointTree:
     gravity: Triple
     joints: tuple[TreeJoint, ...]
     links: tuple[TreeLink, ...]
+    frames: tuple[TreeFrame, ...] = ()
     formulas: Mapping[str, Formula] = field(default_factory=dict)
 
     def chain(self, joint: int | None) -> tuple[int, ...]:

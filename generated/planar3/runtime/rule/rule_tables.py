@@ -81,7 +81,7 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
         kinematic_tables(tree),
         links,
         own,
-        link_numbers(np, eye, *own[2:]),
+        link_numbers(np, eye, *own.carried),
         spatial,
         spatial_numbers(np, spatial, own),
         formula_sources(tree),

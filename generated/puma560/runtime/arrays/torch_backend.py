@@ -1,6 +1,6 @@
 """Closed forms and the vectorised rule on torch tensors."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,14 +9,15 @@ from torch import Tensor
 from torch._subclasses.fake_tensor import unset_fake_temporarily
 from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
-from ..answers import Answers
 from ..arguments import as_array, as_weights, check_axes, check_dense, no_common_shape, precision
 from ..interface import ClosedForms
+from ..kinematics.kinematic_answers import KinematicAnswers
 from ..parameter_values import fits
-from ..rule.joint_tree import Bodies
+from ..rule.joint_tree import Bodies, JointTree
 from ..rule.rule_calls import RigidRule
-from ..rule.tree_arrays import checked_bodies
+from ..rule.tree_arrays import TreeArrays, checked_bodies, given_numbers
 from ..structure import Structure
+from ..sums.sum_answers import SumAnswers
 from .array_kernels import Crossing, known_kernel, operations
 
 FLOATS = ({torch.float32}, {torch.float64})
@@ -46,8 +47,11 @@ class TorchBackend:
         rule: RigidRule | None = None,
         kernel: str = "auto",
         bodies: Bodies[Any] | None = None,
+        tree: JointTree | None = None,
     ) -> None:
         """`links` are the closed forms, `rule` the vectorised rule: a package has one of them, or both.
+
+        tree: where the frames are, of a back end without the rule
 
         Raises ValueError for a kernel that cannot be and for bodies of a wrong shape.
         """
@@ -55,6 +59,7 @@ class TorchBackend:
         self.links = links or ()
         self.operations = operations(links) if links and rule else {}
         self.rule = rule
+        self.tree = tree or (rule.tree if rule else None)
         self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
         self.parameters: dict[str, Any] = {
             k: v if torch.is_tensor(v) else torch.as_tensor(v, dtype=torch.float64)
@@ -79,9 +84,25 @@ class TorchBackend:
         except RuntimeError:
             raise no_common_shape(named, n) from None
 
-    def answers(self, check_finite: bool) -> Answers:
+    def answers(self, check_finite: bool) -> SumAnswers:
         """The calls of `Dynamics`."""
-        return Answers(self.structure, self, check_finite)
+        return SumAnswers(self.structure, self, check_finite)
+
+    def kinematics(
+        self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]
+    ) -> KinematicAnswers:
+        """The calls of `Kinematics`."""
+        return KinematicAnswers(self.structure, self, check_finite, read_beside_motion)
+
+    def side(self, like: Any) -> Any:
+        """What computes with `like`, an array or a tensor."""
+        return self
+
+    def tree_numbers(self, own: tuple[TreeArrays, Any], q: Any) -> TreeArrays:
+        """The tree's numbers for the parameters and the bodies; see `given_numbers`."""
+        assert self.tree is not None  # KinematicAnswers has seen to it
+        p, bodies = self._values(q), self._bodies(q)
+        return given_numbers(torch, self.tree, own, p, bodies, tuple(q.shape[:-1]))
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
@@ -113,6 +134,15 @@ class TorchBackend:
         return self.concatenate(
             _stacked(q, link.position_gradient(torch, q, qd, qdd, p)) for link in self.links
         )
+
+    def energies(self, q: Tensor, qd: Tensor) -> tuple[Tensor, Tensor]:
+        """Kinetic and potential energies of the links in J, (..., N) each."""
+        p = self._values(q)
+        if self.rule:
+            kinetic, potential = self.rule.energies(self, (q, qd), p, self._bodies(q))
+            return kinetic, potential
+        both = self.concatenate(_stacked(q, link.energy(torch, q, qd, p)) for link in self.links)
+        return both[..., 0::2], both[..., 1::2]
 
     def regressor(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""

@@ -10,7 +10,7 @@ from ..dynamics import Dynamics
 from ..interface import Backend
 from ..structure import Structure
 
-MADE_ANEW = ("backend", "layout", "_load", "_asked", "_answers")
+MADE_ANEW = ("backend", "layout", "_load", "_asked", "_answers", "kinematics")
 """What a copy does not take over: it has its own."""
 
 
@@ -56,7 +56,7 @@ class DynamicsModule(Dynamics, torch.nn.Module):
         vars(self).update(state)
         kind: Any = type(self.backend)
         own: Any = self.backend
-        self.backend = kind(own.structure, self.links, self.values)
+        self.backend = kind(own.structure, self.links, self.values, own.tree)
         self._answers = self.backend.answers(self.check_finite)
 
 

@@ -5,6 +5,8 @@ from typing import Any, cast
 
 import torch
 
+from ..chosen_names import position_of
+from ..rule.rule_calls import RigidRule
 from ..structure import Structure
 from .autograd_backend import AutogradBackend
 from .partial_lagrangian import PartialLagrangian
@@ -26,13 +28,10 @@ class LinkModules(torch.nn.Module):
             self.add_module(key, module)
 
     def __getitem__(self, link: int | str) -> PartialLagrangian:
-        """Raises IndexError or KeyError for a link that is not there."""
-        if isinstance(link, str):
-            if link not in self.names:
-                raise KeyError(f"no link {link!r}; the links are {', '.join(self.names)}")
-            link = self.names.index(link)
-        if not -len(self.names) <= link < len(self.names):
-            raise IndexError(f"no link {link}; there are {len(self.names)}, counted from 0")
+        """Raises ValueError for a link that is not there; -1 is the last."""
+        if isinstance(link, int) and -len(self.names) <= link < 0:
+            link += len(self.names)
+        link = position_of(link, self.names, "link", "the link")
         return cast(PartialLagrangian, self._modules[self._keys[link]])
 
     def __len__(self) -> int:
@@ -47,14 +46,19 @@ def backend_of_links(
     kinds: Sequence[type[PartialLagrangian]],
     values: Mapping[str, Any],
     requires_grad: bool | str | Iterable[str] = False,
+    rule: RigidRule | None = None,
 ) -> AutogradBackend:
-    """The back end of one module a link, and these with it; `requires_grad` as the package's `load` says."""
+    """The back end of one module a link, and these with it; `requires_grad` as the package's `load` says.
+
+    rule: that of the package's tree, whose frames are to be known; None for energies
+    """
     rigid = any(issubclass(kind, RigidLagrangian) for kind in kinds)
     learned = learned_names(requires_grad, values, rigid)
     given, made = RunTimeValues(values, learned), dict[Any, PartialLagrangian]()
     for j, kind in enumerate(kinds):
         made[kind] = kind(structure.only(j), given, made.get(kind.parent), learned)
-    return AutogradBackend(structure, LinkModules(structure.link_names, made.values()), given)
+    modules = LinkModules(structure.link_names, made.values())
+    return AutogradBackend(structure, modules, given, rule.tree if rule else None)
 
 
 def learned_names(asked: bool | str | Iterable[str], parameters: Iterable[str], rigid: bool) -> set[str]:

@@ -114,7 +114,7 @@ class NativeCalls:
         compute = self._functions.get((call, kind)) or self._function(call, kind)
         read = [plain(a) for a in motion]
         if self.parameters:
-            read.append(self._numbers(kind) if self.learned else self._constants[kind])
+            read.append(self.constants(kind))
         sizes = self.sizes[call]
         # A robot may have none of a kind; its functions then take no array for it.
         written = into if self._complete[call] else [a for a, size in zip(into, sizes, strict=True) if size]
@@ -139,8 +139,8 @@ class NativeCalls:
         return new_desk(compute, motion, constants, [np.empty(shape, kind) for shape in self.shapes[call]])
 
     def constants(self, kind: "np.dtype[Any]") -> NumberArray:
-        """Values of parameters that stay as they are, in the order of the structure."""
-        return self._constants[kind]
+        """Values of the parameters in the order of the structure, as they are now."""
+        return self._numbers(kind) if self.learned else self._constants[kind]
 
     def address(self, call: str, kind: "np.dtype[Any]") -> int:
         """Where the C function of a call that has been made stands in memory."""
@@ -183,6 +183,10 @@ class NativeCalls:
             wait(waiting)  # nobody may write to memory that has been given back
         for future in waiting:
             future.result()
+
+    def values(self, kind: "np.dtype[Any]") -> dict[str, Any]:
+        """Parameters by name, as numbers of this dtype."""
+        return dict(zip(self.structure.parameters, self.constants(kind), strict=True))
 
     def _numbers(self, kind: "np.dtype[Any]") -> NumberArray:
         """Parameters in the order of the structure; a tensor's value is the one it has now."""

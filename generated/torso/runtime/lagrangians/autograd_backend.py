@@ -6,12 +6,14 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
-from ..answers import Answers
 from ..arrays.torch_backend import TorchBackend
+from ..rule.joint_tree import JointTree
+from ..rule.tree_arrays import TreeArrays
 from ..structure import Structure
+from ..sums.sum_answers import SumAnswers
 from .dynamics_module import DynamicsModule
 from .energy_interface import Energies, Parameters, numbers_of
-from .functional_sweeps import decomposition_followed, position_gradient_followed, torque_followed
+from .functional_sweeps import decomposition_followed, energies, position_gradient_followed, torque_followed
 from .graph_calls import graph_of, graph_parts_of
 from .recording import transformed
 from .run_time_values import RunTimeValues
@@ -32,12 +34,18 @@ class AutogradBackend(TorchBackend):
     name: ClassVar = "autograd"
     face: ClassVar[Any] = DynamicsModule
 
-    def __init__(self, structure: Structure, modules: Iterable[Energies], given: RunTimeValues) -> None:
-        super().__init__(structure, (), {})
+    def __init__(
+        self,
+        structure: Structure,
+        modules: Iterable[Energies],
+        given: RunTimeValues,
+        tree: JointTree | None = None,
+    ) -> None:
+        super().__init__(structure, (), {}, tree=tree)
         self.modules, self.given = modules, given
         self.parameters: Any = given
 
-    def answers(self, check_finite: bool) -> Answers:
+    def answers(self, check_finite: bool) -> SumAnswers:
         """The calls of `Dynamics`."""
         return _Answers(self.structure, self, check_finite)
 
@@ -56,6 +64,21 @@ class AutogradBackend(TorchBackend):
         wanted = torch.is_grad_enabled() and any(t.requires_grad for t in self.numbers())
         return Parameters(self._values(q), q[..., 0], wanted)
 
+    def tree_numbers(self, own: tuple[TreeArrays, Any], q: Tensor) -> TreeArrays:
+        """The tree's numbers, those in place of its own that the modules of the links have."""
+        numbers = super().tree_numbers(own, q)
+        translations, masses, centres = (list(a.unbind(-2)) for a in numbers[1:4])
+        for j, link in enumerate(self.modules):
+            held: Any = link
+            for joint, name in held.places.items():
+                translations[joint] = getattr(held, name).to(q)[:, None]
+            if "mass" in held.constants:
+                masses[j] = held.mass.to(q)[None]
+            if "com" in held.constants:
+                centres[j] = held.com.to(q)[:, None]
+        found = (_side_by_side(rows) for rows in (translations, masses, centres))
+        return numbers._replace(**dict(zip(("translations", "masses", "centres"), found, strict=True)))
+
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         parts: Sequence[Tensor] = self._of_links((decomposition, decomposition_followed), q, qd, qdd)
@@ -70,6 +93,11 @@ class AutogradBackend(TorchBackend):
         """c0 (..., count) in the order of `Layout.velocity`."""
         c0: Tensor = self._of_links((position_gradient, position_gradient_followed), q, qd, qdd)
         return c0
+
+    def energies(self, q: Tensor, qd: Tensor) -> tuple[Tensor, Tensor]:
+        """Kinetic and potential energies of the links in J, (..., N) each."""
+        kinetic, potential = energies(tuple(self.modules), q, qd, self.seen_by(q))
+        return kinetic.movedim(0, -1), potential.movedim(0, -1)
 
     def graph(self, *asked: Any) -> Any:
         """See `Dynamics.graph`."""
@@ -94,6 +122,12 @@ class AutogradBackend(TorchBackend):
         return _in_pieces(lambda some, *motion: sweep(links, some, *motion), p, (q, qd, qdd), most)
 
 
+def _side_by_side(rows: Sequence[Tensor]) -> Tensor:
+    """Tensors (..., samples) as one of shape (..., rows, samples); of one sample is what all share."""
+    samples = max(row.shape[-1] for row in rows)
+    return torch.stack([row.expand(*row.shape[:-1], samples) for row in rows], -2)
+
+
 def _in_pieces(call: Callable[..., Any], p: Parameters, motion: Sequence[Tensor], most: int) -> Any:
     """What `call` makes of all samples, so many at a time."""
     batch = motion[0].shape[:-1]
@@ -109,7 +143,7 @@ def _in_pieces(call: Callable[..., Any], p: Parameters, motion: Sequence[Tensor]
     return [torch.cat(part).reshape(*batch, part[0].shape[-1]) for part in zip(*parts, strict=True)]
 
 
-class _Answers(Answers):
+class _Answers(SumAnswers):
     """Calls that refuse `out` also where a constant of a link is learned."""
 
     def read_beside_motion(self) -> Iterable[Any]:

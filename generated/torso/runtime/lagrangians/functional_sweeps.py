@@ -23,10 +23,17 @@ Links = Sequence[Energies]
 
 def lagrangians(links: Links, q: Tensor, qd: Tensor, p: Parameters) -> Tensor:
     """Lagrangians in J, shape (links, ...), for q and qd of shape (..., n)."""
+    kinetic, potential = energies(links, q, qd, p)
+    return kinetic - potential
+
+
+def energies(links: Links, q: Tensor, qd: Tensor, p: Parameters) -> tuple[Tensor, Tensor]:
+    """Kinetic and potential energies in J, shape (links, ...) each, for q and qd of shape (..., n)."""
     x, v = SharedValues(q.unbind(-1)), SharedValues(qd.unbind(-1))
-    energies = [link.kinetic(x, v, p) - link.potential(x, p) for link in links]
-    nothing = torch.zeros_like(x[0])
-    return torch.stack([nothing + energy for energy in energies])
+    pairs = [(link.kinetic(x, v, p), link.potential(x, p)) for link in links]
+    nothing = torch.zeros_like(x[0])  # an energy may be a number
+    kinetic, potential = (torch.stack([nothing + one for one in kind]) for kind in zip(*pairs, strict=True))
+    return kinetic, potential
 
 
 def decomposition_followed(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Tensor]:

@@ -1,6 +1,6 @@
 """What `Dynamics.graph` and `Dynamics.graph_parts` answer on the autograd back end."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -20,7 +20,7 @@ def graph_of(backend: Any, i: Name, j: Links, k: Name | None, m: int | None) -> 
     joint, through = _place(backend, i, j)
     if m not in (None, 0, 1, 2):
         raise ValueError(f"m is {m!r}; choose {ORDERS}, or leave it away for all of them")
-    coordinate = None if k is None else _index("k", k, backend.structure.joint_names, "joint")
+    coordinate = None if k is None else backend.structure.joint_index(k, "k")
     return torque_graphs(backend, _energies(backend), joint, through, [(coordinate, m)])[0]
 
 
@@ -47,17 +47,8 @@ def _energies(backend: Any) -> Any:
 
 def _place(backend: Any, i: Name, j: Links) -> tuple[int, tuple[int, ...]]:
     structure = backend.structure
-    joint = _index("i", i, structure.joint_names, "joint")
+    joint = structure.joint_index(i, "i")
     if j is None:
         return joint, tuple(range(structure.N))
     chosen = (j,) if isinstance(j, int | str) else j
-    return joint, tuple(_index("j", link, structure.link_names, "link") for link in chosen)
-
-
-def _index(argument: str, given: Name, names: Sequence[str], kind: str) -> int:
-    if isinstance(given, str) and given in names:
-        return names.index(given)
-    if isinstance(given, int) and not isinstance(given, bool) and 0 <= given < len(names):
-        return given
-    choice = f"by number, 0..{len(names) - 1}, or by name: {', '.join(names)}"
-    raise ValueError(f"{argument} is {given!r}; choose a {kind} {choice}")
+    return joint, tuple(structure.link_index(link, "j") for link in chosen)

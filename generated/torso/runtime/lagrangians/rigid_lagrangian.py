@@ -24,6 +24,8 @@ class RigidLagrangian(PartialLagrangian):
     """
 
     constants: ClassVar[Mapping[str, Any]] = {}
+    places: ClassVar[Mapping[int, str]] = {}
+    """Joints, as tree.py counts them, whose place is one of these constants, and its name."""
 
     def __init__(
         self, alone: Structure, given: RunTimeValues, before: Any, learned: Collection[str] = ()

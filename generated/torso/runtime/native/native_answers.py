@@ -5,9 +5,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..answers import KINDS, Answers
+from ..answers import KINDS
 from ..arguments import has_tensors
 from ..interface import Backend
+from ..sums.sum_answers import SumAnswers
 from .native_calls import NativeCalls
 from .native_memory import LARGE
 from .native_module import compiled_calls
@@ -27,7 +28,7 @@ COMPILED = (
 """What the compiled module has of the calls of `Dynamics`."""
 
 
-class NativeAnswers(Answers):
+class NativeAnswers(SumAnswers):
     """The calls of the native back end, as the compiled module passes them on, or without it."""
 
     contiguous: ClassVar = True
@@ -81,6 +82,12 @@ class NativeAnswers(Answers):
             super()._compute_into(call, motion, into)
         else:
             compute(self._quickest, call, motion, into)
+
+    def _parts(self, call: str, motion: Sequence[Any]) -> Sequence[Any]:
+        if type(motion[0]) is np.ndarray:
+            values: Sequence[Any] = self._quickest(call, motion, None)
+            return values
+        return super()._parts(call, motion)
 
     def _quickest(self, call: str, motion: Sequence[Any], into: Sequence[Any] | None) -> Any:
         """Results for arrays from the compiled module, where there is one."""

@@ -126,6 +126,16 @@ def poses(xp: Any, tables: KinematicTables, translations: Any, position: Any) ->
     return Poses(axes, _summed(tables, tables.behind * step))
 
 
+def joint_screws(xp: Any, tables: KinematicTables, poses: Poses) -> Any:
+    """z and s of each joint times its ratio, (5, 2, frames, samples); none for the ground."""
+    axis = poses.axes[:, 2]
+    z = axis * tables.turns
+    s = cross(around(xp, poses.places), around(xp, z))
+    if tables.slides is not None:
+        s = s + axis * tables.slides
+    return around(xp, xp.stack([z, s], 1))
+
+
 def twists(
     xp: Any, tables: KinematicTables, poses: Poses, gravity: Any, velocity: Any, acceleration: Any
 ) -> Twists:
@@ -134,12 +144,7 @@ def twists(
     velocity, acceleration: qd and qdd of every frame's coordinate, (frames, samples); gravity: (3, 1,
     samples)
     """
-    axis = poses.axes[:, 2]
-    z = axis * tables.turns
-    s = cross(around(xp, poses.places), around(xp, z))
-    if tables.slides is not None:
-        s = s + axis * tables.slides
-    screws = around(xp, xp.stack([z, s], 1))
+    screws = joint_screws(xp, tables, poses)
     # V = sum of S qd, Sd = V x S, A = -gravity + sum of S qdd + Sd qd, over the joints of the path.
     moved = _summed(tables, screws * velocity)
     rates = motion_cross(xp, moved, screws)

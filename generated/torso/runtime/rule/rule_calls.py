@@ -12,6 +12,7 @@ from ..quantities import PARAMETERS
 from .fused_products import FusedMoment
 from .joint_tree import Bodies, JointTree
 from .kinematics import poses, taken, twists
+from .link_energies import link_energies
 from .regressors import coefficient_rows, torque_rows
 from .rigid_rule import LinkNumbers, link_numbers, link_states
 from .rule_layout import RuleLayout, rule_layout
@@ -104,6 +105,20 @@ class RigidRule:
 
         return self._answers(space, motion, p, bodies, answer)[0]
 
+    def energies(
+        self, space: Space, motion: Sequence[Any], p: Mapping[str, Any], bodies: Bodies[Any] | None
+    ) -> list[Any]:
+        """Kinetic and potential energies (..., N) for q and qd."""
+        batch, tables = tuple(motion[0].shape[:-1]), self.tables(space, motion[0])
+        numbers = self._numbers(space, tables, p, bodies, batch)
+
+        def answer(own: Sequence[Any], some: TreeArrays, carried: LinkNumbers) -> list[Any]:
+            found = link_energies(space.xp, tables.frames, tables.links.joints, some, *own)
+            return [space.xp.swapaxes(a, 0, 1) for a in found]
+
+        parts = self._in_pieces(space, motion, numbers, tables.numbers, answer, 0)
+        return [a.reshape(*batch, a.shape[-1]) for a in parts]
+
     def regressor(self, space: Space, motion: Sequence[Any], p: Mapping[str, Any]) -> Any:
         """Y of tau, (..., count * 10)."""
         return self._regressed(space, motion, p, torque_rows, len(self.layout.torque[0]))[0]
@@ -136,18 +151,15 @@ class RigidRule:
         q = motion[0]
         batch, n = tuple(q.shape[:-1]), q.shape[-1]
         tables = self.tables(space, q)
-        numbers = tables.own
-        if given := bool(self.tree.formulas) or bodies is not None:
-            numbers = with_formulas(space.xp, self.tree, numbers, tables.sources, p, batch)
-            if bodies is not None:
-                numbers = with_bodies(space.xp, numbers, bodies, batch)
+        numbers = self._numbers(space, tables, p, bodies, batch)
+        given = numbers is not tables.own
         samples = math.prod(batch)
         if space.few(samples, len(self.tree.links)):
             matrices = spatial_numbers(space.xp, tables.spatial, numbers) if given else tables.matrices
             flat = [a.reshape(samples, n) for a in motion]
             parts = answer(spatial_moment(space.xp, tables, matrices, flat))
         else:
-            links = link_numbers(space.xp, tables.links.eye, *numbers[2:]) if given else tables.numbers
+            links = link_numbers(space.xp, tables.links.eye, *numbers.carried) if given else tables.numbers
 
             def innermost(own: Sequence[Any], some: TreeArrays, carried: LinkNumbers) -> list[Any]:
                 found: list[Any] = answer(_moment(space, tables, own, some, carried))
@@ -155,6 +167,13 @@ class RigidRule:
 
             parts = self._in_pieces(space, motion, numbers, links, innermost, 2 * self.layout.zero)
         return [a.reshape(*batch, a.shape[-1]) for a in parts]
+
+    def _numbers(
+        self, space: Space, tables: RuleTables, p: Mapping[str, Any], bodies: Any, batch: tuple[int, ...]
+    ) -> TreeArrays:
+        """The tree's own numbers, or those for parameters and bodies that are given."""
+        numbers = with_formulas(space.xp, self.tree, tables.own, tables.sources, p, batch)
+        return numbers if bodies is None else with_bodies(space.xp, numbers, bodies, batch)
 
     def _in_pieces(
         self,

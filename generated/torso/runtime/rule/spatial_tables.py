@@ -100,7 +100,7 @@ def spatial_tables(tree: JointTree, joints: Any, own: Any) -> SpatialTables:
 
 def spatial_numbers(xp: Any, tables: SpatialTables, numbers: TreeArrays) -> SpatialNumbers:
     """The numbers of a tree in matrices, from those with their samples innermost."""
-    gravity, translations, masses, centres, inertias = (xp.moveaxis(a, -1, 0) for a in numbers)
+    gravity, translations, masses, centres, inertias, _ = (xp.moveaxis(a, -1, 0) for a in numbers)
     # X = (1 + [0 0; [t]x 0]) diag(R, R)
     offset = as_matrices(xp.swapaxes(translations, 1, 2) * tables.behind, tables.offset)
     frames = tables.turned + offset @ tables.turned

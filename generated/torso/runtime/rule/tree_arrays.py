@@ -30,6 +30,13 @@ class TreeArrays(NamedTuple):
     """(3, N, samples)"""
     inertias: Any
     """(3, 3, N, samples)"""
+    offsets: Any
+    """Of the frames that have names, in the axes of what carries them, (3, frames, samples)."""
+
+    @property
+    def carried(self) -> tuple[Any, Any, Any]:
+        """Masses, centres and inertias of the links."""
+        return self.masses, self.centres, self.inertias
 
 
 def own_numbers(tree: JointTree) -> TreeArrays:
@@ -40,6 +47,7 @@ def own_numbers(tree: JointTree) -> TreeArrays:
         np.array([link.mass for link in tree.links])[:, None],
         np.array([link.centre for link in tree.links]).T[..., None],
         np.array([link.inertia for link in tree.links]).transpose(1, 2, 0)[..., None],
+        np.array([frame.translation for frame in tree.frames]).reshape(-1, 3).T[..., None],
     )
 
 
@@ -60,6 +68,7 @@ def _places(tree: JointTree) -> Iterator[str]:
     yield from (f"links[{j}].mass" for j in links)
     yield from (f"links[{j}].centre[{i}]" for i in range(3) for j in links)
     yield from (f"links[{j}].inertia[{i}][{k}]" for i in range(3) for k in range(3) for j in links)
+    yield from (f"frames[{f}].translation[{i}]" for i in range(3) for f in range(len(tree.frames)))
 
 
 def with_formulas(
@@ -102,6 +111,22 @@ def with_bodies(xp: Any, numbers: TreeArrays, bodies: Bodies[Any], batch: tuple[
             value = xp.swapaxes(value, axis, axis + 1)
         given[name] = value
     return numbers._replace(**given)
+
+
+def given_numbers(
+    xp: Any,
+    tree: JointTree,
+    own: tuple[TreeArrays, Any],
+    p: Mapping[str, Any],
+    bodies: Bodies[Any] | None,
+    batch: tuple[int, ...],
+) -> TreeArrays:
+    """The numbers for values of the parameters and, where they are given, bodies.
+
+    own: `own_numbers` and `formula_sources` of the tree, to compute with
+    """
+    numbers = with_formulas(xp, tree, *own, p, batch)
+    return numbers if bodies is None else with_bodies(xp, numbers, bodies, batch)
 
 
 def checked_bodies(given: Any, links: int, read: Callable[[str, Any], Any]) -> Bodies[Any]:

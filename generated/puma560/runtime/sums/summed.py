@@ -1,0 +1,100 @@
+"""What the sums answer, composed from the decomposition of one back end."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..dense import Dense
+from ..interface import Backend
+from ..structure import Structure
+from .inertia_solve import solved
+from .joint_matrices import JointMatrices
+from .namespace import namespace
+
+AT_ONCE = 1 << 22
+"""Packed numbers of one chunk of samples, each at n unit velocities."""
+
+Compute = Callable[[str, Sequence[Any]], Sequence[Any]]
+"""The results of another call, by its name."""
+
+
+class Summed:
+    """The calls for a motion (..., n) of one shape, each with a tuple of arrays or tensors for an answer."""
+
+    def __init__(self, structure: Structure, backend: Backend[Any], compute: Compute) -> None:
+        self._structure, self._backend, self._compute = structure, backend, compute
+        self._dense, self._matrices = Dense(structure, backend), JointMatrices(structure, backend)
+
+    def mass_matrix(self, q: Any) -> tuple[Any, ...]:
+        """M_ik = sum_j c2_ijk."""
+        rest = self._rest(q)
+        return (self._matrices.summed(self._compute("packed", (q, rest, rest))[0], "acceleration"),)
+
+    def mass_matrix_by_link(self, q: Any) -> tuple[Any, ...]:
+        """c2."""
+        return (self._compute("coefficients", (q, self._rest(q)))[0],)
+
+    def coriolis_matrix(self, q: Any, qd: Any) -> tuple[Any, ...]:
+        """C_ik = sum_j c1_ijk."""
+        return (self._matrices.summed(self._compute("packed", (q, qd, self._rest(q)))[1], "velocity"),)
+
+    def coriolis_matrix_by_link(self, q: Any, qd: Any) -> tuple[Any, ...]:
+        """c1."""
+        return (self._compute("coefficients", (q, qd))[1],)
+
+    def gravity_torque(self, q: Any) -> tuple[Any, ...]:
+        """g_i = tau_i at rest."""
+        rest = self._rest(q)
+        return tuple(self._compute("inverse_dynamics", (q, rest, rest)))
+
+    def gravity_torque_by_link(self, q: Any) -> tuple[Any, ...]:
+        """g_ij = tau_ij at rest."""
+        rest = self._rest(q)
+        return tuple(self._compute("partial_torque", (q, rest, rest)))
+
+    def forward_dynamics(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
+        """Solve M qdd = tau - (h + g), h + g the torque without acceleration."""
+        c2, _, _, bias, _ = self._compute("packed", (q, qd, self._rest(q)))
+        mass = self._matrices.summed(c2, "acceleration")
+        return (solved(mass, tau - self._dense.summed(bias), self._structure.joint_names),)
+
+    def energy(self, q: Any, qd: Any) -> tuple[Any, ...]:
+        """K_j and P_j."""
+        return self._backend.energies(q, qd)
+
+    def power(self, q: Any, qd: Any, qdd: Any) -> tuple[Any, ...]:
+        """c2_ijk qdd_k qd_i, c1_ijk qd_k qd_i, g_ij qd_i."""
+        acceleration, velocity, gravity = self._compute("propagation", (q, qd, qdd))
+        rate = qd[..., :, None, None]
+        return acceleration * rate, velocity * rate, gravity * rate[..., 0]
+
+    def christoffel(self, q: Any) -> tuple[Any, ...]:
+        """The sums over j of the next."""
+        return self._christoffel(q, lambda c1: self._matrices.summed(c1, "velocity"))
+
+    def christoffel_by_link(self, q: Any) -> tuple[Any, ...]:
+        """Gamma_ijkl = c1_ijk at qd = e_l, less c1 at rest, which terms of energies linear in qd leave."""
+        return self._christoffel(q, lambda c1: self._dense.spread(c1, "velocity"))
+
+    def _christoffel(self, q: Any, made: Callable[[Any], Any]) -> tuple[Any, ...]:
+        n, batch = self._structure.n, tuple(q.shape[:-1])
+        flat, most = q.reshape(-1, n), max(1, AT_ONCE // (n * max(1, sum(self._structure.sizes))))
+        starts = range(0, max(1, len(flat)), most)
+        parts = [self._of_units(flat[at : at + most], made) for at in starts]
+        whole = parts[0] if len(parts) == 1 else namespace(q).concat(parts, 0)
+        return (whole.reshape(*batch, *whole.shape[1:]),)
+
+    def _of_units(self, q: Any, made: Callable[[Any], Any]) -> Any:
+        """What is made of c1 at unit velocities e_l, for samples (count, n); l is the last axis."""
+        n = self._structure.n
+        units = self._backend.constant(np.eye(n), q)
+        places, rates = q[:, None, :] + 0.0 * units, 0.0 * q[:, None, :] + units
+        values = self._compute("packed", (places, rates, 0.0 * rates))[1]
+        if self._structure.linear:
+            rest = self._rest(q)
+            values = values - self._compute("packed", (q, rest, rest))[1][:, None, :]
+        return namespace(q).moveaxis(made(values), 1, -1)
+
+    def _rest(self, q: Any) -> Any:
+        return self._backend.zeros(q, self._structure.n)

@@ -1,0 +1,218 @@
+"""The calls of `Kinematics` behind its face: motion is checked, answers computed and put where `out` says."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arguments import check_numbers
+from ..outputs import accepted
+from ..rule.joint_tree import JointTree
+from ..rule.rule_tables import converted
+from ..rule.tree_arrays import TreeArrays, formula_sources, own_numbers
+from ..structure import Structure
+from . import frame_arrays as arrays
+from .frame_tables import FrameTables, frame_tables, link_tables
+from .named_frames import frame_index
+
+ALL, LINKS = "all frames", "links"
+
+
+class Asked(NamedTuple):
+    """What a call computes with: array namespace, constants, the tree's numbers, motion (n, samples) each."""
+
+    xp: Any
+    tables: FrameTables
+    numbers: TreeArrays
+    motion: list[Any]
+    point: Any
+    """(3, 1, samples), or None for the frame's origin."""
+
+    def frame(self, from_world: bool = False) -> arrays.Carried:
+        """The frame, or all of them."""
+        q, offsets = self.motion[0], self.numbers.offsets
+        return arrays.carried(self.xp, self.tables, self.numbers, offsets, q, from_world)
+
+    def centres(self, from_world: bool = False) -> arrays.Carried:
+        """Centres of mass of the links."""
+        q, offsets = self.motion[0], self.numbers.centres
+        return arrays.carried(self.xp, self.tables, self.numbers, offsets, q, from_world)
+
+    def moving(self, found: arrays.Carried) -> Any:
+        """Motion of the joints."""
+        return arrays.moving(self.xp, self.tables, self.numbers, found, *self.motion[1:])
+
+
+class KinematicAnswers:
+    """The calls on a back end; arguments as `Kinematics` says."""
+
+    def __init__(
+        self,
+        structure: Structure,
+        backend: Any,
+        check_finite: bool,
+        read_beside_motion: Callable[[], Iterable[Any]],
+    ) -> None:
+        """Raises ValueError for a robot without a tree of rigid links."""
+        if backend.tree is None:
+            raise ValueError(
+                f"the links of {structure.name} are energies, which do not say where anything is; kinematics "
+                "is there for rigid links"
+            )
+        self._structure, self._backend, self._check_finite = structure, backend, check_finite
+        self._read_beside_motion = read_beside_motion
+        self._tree: JointTree = backend.tree
+        self.frames = tuple(frame.name for frame in self._tree.frames)
+        self._listed: dict[Any, Any] = {}
+        self._tables: dict[Any, Any] = {}
+
+    def pose(self, q: Any, frame: Any, out: Any) -> Any:
+        """See `Kinematics.pose`."""
+
+        def answer(at: Asked) -> Any:
+            return arrays.homogeneous(at.xp, at.frame(from_world=True))[:, :, 0]
+
+        return self._answer((q,), self._index(frame), None, answer, (4, 4), out)
+
+    def poses(self, q: Any, out: Any) -> Any:
+        """See `Kinematics.poses`."""
+
+        def answer(at: Asked) -> Any:
+            matrices = arrays.homogeneous(at.xp, at.frame(from_world=True))
+            # (4, 4, F, samples) -> (F, 4, 4, samples)
+            return at.xp.swapaxes(at.xp.swapaxes(matrices, 0, 2), 1, 2)
+
+        return self._answer((q,), ALL, None, answer, (len(self.frames), 4, 4), out)
+
+    def jacobian(self, q: Any, frame: Any, point: Any, out: Any) -> Any:
+        """See `Kinematics.jacobian`."""
+
+        def answer(at: Asked) -> Any:
+            found = at.frame()
+            return arrays.jacobian(at.xp, at.tables, found, arrays.point_at(found, at.point))
+
+        return self._answer((q,), self._index(frame), point, answer, (6, self._structure.n), out)
+
+    def jacobian_rate(self, q: Any, qd: Any, frame: Any, point: Any, out: Any) -> Any:
+        """See `Kinematics.jacobian_rate`."""
+        shape = 6, self._structure.n
+        return self._moving((q, qd), frame, point, arrays.jacobian_rate, shape, out)
+
+    def velocity(self, q: Any, qd: Any, frame: Any, point: Any, out: Any) -> Any:
+        """See `Kinematics.velocity`."""
+        return self._moving((q, qd), frame, point, arrays.velocity_of, (6,), out)
+
+    def acceleration(self, q: Any, qd: Any, qdd: Any, frame: Any, point: Any, out: Any) -> Any:
+        """See `Kinematics.acceleration`."""
+        return self._moving((q, qd, qdd), frame, point, arrays.acceleration_of, (6,), out)
+
+    def centre_of_mass(self, q: Any, out: Any) -> Any:
+        """See `Kinematics.centre_of_mass`."""
+
+        def answer(at: Asked) -> Any:
+            return arrays.centre_of_mass(at.numbers.masses, at.centres(from_world=True))
+
+        return self._answer((q,), LINKS, None, answer, (3,), out)
+
+    def centre_of_mass_jacobian(self, q: Any, out: Any) -> Any:
+        """See `Kinematics.centre_of_mass_jacobian`."""
+
+        def answer(at: Asked) -> Any:
+            return arrays.centre_jacobian(at.xp, at.tables, at.numbers.masses, at.centres())
+
+        return self._answer((q,), LINKS, None, answer, (3, self._structure.n), out)
+
+    def centre_of_mass_jacobian_rate(self, q: Any, qd: Any, out: Any) -> Any:
+        """See `Kinematics.centre_of_mass_jacobian_rate`."""
+
+        def answer(at: Asked) -> Any:
+            found = at.centres()
+            moved = at.moving(found)
+            return arrays.centre_jacobian_rate(at.xp, at.tables, at.numbers.masses, found, moved)
+
+        return self._answer((q, qd), LINKS, None, answer, (3, self._structure.n), out)
+
+    def _moving(
+        self, given: Sequence[Any], frame: Any, point: Any, made: Any, shape: tuple[int, ...], out: Any
+    ) -> Any:
+        """What `made` computes of a point's motion."""
+
+        def answer(at: Asked) -> Any:
+            found = at.frame()
+            value = made(at.xp, at.tables, at.moving(found), arrays.point_at(found, at.point))
+            return value if len(shape) > 1 else value[:, 0]
+
+        return self._answer(given, self._index(frame), point, answer, shape, out)
+
+    def _index(self, frame: Any) -> int:
+        return frame_index(frame, self.frames, self._structure.link_names)
+
+    def _answer(
+        self,
+        given: Sequence[Any],
+        part: Any,
+        point: Any,
+        answer: Callable[[Asked], Any],
+        shape: tuple[int, ...],
+        out: Any,
+    ) -> Any:
+        """Answer (..., *shape) to a motion; `answer` gives it with the samples last."""
+        named = dict(zip(("q", "qd", "qdd"), given, strict=False))
+        motion = list(self._backend.arrays(named, self._structure.n))
+        if self._check_finite:
+            check_numbers(named, self._structure.joint_names)
+        own = self._backend.side(motion[0])
+        if point is not None:
+            motion, point = _with_point(own, motion, point)
+        if out is not None:
+            read = dict(zip(("q", "qd", "qdd"), motion, strict=False))
+            read |= {} if point is None else {"point": point}
+            accepted(out, (), (shape,), read, self._read_beside_motion(), False)
+        value = answer(self._asked(own, part, motion, point))
+        value = own.xp.swapaxes(value.reshape(math.prod(shape), value.shape[-1]), 0, 1)
+        value = value.reshape(*motion[0].shape[:-1], *shape)
+        if out is None:  # its numbers side by side
+            return value.copy() if isinstance(value, np.ndarray) else value.contiguous()
+        out[...] = value
+        return out
+
+    def _asked(self, own: Any, part: Any, motion: Sequence[Any], point: Any) -> Asked:
+        """Constants, numbers and motion with samples innermost; `part` is a frame, all of them or links."""
+        q, xp = motion[0], own.xp
+        key = xp.__name__, q.dtype, getattr(q, "device", None)
+        if key not in self._listed:
+            numbers = own_numbers(self._tree), formula_sources(self._tree)
+            self._listed[key] = converted(numbers, own, q)
+        if (part, key) not in self._tables:
+            self._tables[part, key] = converted(self._tables_of(part), own, q)
+        numbers = own.tree_numbers(self._listed[key], q)
+        flat = [xp.swapaxes(a.reshape(-1, a.shape[-1]), 0, 1) for a in motion]
+        if point is not None:
+            point = xp.swapaxes(point.reshape(-1, 3), 0, 1)[:, None]
+        return Asked(xp, self._tables[part, key], numbers, flat, point)
+
+    def _tables_of(self, part: Any) -> FrameTables:
+        if part == LINKS:
+            return link_tables(self._tree, self._structure.n)
+        frames = range(len(self.frames)) if part == ALL else [part]
+        return frame_tables(self._tree, self._structure.n, frames)
+
+
+def _with_point(own: Any, motion: Sequence[Any], given: Any) -> tuple[list[Any], Any]:
+    """Motion and point in one shape of samples; raises ValueError for a point that does not go with it."""
+    q = motion[0]
+    point = own.weights("point", given, q)
+    if point.ndim == 0 or point.shape[-1] != 3:
+        raise ValueError(
+            f"point has shape {tuple(point.shape)}; its last axis must be 3: x, y, z in the frame, in m"
+        )
+    try:
+        batch = np.broadcast_shapes(tuple(q.shape[:-1]), tuple(point.shape[:-1]))
+    except ValueError:
+        raise ValueError(
+            f"point has shape {tuple(point.shape)}, the motion has samples of shape {tuple(q.shape[:-1])}; "
+            "give one point, or one for each sample"
+        ) from None
+    motion = [own.xp.broadcast_to(a, (*batch, a.shape[-1])) for a in motion]
+    return motion, own.xp.broadcast_to(point, (*batch, 3))
