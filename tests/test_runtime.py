@@ -65,7 +65,8 @@ def test_the_runtime_imports_numpy_torch_and_its_own_files_only(file: str) -> No
         if isinstance(node, ast.ImportFrom):
             name = node.module or ""
             own = path.parents[max(node.level - 1, 0)].joinpath(*name.split(".")).relative_to(RUNTIME)
-            assert f"{own.as_posix()}.py" in FILES if node.level else name.split(".")[0] in ALLOWED
+            there = {f"{own.as_posix()}.py", f"{own.as_posix()}/__init__.py"} & set(FILES)
+            assert there if node.level else name.split(".")[0] in ALLOWED
         elif isinstance(node, ast.Import):
             assert all(alias.name.split(".")[0] in ALLOWED for alias in node.names)
 
