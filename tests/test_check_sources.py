@@ -13,6 +13,7 @@ from linkwise import Options, read_system
 from linkwise.check.body_reference import body_reference
 from linkwise.check.compare import ROUNDINGS, Entries, compare
 from linkwise.check.energy_reference import energy_reference, states_of_energies
+from linkwise.check.frame_reference import frame_calls, frame_reference
 from linkwise.check.latex_reader import LatexReader, Unreadable
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.newton_euler import NewtonEuler
@@ -334,3 +335,18 @@ def test_writing_beside_an_array_is_noticed_on_either_side(tmp_path: Path) -> No
         if found is not None:
             assert found["c2"][place] == 7.0
             assert np.isnan(np.delete(found["c2"], place)).all()
+
+
+def test_a_frame_a_nanometre_off_is_found(
+    directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    manifest = Manifest.read(directory_of("planar3"))
+    assert manifest.tree is not None
+    model, states = package_of("planar3").load("numpy"), random_states(3, 20)
+    right = frame_calls("numpy", model, frame_reference(manifest, manifest.tree, states))
+    assert all(result.passed for result in right)
+    x, y, z = manifest.tree.frames[-1].translation
+    frames = (*manifest.tree.frames[:-1], replace(manifest.tree.frames[-1], translation=(x, y + 1e-9, z)))
+    off = frame_reference(manifest, replace(manifest.tree, frames=frames), states)
+    wrong = frame_calls("numpy", model, off)
+    assert [result.passed for result in wrong] == [False, False, True], "the centre of mass has no frame"

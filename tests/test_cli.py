@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import urdf_text
 from conftest import DATA, PANDA
 from linkwise import Options
 
@@ -456,6 +457,15 @@ def test_inspect_lists_what_each_joint_leaves_out_on_request(linkwise: Run, tmp_
     assert "N·m·s/rad" not in told
     asked = linkwise("inspect", "hand.xml", "--free-mimic", "--details").stdout
     assert "  c 0.3 N·m·s/rad; damping left out of the torques\n" in asked
+
+
+def test_inspect_lists_frames_on_request(linkwise: Run, tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(
+        urdf_text.chain(urdf_text.joint("ab", "a", "b"), urdf_text.joint("bc", "b", "c", type="fixed"))
+    )
+    assert "frames" not in linkwise("inspect", "arm.urdf").stdout
+    asked = linkwise("inspect", "arm.urdf", "--details").stdout
+    assert "frames (of `kinematics`; on which link)\n  a  (the ground)\n  b  (b)\n  c  (b)\n" in asked
 
 
 @pytest.mark.parametrize("report", ["terms", "reduction"])

@@ -1,11 +1,13 @@
 """Frames that a robot has by name: bodies of the file, also those merged away, and sites."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from linkwise import Options, read_system
+from linkwise.emit.definition import rigid_tree
 from linkwise.robot.robot import Robot
-from linkwise.symbolic.system import RigidSystem
+from linkwise.symbolic.system import RigidSystem, rigid_system
 from urdf_text import joint, link, robot
 
 ARM = robot(
@@ -86,3 +88,12 @@ def test_sites_are_frames_unless_a_body_has_their_name(tmp_path: Path) -> None:
     assert on == {"world": None, "origin": None, "arm": 0, "hand": 0, "grip": 0}
     doubles = [note for note in found.notes if note.subject == "arm"]
     assert [note.detail for note in doubles] == ["a site whose name another frame has"]
+
+
+def test_a_robot_made_in_python_has_a_frame_for_each_link(tmp_path: Path) -> None:
+    found = read(tmp_path / "arm.urdf", ARM)
+    made = replace(found, frames=())
+    assert [(frame.name, frame.link) for frame in made.named_frames] == [("b", 0), ("c", 1)]
+    tree = rigid_tree(rigid_system(made))
+    assert tree is not None
+    assert [frame.name for frame in tree.frames] == ["b", "c"]

@@ -16,6 +16,7 @@ from linkwise.check.compiled_c import CompiledPackage
 from linkwise.check.derivations import derivations
 from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.formula_texts import check_formulas
+from linkwise.check.frame_reference import FrameReference, frame_calls, frame_reference
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.model_calls import Named, against_reference
 from linkwise.check.newton_euler import NewtonEuler
@@ -152,7 +153,7 @@ class _Checks:
         if reference is None:
             yield Skipped(f"numbers{label}", "nothing here computes with the energies")
             return
-        regressors = self._regressors(values, reference)
+        regressors, frames = self._regressors(values, reference), self._frames(values, reference)
         for result in _c_results(functions, f"c{label}", reference, regressors) if functions else ():
             c_passes &= result.passed
             yield result
@@ -166,6 +167,8 @@ class _Checks:
                     yield recorded_parts(Named(f"{way.label}{label}", model, rows, reference))
                 if regressors is not None and model.backend.rule is not None:
                     yield from regressor_calls(f"{way.label}{label}", model, regressors)
+                if frames is not None and way.kernel != "rule":  # no kernel has a part in it
+                    yield from frame_calls(f"{way.label}{label}", model, frames)
         if manifest.tree is not None:
             how = "from energies" if manifest.request.get("derivation") == "energy" else "by the rigid rule"
             ways = {way.label: model for way, model in loaded.items()}
@@ -203,6 +206,13 @@ class _Checks:
         if manifest.tree is None:
             return None
         return regressor_reference(manifest, tree_with(manifest.tree, values), reference.states)
+
+    def _frames(self, values: Mapping[str, float], reference: Reference) -> FrameReference | None:
+        """What kinematics is held against; energies have none."""
+        manifest = self.package.manifest
+        if manifest.tree is None:
+            return None
+        return frame_reference(manifest, tree_with(manifest.tree, values), reference.states)
 
     def _own_reference(
         self, loaded: Mapping[Way, Model], functions: CFunctions | None

@@ -5,10 +5,12 @@ so that nothing cancels. Closed forms in a common frame add such numbers too, an
 A torque that is 0 by geometry has no size of its own; of its operands rounding leaves some 1e-16.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from linkwise.check.newton_euler import Points
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
@@ -69,6 +71,31 @@ class Magnitudes:
             mass = abs(body.mass)
             sizes.append(0.5 * (mass * speed**2 + spin) + mass * self.gravity * reach)
         return np.stack(sizes, -1)
+
+    def poses(self, points: Points, q: Array) -> Array:
+        """Bounds of a frame's matrix whose origin is a point, (samples, points, 4, 4)."""
+        found = np.ones((len(q), len(points), 4, 4))
+        for p, (frame, lever) in enumerate(self._carriers(points, q, 0.0 * q, 0.0 * q)):
+            found[:, p, :3, 3] = (frame.reach + lever)[:, None]
+        return found
+
+    def points(self, points: Points, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
+        """Bounds of (ω, v) and (α, a) of points, (samples, points, 6) each."""
+        speeds, changes = [], []
+        for frame, lever in self._carriers(points, q, qd, qdd):
+            reach, turning = frame.reach + lever, frame.alpha + frame.omega**2
+            speed = frame.v + frame.omega * reach
+            change = frame.a + frame.omega * frame.v + turning * reach
+            speeds.append(np.stack([frame.omega] * 3 + [speed] * 3, -1))
+            changes.append(np.stack([turning] * 3 + [change] * 3, -1))
+        return np.stack(speeds, 1), np.stack(changes, 1)
+
+    def _carriers(self, points: Points, q: Array, qd: Array, qdd: Array) -> Iterator[tuple[_Sizes, float]]:
+        """What carries each point, and how far it is from the origin of that."""
+        frames, zero = self._frames(q, qd, qdd, 0.0), np.zeros(len(q))
+        ground = _Sizes(zero, zero, zero, zero, zero)
+        for body, place in points:
+            yield ground if body is None else frames[body], float(np.linalg.norm(place))
 
     def _com(self, frames: list[_Sizes], at: int) -> Array:
         return frames[at].reach + _length(self.bodies[at].com)

@@ -5,12 +5,16 @@ takes complex motion too, being but sums, products, sines and cosines: complex s
 the last digit (Squire and Trapp, SIAM Review 40(1), 1998).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from linkwise.package.load import Array
-from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
+from linkwise.package.manifest import BodyEntry, FrameEntry, Manifest, RigidTree
+
+Points = Sequence[tuple[int | None, Array]]
+"""What carries each point, a body or None for the ground, and where it is in the axes of that, (3,)."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,40 @@ class NewtonEuler:
             )
             potential.append(-body.mass * motion.com @ self.gravity)
         return np.stack(kinetic, -1), np.stack(potential, -1)
+
+    def poses(self, frames: Sequence[FrameEntry], q: Array) -> Array:
+        """Homogeneous matrices from the coordinates of frames to the world's, (samples, frames, 4, 4)."""
+        found = np.zeros((len(q), len(frames), 4, 4))
+        found[..., 3, 3] = 1.0
+        carriers = self._carriers([frame.body for frame in frames], q, 0.0 * q, 0.0 * q)
+        for f, (frame, carrier) in enumerate(zip(frames, carriers, strict=True)):
+            found[:, f, :3, :3] = carrier.rotation @ np.array(frame.rotation)
+            found[:, f, :3, 3] = carrier.origin + carrier.rotation @ np.array(frame.translation)
+        return found
+
+    def places(self, points: Points, q: Array) -> Array:
+        """Where points are in the world, (samples, points, 3)."""
+        carriers = self._carriers([body for body, _ in points], q, 0.0 * q, 0.0 * q)
+        found = (at.origin + at.rotation @ place for at, (_, place) in zip(carriers, points, strict=True))
+        return np.stack(list(found), 1)
+
+    def points(self, points: Points, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
+        """(ω, v) and (α, a) of points and what carries them, (samples, points, 6) each; no gravity in a."""
+        speeds, changes = [], []
+        for at, (_, place) in zip(self._carriers([b for b, _ in points], q, qd, qdd), points, strict=True):
+            arm = at.rotation @ place
+            speed = np.cross(at.omega, arm)
+            change = np.cross(at.alpha, arm) + np.cross(at.omega, speed)
+            speeds.append(np.concatenate([at.omega, at.v + speed], -1))
+            changes.append(np.concatenate([at.alpha, at.a + change], -1))
+        return np.stack(speeds, 1), np.stack(changes, 1)
+
+    def _carriers(self, bodies: Sequence[int | None], q: Array, qd: Array, qdd: Array) -> list[_FrameMotion]:
+        """Frames of some bodies, or of the ground, in motion without gravity."""
+        motions = self._motions(q, qd, qdd, 0.0 * self.gravity)
+        zero = np.zeros((len(q), 3))
+        ground = _FrameMotion(np.broadcast_to(np.eye(3), (len(q), 3, 3)), zero, zero, zero, zero, zero)
+        return [ground if body is None else motions[body].frame for body in bodies]
 
     def _motions(self, q: Array, qd: Array, qdd: Array, gravity: Array) -> list[_BodyMotion]:
         """Motion of each body, from the ground outwards."""

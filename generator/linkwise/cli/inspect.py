@@ -11,6 +11,7 @@ from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.definition import rigid_tree
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, printable
+from linkwise.package.entries import RigidTree
 from linkwise.robot import Options, left_out
 from linkwise.robot.robot import Parameter
 from linkwise.symbolic.system import EnergySystem, System
@@ -45,7 +46,7 @@ def _system(robot: str, options: Options) -> tuple[System, str]:
 
 
 def inspection(system: System, details: bool = False, refused: str = "") -> dict[str, Any]:
-    """Joints, links, parameters and notes, ready for JSON; with `details` on each joint what was left out."""
+    """Joints, links, parameters and notes, ready for JSON; with `details` frames, and each joint's notes."""
     tree = rigid_tree(system)
     notes = system.notes
     if not details:
@@ -62,10 +63,19 @@ def inspection(system: System, details: bool = False, refused: str = "") -> dict
             }
             for j, name in enumerate(system.link_names)
         ],
+        **({"frames": _frames(tree)} if details and tree else {}),
         "parameters": [asdict(parameter) for parameter in parameters(system)],
         "notes": [asdict(note) for note in notes],
         "refused": refused,
     }
+
+
+def _frames(tree: RigidTree) -> list[dict[str, str | None]]:
+    """Frames that kinematics knows by name, and the moving link that carries each; None for the ground."""
+    return [
+        {"name": frame.name, "link": None if frame.body is None else tree.bodies[frame.body].link}
+        for frame in tree.frames
+    ]
 
 
 def parameters(system: System) -> tuple[Parameter, ...]:
@@ -88,6 +98,9 @@ def table(data: dict[str, Any]) -> str:
     for k, link in enumerate(data["links"], 1):
         mass = "" if link["mass"] is None else f"{link['mass']:.6g} kg; "
         lines.append(f"  {k}  {link['name']}  ({mass}{', '.join(link['path'])})")
+    if "frames" in data:
+        lines += ["", "frames (of `kinematics`; on which link)"]
+        lines += [f"  {f['name']}  ({f['link'] or 'the ground'})" for f in data["frames"]]
     if data["parameters"]:
         heads = [f"{p['name']} = {p['value']:.6g} {p['unit']}".rstrip() for p in data["parameters"]]
         width = max(map(len, heads))

@@ -52,7 +52,7 @@ def rigid_tree(system: System) -> RigidTree | None:
                 frame.rotation,  # type: ignore[arg-type]
                 numbers(frame.translation),
             )
-            for frame in robot.frames
+            for frame in robot.named_frames
         ),
         {
             place: text(value)
@@ -79,7 +79,7 @@ def _places(robot: Robot) -> Iterator[tuple[str, Scalar]]:
         yield from _entries(f"bodies[{b}].com", link.com)
         for i, row in enumerate(link.inertia):
             yield from _entries(f"bodies[{b}].inertia[{i}]", row)
-    for f, frame in enumerate(robot.frames):
+    for f, frame in enumerate(robot.named_frames):
         yield from _entries(f"frames[{f}].translation", frame.translation)
 
 

@@ -38,6 +38,10 @@ class Model(Protocol):
     layout: PackedLayout
     backend: Any
 
+    @property
+    def kinematics(self) -> Any:
+        """Poses and Jacobians of frames, for rigid links."""
+
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """τ_ij (..., n, N)."""
 

@@ -121,7 +121,7 @@ class Robot:
     """A tree of links, parents before children, moved by `coordinates`; gravity in m/s².
 
     With `allow_unphysical` its parameters may take values that no body has. `frames` are the file's own, one
-    for each link among them.
+    for each link among them, or none.
     """
 
     name: str
@@ -149,6 +149,13 @@ class Robot:
                     raise LinkwiseError(f"a {what} has an empty name; name it")
                 if count > 1:
                     raise LinkwiseError(f"two {what}s are named {name!r}; rename one")
+
+    @property
+    def named_frames(self) -> tuple[Frame, ...]:
+        """The frames; of a robot that was given none, those of its links."""
+        upright = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        own = (Frame(link.name, at, upright, (0.0, 0.0, 0.0)) for at, link in enumerate(self.links))
+        return self.frames or tuple(own)
 
     def chain(self, link: int) -> tuple[int, ...]:
         """Indices of the links from the root to `link`, itself included."""

@@ -112,7 +112,7 @@ def _sites(model: Any, links: list[str]) -> tuple[Site, ...]:
             _vector(model.site_pos[index]),
         )
         for index in range(model.nsite)
-        if model.site(index).name
+        if model.site(index).name.strip()
     )
 
 

@@ -1,0 +1,201 @@
+"""`robot.kinematics`: frames by name, points, batches, gradients, parameters, bodies and `out`."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import DATA, needs_compiler
+from linkwise import Options, generate, read_system, write_package
+from linkwise.package.load import import_package
+
+torch = pytest.importorskip("torch")
+
+TOOL = """schema = 1
+name = "arm"
+gravity = [0, -9.81, 0]
+parameters = {L = 0.4, m = 1.0}
+joint = [
+  {name = "shoulder", type = "revolute", parent = "base", child = "upper"},
+  {name = "elbow", type = "revolute", parent = "upper", child = "fore", xyz = ["L", 0, 0]},
+  {name = "end", type = "fixed", parent = "fore", child = "tool", xyz = ["2*L", 0, 0], rpy = [0, 0, "pi/2"]},
+]
+link = [
+  {name = "base"}, {name = "tool"},
+  {name = "upper", mass = "m", com = ["L/2", 0, 0], inertia = {xx = 0.1, yy = 0.1, zz = 0.1}},
+  {name = "fore", mass = 2, com = ["L", 0, 0], inertia = {xx = 0.1, yy = 0.1, zz = 0.1}},
+]
+"""
+Q, QD, QDD = (np.array(row) for row in ([0.3, -1.1], [0.7, 0.4], [-0.2, 0.9]))
+BACKENDS = ("numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler))
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    folder = tmp_path_factory.mktemp("arm")
+    (folder / "arm.toml").write_text(TOOL)
+    system = read_system(folder / "arm.toml", Options("symbolic"))
+    write_package(generate(system, ["numpy", "torch", "autograd", "native"]), folder / "arm")
+    return import_package(folder / "arm")
+
+
+def as_array(value: Any) -> Any:
+    return value.detach().numpy() if torch.is_tensor(value) else value
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_merged_tool_moves_as_by_hand_for_other_parameters(arm: ModuleType, backend: str) -> None:
+    length = 0.5
+    kinematics = arm.load(backend, parameters={"L": length, "m": 3.0}).kinematics
+    assert kinematics.frames == ("base", "upper", "fore", "tool")
+    a, b = Q[0], Q.sum()
+    x, y = length * (np.cos(a) + 2 * np.cos(b)), length * (np.sin(a) + 2 * np.sin(b))
+    # The tool's axes are turned by a right angle.
+    expected = [[-np.sin(b), -np.cos(b), 0, x], [np.cos(b), -np.sin(b), 0, y], [0, 0, 1, 0], [0, 0, 0, 1]]
+    np.testing.assert_allclose(as_array(kinematics.pose(Q, "tool")), expected, atol=1e-15)
+    jacobian = np.zeros((6, 2))
+    jacobian[2] = 1.0
+    jacobian[3:5] = [[-y, -2 * length * np.sin(b)], [x, 2 * length * np.cos(b)]]
+    np.testing.assert_allclose(as_array(kinematics.jacobian(Q, "tool")), jacobian, atol=1e-15)
+    centre = 3 * length / 2 * np.array([np.cos(a), np.sin(a)])
+    centre += 2 * length * np.array([np.cos(a) + np.cos(b), np.sin(a) + np.sin(b)])
+    np.testing.assert_allclose(as_array(kinematics.centre_of_mass(Q))[:2], centre / 5, atol=1e-15)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_points_and_batches_of_any_shape(arm: ModuleType, backend: str) -> None:
+    kinematics = arm.load(backend).kinematics
+    generator = np.random.default_rng(0)
+    q, qd, qdd = generator.uniform(-2, 2, (3, 2, 5, 2))
+    points = generator.uniform(-1, 1, (5, 3))
+    velocity = as_array(kinematics.velocity(q, qd, "tool", points))
+    acceleration = as_array(kinematics.acceleration(q, qd, qdd, "tool", points))
+    jacobian, rate = (
+        as_array(found)
+        for found in (
+            kinematics.jacobian(q, "tool", points),
+            kinematics.jacobian_rate(q, qd, "tool", points),
+        )
+    )
+    np.testing.assert_allclose(velocity, (jacobian @ qd[..., None])[..., 0], atol=1e-14)
+    moved = (jacobian @ qdd[..., None] + rate @ qd[..., None])[..., 0]
+    np.testing.assert_allclose(acceleration, moved, atol=1e-14)
+    one = as_array(kinematics.jacobian(q[1, 3], "tool", points[3]))
+    np.testing.assert_allclose(jacobian[1, 3], one, atol=1e-15)
+    # Many points of one configuration.
+    spread = as_array(kinematics.jacobian(q[0, 0], "tool", points))
+    assert spread.shape == (5, 6, 2)
+    assert as_array(kinematics.poses(q[:0])).shape == (0, 5, 4, 4, 4)
+
+
+def test_a_wrench_on_a_point_loads_the_joints_by_the_transpose(package_of: Callable[..., ModuleType]) -> None:
+    robot = package_of("puma560").load("numpy")
+    q = np.random.default_rng(1).uniform(-2, 2, robot.n)
+    weights = robot.backend.rule.bodies()
+    force = -9.81 * weights.masses[:, None] * np.array([0, 0, 1.0])
+    torque = sum(
+        robot.kinematics.jacobian(q, j)[3:].T @ f
+        + np.cross(robot.kinematics.pose(q, j)[:3, :3] @ c, f) @ robot.kinematics.jacobian(q, j)[:3]
+        for j, (f, c) in enumerate(zip(force, centres_in_files_axes(robot), strict=True))
+    )
+    rest = 0 * q
+    np.testing.assert_allclose(-torque, robot.inverse_dynamics(q, rest, rest), atol=1e-12)
+
+
+def centres_in_files_axes(robot: Any) -> Any:
+    """Of each link, in the axes of its frame from that frame's origin."""
+    tree = robot.backend.tree
+    at = {frame.name: frame for frame in tree.frames}
+    for link in tree.links:
+        frame = at[link.name]
+        yield np.array(frame.rotation).T @ (np.array(link.centre) - np.array(frame.translation))
+
+
+def test_gradients_flow_and_transformations_pass(arm: ModuleType) -> None:
+    length = torch.tensor(0.4, dtype=torch.float64, requires_grad=True)
+    kinematics = arm.load("torch", parameters={"L": length}).kinematics
+    q, qd = torch.from_numpy(Q), torch.from_numpy(QD)
+    jacobian = kinematics.jacobian(q, "tool")
+    by_torch = torch.func.jacrev(lambda at: kinematics.pose(at, "tool")[:3, 3])(q)
+    torch.testing.assert_close(jacobian[3:], by_torch, rtol=0, atol=1e-15)
+    rate = torch.func.jacrev(lambda at: kinematics.jacobian(at, "tool"))(q) @ qd
+    torch.testing.assert_close(kinematics.jacobian_rate(q, qd, "tool"), rate, rtol=0, atol=1e-15)
+    both = torch.func.vmap(lambda at: kinematics.poses(at))(torch.stack([q, qd]))
+    torch.testing.assert_close(both, kinematics.poses(torch.stack([q, qd])), rtol=0, atol=1e-15)
+    kinematics.pose(q, "tool")[0, 3].backward()
+    assert length.grad is not None
+    assert float(length.grad) == pytest.approx(np.cos(Q[0]) + 2 * np.cos(Q.sum()))
+
+
+def test_autograd_uses_the_numbers_that_its_modules_have(package_of: Callable[..., ModuleType]) -> None:
+    robot = package_of("planar3").load("autograd", requires_grad="place")
+    q = torch.zeros(3, dtype=torch.float64)
+    before = robot.kinematics.pose(q, "link3")[0, 3].detach()
+    with torch.no_grad():
+        robot.links["link3"].place += torch.tensor([0.5, 0.0, 0.0])
+    after = robot.kinematics.pose(q, "link3")[0, 3]
+    assert float(after.detach() - before) == pytest.approx(0.5)
+    after.backward()
+    assert robot.links["link3"].place.grad.tolist() == [1.0, 0.0, 0.0]
+
+
+def test_other_bodies_move_the_centre_of_mass(package_of: Callable[..., ModuleType]) -> None:
+    package = package_of("planar3")
+    own = package.bodies()
+    heavy = own._replace(masses=np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+    q = np.zeros((2, 3))
+    centre = package.load("numpy", bodies=heavy).kinematics.centre_of_mass(q)
+    np.testing.assert_allclose(centre[:, 0], [0.125, 0.625], atol=1e-15)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_single_precision_and_out(arm: ModuleType, backend: str) -> None:
+    kinematics = arm.load(backend).kinematics
+    q: Any = Q.astype(np.float32)
+    if backend in ("torch", "autograd"):
+        q = torch.from_numpy(q)
+    jacobian = kinematics.jacobian(q, "tool")
+    assert jacobian.dtype == q.dtype
+    np.testing.assert_allclose(as_array(jacobian), as_array(kinematics.jacobian(Q, "tool")), atol=1e-6)
+    out = 0 * jacobian
+    assert kinematics.jacobian(q, "tool", out=out) is out
+    assert (out == jacobian).all()
+    with pytest.raises(ValueError, match=r"out has shape \(6, 2\); the answer has \(4, 4\)"):
+        kinematics.pose(q, "tool", out=out)
+
+
+def test_large_batches_are_computed_in_pieces_that_fit(arm: ModuleType) -> None:
+    kinematics = arm.load("numpy", parameters={"L": np.linspace(0.3, 0.5, 40000)}).kinematics
+    q = np.random.default_rng(2).uniform(-2, 2, (40000, 2))
+    poses = kinematics.poses(q)
+    some = slice(39990, 40000)
+    few = arm.load("numpy", parameters={"L": np.linspace(0.3, 0.5, 40000)[some]}).kinematics.poses(q[some])
+    np.testing.assert_array_equal(poses[some], few)
+
+
+def test_what_is_no_frame_is_named(arm: ModuleType) -> None:
+    kinematics = arm.load("numpy").kinematics
+    with pytest.raises(
+        ValueError, match=r"frame is 'tol', which is not there; the frames are 'base', 'upper'"
+    ):
+        kinematics.pose(Q, "tol")
+    with pytest.raises(
+        ValueError, match=r"frame is 2, but links are numbered 0\.\.1; or give a frame's name"
+    ):
+        kinematics.pose(Q, 2)
+    with pytest.raises(TypeError, match=r"frame is None; give the name of a frame, or the number of a link"):
+        kinematics.pose(Q, None)
+    with pytest.raises(ValueError, match=r"point has shape \(2,\); its last axis must be 3"):
+        kinematics.jacobian(Q, "tool", [1.0, 2.0])
+    with pytest.raises(ValueError, match=r"point has shape \(4, 3\), the motion has samples of shape \(3,\)"):
+        kinematics.jacobian(np.zeros((3, 2)), "tool", np.zeros((4, 3)))
+    np.testing.assert_array_equal(kinematics.pose(Q, 1), kinematics.pose(Q, "fore"))
+
+
+def test_links_of_energies_have_no_places(tmp_path: Path) -> None:
+    write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["numpy"]), tmp_path / "cart")
+    robot = import_package(tmp_path / "cart").load()
+    with pytest.raises(ValueError, match="are energies, which do not say where anything is"):
+        _ = robot.kinematics
