@@ -200,6 +200,19 @@ def test_what_cannot_be_learned_is_refused(
         planar2.load(backend, requires_grad=asked)
 
 
+def test_constants_that_hang_on_run_time_parameters_in_every_link_cannot_be_asked_for(
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    load = package_of("planar3 symbolic").load
+    with pytest.raises(
+        ValueError, match=r"'mass', which hangs on run-time parameters .*these: near it"
+    ):
+        load("autograd", requires_grad="mass")
+    assert dict(load("autograd", requires_grad="m_2").named_parameters()).keys() == {"values.m_2"}
+    with pytest.raises(TypeError, match="requires_grad is 3; give True, or names: mass, "):
+        load("autograd", requires_grad=3)
+
+
 def test_a_longer_arm_has_the_same_numbers_under_the_same_names(
     package_of: Callable[[str], ModuleType],
 ) -> None:

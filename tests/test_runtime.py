@@ -136,8 +136,7 @@ def pendulum(backend: str) -> Dynamics:
     if backend == "numpy":
         return Dynamics(ROD, NumpyBackend(ROD, [Pendulum()], ROD.values(None)), pendulum, (backend,))
     from linkwise.runtime.arrays.torch_backend import TorchBackend
-    from linkwise.runtime.lagrangians.dynamics_module import DynamicsModule
-    from linkwise.runtime.lagrangians.link_modules import backend_of_links
+    from linkwise.runtime.lagrangians.dynamics_module import DynamicsModule, backend_of_links
     from linkwise.runtime.lagrangians.partial_lagrangian import PartialLagrangian
 
     class Lagrangian(PartialLagrangian):
@@ -188,8 +187,8 @@ def test_lagrangians_are_differentiated_a_part_of_a_large_batch_at_a_time(
 
 
 def test_what_a_link_hands_on_is_worked_out_once_for_all_that_it_carries() -> None:
+    from linkwise.runtime.lagrangians.dynamics_module import backend_of_links
     from linkwise.runtime.lagrangians.lanes import carried
-    from linkwise.runtime.lagrangians.link_modules import backend_of_links
     from linkwise.runtime.lagrangians.partial_lagrangian import PartialLagrangian
 
     calls = []
@@ -236,7 +235,7 @@ def test_what_a_link_hands_on_is_worked_out_once_for_all_that_it_carries() -> No
 
 
 def test_an_energy_off_its_path_is_refused() -> None:
-    from linkwise.runtime.lagrangians.link_modules import backend_of_links
+    from linkwise.runtime.lagrangians.dynamics_module import backend_of_links
     from linkwise.runtime.lagrangians.partial_lagrangian import PartialLagrangian
 
     class Stray(PartialLagrangian):
@@ -287,7 +286,16 @@ def of_tensors(q: torch.Tensor) -> torch.Tensor:
     return robot.coefficients(q, q).acceleration.sum() + stiffness.sum() + robot.inverse_dynamics(q, q, q)
 
 
+def of_links(q: torch.Tensor) -> torch.Tensor:
+    learned = planar2.load("autograd", requires_grad="mass")
+    energy: torch.Tensor = learned.links["link2"](q, q)
+    rows = [link.torque(q, q, q) for link in learned.links]
+    learned.links[0].coefficients(q)  # ERROR
+    return torch.stack(rows).sum() + energy.sum() + learned.values["m"] + learned.inverse_dynamics(q, q, q)
+
+
 robot = planar2.load()
+robot.links  # ERROR
 tau = robot.partial_torque(np.zeros(2), np.zeros(2), np.zeros(2))
 reveal_type(tau)
 robot.partial_torques  # ERROR

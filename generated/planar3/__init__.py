@@ -8,7 +8,7 @@ See `load` for the back ends, `Dynamics` for all calls and `names.py` for the ro
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from .names import ROBOT
 from .runtime.dynamics import Dynamics
@@ -18,10 +18,37 @@ from .runtime.quantities import Coefficients, GradientPropagation, Packed, Propa
 from .runtime.rule.regressors import inertial_parameters
 from .runtime.structure import Layout
 
+if TYPE_CHECKING:
+    from .runtime.lagrangians.dynamics_module import DynamicsModule
+
 joint_names = ROBOT.joint_names
 link_names = ROBOT.link_names
 parameters = ROBOT.parameters
 """Run-time parameters and their built-in values."""
+
+
+@overload
+def load(
+    backend: Literal["autograd"],
+    parameters: Mapping[str, Any] | None = None,
+    check_finite: bool = False,
+    allow_unphysical: bool = False,
+    kernel: str = "auto",
+    bodies: None = None,
+    requires_grad: bool | str | Iterable[str] = False,
+) -> "DynamicsModule": ...
+
+
+@overload
+def load(
+    backend: str = "numpy",
+    parameters: Mapping[str, Any] | None = None,
+    check_finite: bool = False,
+    allow_unphysical: bool = False,
+    kernel: str = "auto",
+    bodies: Bodies[Any] | None = None,
+    requires_grad: bool | str | Iterable[str] = False,
+) -> Dynamics: ...
 
 
 def load(
@@ -105,7 +132,7 @@ def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: A
 
 def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from .energies import LAGRANGIANS
-    from .runtime.lagrangians.link_modules import backend_of_links
+    from .runtime.lagrangians.dynamics_module import backend_of_links
     from .tree import RULE
     from .runtime.arrays.array_kernels import refuse_choice
 

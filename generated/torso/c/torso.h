@@ -123,7 +123,8 @@ void torso_dense_position_gradient(size_t count, const double *q, const double *
 
 /* Regressors, with their zeros: entry (i - 1, j - 1) of a row is the Y of which tau(i, j) = Y . pi(j), whatever link j
    carries: pi(j) = (m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz), mass, first moment, and inertia about the
-   origin of the link's frame, in whose axes they are; torso_tree.h has these frames.
+   origin of the link's frame, in whose axes they are; torso_tree.h has these frames. Rows are computed a block at a
+   time, on SIMD lanes: one alone takes the arithmetic of a whole block.
    Reads q, qd, qdd (count, JOINTS); writes regressor (count, JOINTS, LINKS, 10). */
 void torso_regressor(size_t count, const double *q, const double *qd, const double *qdd, double *regressor);
 
@@ -208,7 +209,8 @@ void torso_dense_position_gradientf(size_t count, const float *q, const float *q
 
 /* Regressors, with their zeros: entry (i - 1, j - 1) of a row is the Y of which tau(i, j) = Y . pi(j), whatever link j
    carries: pi(j) = (m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz), mass, first moment, and inertia about the
-   origin of the link's frame, in whose axes they are; torso_tree.h has these frames.
+   origin of the link's frame, in whose axes they are; torso_tree.h has these frames. Rows are computed a block at a
+   time, on SIMD lanes: one alone takes the arithmetic of a whole block.
    Reads q, qd, qdd (count, JOINTS); writes regressor (count, JOINTS, LINKS, 10). */
 void torso_regressorf(size_t count, const float *q, const float *qd, const float *qdd, float *regressor);
 

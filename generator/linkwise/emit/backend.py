@@ -52,6 +52,8 @@ class Loading:
     """Whether it may be made of LINKS, the closed forms, which are None where the kernel is in loops."""
     uses_rule: bool = False
     """Whether it may be made of RULE, the vectorised rule of rigid links, which is None for energies."""
+    face: str = "Dynamics"
+    """Class of what `load` answers; another than `Dynamics` stands in the module."""
     chooses: bool = False
     """Whether it has kernels to choose from and takes bodies, as `kernel` and `bodies`."""
     learns: bool = False
@@ -156,10 +158,11 @@ BACKENDS: dict[str, BackendFiles] = {
             emits=(_energies, _tree),
             runtime=("arrays/torch_backend.py", "lagrangians", "recorded", *RULE),
             loading=Loading(
-                "lagrangians.link_modules",
+                "lagrangians.dynamics_module",
                 "backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad, RULE)",
                 ("from .energies import LAGRANGIANS",),
                 speed=4,
+                face="DynamicsModule",
                 uses_rule=True,
                 learns=True,
             ),

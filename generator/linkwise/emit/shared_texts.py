@@ -32,6 +32,8 @@ class Maker:
     doc: str
     imports: tuple[str, ...]
     made: str
+    module: str
+    face: str
     chooses: bool
     learns: bool
 
@@ -47,7 +49,8 @@ class Maker:
             imports.append("from .tree import RULE" if rigid else "RULE = None")
         if loading.uses_forms and kernel == "loops":
             imports.append("LINKS = None")
-        return cls(backend.name, backend.doc, tuple(imports), loading.made, loading.chooses, loading.learns)
+        answered = loading.made, loading.module, loading.face
+        return cls(backend.name, backend.doc, tuple(imports), *answered, loading.chooses, loading.learns)
 
 
 def init_text(
@@ -64,11 +67,13 @@ def init_text(
     """
     loadable = {backend: backend.loading for backend in chosen if backend.loading}
     fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
+    makers = [Maker.of(backend, loading, rigid, kernel) for backend, loading in loadable.items()]
     view = {
         "version": VERSION,
         "package": package,
         "default": next((backend.name for backend in loadable), ""),
-        "makers": [Maker.of(backend, loading, rigid, kernel) for backend, loading in loadable.items()],
+        "makers": makers,
+        "own_faces": [maker for maker in makers if maker.face != "Dynamics"],
         "choosing": [backend.name for backend, loading in loadable.items() if loading.chooses],
         "learning": [backend.name for backend, loading in loadable.items() if loading.learns],
         "rigid": rigid,

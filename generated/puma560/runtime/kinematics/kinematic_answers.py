@@ -12,10 +12,27 @@ from ..rule.joint_tree import JointTree
 from ..rule.rule_tables import converted
 from ..rule.tree_arrays import TreeArrays, formula_sources, own_numbers
 from ..structure import Structure
-from . import frame_arrays as arrays
+from .frame_arrays import (
+    Carried,
+    acceleration_of,
+    carried,
+    centre_jacobian,
+    centre_jacobian_rate,
+    centre_of_mass,
+    homogeneous,
+    jacobian,
+    jacobian_rate,
+    moving,
+    point_at,
+    velocity_of,
+)
 from .frame_tables import FrameTables, frame_tables, link_tables
 from .named_frames import frame_index
 
+CACHE = 1 << 21
+"""Bytes of the arrays of one piece of a batch, which are to stay in the processor's cache."""
+NUMBERS = 60
+"""Numbers that a joint or a frame has of one sample."""
 ALL, LINKS = "all frames", "links"
 
 
@@ -29,19 +46,26 @@ class Asked(NamedTuple):
     point: Any
     """(3, 1, samples), or None for the frame's origin."""
 
-    def frame(self, from_world: bool = False) -> arrays.Carried:
+    def frame(self, from_world: bool = False) -> Carried:
         """The frame, or all of them."""
         q, offsets = self.motion[0], self.numbers.offsets
-        return arrays.carried(self.xp, self.tables, self.numbers, offsets, q, from_world)
+        return carried(self.xp, self.tables, self.numbers, offsets, q, from_world)
 
-    def centres(self, from_world: bool = False) -> arrays.Carried:
+    def centres(self, from_world: bool = False) -> Carried:
         """Centres of mass of the links."""
         q, offsets = self.motion[0], self.numbers.centres
-        return arrays.carried(self.xp, self.tables, self.numbers, offsets, q, from_world)
+        return carried(self.xp, self.tables, self.numbers, offsets, q, from_world)
 
-    def moving(self, found: arrays.Carried) -> Any:
+    def moving(self, found: Carried) -> Any:
         """Motion of the joints."""
-        return arrays.moving(self.xp, self.tables, self.numbers, found, *self.motion[1:])
+        return moving(self.xp, self.tables, self.numbers, found, *self.motion[1:])
+
+    def some(self, samples: slice) -> "Asked":
+        """The same for some of the samples; of a number that all share there is one."""
+        numbers = (a[..., samples] if a.shape[-1] > 1 else a for a in self.numbers)
+        point = None if self.point is None else self.point[..., samples]
+        motion = [a[:, samples] for a in self.motion]
+        return Asked(self.xp, self.tables, TreeArrays(*numbers), motion, point)
 
 
 class KinematicAnswers:
@@ -71,7 +95,7 @@ class KinematicAnswers:
         """See `Kinematics.pose`."""
 
         def answer(at: Asked) -> Any:
-            return arrays.homogeneous(at.xp, at.frame(from_world=True))[:, :, 0]
+            return homogeneous(at.xp, at.frame(from_world=True))[:, :, 0]
 
         return self._answer((q,), self._index(frame), None, answer, (4, 4), out)
 
@@ -79,7 +103,7 @@ class KinematicAnswers:
         """See `Kinematics.poses`."""
 
         def answer(at: Asked) -> Any:
-            matrices = arrays.homogeneous(at.xp, at.frame(from_world=True))
+            matrices = homogeneous(at.xp, at.frame(from_world=True))
             # (4, 4, F, samples) -> (F, 4, 4, samples)
             return at.xp.swapaxes(at.xp.swapaxes(matrices, 0, 2), 1, 2)
 
@@ -90,28 +114,28 @@ class KinematicAnswers:
 
         def answer(at: Asked) -> Any:
             found = at.frame()
-            return arrays.jacobian(at.xp, at.tables, found, arrays.point_at(found, at.point))
+            return jacobian(at.xp, at.tables, found, point_at(found, at.point))
 
         return self._answer((q,), self._index(frame), point, answer, (6, self._structure.n), out)
 
     def jacobian_rate(self, q: Any, qd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.jacobian_rate`."""
         shape = 6, self._structure.n
-        return self._moving((q, qd), frame, point, arrays.jacobian_rate, shape, out)
+        return self._moving((q, qd), frame, point, jacobian_rate, shape, out)
 
     def velocity(self, q: Any, qd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.velocity`."""
-        return self._moving((q, qd), frame, point, arrays.velocity_of, (6,), out)
+        return self._moving((q, qd), frame, point, velocity_of, (6,), out)
 
     def acceleration(self, q: Any, qd: Any, qdd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.acceleration`."""
-        return self._moving((q, qd, qdd), frame, point, arrays.acceleration_of, (6,), out)
+        return self._moving((q, qd, qdd), frame, point, acceleration_of, (6,), out)
 
     def centre_of_mass(self, q: Any, out: Any) -> Any:
         """See `Kinematics.centre_of_mass`."""
 
         def answer(at: Asked) -> Any:
-            return arrays.centre_of_mass(at.numbers.masses, at.centres(from_world=True))
+            return centre_of_mass(at.numbers.masses, at.centres(from_world=True))
 
         return self._answer((q,), LINKS, None, answer, (3,), out)
 
@@ -119,7 +143,7 @@ class KinematicAnswers:
         """See `Kinematics.centre_of_mass_jacobian`."""
 
         def answer(at: Asked) -> Any:
-            return arrays.centre_jacobian(at.xp, at.tables, at.numbers.masses, at.centres())
+            return centre_jacobian(at.xp, at.tables, at.numbers.masses, at.centres())
 
         return self._answer((q,), LINKS, None, answer, (3, self._structure.n), out)
 
@@ -129,7 +153,7 @@ class KinematicAnswers:
         def answer(at: Asked) -> Any:
             found = at.centres()
             moved = at.moving(found)
-            return arrays.centre_jacobian_rate(at.xp, at.tables, at.numbers.masses, found, moved)
+            return centre_jacobian_rate(at.xp, at.tables, at.numbers.masses, found, moved)
 
         return self._answer((q, qd), LINKS, None, answer, (3, self._structure.n), out)
 
@@ -140,7 +164,7 @@ class KinematicAnswers:
 
         def answer(at: Asked) -> Any:
             found = at.frame()
-            value = made(at.xp, at.tables, at.moving(found), arrays.point_at(found, at.point))
+            value = made(at.xp, at.tables, at.moving(found), point_at(found, at.point))
             return value if len(shape) > 1 else value[:, 0]
 
         return self._answer(given, self._index(frame), point, answer, shape, out)
@@ -169,9 +193,8 @@ class KinematicAnswers:
             read = dict(zip(("q", "qd", "qdd"), motion, strict=False))
             read |= {} if point is None else {"point": point}
             accepted(out, (), (shape,), read, self._read_beside_motion(), False)
-        value = answer(self._asked(own, part, motion, point))
-        value = own.xp.swapaxes(value.reshape(math.prod(shape), value.shape[-1]), 0, 1)
-        value = value.reshape(*motion[0].shape[:-1], *shape)
+        at, count = self._asked(own, part, motion, point), math.prod(shape)
+        value = _in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
         if out is None:  # its numbers side by side
             return value.copy() if isinstance(value, np.ndarray) else value.contiguous()
         out[...] = value
@@ -197,6 +220,21 @@ class KinematicAnswers:
             return link_tables(self._tree, self._structure.n)
         frames = range(len(self.frames)) if part == ALL else [part]
         return frame_tables(self._tree, self._structure.n, frames)
+
+
+def _in_pieces(own: Any, motion: Sequence[Any], at: Asked, answer: Callable[[Asked], Any], count: int) -> Any:
+    """Answers (samples, count), as many samples at once as the back end wants."""
+    xp, samples = at.xp, at.motion[0].shape[1]
+    moved = len(at.tables.joints.parents) + len(at.tables.carriers)
+    size = own.chunk(motion, max(16, CACHE // (motion[0].itemsize * (NUMBERS * moved + count))))
+    if size is None or samples <= size:
+        return xp.swapaxes(answer(at).reshape(count, samples), 0, 1)
+    whole = xp.empty((samples, count), dtype=motion[0].dtype)
+    for start in range(0, samples, size):
+        piece = slice(start, min(start + size, samples))
+        found = answer(at.some(piece)).reshape(count, piece.stop - start)
+        whole[piece] = xp.swapaxes(found, 0, 1)
+    return whole
 
 
 def _with_point(own: Any, motion: Sequence[Any], given: Any) -> tuple[list[Any], Any]:

@@ -1,14 +1,12 @@
 """The modules of a robot's links, by number or by name."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any, cast
 
 import torch
 
-from ..chosen_names import position_of
-from ..rule.rule_calls import RigidRule
+from ..chosen_names import choice, position_of, short
 from ..structure import Structure
-from .autograd_backend import AutogradBackend
 from .partial_lagrangian import PartialLagrangian
 from .rigid_lagrangian import RigidLagrangian
 from .run_time_values import RunTimeValues, attribute_names
@@ -41,24 +39,21 @@ class LinkModules(torch.nn.Module):
         return (self[j] for j in range(len(self)))
 
 
-def backend_of_links(
+def links_and_values(
     structure: Structure,
     kinds: Sequence[type[PartialLagrangian]],
     values: Mapping[str, Any],
-    requires_grad: bool | str | Iterable[str] = False,
-    rule: RigidRule | None = None,
-) -> AutogradBackend:
-    """The back end of one module a link, and these with it; `requires_grad` as the package's `load` says.
-
-    rule: that of the package's tree, whose frames are to be known; None for energies
-    """
+    requires_grad: bool | str | Iterable[str],
+) -> tuple[LinkModules, RunTimeValues]:
+    """One module a link, and what they share; `requires_grad` as the package's `load` says."""
     rigid = any(issubclass(kind, RigidLagrangian) for kind in kinds)
     learned = learned_names(requires_grad, values, rigid)
     given, made = RunTimeValues(values, learned), dict[Any, PartialLagrangian]()
     for j, kind in enumerate(kinds):
         made[kind] = kind(structure.only(j), given, made.get(kind.parent), learned)
-    modules = LinkModules(structure.link_names, made.values())
-    return AutogradBackend(structure, modules, given, rule.tree if rule else None)
+    if not isinstance(requires_grad, bool):
+        _refuse_idle(learned.intersection(KINDS), made.values(), values)
+    return LinkModules(structure.link_names, made.values()), given
 
 
 def learned_names(asked: bool | str | Iterable[str], parameters: Iterable[str], rigid: bool) -> set[str]:
@@ -69,8 +64,22 @@ def learned_names(asked: bool | str | Iterable[str], parameters: Iterable[str], 
     known = [*(KINDS if rigid else ()), *parameters]
     if isinstance(asked, bool):
         return set(known) if asked else set()
+    if not isinstance(asked, Iterable):
+        raise TypeError(f"requires_grad is {short(asked)}; give True, or names: {', '.join(known)}")
     names = {asked} if isinstance(asked, str) else set(asked)
     for name in sorted(names.difference(known), key=str):
         there = f"choose among {', '.join(known)}" if known else "this package has no number to learn"
         raise ValueError(f"requires_grad names {name!r}; {there}")
     return names
+
+
+def _refuse_idle(
+    kinds: Iterable[str], modules: Collection[PartialLagrangian], parameters: Mapping[str, Any]
+) -> None:
+    """Raise ValueError for a kind of constants that no link has, as they hang on run-time parameters."""
+    for kind in sorted(kinds):
+        if not any(kind in module._parameters for module in modules):
+            raise ValueError(
+                f"requires_grad names {kind!r}, which hangs on run-time parameters in every link here; name "
+                f"these: {choice(kind, parameters, 'parameters')}"
+            )

@@ -11,7 +11,6 @@ from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays
 from ..structure import Structure
 from ..sums.sum_answers import SumAnswers
-from .dynamics_module import DynamicsModule
 from .energy_interface import Energies, Parameters, numbers_of
 from .functional_sweeps import decomposition_followed, energies, position_gradient_followed, torque_followed
 from .graph_calls import graph_of, graph_parts_of
@@ -32,7 +31,6 @@ class AutogradBackend(TorchBackend):
     """
 
     name: ClassVar = "autograd"
-    face: ClassVar[Any] = DynamicsModule
 
     def __init__(
         self,

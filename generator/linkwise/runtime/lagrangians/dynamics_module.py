@@ -1,14 +1,19 @@
 """A robot whose links are torch modules, itself one."""
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
 
 from ..dynamics import Dynamics
 from ..interface import Backend
+from ..rule.rule_calls import RigidRule
 from ..structure import Structure
+from .autograd_backend import AutogradBackend
+from .link_modules import LinkModules, links_and_values
+from .partial_lagrangian import PartialLagrangian
+from .run_time_values import RunTimeValues
 
 MADE_ANEW = ("backend", "layout", "_load", "_asked", "_answers", "kinematics")
 """What a copy does not take over: it has its own."""
@@ -22,6 +27,11 @@ class DynamicsModule(Dynamics, torch.nn.Module):
     in the motion's dtype and on its device, wherever the modules are. Hooks see robot(q, qd, qdd) and
     links[j](q, qd); the calls that have names go past them.
     """
+
+    links: LinkModules
+    """Modules of the links, by number or by name."""
+    values: RunTimeValues
+    """Run-time parameters, which links share."""
 
     def __init__(
         self,
@@ -58,6 +68,27 @@ class DynamicsModule(Dynamics, torch.nn.Module):
         own: Any = self.backend
         self.backend = kind(own.structure, self.links, self.values, own.tree)
         self._answers = self.backend.answers(self.check_finite)
+
+
+class BackendOfLinks(AutogradBackend):
+    """The back end of a robot whose links are these modules."""
+
+    face: ClassVar[Any] = DynamicsModule
+
+
+def backend_of_links(
+    structure: Structure,
+    kinds: Sequence[type[PartialLagrangian]],
+    values: Mapping[str, Any],
+    requires_grad: bool | str | Iterable[str] = False,
+    rule: RigidRule | None = None,
+) -> BackendOfLinks:
+    """The back end of one module a link, and these with it; `requires_grad` as the package's `load` says.
+
+    rule: that of the package's tree, whose frames are to be known; None for energies
+    """
+    modules, given = links_and_values(structure, kinds, values, requires_grad)
+    return BackendOfLinks(structure, modules, given, rule.tree if rule else None)
 
 
 class _Parameters(Mapping[str, Tensor]):
