@@ -25,6 +25,7 @@ from linkwise.check.parametric_tree import changed_values, check_bodies, tree_wi
 from linkwise.check.reference import Reference
 from linkwise.check.regressor_reference import regressor_calls, regressor_reference
 from linkwise.check.states import random_states
+from linkwise.check.sum_checks import sums_against_reference
 from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.torque_reference import states_of_torques, torque_reference
 from linkwise.package.load import Array, Model, Package, load_package, staying
@@ -161,6 +162,7 @@ class _Checks:
                 yield Skipped(f"{way.label}{label}: not called", "its C is wrong, see above")
             else:
                 yield from against_reference(Named(f"{way.label}{label}", model, rows, reference), manifest)
+                yield from sums_against_reference(f"{way.label}{label}", model, reference)
                 if regressors is not None and model.backend.rule is not None:
                     yield from regressor_calls(f"{way.label}{label}", model, regressors)
         if manifest.tree is not None:
