@@ -465,6 +465,14 @@ def test_closed_forms_are_held_against_the_energies_that_a_user_wrote(tmp_path: 
     assert "numpy: c1 against energies differentiated" in failing
 
 
+def test_an_energy_that_is_not_the_one_that_a_user_wrote_fails(tmp_path: Path) -> None:
+    package = tmp_path / "turntable"
+    write_package(generate(read_system(str(DATA / "turntable.py")), ["numpy"]), package)
+    change_file(package, "forms/link_1.py", "-(t4 + t5),  # P(1)", "-(t4 + 1.00001 * t5),  # P(1)")
+    failing = [name for name, mark in marks(package).items() if mark == "FAIL"]
+    assert failing == ["numpy: energies of the links"]
+
+
 def test_a_lagrangian_that_is_not_the_one_that_a_user_wrote_fails(tmp_path: Path) -> None:
     package = tmp_path / "turntable"
     write_package(generate(read_system(str(DATA / "turntable.py")), ["autograd"]), package)

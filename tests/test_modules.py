@@ -204,9 +204,7 @@ def test_constants_that_hang_on_run_time_parameters_in_every_link_cannot_be_aske
     package_of: Callable[[str], ModuleType],
 ) -> None:
     load = package_of("planar3 symbolic").load
-    with pytest.raises(
-        ValueError, match=r"'mass', which hangs on run-time parameters .*these: near it"
-    ):
+    with pytest.raises(ValueError, match=r"'mass', which hangs on run-time parameters .*these: near it"):
         load("autograd", requires_grad="mass")
     assert dict(load("autograd", requires_grad="m_2").named_parameters()).keys() == {"values.m_2"}
     with pytest.raises(TypeError, match="requires_grad is 3; give True, or names: mass, "):

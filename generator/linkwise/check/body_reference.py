@@ -43,6 +43,7 @@ def body_reference(recursion: NewtonEuler, magnitudes: Magnitudes, states: State
     }
     values["h1"], scales["h1"] = 0.0 * values["c1"], scales["c1"]
     kinetic, potential = recursion.energies(q, qd)
+    sizes = magnitudes.lagrangian(at, speed)
     moved = recursion.energies(q + 1j * COMPLEX_STEP * qd, qd + 1j * COMPLEX_STEP * qdd)
     return Reference(
         "Newton-Euler recursion",
@@ -50,6 +51,6 @@ def body_reference(recursion: NewtonEuler, magnitudes: Magnitudes, states: State
         states,
         values,
         scales,
-        (kinetic - potential, magnitudes.lagrangian(at, speed)),
+        {"kinetic": (kinetic, sizes), "potential": (potential, sizes)},
         (moved[0] + moved[1]).imag / COMPLEX_STEP,
     )

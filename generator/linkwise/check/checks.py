@@ -27,6 +27,7 @@ from linkwise.check.recorded_parts import recorded_parts
 from linkwise.check.reference import Reference
 from linkwise.check.regressor_reference import regressor_calls, regressor_reference
 from linkwise.check.states import random_states
+from linkwise.check.sum_checks import sums_against_reference
 from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.torque_reference import states_of_torques, torque_reference
 from linkwise.package.load import Array, Model, Package, load_package, staying
@@ -165,6 +166,7 @@ class _Checks:
                 yield from against_reference(Named(f"{way.label}{label}", model, rows, reference), manifest)
                 if way.backend == "autograd":
                     yield recorded_parts(Named(f"{way.label}{label}", model, rows, reference))
+                yield from sums_against_reference(f"{way.label}{label}", model, reference)
                 if regressors is not None and model.backend.rule is not None:
                     yield from regressor_calls(f"{way.label}{label}", model, regressors)
                 if frames is not None and way.kernel != "rule":  # no kernel has a part in it

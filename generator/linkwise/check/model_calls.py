@@ -173,26 +173,19 @@ def _lagrangians(model: Model, states: States) -> Array:
 
 
 def _structure(checked: Named, manifest: Manifest) -> Iterator[Result]:
-    """Power, zeros off the path, and the mass matrix, which no other check looks at as a whole.
+    """Zeros off the path, and the mass matrix, which no other check looks at as a whole.
 
-    Torques that agree with the recursion have the power that the recursion's energies gain, unless the
-    recursion is wrong: that check holds the two halves of the reference together by the package's torques.
     Off the path not even rounding may be left.
     A user's energies, and bodies allowed to be unphysical, may have any mass matrix: there it is told only.
     """
     name, model, rows, reference = checked
     q, qd, qdd = reference.states.motion
     tau = model.partial_torque(q, qd, qdd)
-    if reference.power is not None:
-        power = np.einsum("sij,si->sj", tau, qd)
-        scale = np.einsum("sij,si->sj", reference.scales["tau"], np.abs(qd))
-        entries = Entries("power", power, reference.power, scale)
-        yield compare(f"{name}: power is what each link's energy gains", [entries], reference.tolerance)
     off = np.ones(tau.shape[1:], dtype=bool)
     off[tuple(rows.tau.T)] = False
     error = float(np.abs(tau[:, off]).max(initial=0.0))
     yield Result(f"{name}: tau_ij = 0 off the path", error == 0.0, error, f"largest value {error:.1e}")
-    mass = model.coefficients(q, qd).acceleration.sum(2)
+    mass = model.mass_matrix(q)
     # Of the matrix with ones on its diagonal: a hand's inertia is not lost beside a body's.
     diagonal = np.einsum("sii->si", mass)
     size = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))

@@ -6,7 +6,7 @@
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ class Reference:
     """Dense values by quantity, (samples, n, N[, n]), and how large the numbers are that each is summed from.
 
     values, scales: of tau, c2, c1, g, c0 and h1, alike in shape
-    lagrangian: (samples, N), and its scales likewise, None where the source has no energies
+    energies: kinetic and potential ones (samples, N), and their scales, by name; empty where there are none
     power: d/dt of each link's energy, (samples, N)
     """
 
@@ -37,8 +37,16 @@ class Reference:
     states: States
     values: Mapping[str, Array]
     scales: Mapping[str, Array]
-    lagrangian: tuple[Array, Array] | None = None
+    energies: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     power: Array | None = None
+
+    @property
+    def lagrangian(self) -> tuple[Array, Array] | None:
+        """Kinetic less potential energies (samples, N), and their scales likewise."""
+        if not self.energies:
+            return None
+        (kinetic, size), (potential, other) = self.energies.values()
+        return kinetic - potential, size + other
 
     def fits_single(self) -> NDArray[np.bool_]:
         """Samples (samples,) whose numbers are small enough for single precision, squares included."""

@@ -32,6 +32,11 @@ class TextLagrangian:
 
     def __call__(self, q: Any, qd: Any) -> Any:
         """Value in J, without an axis."""
+        kinetic, potential = self.energies(q, qd)
+        return kinetic - potential
+
+    def energies(self, q: Any, qd: Any) -> tuple[Any, Any]:
+        """Kinetic and potential energy in J, without an axis."""
         names, functions = dict(self._parameters), dict(torch_functions())
         for kind, motion in (("q", q), ("qd", qd)):
             names |= {f"{kind}_{k}": motion[k - 1] for k in range(1, len(motion) + 1)}
@@ -40,8 +45,10 @@ class TextLagrangian:
             names = {name: _Noisy(value, errors) for name, value in names.items()}
             functions = {name: _noisy(function, errors) for name, function in functions.items()}
         energies = (formula.value(names, functions) for formula in (self._kinetic, self._potential))
-        kinetic, potential = map(_plain, energies)
-        return q.new_zeros(()) + kinetic - potential  # a constant is a tensor, too
+        kinetic, potential = (
+            q.new_zeros(()) + _plain(one) for one in energies
+        )  # a constant is a tensor, too
+        return kinetic, potential
 
 
 def _errors(seed: int) -> Iterator[float]:

@@ -69,6 +69,27 @@ class Model(Protocol):
     def coefficient_regressors(self, q: Array, qd: Array) -> Any:
         """Y of c2, c1 (..., n, N, n, 10) and g (..., n, N, 10)."""
 
+    def mass_matrix(self, q: Array, by_link: bool = False) -> Array:
+        """M (..., n, n), or by link (..., n, N, n)."""
+
+    def coriolis_matrix(self, q: Array, qd: Array, by_link: bool = False) -> Array:
+        """C, likewise."""
+
+    def gravity_torque(self, q: Array, by_link: bool = False) -> Array:
+        """g (..., n), or by link (..., n, N)."""
+
+    def forward_dynamics(self, q: Array, qd: Array, tau: Array) -> Array:
+        """qdd (..., n)."""
+
+    def christoffel(self, q: Array, by_link: bool = False) -> Array:
+        """Gamma (..., n, n, n), or by link (..., n, N, n, n)."""
+
+    def energy(self, q: Array, qd: Array) -> Any:
+        """Kinetic and potential energies (..., N)."""
+
+    def power(self, q: Array, qd: Array, qdd: Array) -> Any:
+        """P_ij by cause and order (..., n, N, n) twice, of gravity (..., n, N)."""
+
     def masked(self, q: Array, qd: Array, qdd: Array, mask: Array) -> Array:
         """Chosen terms of the decomposition (..., n, N)."""
 

@@ -38,8 +38,12 @@ class ClosedForms(Protocol):
     def position_gradient(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> Entries:
         """c0_ijk = d(tau_ij)/d(q_k), by i, then k."""
 
+
+class EnergyForms(ClosedForms, Protocol):
+    """Those of a link that is energies; the rule has the energies of rigid links."""
+
     def energy(self, xp: Any, q: Any, qd: Any, p: Mapping[str, Any]) -> Entries:
-        """Kinetic and potential energy, of links that are energies; the rule has those of rigid links."""
+        """Kinetic and potential energy in J."""
 
 
 class Backend(Protocol[Kind]):

@@ -1,0 +1,128 @@
+"""Sums over the links, forward dynamics, energies and power of a back end against the reference."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.check.compare import Entries, Result, Skipped, compare
+from linkwise.check.model_calls import FLOAT32
+from linkwise.check.reference import Reference
+from linkwise.package.load import Array, Model
+
+REGULAR = 1e-8
+"""Least eigenvalue of a mass matrix, with ones on its diagonal, from which accelerations are looked at."""
+PAIRS, MOST = 1 << 20, 12
+"""Christoffel symbols computed at a time, and states, at most: of many joints, fewer."""
+
+Samples = NDArray[np.intp]
+
+
+def sums_against_reference(name: str, model: Model, reference: Reference) -> Iterator[Result]:
+    """Every call, of all states, of none and of one, and in single precision."""
+    every = np.arange(len(reference.states.q))
+    batches = [every, every[:0], *([every[0], every[:1, None]] if len(every) else [])]
+    groups = [each for at in batches for each in _sums(model, reference, at)]
+    yield compare(f"{name}: sums over the links", groups, reference.tolerance)
+    powers = _power(model, reference)
+    yield compare(f"{name}: power is what each link's energy gains", powers, reference.tolerance)
+    if reference.energies:
+        energies = [each for at in batches for each in _energies(model, reference, at)]
+        yield compare(f"{name}: energies of the links", energies, reference.tolerance)
+    regular = every[_regular(reference)]
+    if regular.size:
+        moved = [each for at in (regular, regular[0]) for each in _accelerations(model, reference, at)]
+        yield compare(f"{name}: forward dynamics undoes inverse dynamics", moved, reference.tolerance)
+    else:
+        yield Skipped(f"{name}: forward dynamics", "no mass matrix can be inverted here")
+    fitting = np.flatnonzero(reference.fits_single())
+    if fitting.size:
+        single = _sums(model, reference, fitting, np.float32)
+        yield compare(f"{name}: sums in single precision", single, **FLOAT32)
+
+
+def _sums(model: Model, reference: Reference, at: Any, kind: Any = float) -> Iterator[Entries]:
+    """Matrices, gravity and Christoffel symbols of some samples, whole and link by link.
+
+    Christoffel symbols are right if they make the Coriolis matrix of velocities at random, but for what
+    terms of energies linear in them have in it.
+    """
+    q, qd, _ = (a.astype(kind) for a in reference.states.at(at).motion)
+    count = max(1, min(MOST, PAIRS // (q.shape[-1] ** 3 * len(model.link_names))))
+    few = np.asarray(at).reshape(-1)[:count]
+    some, rates = (a[few].astype(kind) for a in (reference.states.q, reference.states.qd))
+    for by_link in (False, True):
+
+        def entries(what: str, value: Array, shares: str, rows: Any = at, by_link: bool = by_link) -> Entries:
+            rows = np.asarray(rows)
+            source, scale = (
+                kept[rows] if by_link else kept[rows].sum(rows.ndim + 1)
+                for kept in (_values(reference)[shares], reference.scales[shares.removesuffix(" alone")])
+            )
+            return _flat(f"{what}{' by link' * by_link}", value, source, scale, rows.ndim)
+
+        yield entries("M", model.mass_matrix(q, by_link=by_link), "c2")
+        yield entries("C", model.coriolis_matrix(q, qd, by_link=by_link), "c1")
+        yield entries("g", model.gravity_torque(q, by_link=by_link), "g")
+        symbols = model.christoffel(some, by_link=by_link)
+        yield entries("Gamma qd", np.einsum("s...l,sl->s...", symbols, rates), "c1 alone", few)
+
+
+def _values(reference: Reference) -> dict[str, Array]:
+    """The reference's values; c1 alone is what no energy's terms linear in the velocities have a part in."""
+    return {**reference.values, "c1 alone": reference.values["c1"] - reference.values["h1"]}
+
+
+def _power(model: Model, reference: Reference) -> Iterator[Entries]:
+    """Each part, and their sum for each link."""
+    q, qd, qdd = reference.states.motion
+    values, scales, power = reference.values, reference.scales, model.power(q, qd, qdd)
+    rate = qd[:, :, None, None]
+    for what, part, k in (("c2", power.acceleration, qdd), ("c1", power.velocity, qd)):
+        over = k[:, None, None, :] * rate
+        yield Entries(f"{what} power", part, values[what] * over, scales[what] * np.abs(over))
+    gravity, scale = (
+        kept["g"] * factor for kept, factor in ((values, rate[..., 0]), (scales, np.abs(rate[..., 0])))
+    )
+    yield Entries("g power", power.gravity, gravity, scale)
+    if reference.power is not None:
+        scale = np.einsum("sij,si->sj", scales["tau"], np.abs(qd))
+        yield Entries("power", power.total.sum(1), reference.power, scale)
+
+
+def _energies(model: Model, reference: Reference, at: Any) -> Iterator[Entries]:
+    states = reference.states.at(at)
+    for (what, (value, scale)), found in zip(
+        reference.energies.items(), model.energy(*states.motion[:2]), strict=True
+    ):
+        yield _flat(f"{what} energy", found, value[at], scale[at], np.ndim(at))
+
+
+def _accelerations(model: Model, reference: Reference, at: Any) -> Iterator[Entries]:
+    """Of the reference's torques: rounding of these and of M qdd moves qdd by |M^-1| times as much."""
+    q, qd, qdd = reference.states.at(at).motion
+    mass = reference.values["c2"][at].sum(np.ndim(at) + 1)
+    noise = reference.scales["tau"][at].sum(-1)[..., None]
+    noise = noise + reference.scales["c2"][at].sum(np.ndim(at) + 1) @ np.abs(qdd)[..., None]
+    scale = (np.abs(np.linalg.inv(mass)) @ noise)[..., 0]
+    found = model.forward_dynamics(q, qd, reference.values["tau"][at].sum(-1))
+    yield _flat("qdd", found, qdd, scale, np.ndim(at))
+
+
+def _regular(reference: Reference) -> NDArray[np.bool_]:
+    """Samples whose mass matrix is far from singular, however its joints are measured."""
+    mass = reference.values["c2"].sum(2)
+    size = np.sqrt(np.abs(np.einsum("sii->si", mass)))
+    size = np.where(size > 0, size, 1.0)
+    scaled = mass / (size[:, :, None] * size[:, None, :])
+    least: NDArray[np.bool_] = np.abs(np.linalg.eigvalsh(scaled)).min(-1) > REGULAR
+    return least
+
+
+def _flat(what: str, value: Array, expected: Array, scale: Array, axes: int) -> Entries:
+    """Entries of a batch of so many axes, samples in one."""
+    if value.shape != expected.shape:
+        return Entries(what, value, expected, scale)
+    value, expected, scale = (a.reshape(-1, *a.shape[axes:]) for a in (value, expected, scale))
+    return Entries(what, value, expected, scale)
