@@ -44,7 +44,8 @@ UNITS = {"angle": "rad", "length": "m", "mass": "kg", "time": "s", "torque": "N 
 CONVENTIONS = {
     "decomposition": "tau_ij = sum_k c2_ijk qdd_k + sum_k c1_ijk qd_k + g_ij: joint i, link j, coordinate k",
     "velocity": "closing: c1 = 1/2 d(tau)/d(qd) of the part quadratic in the velocities",
-    "indices": "in this file they count from 0; parent is an index of tree.bodies, None for the ground",
+    "indices": "in this file they count from 0; parent, and body of a frame, is an index of tree.bodies, "
+    "None for the ground",
     "operations": "additions, multiplications and divisions for one sample; sines and the like apart",
 }
 

@@ -90,8 +90,7 @@ class Dynamics(SumCalls):
     @cached_property
     def kinematics(self) -> Kinematics[Any]:
         """Poses, Jacobians and their rates of the robot's frames; raises ValueError for links of energies."""
-        made: Any = self.backend
-        return Kinematics(made.kinematics(self.check_finite, self._answers.read_beside_motion))
+        return Kinematics(self.backend.kinematics(self.check_finite, self._answers.read_beside_motion))
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}

@@ -1,6 +1,6 @@
 """What the parts of a package say to each other: arrays, closed forms, back ends."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
@@ -58,6 +58,8 @@ class Backend(Protocol[Kind]):
     """Values of the run-time parameters by name."""
     rule: Any
     """The vectorised rule of rigid links, None without it."""
+    tree: Any
+    """Joints, links and frames of rigid links; None for energies."""
 
     def arrays(self, named: Mapping[str, Kind], n: int) -> Sequence[Kind]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
@@ -82,6 +84,9 @@ class Backend(Protocol[Kind]):
 
     def answers(self, check_finite: bool) -> Any:
         """The calls of `Dynamics` on this back end: an `Answers`."""
+
+    def kinematics(self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]) -> Any:
+        """The calls of `Kinematics`, a `KinematicAnswers`; raises ValueError without a tree."""
 
     def constant(self, values: NDArray[Any], like: Kind) -> Kind:
         """A table of numbers, to compute with `like`."""
