@@ -380,9 +380,9 @@ def test_generate_warns_of_what_the_torques_leave_out(linkwise: Run, tmp_path: P
     assert [line for line in done.stderr.splitlines() if line.startswith("warning")] == [
         "warning: hand.xml: moving by themselves, their coupling left out of the torques: "
         "b (coupled to 'c' by an equality)",
+        "warning: hand.xml: spring left out of the torques: b (3 N·m/rad)",
         "warning: hand.xml: damping left out of the torques: a (0.2 N·m·s/rad), c (0.3 N·m·s/rad)",
         "warning: hand.xml: armature left out of the torques: a (0.1 kg·m²)",
-        "warning: hand.xml: spring left out of the torques: b (3 N·m/rad)",
     ]
     asked = linkwise("generate", "hand.xml", "--out", "out", "--backend", "c", "--free-mimic", "--details")
     assert "damping left out of the torques: a (0.2 N·m·s/rad)\n" in asked.stderr

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .parameter_values import ParametricBody, checked_values
+from .passive_joints import PassiveJoint
 
 Indices = NDArray[np.intp]
 
@@ -56,6 +57,8 @@ class Structure:
     """Run-time parameters and the values they have unless others are given."""
     bodies: tuple[ParametricBody, ...] = ()
     """Links that parameters may not make such as no body can be."""
+    passive: tuple[PassiveJoint, ...] = ()
+    """What joints have of their own: springs, damping, friction, armature."""
 
     @cached_property
     def n(self) -> int:
@@ -93,6 +96,7 @@ class Structure:
             linear=(0,) if link in self.linear else (),
             parameters={},
             bodies=(),
+            passive=(),
         )
 
     def values(self, given: Mapping[str, Any] | None, allow_unphysical: bool = False) -> dict[str, Any]:
