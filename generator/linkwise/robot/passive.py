@@ -7,7 +7,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot.coordinates import AxisRule
 from linkwise.robot.description import Connection
 from linkwise.robot.joint_types import SINGLE
-from linkwise.robot.notes import Note, Omission
+from linkwise.robot.notes import APART, Note
 from linkwise.robot.robot import NOTHING, PassiveAxis, unusable
 
 SHARES: dict[str, tuple[str, tuple[str, str]]] = {
@@ -61,4 +61,5 @@ def passive_notes(connections: Iterable[Connection], axes: Iterable[PassiveAxis]
                 slides = SINGLE[c.type] == "prismatic"
                 at = f", at rest at {c.passive.rest:g} {'m' if slides else 'rad'}"
                 rest = at if what == "spring" and c.passive.rest else ""
-                yield Omission(what, c.name, f"{number:g} {units[slides]}{rest}").note()
+                detail = f"{number:g} {units[slides]}{rest}"
+                yield Note("passive", c.name, detail, f"{what} {APART}")

@@ -56,9 +56,7 @@ def passive_sums(joints: Sequence[PassiveJoint], n: int) -> PassiveSums:
     )
 
 
-def passive_torques(
-    xp: Any, sums: PassiveSums, constant: Callable[[Sequence[float]], Any], q: Any, qd: Any, qdd: Any
-) -> tuple[Any, ...]:
-    """Spring, damping, friction and armature, each of shape (..., n) as the motion is."""
-    stiffness, pull, damping, friction, armature = map(constant, sums)
-    return stiffness * q + pull, damping * qd, friction * xp.sign(qd), armature * qdd
+def passive_torques(side: Any, sums: PassiveSums, q: Any, qd: Any, qdd: Any) -> tuple[Any, ...]:
+    """Spring, damping, friction, armature, (..., n) each; `side` is what computes with the motion."""
+    stiffness, pull, damping, friction, armature = (side.constant(numbers, q) for numbers in sums)
+    return stiffness * q + pull, damping * qd, friction * side.xp.sign(qd), armature * qdd

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .parameter_values import ParametricBody, checked_values
-from .passive_joints import PassiveJoint
+from .passive_joints import PassiveJoint, PassiveSums, passive_sums
 
 Indices = NDArray[np.intp]
 
@@ -86,6 +86,11 @@ class Structure:
     def sizes(self) -> Sizes:
         """Number of packed values of one sample: c2, c1, g, tau, h1."""
         return Sizes(*map(len, self.layout))
+
+    @cached_property
+    def passive_sums(self) -> PassiveSums:
+        """What joints have of their own, summed up for each coordinate."""
+        return passive_sums(self.passive, self.n)
 
     def only(self, link: int) -> "Structure":
         """The robot as if this link alone were there, its parameters aside."""

@@ -26,7 +26,7 @@ def numbers_of(model: Any, fields: Collection[str], index: int) -> list[float]:
 def is_passive(mujoco: Any, model: Any, joint: int, fields: tuple[str, ...]) -> bool:
     """Whether `Passive` can say what these fields say of a joint: of one axis, nothing of higher order."""
     kinds = mujoco.mjtJoint
-    if model.jnt_type[joint] not in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE):
+    if kinds(int(model.jnt_type[joint])) not in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE):
         return False
     _, *higher = numbers_of(model, fields, _index(model, joint, fields))
     return not any(higher) and not (fields == SPRING and any(numbers_of(model, (YIELDS,), joint)))
