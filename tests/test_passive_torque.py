@@ -1,5 +1,7 @@
 """What joints take for springs, damping, friction and armature of their own, on every back end."""
 
+import hashlib
+import json
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -10,6 +12,7 @@ import pytest
 from answers import random_states, relative_error
 from conftest import PANDA, needs_compiler
 from linkwise import generate, read_system, write_package
+from linkwise.check.checks import check_package
 from linkwise.package.load import import_package
 from urdf_text import joint, link, mimic, robot
 
@@ -42,12 +45,15 @@ def by_hand(q: Any, qd: Any, qdd: Any) -> tuple[Any, ...]:
     return tuple(np.stack(share, -1) for share in shares)
 
 
+def written(folder: Path, backends: list[str] | None = None) -> Path:
+    (folder / "hand.urdf").write_text(HAND)
+    write_package(generate(read_system(folder / "hand.urdf"), backends, kernel="loops"), folder / "hand")
+    return folder / "hand"
+
+
 @pytest.fixture(scope="module")
 def hand(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    folder = tmp_path_factory.mktemp("hand")
-    (folder / "hand.urdf").write_text(HAND)
-    write_package(generate(read_system(folder / "hand.urdf"), kernel="loops"), folder / "hand")
-    return import_package(folder / "hand")
+    return import_package(written(tmp_path_factory.mktemp("hand")))
 
 
 def taken(model: Any, arrays: Any) -> Any:
@@ -134,3 +140,35 @@ def test_armature_is_that_of_pinocchios_inverse_dynamics(tmp_path: Path) -> None
     expected = [pinocchio.rnea(model, data, *state) for state in zip(*states, strict=True)]
     found = arm.inverse_dynamics(*states) + arm.passive_torque(*states).total
     assert relative_error(found, expected) <= 1e-13
+
+
+def test_check_holds_them_against_the_manifest(tmp_path: Path) -> None:
+    directory = written(tmp_path, ["numpy"])
+    told = {result.name: result for result in check_package(directory, 20)}
+    assert all(result.passed for result in told.values())
+    assert "numpy: passive torques of the joints" in told
+    for file, old, new in (
+        ("names.py", "damping=0.7", "damping=0.8"),
+        ("manifest.json", '"rest": 0.1', '"rest": 0.15'),
+        ("runtime/passive_joints.py", "j.ratio**2 * j.damping", "j.ratio * j.damping"),
+    ):
+        text = (directory / file).read_text()
+        assert old in text
+        forged(directory, file, text.replace(old, new))
+        failed = {result.name for result in check_package(directory, 20) if not result.passed}
+        assert {"runtime", "numpy: passive torques of the joints"} <= failed
+        forged(directory, file, text)
+
+
+def forged(directory: Path, file: str, text: str) -> None:
+    """Write a file, with its hash in the manifest, or with the manifest's own checksums."""
+    (directory / file).write_text(text)
+    path = directory / "manifest.json"
+    data = json.loads(path.read_text())
+    if file != path.name:
+        data["files"][file] = hashlib.sha256(text.encode()).hexdigest()
+    data["checksums"] = {
+        key: hashlib.sha256(json.dumps(data[key], sort_keys=True).encode()).hexdigest()
+        for key in data["checksums"]
+    }
+    path.write_text(json.dumps(data))

@@ -65,6 +65,9 @@ class Model(Protocol):
     def coefficient_regressors(self, q: Array, qd: Array) -> Any:
         """Y of c2, c1 (..., n, N, n, 10) and g (..., n, N, 10)."""
 
+    def passive_torque(self, q: Array, qd: Array, qdd: Array) -> Any:
+        """Spring, damping, friction and armature of the joints (..., n) each."""
+
     def masked(self, q: Array, qd: Array, qdd: Array, mask: Array) -> Array:
         """Chosen terms of the decomposition (..., n, N)."""
 
