@@ -17,7 +17,7 @@ COMMANDS = (
     "report reduction --dof 1..2 --out out/reduction",
     "motion --out out/motion",
     "analyze log.csv --robot out/skew --out out/analysis --backend numpy --format csv --cutoff 6",
-    "analyze log.csv --robot out/skew --out out/plain --backend numpy --format csv --no-page",
+    "analyze log.csv --robot out/skew --out out/plain --backend numpy --format csv --no-page --power-terms",
 )
 
 

@@ -16,6 +16,7 @@ from linkwise.analysis.result import Totals
 from linkwise.analysis.result_columns import Column, columns_of
 from linkwise.analysis.run import Wanted, analyze_to
 from linkwise.analysis.show.page import report
+from linkwise.analysis.work import Work
 from linkwise.progress import silent
 from motion_logs import PLANAR3, smooth, write_csv
 from selenium.webdriver.support.wait import WebDriverWait
@@ -117,6 +118,43 @@ def test_numbers_in_the_table_are_the_files(page, result):
     assert sum(value for _, value, _ in cells[:-1]) == pytest.approx(cells[-1][1], rel=1e-12)
 
 
+POWER = "return document.getElementById('power').data[0]"
+
+
+def test_energy_flows_from_joints_through_links_and_balances(page, result):
+    choose(page, "span", "movement")
+    flows = page.execute_script(POWER)
+    assert flows["type"] == "sankey"
+    record = json.loads((result / "analysis.json").read_text(encoding="utf-8"))["work"]["into_links"]
+    net = {(entry["joint"], entry["link"]): entry["net"] for entry in record}
+    for link in ("link1", "link2", "link3"):
+        net["links", link] = -sum(x for (_, through), x in net.items() if through == link)
+    least = 0.005 * max(map(abs, net.values()))
+    expected = {pair: pytest.approx(x, rel=1e-9) for pair, x in net.items() if abs(x) > least}
+    assert {x > 0 for x in net.values()} == {True, False}
+    seen = {}
+    for (start, end), value in zip(flows["link"]["customdata"], flows["link"]["value"], strict=True):
+        gives = end in ("link1", "link2", "link3")
+        seen[(start.split()[0], end) if gives else (end.split()[0], start)] = value if gives else -value
+    assert seen == expected
+
+
+def test_power_now_is_the_files(page, result):
+    table = pq.read_table(result / "analysis.parquet")
+    choose(page, "span", "now")
+    for at in (321, 700):
+        choose(page, "slider", at)
+        numbers = page.execute_script(POWER)["z"]
+        for i in range(3):
+            for j in range(3):
+                name = f"power/joint{i + 1}/link{j + 1}"
+                written = table[name][2 * at].as_py() if name in table.column_names else None
+                assert numbers[i][j] == written
+            assert numbers[i][3] == pytest.approx(table[f"power/joint{i + 1}"][2 * at].as_py(), rel=1e-9)
+        gains = [sum(row[j] or 0 for row in numbers[:3]) for j in range(3)]
+        assert numbers[3] == pytest.approx([*gains, sum(gains)], rel=1e-9)
+
+
 def test_curves_are_linked_to_the_slider(page):
     choose(page, "slider", 700)
     share = page.execute_script(
@@ -190,15 +228,19 @@ def crowd(place, count=14):
     columns = [Column("time", "time", "s")] + [
         Column("tau_qdd", f"tau_qdd/{i}/{k}/{k}", "N·m", i, k, k) for i in range(count) for k in range(count)
     ]
-    values = np.vstack([analysis.values[0], np.sin(np.arange(count * count)[:, None] + np.arange(40) / 9)])
+    columns += [Column("power_link", f"power/{i}/{k}", "W", i, k) for i in range(count) for k in range(count)]
+    torques = np.sin(np.arange(count * count)[:, None] + np.arange(40) / 9)
+    values = np.vstack([analysis.values[0], torques, torques])
     totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
-    made = replace(analysis, robot=robot, columns=tuple(columns), values=values, totals=totals)
+    given = np.arange(1.0, count * count + 1).reshape(count, count)
+    work = Work(given, given.T)
+    made = replace(analysis, robot=robot, columns=tuple(columns), values=values, totals=totals, work=work)
     (place / "report.html").write_text(report(made), encoding="utf-8")
     return names, (place / "report.html").as_uri()
 
 
 TICKS = (
-    "return [...document.querySelectorAll('#map .' + arguments[0] + ' text')]"
+    "return [...document.querySelectorAll('#' + (arguments[1] || 'map') + ' .' + arguments[0] + ' text')]"
     ".map((text) => [text.textContent, text.getBoundingClientRect()])"
     ".map(([text, box]) => [text, box.left, box.right, box.top, box.bottom])"
 )
@@ -225,6 +267,10 @@ def test_many_joints_and_long_names_fit(driver, tmp_path, width):
     assert "…" in rows[4][0]
     for (_, _, _, _, bottom), (_, _, _, top, _) in pairwise(sorted(rows, key=lambda row: row[3])):
         assert bottom <= top + 1
+    assert driver.execute_script(POWER)["type"] == "heatmap"  # 182 flows are too many to follow
+    for (_, _, right, _, _), (_, left, _, _, _) in pairwise(driver.execute_script(TICKS, "xtick", "power")):
+        assert right <= left + 1
+    assert [text for text, *_ in driver.execute_script(TICKS, "ytick", "power")][-1] == "link gains"
     hover, colours = driver.execute_script(
         "return [document.getElementById('map').data[0].customdata[4][4],"
         "document.getElementById('curves').data.map((trace) => trace.line.color)]"
@@ -256,6 +302,11 @@ def test_names_are_shown_and_not_obeyed(driver, tmp_path):
     assert driver.execute_script(options) == shown
     rows = [text.partition(" ")[2] for text, *_ in driver.execute_script(TICKS, "ytick")]
     assert [rows[0], rows[2]] == [shown[0], shown[2]]
+    flows = driver.execute_script(
+        "return [...document.querySelectorAll('#power .node-label')].map((text) => text.textContent)"
+    )
+    assert any(text.startswith(names[0]) for text in flows)
+    assert "</script><scr" in " ".join(flows)
     told = []
     for curve in range(2):
         driver.execute_script(

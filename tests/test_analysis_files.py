@@ -57,6 +57,20 @@ def test_parquet_holds_the_analysis(call, log, tmp_path):
     assert sorted(file.name for file in tmp_path.iterdir()) == ["log.csv", "out"]
 
 
+def test_power_terms_are_written_where_asked_for_and_leave_the_page_alone(call, log, tmp_path):
+    call("analyze", log, *ROBOT, "--out", tmp_path / "plain")
+    call("analyze", log, *ROBOT, "--out", tmp_path / "more", "--power-terms")
+    plain, more = (pq.read_schema(tmp_path / name / "analysis.parquet").names for name in ("plain", "more"))
+    assert more[: len(plain)] == plain
+    assert {name.partition("/")[0] for name in more[len(plain) :]} == {
+        "power_qdd",
+        "power_qd",
+        "power_gravity",
+    }
+    pages = [(tmp_path / name / "report.html").read_bytes() for name in ("plain", "more")]
+    assert pages[0] == pages[1]
+
+
 def test_csv_reads_back_exactly(call, log, tmp_path):
     call("analyze", log, *ROBOT, "--out", tmp_path / "out", "--no-page", "--format", "csv")
     with (tmp_path / "out" / "analysis.csv").open(encoding="utf-8", newline="") as handle:

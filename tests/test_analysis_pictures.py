@@ -47,6 +47,19 @@ def test_shares_fill_the_bars(analysis):
     figure.draw_without_rendering()
 
 
+def test_power_figure_draws_joint_power_and_work_by_link(analysis):
+    figure = analysis.figure("power")
+    curves, bars = figure.axes
+    np.testing.assert_array_equal([line.get_ydata() for line in curves.lines[:-1]], analysis.joint_power.T)
+    widths = np.array([[patch.get_width() for patch in bar] for bar in bars.containers])
+    np.testing.assert_allclose(widths[:3].T, analysis.work.given, rtol=1e-14)
+    np.testing.assert_allclose(widths[3:].T, -analysis.work.taken, rtol=1e-14)
+    ends = widths[:3].sum(axis=0) + widths[3:].sum(axis=0)
+    np.testing.assert_allclose(bars.lines[0].get_xdata(), ends, atol=1e-12)
+    assert [text.get_text() for text in bars.get_legend().get_texts()] == ["net", "link1", "link2", "link3"]
+    figure.draw_without_rendering()
+
+
 def test_unknown_figures_are_named(analysis):
     with pytest.raises(LinkwiseError, match="--figure shares:joint1"):
         analysis.figure("shares:joint1")

@@ -75,7 +75,7 @@ def test_record_says_how(simulated):
     assert record["samples"] == 601
     assert record["rate_hz"] == pytest.approx(100)
     assert {column["unit"] for column in record["columns"]} == {
-        "s", "rad", "rad/s", "rad/s²", "N·m",
+        "s", "rad", "rad/s", "rad/s²", "N·m", "W",
     }  # fmt: skip
 
 
@@ -89,6 +89,8 @@ def test_blocks_do_not_show(tmp_path, monkeypatch, derivative):
     parts = analyze(path, PLANAR3, processing=processing)
     np.testing.assert_allclose(parts.values, whole.values, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(parts.totals.mean, whole.totals.mean, rtol=1e-12)
+    np.testing.assert_allclose(parts.work.given, whole.work.given, rtol=1e-12)
+    np.testing.assert_allclose(parts.joint_work.taken, whole.joint_work.taken, rtol=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
@@ -206,6 +208,10 @@ def test_walking_with_a_planar_leg(tmp_path):
     assert result.closure.terms_relative < 1e-12
     units = {column.name: column.unit for column in result.columns}
     assert (units["tau/pelvis_ty"], units["tau/knee_angle_r"]) == ("N", "N·m")
+    assert (
+        units["power/pelvis_ty"] == units["power/pelvis_ty/foot"] == units["power/knee_angle_r/foot"] == "W"
+    )
+    assert result.closure.energy_relative < 1e-12
     weight = 9.80665 * (50.85 + 7.5 + 3.49 + 1.09)
     np.testing.assert_allclose(result.gravity[:, 1].sum(-1), weight)
 

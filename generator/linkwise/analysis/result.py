@@ -9,10 +9,11 @@ from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.result_columns import MEANING, Column, Quantity
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.verify import Closure
+from linkwise.analysis.work import Work
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 
-SCHEMA = 1
+SCHEMA = 2
 """Version of the record's fields."""
 
 
@@ -29,7 +30,7 @@ class AnalysisResult:
     """Who loads whom: S samples of every torque term, SI units; index order joint, link, cause.
 
     `values` (columns, S) holds what `columns` names; terms that are identically 0 have no column.
-    With a `stride` above 1 only every stride-th of `total` samples is kept; `totals` and `closure`
+    With a `stride` above 1 only every stride-th of `total` samples is kept; `totals`, `work` and `closure`
     cover all of them. n joints, N links.
     """
 
@@ -43,6 +44,10 @@ class AnalysisResult:
     columns: tuple[Column, ...]
     values: Array
     totals: Totals
+    work: Work
+    """What each joint gave to each link and took back, (n, N) in J, over all samples."""
+    joint_work: Work
+    """The same for all links together, (n,) in J: the integral of τ_i q̇_i where it is positive, negative."""
     closure: Closure
     ignored: tuple[str, ...]
     """Columns of the log that no joint has."""
@@ -105,6 +110,16 @@ class AnalysisResult:
         return self._dense("tau_gravity", 2)
 
     @property
+    def power(self) -> Array:
+        """P_ij = τ_ij q̇_i (S, n, N) in W, what joint i sends into link j; Σ_i P_ij = d(K_j + P_j)/dt."""
+        return self._dense("power_link", 2)
+
+    @property
+    def joint_power(self) -> Array:
+        """P_i = τ_i q̇_i (S, n) in W."""
+        return self._dense("power", 1)
+
+    @property
     def provenance(self) -> str:
         """One line that says how the motion was derived."""
         made = self.processing
@@ -139,6 +154,7 @@ class AnalysisResult:
             "rate_hz": self.rate,
             "samples": self.total,
             "closure": asdict(self.closure),
+            "work": self._work(),
             "ignored_columns": list(self.ignored),
             "warnings": list(self.warnings),
             "columns": [
@@ -150,6 +166,23 @@ class AnalysisResult:
                     "peak_magnitude": float(peak),
                 }
                 for column, mean, peak in zip(self.columns, self.totals.mean, self.totals.peak, strict=True)
+            ],
+        }
+
+    def _work(self) -> dict[str, Any]:
+        """Work in J of each joint, all links together, and of each joint into each link that it moves."""
+        joints, links = self.robot.joints, self.robot.links
+
+        def entry(work: Work, *at: int) -> dict[str, float]:
+            given, taken = float(work.given[at]), float(work.taken[at])
+            return {"given": given, "taken_back": taken, "net": given - taken}
+
+        pairs = [(c.joint or 0, c.link or 0) for c in self.columns if c.quantity == "power_link"]
+        return {
+            "unit": "J",
+            "of_joints": [{"joint": name, **entry(self.joint_work, i)} for i, name in enumerate(joints)],
+            "into_links": [
+                {"joint": joints[i], "link": links[j], **entry(self.work, i, j)} for i, j in pairs
             ],
         }
 

@@ -1,5 +1,6 @@
 """The columns of a result: what each holds, of which joint, link and cause, in which unit."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -7,7 +8,22 @@ from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.escape import column_part
 from linkwise.package.load import PackedLayout
 
-Quantity = Literal["time", "q", "qd", "qdd", "tau", "tau_link", "tau_qdd", "tau_qd", "tau_gravity"]
+Quantity = Literal[
+    "time",
+    "q",
+    "qd",
+    "qdd",
+    "tau",
+    "tau_link",
+    "tau_qdd",
+    "tau_qd",
+    "tau_gravity",
+    "power",
+    "power_link",
+    "power_qdd",
+    "power_qd",
+    "power_gravity",
+]
 MEANING: dict[Quantity, str] = {
     "time": "time",
     "q": "joint coordinate",
@@ -18,9 +34,21 @@ MEANING: dict[Quantity, str] = {
     "tau_qdd": "propagation torque: on the joint, through the link, by the cause's acceleration",
     "tau_qd": "propagation torque: on the joint, through the link, by the cause's velocity",
     "tau_gravity": "on the joint, through the link, by gravity and other potentials",
+    "power": "power of the joint: what it sends into all links together",
+    "power_link": "power that the joint sends into the link",
+    "power_qdd": "power that the joint sends into the link, by the cause's acceleration",
+    "power_qd": "power that the joint sends into the link, by the cause's velocity",
+    "power_gravity": "power that the joint sends into the link, by gravity and other potentials",
 }
 TERMS: tuple[Quantity, ...] = ("tau_qdd", "tau_qd", "tau_gravity")
 """The parts that sum to a partial torque."""
+POWER: tuple[Quantity, ...] = ("power", "power_link")
+POWER_TERMS: tuple[Quantity, ...] = ("power_qdd", "power_qd", "power_gravity")
+"""The parts that sum to what a joint sends into a link; in a result where they are asked for."""
+TORQUE_OF: dict[Quantity, Quantity] = dict(
+    zip((*POWER, *POWER_TERMS), ("tau", "tau_link", *TERMS), strict=True)
+)
+"""The torque that a power is made of: P = τ q̇_i, term by term."""
 
 Key = tuple[Quantity, int | None, int | None, int | None]
 """What identifies a column, without names: quantity, joint, link, cause."""
@@ -48,8 +76,8 @@ def load_unit(unit: str) -> str:
     return "N·m" if unit == "rad" else "N"
 
 
-def columns_of(robot: LoadedRobot, layout: PackedLayout) -> tuple[Column, ...]:
-    """Columns in order: time, motion, τ_i, τ_ij, then the terms; what is identically 0 has none."""
+def columns_of(robot: LoadedRobot, layout: PackedLayout, power_terms: bool = False) -> tuple[Column, ...]:
+    """Columns in order: time, motion, τ_i, τ_ij, the terms, power; what is identically 0 has none."""
     out = [Column("time", "time", "s")]
     motions: tuple[tuple[Quantity, str], ...] = (("q", ""), ("qd", "/s"), ("qdd", "/s²"))
     for quantity, suffix in motions:
@@ -71,7 +99,16 @@ def columns_of(robot: LoadedRobot, layout: PackedLayout) -> tuple[Column, ...]:
         load("tau_qd", "tau_qd", i, j, k)
     for i, j in sorted(map(tuple, layout.gravity.tolist())):
         load("tau_gravity", "tau_gravity", i, j)
-    return tuple(out)
+    return *out, *_powers(out, (*POWER, *POWER_TERMS) if power_terms else POWER)
+
+
+def _powers(columns: Sequence[Column], quantities: Sequence[Quantity]) -> Iterator[Column]:
+    """The powers of all torques that are asked for, named like these."""
+    for quantity in quantities:
+        for c in columns:
+            if c.quantity == TORQUE_OF[quantity]:
+                name = c.name.replace("tau", "power", 1)
+                yield Column(quantity, name, "W", c.joint, c.link, c.cause)
 
 
 def mirrored(layout: PackedLayout) -> list[tuple[int, int, int, int]]:

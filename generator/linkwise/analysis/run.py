@@ -13,7 +13,7 @@ from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import check_figure, draw, figure_png
-from linkwise.analysis.show.page import NUMBERS, SAMPLES, report
+from linkwise.analysis.show.page import NUMBERS, SAMPLES, on_page, report
 from linkwise.analysis.stream import KeptSamples, Sink, Streamed, span_of, stream, stride_for
 from linkwise.analysis.tables import Format, open_table
 from linkwise.analysis.torques import Decomposer
@@ -37,7 +37,7 @@ class Analysis(AnalysisResult):
     """What `analyze` returns: an `AnalysisResult` that draws itself."""
 
     def figure(self, name: str = "paper") -> "Figure":
-        """A matplotlib figure: "paper", "paper:JOINT" for another loaded joint than the first, or "shares".
+        """A matplotlib figure: "paper", or "paper:JOINT" for another joint than the first; "shares"; "power".
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """
@@ -47,11 +47,13 @@ class Analysis(AnalysisResult):
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which files to write: the table's format, figures by name, and whether the page."""
+    """Which files to write, and what in them: the table's format, figures by name, whether the page."""
 
     table: Format = "parquet"
     figures: tuple[str, ...] = ()
     page: bool = True
+    power_terms: bool = False
+    """Power by cause and order, too: as many columns again as torques have."""
 
 
 def analyze(
@@ -91,9 +93,10 @@ def analyze_to(
     if os.path.realpath(log).startswith(os.path.join(os.path.realpath(out), "")):
         raise LinkwiseError(f"--out {out} is to be replaced and holds the log {log}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
-        job = _prepared(log, robot, reading, processing, progress, draft)
+        job = _prepared(log, robot, reading, processing, progress, draft, wanted.power_terms)
         columns = job.decomposer.columns
-        kept = KeptSamples(len(columns), stride_for(job.count, len(columns), NUMBERS, SAMPLES))
+        shown = sum(map(on_page, columns))
+        kept = KeptSamples(len(columns), stride_for(job.count, shown, NUMBERS, SAMPLES))
         note = json_text({"log": log.name, "robot": robot.name, **choices(reading, processing)})
         with open_table(draft / f"analysis.{wanted.table}", columns, note) as table:
 
@@ -183,6 +186,8 @@ class Job:
             self.decomposer.columns,
             kept.values,
             done.totals,
+            done.work,
+            done.joint_work,
             done.closure,
             self.samples.ignored,
             self.samples.warnings,
@@ -198,6 +203,7 @@ def _prepared(
     processing: Processing,
     progress: Progress,
     buffer: Path | None = None,
+    power_terms: bool = False,
 ) -> Job:
     """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
     samples = read_samples(log, robot.joints, robot.units, reading, progress, buffer)
@@ -205,4 +211,5 @@ def _prepared(
         span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
-    return Job(log.name, reading, processing, samples, Decomposer.of(robot, processing.convention))
+    decomposer = Decomposer.of(robot, processing.convention, power_terms)
+    return Job(log.name, reading, processing, samples, decomposer)

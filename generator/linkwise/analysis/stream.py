@@ -12,6 +12,7 @@ from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
 from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.verify import Closure, against_recursion
+from linkwise.analysis.work import Work, WorkSum
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 from linkwise.progress import Progress
@@ -56,6 +57,8 @@ class Streamed:
     """What is known once every block is done."""
 
     totals: Totals
+    work: Work
+    joint_work: Work
     closure: Closure
     samples: int
 
@@ -82,6 +85,7 @@ def stream(
     start, stop = span_of(samples, processing)
     total = np.zeros(len(decomposer.columns))
     peak = np.zeros(len(decomposer.columns))
+    work = WorkSum(decomposer.columns)
     closure = Closure()
     with ThreadPoolExecutor(1) as writer, np.errstate(over="ignore", invalid="ignore"):
         pending: Future[None] | None = None
@@ -98,6 +102,7 @@ def stream(
                     raise _overflow(samples, decomposer, out, at)
                 total += added
                 np.maximum(peak, magnitude.max(axis=1), out=peak)
+                work(out)
             closure |= against_recursion(decomposer.robot, decomposer.columns, block)
             closure.check()
             if pending is not None:
@@ -106,7 +111,9 @@ def stream(
             progress("analysing", last - start, stop - start)
         if pending is not None:
             pending.result()
-    return Streamed(Totals(total / (stop - start), peak), closure, stop - start)
+    robot = decomposer.robot
+    works = work.work(1 / samples.rate, len(robot.joints), len(robot.links))
+    return Streamed(Totals(total / (stop - start), peak), *works, closure, stop - start)
 
 
 def _overflow(samples: Samples, decomposer: Decomposer, out: Array, start: int) -> LinkwiseError:

@@ -5,7 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.result_columns import TERMS, Column, Key, Quantity, columns_of, mirrored
+from linkwise.analysis.result_columns import (
+    TERMS,
+    TORQUE_OF,
+    Column,
+    Key,
+    Quantity,
+    columns_of,
+    mirrored,
+)
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.verify import Closure, residual, worst_of
 from linkwise.package.load import Array, PackedLayout
@@ -20,6 +28,7 @@ class Decomposer:
 
     With q̈_k and q̇_k the coordinates' motion, and index order joint i, link j, coordinate k:
     τ_i = Σ_j τ_ij and τ_ij = Σ_k c2_ijk q̈_k + Σ_k c1_ijk q̇_k + g_ij
+    P_ij = τ_ij q̇_i, what joint i sends into link j
     """
 
     robot: LoadedRobot
@@ -30,11 +39,13 @@ class Decomposer:
     """Row of each τ_ij, and the rows of its terms."""
     wholes: tuple[tuple[int, tuple[int, ...]], ...]
     """Row of each τ_i, and the rows of its τ_ij."""
+    powers: tuple[tuple[int, int, int], ...]
+    """Row of each power, the row of its torque, and the joint whose velocity multiplies."""
 
     @classmethod
-    def of(cls, robot: LoadedRobot, convention: Convention) -> "Decomposer":
+    def of(cls, robot: LoadedRobot, convention: Convention, power_terms: bool = False) -> "Decomposer":
         """Plan where each packed value of the robot goes."""
-        columns = columns_of(robot, robot.model.layout)
+        columns = columns_of(robot, robot.model.layout, power_terms)
         row = {column.key: at for at, column in enumerate(columns)}
         parts = [
             (at, _rows(columns, TERMS, joint=c.joint, link=c.link))
@@ -46,7 +57,13 @@ class Decomposer:
             for at, c in enumerate(columns)
             if c.quantity == "tau"
         ]
-        return cls(robot, convention, columns, _sources(robot.model.layout, row), tuple(parts), tuple(wholes))
+        powers = [
+            (at, row[TORQUE_OF[c.quantity], c.joint, c.link, c.cause], c.joint)
+            for at, c in enumerate(columns)
+            if c.quantity in TORQUE_OF and c.joint is not None
+        ]
+        sources = _sources(robot.model.layout, row)
+        return cls(robot, convention, columns, sources, tuple(parts), tuple(wholes), tuple(powers))
 
     def rows(self, quantity: Quantity) -> slice:
         """Where a quantity's columns stand; they stand together."""
@@ -73,16 +90,18 @@ class Decomposer:
             for column, values in zip(self.columns, out, strict=True):
                 if column.quantity == "tau_qd":
                     values[:] = velocity[:, column.joint, column.link, column.cause]
+        for power, torque, i in self.powers:
+            np.multiply(out[torque], qd[:, i], out=out[power])
         return closure
 
     def _closure(self, out: Array) -> Closure:
-        """Check the closing sums; by joint, for one may be in N·m and another in N."""
+        """Check the closing sums, by unit: a joint that carries but rounding is measured by its peers."""
         worst = Closure()
-        for whole, links in self.wholes:
-            terms = [
-                residual([out[row] for row in rows], out[link]) for link, rows in self.parts if link in links
-            ]
-            sums = [residual([out[row] for row in links], out[whole])]
+        for unit in dict.fromkeys(self.columns[whole].unit for whole, _ in self.wholes):
+            alike = [(whole, links) for whole, links in self.wholes if self.columns[whole].unit == unit]
+            parts = [(link, rows) for link, rows in self.parts if self.columns[link].unit == unit]
+            terms = [residual([out[row] for row in rows], out[link]) for link, rows in parts]
+            sums = [residual([out[row] for row in links], out[whole]) for whole, links in alike]
             worst |= Closure(*worst_of(terms), *worst_of(sums))
         return worst
 

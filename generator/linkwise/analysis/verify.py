@@ -8,6 +8,7 @@ import numpy as np
 
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.result_columns import Column, Quantity
+from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 
@@ -20,6 +21,9 @@ AGAINST_RECURSION = 1e-6
 SAMPLES = 8
 """Samples of each block that are computed again; the recursion is slow in Python."""
 
+STEP = 1e-30
+"""Of the complex step, in s: its square is nothing beside 1."""
+
 LARGEST = 1e6
 """In rad or m; past it a coordinate's own rounding hides what the comparison would show."""
 
@@ -30,7 +34,8 @@ class Closure:
 
     Absolute in N·m (N), relative to the largest sum of magnitudes in the same block of samples. Packages
     may sum τ_i from the τ_ij, so both sums say only that nothing was lost; `recursion` is the largest
-    error of τ_ij against an independent Newton–Euler recursion, None where the energies are hand-written.
+    error of τ_ij against an independent Newton–Euler recursion, and `energy` that of Σ_i P_ij, in W, against
+    dE_j/dt of link j's energy there; None where the energies are hand-written.
     """
 
     terms_absolute: float = 0.0
@@ -39,6 +44,8 @@ class Closure:
     links_relative: float = 0.0
     recursion_absolute: float | None = None
     recursion_relative: float | None = None
+    energy_absolute: float | None = None
+    energy_relative: float | None = None
 
     def __or__(self, other: "Closure") -> "Closure":
         """The larger of both, error by error."""
@@ -56,6 +63,11 @@ class Closure:
             raise LinkwiseError(
                 "the robot's partial torques are not those of the Newton-Euler recursion (relative error"
                 f" {self.recursion_relative:.2g}); run `linkwise check` on it"
+            )
+        if self.energy_relative is not None and not self.energy_relative <= AGAINST_RECURSION:
+            raise LinkwiseError(
+                "the power that the robot's joints send into its links is not the gain of the links' energies"
+                f" (relative error {self.energy_relative:.2g}); run `linkwise check` on it"
             )
 
 
@@ -81,7 +93,7 @@ def worst_of(pairs: list[tuple[float, float]]) -> tuple[float, float]:
 
 
 def against_recursion(robot: LoadedRobot, columns: tuple[Column, ...], block: Array) -> Closure:
-    """τ_ij of some samples of a block (columns, S) against Newton–Euler; none for hand-written energies.
+    """τ_ij and P_ij of some samples of a block (columns, S) against Newton–Euler; none for energies by hand.
 
     Relative errors are by unit: a joint that carries nothing but rounding is measured by its peers.
     """
@@ -94,16 +106,33 @@ def against_recursion(robot: LoadedRobot, columns: tuple[Column, ...], block: Ar
 
     if np.abs(dense("q")).max(initial=0.0) > LARGEST:
         return Closure()
-    expected = robot.recursion.partial_torque(dense("q"), dense("qd"), dense("qdd"))
-    ours = np.zeros_like(expected)
+    q, qd, qdd = dense("q"), dense("qd"), dense("qdd")
+    expected = robot.recursion.partial_torque(q, qd, qdd)
+    ours, power = np.zeros_like(expected), np.zeros_like(expected)
     for row, column in enumerate(columns):
-        if column.quantity == "tau_link":
-            ours[:, column.joint, column.link] = block[row, at]
-    absolute, relative = 0.0, 0.0
+        if column.quantity in ("tau_link", "power_link"):
+            into = ours if column.quantity == "tau_link" else power
+            into[:, column.joint, column.link] = block[row, at]
+    absolute, relative, watts = 0.0, 0.0, 0.0
     for unit in set(robot.units):
         alike = [i for i, other in enumerate(robot.units) if other == unit]
         error = float(np.abs(ours - expected)[:, alike].max(initial=0.0))
         scale = float(np.abs(expected).sum(axis=2)[:, alike].max(initial=0.0))
         absolute = max(absolute, error)
         relative = max(relative, error / scale if scale else error)
-    return Closure(recursion_absolute=absolute, recursion_relative=relative)
+        # Power that is but rounding is measured by the torques and speeds that it is the rounding of.
+        watts += scale * float(np.abs(qd[:, alike]).max(initial=0.0))
+    apart = float(np.abs(power.sum(axis=1) - _gain(robot.recursion, q, qd, qdd)).max(initial=0.0))
+    return Closure(
+        recursion_absolute=absolute,
+        recursion_relative=relative,
+        energy_absolute=apart,
+        energy_relative=apart / watts if watts else apart,
+    )
+
+
+def _gain(recursion: NewtonEuler, q: Array, qd: Array, qdd: Array) -> Array:
+    """dE_j/dt of K_j + P_j in W, (S, N): along the motion, by a complex step, which has no cancellation."""
+    kinetic, potential = recursion.energies(q + 1j * STEP * qd, qd + 1j * STEP * qdd)
+    gain: Array = (kinetic + potential).imag / STEP
+    return gain

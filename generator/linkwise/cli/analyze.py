@@ -41,7 +41,10 @@ Terms = Annotated[
     Convention, typer.Option(help="Velocity terms: closing sums to the torque, gradient is Eq. 1")
 ]
 TableFormat = Annotated[Format, typer.Option(help="Format of the table")]
-Figures = Annotated[list[str] | None, typer.Option(help="paper, paper:JOINT or shares; may be repeated")]
+Figures = Annotated[
+    list[str] | None, typer.Option(help="paper, paper:JOINT, shares or power; may be repeated")
+]
+PowerTerms = Annotated[bool, typer.Option("--power-terms", help="Write power by cause and order too")]
 Page = Annotated[bool, typer.Option("--page/--no-page", help="Write report.html")]
 
 app = typer.Typer(add_completion=False)
@@ -67,6 +70,7 @@ def analyze(
     convention: Terms = "closing",
     format: TableFormat = "parquet",
     figure: Figures = None,
+    power_terms: PowerTerms = False,
     backend: Backend = None,
     page: Page = True,
     as_json: Json = False,
@@ -76,7 +80,7 @@ def analyze(
     processing = chosen_processing(
         derivative, window, degree, chosen_lowpass(cutoff, filter_order, padding), edges, convention
     )
-    wanted = Wanted(format, tuple(figure or ()), page)
+    wanted = Wanted(format, tuple(figure or ()), page, power_terms)
     package = load_robot(robot, backend)
     with shown_progress(UNITS) as progress:
         analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress)
@@ -96,7 +100,8 @@ def _told(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         "no independent value for energies written by hand"
         if closure.recursion_relative is None
         else f"partial torques agree with an independent Newton-Euler recursion within"
-        f" {closure.recursion_relative:.1e}"
+        f" {closure.recursion_relative:.1e}, power with the gain of the links' energies there within"
+        f" {closure.energy_relative:.1e}"
     )
     return [
         f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {analysis.robot.backend};"

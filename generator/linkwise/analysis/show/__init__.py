@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.paper_figure import paper
+from linkwise.analysis.show.power_figure import power
 from linkwise.analysis.show.shares_figure import shares
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
@@ -14,11 +15,15 @@ from linkwise.plotstyle import saved, styled
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {"paper": paper, "shares": shares}
+FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
+    "paper": paper,
+    "shares": shares,
+    "power": power,
+}
 
 
 def draw(result: AnalysisResult, name: str) -> "Figure":
-    """Draw "paper", "shares", or "paper:JOINT" for another loaded joint than the first.
+    """Draw "paper", "shares", "power", or "paper:JOINT" for another loaded joint than the first.
 
     Raises LinkwiseError for another name.
     """

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.result_columns import TORQUE_OF, Column
 from linkwise.analysis.show.poses import poses
 from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
@@ -33,12 +34,18 @@ def view(result: AnalysisResult) -> dict[str, str]:
     }
 
 
+def on_page(column: Column) -> bool:
+    """Whether a page holds a column: power it does not, being the product of two that it holds."""
+    return column.quantity not in TORQUE_OF
+
+
 def page_data(result: AnalysisResult) -> str:
     """JSON with numbers as base64 of little-endian float64: the table's, to the last bit.
 
     Names are as people read them, but for those of columns, which are the table's.
     """
     robot = result.robot
+    shown = [at for at, column in enumerate(result.columns) if on_page(column)]
     data = {
         "robot": printable(robot.name),
         "log": printable(result.source),
@@ -59,11 +66,12 @@ def page_data(result: AnalysisResult) -> str:
                 "j": c.link,
                 "k": c.cause,
             }
-            for c in result.columns
+            for c in (result.columns[at] for at in shown)
         ],
-        "values": _encode(result.values),
-        "mean": result.totals.mean.tolist(),
-        "peak": result.totals.peak.tolist(),
+        "values": _encode(result.values[shown]),
+        "mean": result.totals.mean[shown].tolist(),
+        "peak": result.totals.peak[shown].tolist(),
+        "work": _work(result),
         "colours": list(COLOURS),
         "coloursDark": list(ON_DARK),
         "gravityColour": GRAVITY,
@@ -87,6 +95,13 @@ def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
         "origins": _encode(origins),
         "centres": _encode(centres),
     }
+
+
+def _work(result: AnalysisResult) -> list[dict[str, float]]:
+    """What each joint i gave to each link j and took back, in J, over all samples."""
+    given, taken = result.work.given, result.work.taken
+    pairs = [(c.joint or 0, c.link or 0) for c in result.columns if c.quantity == "power_link"]
+    return [{"i": i, "j": j, "given": float(given[i, j]), "taken": float(taken[i, j])} for i, j in pairs]
 
 
 def _encode(values: Array) -> str:

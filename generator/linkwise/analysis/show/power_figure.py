@@ -1,0 +1,77 @@
+"""Power of each joint over time, and below it the work that joints gave to each link and took back."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.work import Work
+from linkwise.extras import extra
+from linkwise.package.load import Array
+from linkwise.plotstyle import COLOURS, INK, colour, dash, drawn
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+HATCHES = ("", "////", "....")
+"""For the links that share a colour."""
+
+LEGEND = 12
+"""Names that one column of a legend holds beside its axis."""
+
+
+def power(result: AnalysisResult, _: int) -> "Figure":
+    """Curves of P_i = τ_i q̇_i in W; for each joint bars of work in J, into links and out of them."""
+    robot = result.robot
+    joints = [drawn(name) for name in robot.joints]
+    height = 0.9 + 0.34 * len(joints)
+    figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.4 + height), layout="constrained")
+    curves, bars = figure.subplots(2, 1, height_ratios=(2.4, height))
+    for i, values in enumerate(result.joint_power.T):
+        curves.plot(result.time, values, label=joints[i], color=colour(i), linestyle=dash(i))
+    curves.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+    curves.set_title("Power of each joint")
+    curves.set_ylabel("W")
+    curves.set_xlabel("time (s)")
+    curves.set_xlim(result.time[0], result.time[-1])
+    _legend(curves, "joint", len(joints))
+    _bars(bars, result.work, [drawn(name) for name in robot.links])
+    bars.set_title("Work: taken back out of links, and given to them")
+    bars.set_yticks(range(len(joints)), joints)
+    bars.invert_yaxis()
+    bars.set_xlabel("J")
+    bars.grid(axis="y", visible=False)
+    _legend(bars, "link", len(robot.links) + 1)
+    figure.suptitle(f"{drawn(robot.name, 40)} · {drawn(result.source, 50)}", x=0.01, ha="left", fontsize=11)
+    figure.supxlabel(result.provenance, x=0.01, ha="left", fontsize=7, color="#5A6270")
+    return figure  # type: ignore[no-any-return]
+
+
+def _bars(axis: Any, work: Work, links: list[str]) -> None:
+    """Stacked from zero outwards, by link; a mark stands at the net of each joint."""
+    at = range(len(work.given))
+    for side in (work.given, -work.taken):
+        starts: Array = np.zeros(len(work.given))
+        for j, name in enumerate(links):
+            label = name if side is work.given else None
+            fill = {
+                "color": colour(j),
+                "hatch": HATCHES[j // len(COLOURS) % 3],
+                "edgecolor": "white",
+                "linewidth": 0.6,
+            }
+            axis.barh(at, side[:, j], left=starts, height=0.64, label=label, **fill)
+            starts = starts + side[:, j]
+    axis.plot(work.net.sum(axis=1), at, "D", color=INK, markersize=5, markeredgecolor="white", label="net")
+    axis.axvline(0, color=INK, linewidth=0.8)
+
+
+def _legend(axis: Any, title: str, names: int) -> None:
+    axis.legend(
+        title=title,
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1),
+        fontsize=8,
+        ncols=-(-names // LEGEND),
+        handlelength=2,
+    )
