@@ -370,10 +370,16 @@ def test_energies_take_no_option_of_rigid_bodies(linkwise: Run) -> None:
 HAND = """<mujoco><worldbody><body name="palm"><joint name="a" axis="0 0 1" armature="0.1" damping="0.2"/>
 <geom size="0.1"/><body name="finger"><joint name="b" axis="0 1 0" stiffness="3"/><geom size="0.1"/></body>
 <body name="thumb"><joint name="c" axis="0 1 0" damping="0.3"/><geom size="0.1"/></body></body></worldbody>
+<tendon><fixed name="t" stiffness="4"><joint joint="a" coef="1"/></fixed></tendon>
 <equality><joint joint1="b" joint2="c"/></equality><actuator><motor joint="a"/></actuator></mujoco>"""
 
 
-def test_generate_warns_of_what_the_torques_leave_out(linkwise: Run, tmp_path: Path) -> None:
+APART = "apart from the links' torques, by passive_torque"
+
+
+def test_generate_says_what_the_torques_leave_out_and_what_stands_apart_from_them(
+    linkwise: Run, tmp_path: Path
+) -> None:
     pytest.importorskip("mujoco")
     (tmp_path / "hand.xml").write_text(HAND)
     done = linkwise("generate", "hand.xml", "--out", "out", "--backend", "c", "--free-mimic")
@@ -381,13 +387,14 @@ def test_generate_warns_of_what_the_torques_leave_out(linkwise: Run, tmp_path: P
     assert [line for line in done.stderr.splitlines() if line.startswith("warning")] == [
         "warning: hand.xml: moving by themselves, their coupling left out of the torques: "
         "b (coupled to 'c' by an equality)",
-        "warning: hand.xml: damping left out of the torques: a (0.2 N·m·s/rad), c (0.3 N·m·s/rad)",
-        "warning: hand.xml: armature left out of the torques: a (0.1 kg·m²)",
-        "warning: hand.xml: spring left out of the torques: b (3 N·m/rad)",
+        f"warning: hand.xml: spring {APART}: b (3 N·m/rad)",
+        f"warning: hand.xml: damping {APART}: a (0.2 N·m·s/rad), c (0.3 N·m·s/rad)",
+        f"warning: hand.xml: armature {APART}: a (0.1 kg·m²)",
+        "warning: hand.xml: tendon spring left out of the torques: t (4)",
     ]
     asked = linkwise("generate", "hand.xml", "--out", "out", "--backend", "c", "--free-mimic", "--details")
-    assert "damping left out of the torques: a (0.2 N·m·s/rad)\n" in asked.stderr
-    assert "damping left out of the torques: c (0.3 N·m·s/rad)\n" in asked.stderr
+    assert f"damping {APART}: a (0.2 N·m·s/rad)\n" in asked.stderr
+    assert f"damping {APART}: c (0.3 N·m·s/rad)\n" in asked.stderr
 
 
 def test_generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be(
@@ -449,14 +456,15 @@ def test_xacro_is_told_to_be_expanded(linkwise: Run, tmp_path: Path) -> None:
     )
 
 
-def test_inspect_lists_what_each_joint_leaves_out_on_request(linkwise: Run, tmp_path: Path) -> None:
+def test_inspect_lists_what_each_joint_has_of_its_own_on_request(linkwise: Run, tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     (tmp_path / "hand.xml").write_text(HAND)
     told = linkwise("inspect", "hand.xml", "--free-mimic").stdout
-    assert "  damping 2 ×; left out of the torques\n" in told
+    assert f"\npassive\n  spring 1 ×; {APART}\n  damping 2 ×; {APART}\n" in told
+    assert "  tendon spring 1 ×; left out of the torques\n" in told
     assert "N·m·s/rad" not in told
     asked = linkwise("inspect", "hand.xml", "--free-mimic", "--details").stdout
-    assert "  c 0.3 N·m·s/rad; damping left out of the torques\n" in asked
+    assert f"  c 0.3 N·m·s/rad; damping {APART}\n" in asked
 
 
 def test_inspect_lists_frames_on_request(linkwise: Run, tmp_path: Path) -> None:

@@ -347,9 +347,9 @@ def test_coupled_joints_of_mjcf_are_refused_unless_freed(tmp_path: Path) -> None
     assert len(read_robot(path, Options(lock={"c": 0.0})).coordinates) == 2
     notes = notes_of(path, Options(free_mimic=True))
     assert ("freed", "c", "coupled to 'b' by an equality") in notes
-    assert ("left out", "a", "0.1 kg·m²") in notes
+    assert ("passive", "a", "0.1 kg·m²") in notes
     touched = effects(read_robot(path, Options(free_mimic=True)).notes)
-    assert "armature left out of the torques: a (0.1 kg·m²)" in touched
+    assert "armature apart from the links' torques, by passive_torque: a (0.1 kg·m²)" in touched
     assert any("coupling left out of the torques: c (coupled to 'b' by an equality)" in t for t in touched)
     assert not [note for note in notes if note[0] == "massless" or note[1] == "geom"]
 

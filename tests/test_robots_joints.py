@@ -176,7 +176,7 @@ def test_notes_say_what_was_done(tmp_path: Path) -> None:
         ("merged", "a", "into the ground, with its 1.5 kg"),
         ("merged", "c", "into b"),
         ("merged", "d", "into b"),
-        ("left out", "ab", "0.5 N·m·s/rad"),
+        ("passive", "ab", "0.5 N·m·s/rad"),
     }
 
 
@@ -204,7 +204,7 @@ def test_extensions_of_simulators_that_load_joints_are_told(tmp_path: Path) -> N
     )
     told = {
         "Gazebo's switch for gravity left out of the torques: b",
-        "spring left out of the torques: ab (3)",
+        "spring apart from the links' torques, by passive_torque: ab (3 N·m/rad)",
         "armature left out of the torques: bc (0.01), bc (0.2)",
     }
     assert set(effects(read_system(tmp_path / "robot.urdf").robot.notes)) == told

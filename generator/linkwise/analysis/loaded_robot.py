@@ -8,7 +8,7 @@ from pathlib import Path
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Model, Package, open_package
-from linkwise.package.manifest import FILE, BodyEntry
+from linkwise.package.manifest import FILE, BodyEntry, PassiveEntry
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,8 @@ class LoadedRobot:
     manifest_sha256: str
     recursion: NewtonEuler | None = None
     """Partial torques by an independent way; None where the energies were written by hand."""
+    passive: tuple[PassiveEntry, ...] = ()
+    """What joints have of their own, those that have anything."""
 
 
 def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
@@ -51,6 +53,7 @@ def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
         _up(tree.gravity if tree is not None else None),
         hashlib.sha256((directory / FILE).read_bytes()).hexdigest(),
         NewtonEuler(manifest, tree) if tree is not None else None,
+        tree.passive if tree is not None else (),
     )
 
 

@@ -18,35 +18,67 @@ Quantity = Literal[
     "tau_qdd",
     "tau_qd",
     "tau_gravity",
+    "tau_spring",
+    "tau_damping",
+    "tau_friction",
+    "tau_armature",
     "power",
     "power_link",
     "power_qdd",
     "power_qd",
     "power_gravity",
+    "power_spring",
+    "power_damping",
+    "power_friction",
+    "power_armature",
 ]
 MEANING: dict[Quantity, str] = {
     "time": "time",
     "q": "joint coordinate",
     "qd": "joint velocity",
     "qdd": "joint acceleration",
-    "tau": "joint torque, all links together",
+    "tau": "joint torque: all links together, and what the joint has of its own",
     "tau_link": "partial torque: on the joint, through the link",
     "tau_qdd": "propagation torque: on the joint, through the link, by the cause's acceleration",
     "tau_qd": "propagation torque: on the joint, through the link, by the cause's velocity",
     "tau_gravity": "on the joint, through the link, by gravity and other potentials",
-    "power": "power of the joint: what it sends into all links together",
+    "tau_spring": "what the joint takes for its own spring",
+    "tau_damping": "what the joint takes for its own damping",
+    "tau_friction": "what the joint takes for its own Coulomb friction",
+    "tau_armature": "what the joint takes for its own armature, the inertia behind its gear",
+    "power": "power of the joint: what it sends into all links together, and into what it has of its own",
     "power_link": "power that the joint sends into the link",
     "power_qdd": "power that the joint sends into the link, by the cause's acceleration",
     "power_qd": "power that the joint sends into the link, by the cause's velocity",
     "power_gravity": "power that the joint sends into the link, by gravity and other potentials",
+    "power_spring": "power that the joint sends into its own spring",
+    "power_damping": "power that the joint's own damping takes",
+    "power_friction": "power that the joint's own Coulomb friction takes",
+    "power_armature": "power that the joint sends into its own armature",
 }
 TERMS: tuple[Quantity, ...] = ("tau_qdd", "tau_qd", "tau_gravity")
 """The parts that sum to a partial torque."""
+PASSIVE: dict[Quantity, str] = {
+    "tau_spring": "stiffness",
+    "tau_damping": "damping",
+    "tau_friction": "friction",
+    "tau_armature": "armature",
+}
+"""Beside the links' what a joint's torque consists of, in the order of `passive_torque`, and the number that
+says whether a joint has it."""
 POWER: tuple[Quantity, ...] = ("power", "power_link")
-POWER_TERMS: tuple[Quantity, ...] = ("power_qdd", "power_qd", "power_gravity")
-"""The parts that sum to what a joint sends into a link; in a result where they are asked for."""
+POWER_TERMS: tuple[Quantity, ...] = (
+    "power_qdd",
+    "power_qd",
+    "power_gravity",
+    "power_spring",
+    "power_damping",
+    "power_friction",
+    "power_armature",
+)
+"""The parts of what a joint sends into a link, or into its own; in a result where they are asked for."""
 TORQUE_OF: dict[Quantity, Quantity] = dict(
-    zip((*POWER, *POWER_TERMS), ("tau", "tau_link", *TERMS), strict=True)
+    zip((*POWER, *POWER_TERMS), ("tau", "tau_link", *TERMS, *PASSIVE), strict=True)
 )
 """The torque that a power is made of: P = τ q̇_i, term by term."""
 
@@ -77,7 +109,7 @@ def load_unit(unit: str) -> str:
 
 
 def columns_of(robot: LoadedRobot, layout: PackedLayout, power_terms: bool = False) -> tuple[Column, ...]:
-    """Columns in order: time, motion, τ_i, τ_ij, the terms, power; what is identically 0 has none."""
+    """Columns in order: time, motion, τ_i, τ_ij, terms, the joints' own, power; what is always 0 has none."""
     out = [Column("time", "time", "s")]
     motions: tuple[tuple[Quantity, str], ...] = (("q", ""), ("qd", "/s"), ("qdd", "/s²"))
     for quantity, suffix in motions:
@@ -99,6 +131,9 @@ def columns_of(robot: LoadedRobot, layout: PackedLayout, power_terms: bool = Fal
         load("tau_qd", "tau_qd", i, j, k)
     for i, j in sorted(map(tuple, layout.gravity.tolist())):
         load("tau_gravity", "tau_gravity", i, j)
+    for share, number in PASSIVE.items():
+        for i in sorted({own.coordinate for own in robot.passive if getattr(own, number)}):
+            out.append(Column(share, f"{share}/{column_part(robot.joints[i])}", load_unit(robot.units[i]), i))
     return *out, *_powers(out, (*POWER, *POWER_TERMS) if power_terms else POWER)
 
 

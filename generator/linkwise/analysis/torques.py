@@ -6,6 +6,7 @@ import numpy as np
 
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.result_columns import (
+    PASSIVE,
     TERMS,
     TORQUE_OF,
     Column,
@@ -27,7 +28,7 @@ class Decomposer:
     """Computes blocks of the result, stored by column: (columns, samples).
 
     With q̈_k and q̇_k the coordinates' motion, and index order joint i, link j, coordinate k:
-    τ_i = Σ_j τ_ij and τ_ij = Σ_k c2_ijk q̈_k + Σ_k c1_ijk q̇_k + g_ij
+    τ_i = Σ_j τ_ij + what the joint has of its own, and τ_ij = Σ_k c2_ijk q̈_k + Σ_k c1_ijk q̇_k + g_ij
     P_ij = τ_ij q̇_i, what joint i sends into link j
     """
 
@@ -38,7 +39,7 @@ class Decomposer:
     parts: tuple[tuple[int, tuple[int, ...]], ...]
     """Row of each τ_ij, and the rows of its terms."""
     wholes: tuple[tuple[int, tuple[int, ...]], ...]
-    """Row of each τ_i, and the rows of its τ_ij."""
+    """Row of each τ_i, and the rows of what it is the sum of: its τ_ij, and what the joint has of its own."""
     powers: tuple[tuple[int, int, int], ...]
     """Row of each power, the row of its torque, and the joint whose velocity multiplies."""
 
@@ -53,7 +54,7 @@ class Decomposer:
             if c.quantity == "tau_link"
         ]
         wholes = [
-            (at, _rows(columns, ("tau_link",), joint=c.joint))
+            (at, _rows(columns, ("tau_link", *PASSIVE), joint=c.joint))
             for at, c in enumerate(columns)
             if c.quantity == "tau"
         ]
@@ -76,6 +77,7 @@ class Decomposer:
         out[0] = time
         out[self.rows("q")], out[self.rows("qd")], out[self.rows("qdd")] = q.T, qd.T, qdd.T
         out[self.rows("tau")] = self.robot.model.inverse_dynamics(q, qd, qdd).T
+        self._add_passive(out, q, qd, qdd)
         for row, source, _ in self.sources["tau_link"]:
             out[row] = packed.torque[..., source]
         for row, source, k in self.sources["tau_qdd"]:
@@ -93,6 +95,17 @@ class Decomposer:
         for power, torque, i in self.powers:
             np.multiply(out[torque], qd[:, i], out=out[power])
         return closure
+
+    def _add_passive(self, out: Array, q: Array, qd: Array, qdd: Array) -> None:
+        """Fill what joints have of their own, and add it to their torques."""
+        if not self.robot.passive:
+            return
+        found = dict(zip(PASSIVE, self.robot.model.passive_torque(q, qd, qdd), strict=True))
+        whole = self.rows("tau").start
+        for column, values in zip(self.columns, out, strict=True):
+            if column.quantity in PASSIVE and column.joint is not None:
+                values[:] = found[column.quantity][:, column.joint]
+                out[whole + column.joint] += values
 
     def _closure(self, out: Array) -> Closure:
         """Check the closing sums, by unit: a joint that carries but rounding is measured by its peers."""

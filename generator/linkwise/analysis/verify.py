@@ -30,7 +30,9 @@ LARGEST = 1e6
 
 @dataclass(frozen=True)
 class Closure:
-    """Largest errors of Σ_k τp_ij + g_ij against τ_ij (terms) and of Σ_j τ_ij against τ_i (links).
+    """Largest errors of Σ_k τp_ij + g_ij against τ_ij (terms) and of the sum that τ_i is (links).
+
+    That is Σ_j τ_ij, and what joint i has of its own.
 
     Absolute in N·m (N), relative to the largest sum of magnitudes in the same block of samples. Packages
     may sum τ_i from the τ_ij, so both sums say only that nothing was lost; `recursion` is the largest

@@ -23,6 +23,7 @@ from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.own_process import Ended, in_own_process
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.parametric_tree import changed_values, check_bodies, tree_with
+from linkwise.check.passive_reference import passive_calls
 from linkwise.check.recorded_parts import recorded_parts
 from linkwise.check.reference import Reference
 from linkwise.check.regressor_reference import regressor_calls, regressor_reference
@@ -171,6 +172,8 @@ class _Checks:
                     yield from regressor_calls(f"{way.label}{label}", model, regressors)
                 if frames is not None and way.kernel != "rule":  # no kernel has a part in it
                     yield from frame_calls(f"{way.label}{label}", model, frames)
+                joints = manifest.tree.passive if manifest.tree is not None else ()
+                yield from passive_calls(f"{way.label}{label}", model, joints, reference.states)
         if manifest.tree is not None:
             how = "from energies" if manifest.request.get("derivation") == "energy" else "by the rigid rule"
             ways = {way.label: model for way, model in loaded.items()}

@@ -12,7 +12,7 @@ from linkwise.emit.definition import rigid_tree
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, printable
 from linkwise.package.entries import RigidTree
-from linkwise.robot import Options, left_out
+from linkwise.robot import Options, kept_apart, left_out
 from linkwise.robot.robot import Parameter
 from linkwise.symbolic.system import EnergySystem, System
 
@@ -50,7 +50,8 @@ def inspection(system: System, details: bool = False, refused: str = "") -> dict
     tree = rigid_tree(system)
     notes = system.notes
     if not details:
-        notes = (*(note for note in notes if note.kind != "left out"), *left_out(notes))
+        others = (note for note in notes if note.kind not in ("left out", "passive"))
+        notes = (*others, *kept_apart(notes), *left_out(notes))
     mass = {body.link: body.mass for body in tree.bodies} if tree else {}
     return {
         "name": system.name,

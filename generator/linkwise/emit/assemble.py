@@ -35,6 +35,7 @@ SHARED_RUNTIME = (
     "interface.py",
     "outputs.py",
     "parameter_values.py",
+    "passive_joints.py",
     "quantities.py",
     "robot_kinematics.py",
     "structure.py",
@@ -104,7 +105,9 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     joints = [(c.name, c.unit) for c in system.coordinates]
     links = {name: system.path(j) for j, name in enumerate(system.link_names)}
     linear = derivation.linear
-    yield "names.py", names_text(derivation.package, joints, links, linear, parameters, bodies)
+    tree = rigid_tree(system)
+    passive = tree.passive if tree else ()
+    yield "names.py", names_text(derivation.package, joints, links, linear, parameters, bodies, passive)
     yield "py.typed", ""
     copied = {name for backend in loadable for place in backend.runtime for name in _files_at(place)}
     for name in sorted(copied.union(SHARED_RUNTIME)):

@@ -1,12 +1,13 @@
 """What a manifest says that a robot is, rigid bodies or energies, by which its package can be checked."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import astuple
 
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from linkwise.emit.formula_symbols import motion_symbol, parameter_symbols
-from linkwise.package.manifest import BodyEntry, EnergyEntry, FrameEntry, RigidTree
+from linkwise.package.manifest import BodyEntry, EnergyEntry, FrameEntry, PassiveEntry, RigidTree
 from linkwise.robot.robot import Robot, Scalar, Vec3
 from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
@@ -53,6 +54,10 @@ def rigid_tree(system: System) -> RigidTree | None:
                 numbers(frame.translation),
             )
             for frame in robot.named_frames
+        ),
+        tuple(
+            PassiveEntry(axis.joint, axis.coordinate, axis.ratio, *astuple(axis.own))
+            for axis in robot.passive
         ),
         {
             place: text(value)

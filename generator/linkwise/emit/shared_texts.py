@@ -4,12 +4,12 @@ They are made of what a manifest has too, so that `linkwise check` makes them ag
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.render import render
 from linkwise.escape import python_docstring, python_literal
-from linkwise.package.entries import KernelKind
+from linkwise.package.entries import KernelKind, PassiveEntry
 from linkwise.version import VERSION
 
 LINE = 100
@@ -92,8 +92,10 @@ def names_text(
     linear: Iterable[int],
     parameters: Mapping[str, float],
     bodies: Sequence[BodyText],
+    passive: Sequence[PassiveEntry],
 ) -> str:
-    """names.py: names and units of the joints, names and paths of the links, and what hangs on parameters."""
+    """names.py: names and units of the joints, what they have of their own, names and paths of the links, and
+    what hangs on parameters."""
     joints = list(joints)
     view = {
         "version": VERSION,
@@ -105,9 +107,17 @@ def names_text(
         "linear": repr(tuple(sorted(linear))),
         "parameters": [(python_literal(name), repr(value)) for name, value in parameters.items()],
         "bodies": bodies,
+        "passive": [_passive_text(entry) for entry in passive],
         "calls_numpy": any("np." in value for body in bodies for value in body.values),
     }
     return render("package/names.py.j2", view)
+
+
+def _passive_text(entry: PassiveEntry) -> str:
+    """The arguments of a PassiveJoint, which has the fields of the entry; zeros are its defaults."""
+    joint, coordinate, ratio, *own = asdict(entry).items()
+    moved = python_literal(joint[1]), repr(coordinate[1]), repr(ratio[1])
+    return ", ".join([*moved, *(f"{name}={value!r}" for name, value in own if value)])
 
 
 def _parameter_lines(parameters: Iterable[str]) -> list[str]:

@@ -75,8 +75,27 @@ class FrameEntry:
 
 
 @dataclass(frozen=True)
+class PassiveEntry:
+    """What a body's joint has of its own, p = ratio · q of a coordinate being its position, in rad or m.
+
+    It takes stiffness (p − rest) + damping ṗ + friction sign(ṗ) + armature p̈ to move it, in N·m or N.
+    """
+
+    joint: str
+    coordinate: int
+    ratio: float
+    stiffness: float
+    rest: float
+    damping: float
+    friction: float
+    armature: float
+
+
+@dataclass(frozen=True)
 class RigidTree:
     """The rigid bodies, parents before children, the frames, and gravity in m/s² in the base's axes.
+
+    passive: what joints have of their own, those that have anything
 
     formulas: by its place, such as bodies[2].com[0], each number that hangs on run-time parameters, as text
     in their symbols; the numbers themselves are those of the parameters' own values
@@ -85,6 +104,7 @@ class RigidTree:
     gravity: Row
     bodies: tuple[BodyEntry, ...]
     frames: tuple[FrameEntry, ...]
+    passive: tuple[PassiveEntry, ...]
     formulas: Mapping[str, str]
 
 
@@ -119,6 +139,7 @@ def check_tree(tree: RigidTree, joints: Sequence[JointEntry], links: Sequence[Li
             raise ValueError(f"the path of link {link.name!r} is not that of the tree")
     _check_joints(tree, joints)
     _check_frames(tree, links)
+    _check_passive(tree)
     for place in tree.formulas:
         found = PLACE.fullmatch(place)
         known = found and (
@@ -150,6 +171,14 @@ def _check_frames(tree: RigidTree, links: Sequence[LinkEntry]) -> None:
     for link in links:
         if carriers.get(link.name) != at[link.name]:
             raise ValueError(f"tree.frames has no frame {link.name[:80]!a} on the body of that link")
+
+
+def _check_passive(tree: RigidTree) -> None:
+    """Raise ValueError for what is of no joint of the tree, or of one that moves otherwise."""
+    moved = {body.joint: (body.coordinate, body.ratio) for body in tree.bodies}
+    for index, entry in enumerate(tree.passive):
+        if moved.get(entry.joint) != (entry.coordinate, entry.ratio):
+            raise ValueError(f"passive entry {index} of the tree is not of a joint that moves so")
 
 
 def _check_joints(tree: RigidTree, joints: Sequence[JointEntry]) -> None:

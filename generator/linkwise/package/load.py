@@ -90,6 +90,9 @@ class Model(Protocol):
     def power(self, q: Array, qd: Array, qdd: Array) -> Any:
         """P_ij by cause and order (..., n, N, n) twice, of gravity (..., n, N)."""
 
+    def passive_torque(self, q: Array, qd: Array, qdd: Array) -> Any:
+        """Spring, damping, friction and armature of the joints (..., n) each."""
+
     def masked(self, q: Array, qd: Array, qdd: Array, mask: Array) -> Array:
         """Chosen terms of the decomposition (..., n, N)."""
 

@@ -19,6 +19,7 @@ from linkwise.package.entries import (
     JointEntry,
     KernelKind,
     LinkEntry,
+    PassiveEntry,
     RigidTree,
     check_tree,
 )
@@ -34,6 +35,7 @@ __all__ = [
     "JointEntry",
     "LinkEntry",
     "Manifest",
+    "PassiveEntry",
     "RigidTree",
     "altered_entries",
     "is_inside",

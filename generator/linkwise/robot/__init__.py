@@ -1,7 +1,7 @@
 """Robots: what a description says, and the readers for it."""
 
 from linkwise.robot.build import Options
-from linkwise.robot.notes import Note, effects, left_out
+from linkwise.robot.notes import Note, effects, kept_apart, left_out
 from linkwise.robot.read import BUILT_IN, DESCRIPTIONS, read_robot
 from linkwise.robot.robot import Coordinate, Joint, Link, Robot
 
@@ -15,6 +15,7 @@ __all__ = [
     "Options",
     "Robot",
     "effects",
+    "kept_apart",
     "left_out",
     "read_robot",
 ]

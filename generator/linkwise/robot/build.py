@@ -15,6 +15,7 @@ from linkwise.robot.mass_matrix import check_mass_matrix
 from linkwise.robot.naming import Named, Naming
 from linkwise.robot.notes import Note
 from linkwise.robot.parameters import numeric
+from linkwise.robot.passive import checked_passive, passive_axes, passive_notes
 from linkwise.robot.robot import Frame, Link, Parameter, Robot, Scalar, unusable
 from linkwise.robot.tree import check_loops, cut, depth_first
 
@@ -53,6 +54,8 @@ def build(description: Description, options: Options) -> Robot:
     axes = tuple(axis for _, parts in joints for axis in parts)
     uncoupled = check_couplings(description.couplings, axes, options.lock, options.free_mimic)
     moving = movement(axes, connections, options.lock, options.free_mimic)
+    checked_passive(connections, options.allow_unphysical)
+    passive = passive_axes(connections, moving.motion)
     assembly = moving_links(description.bodies, joints, moving.motion, naming, description.sites)
     check_loops(description.loops, assembly.carrier)
     numbers = assembly.links if naming is None else _links(plain, options, moving.motion)
@@ -71,6 +74,7 @@ def build(description: Description, options: Options) -> Robot:
         *singular,
         *_massless(description, assembly.links),
         *_as_read(connections),
+        *passive_notes(connections, passive),
         *_left_out(description, joints, moving.motion, assembly.carrier),
     )
     parameters = naming.parameters(assembly.links, description.gravity) if naming else ()
@@ -83,6 +87,7 @@ def build(description: Description, options: Options) -> Robot:
         (*notes, *naming.notes()) if naming else notes,
         options.allow_unphysical,
         _with_known(assembly.frames, parameters, dict(description.parameters)),
+        passive,
     )
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from linkwise.robot.notes import Note, Omission
-from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3
+from linkwise.robot.robot import NOTHING, Mat3, Passive, Rotation, Scalar, Vec3
 
 ZERO3: Vec3 = (0.0, 0.0, 0.0)
 ZERO33: Mat3 = (ZERO3, ZERO3, ZERO3)
@@ -73,7 +73,8 @@ class Loop:
 class Connection:
     """A joint as the file has it: any type, any axis; its place in the parent's frame, its axis in its own.
 
-    `snapped` says that entries of the rotation were rounded to −1, 0 or 1.
+    `snapped` says that entries of the rotation were rounded to −1, 0 or 1; only a joint of one axis has
+    anything `passive`.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Connection:
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     mimic: Mimic | None = None
     snapped: bool = False
+    passive: Passive = NOTHING
 
 
 @dataclass(frozen=True)

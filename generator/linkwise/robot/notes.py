@@ -8,6 +8,7 @@ from typing import Literal
 from linkwise.escape import listed
 
 LEFT_OUT = "left out of the torques"
+APART = "apart from the links' torques, by passive_torque"
 UNCOUPLED = "moving by themselves, their coupling left out of the torques"
 IMPOSSIBLE = "accepted though physically impossible"
 WARNED = "MuJoCo warns"
@@ -40,6 +41,7 @@ class Note:
         "unphysical",
         "freed",
         "left out",
+        "passive",
         "warned",
         "promoted",
     ]
@@ -92,8 +94,16 @@ def effects(notes: Iterable[Note], every: bool = False) -> tuple[str, ...]:
 
 def left_out(notes: Iterable[Note]) -> tuple[Note, ...]:
     """One note for each kind of thing that was left out, with how often, in place of one for each joint."""
-    counts = Counter(note.effect for note in notes if note.kind == "left out")
+    return _counted("left out", LEFT_OUT, notes)
+
+
+def kept_apart(notes: Iterable[Note]) -> tuple[Note, ...]:
+    """The same for what joints have of their own."""
+    return _counted("passive", APART, notes)
+
+
+def _counted(kind: Literal["left out", "passive"], effect: str, notes: Iterable[Note]) -> tuple[Note, ...]:
+    counts = Counter(note.effect for note in notes if note.kind == kind)
     return tuple(
-        Note("left out", effect.removesuffix(f" {LEFT_OUT}"), f"{count} ×", LEFT_OUT)
-        for effect, count in counts.items()
+        Note(kind, what.removesuffix(f" {effect}"), f"{count} ×", effect) for what, count in counts.items()
     )

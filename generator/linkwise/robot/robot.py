@@ -74,6 +74,38 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Passive:
+    """What a joint of one axis has of its own, q being its position in rad or m.
+
+    It takes stiffness (q − rest) + damping q̇ + friction sign(q̇) + armature q̈ to move it, beside its links.
+    """
+
+    stiffness: float = 0.0
+    """In N·m/rad or N/m."""
+    rest: float = 0.0
+    damping: float = 0.0
+    """In N·m·s/rad or N·s/m."""
+    friction: float = 0.0
+    """Coulomb's, in N·m or N."""
+    armature: float = 0.0
+    """Inertia of what turns behind a gear, as the joint feels it, in kg·m² or kg."""
+
+
+NOTHING = Passive()
+
+
+@dataclass(frozen=True)
+class PassiveAxis:
+    """What a joint at ratio · q of a coordinate has of its own."""
+
+    joint: str
+    coordinate: int
+    """Index among the robot's coordinates."""
+    ratio: float
+    own: Passive
+
+
+@dataclass(frozen=True)
 class Link:
     """A rigid body in its own frame: mass in kg, centre of mass in m, inertia about it in kg·m²."""
 
@@ -132,6 +164,7 @@ class Robot:
     notes: tuple[Note, ...] = field(default=(), compare=False)
     allow_unphysical: bool = False
     frames: tuple[Frame, ...] = ()
+    passive: tuple[PassiveAxis, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.coordinates:

@@ -64,6 +64,9 @@ class Backend(Protocol[Kind]):
     def arrays(self, named: Mapping[str, Kind], n: int) -> Sequence[Kind]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
 
+    def side(self, like: Kind) -> Any:
+        """What computes with `like`, an array or a tensor: it has `constant`, and its namespace as `xp`."""
+
     def decomposition(self, q: Kind, qd: Kind, qdd: Kind) -> Sequence[Kind]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
 

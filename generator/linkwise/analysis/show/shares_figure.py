@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import Quantity
+from linkwise.analysis.result_columns import PASSIVE, Quantity
 from linkwise.extras import extra
 from linkwise.plotstyle import GRAVITY, colour, drawn
 
@@ -30,7 +30,12 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     for k, joint in enumerate(robot.joints):
         movement.append(_Cause("tau_qdd", k, f"{drawn(joint)} acceleration", colour(k)))
         movement.append(_Cause("tau_qd", k, f"{drawn(joint)} velocity", colour(k), "////"))
-    every = [_Cause("tau_gravity", None, "gravity", GRAVITY), *movement]
+    own = dict.fromkeys(column.quantity for column in result.columns if column.quantity in PASSIVE)
+    passive = [
+        _Cause(quantity, None, quantity.removeprefix("tau_"), colour(len(robot.joints) + at), "....")
+        for at, quantity in enumerate(own)
+    ]
+    every = [_Cause("tau_gravity", None, "gravity", GRAVITY), *movement, *passive]
     rows = -(-len(every) // 3)
     figure = extra("matplotlib.figure").Figure(
         figsize=(8.4, 1.3 + 0.42 * len(robot.joints) + 0.2 * rows), layout="constrained"

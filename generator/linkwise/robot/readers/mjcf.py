@@ -15,8 +15,9 @@ from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Descri
 from linkwise.robot.notes import WARNED, Note
 from linkwise.robot.readers.mjcf_equality import couplings, loops
 from linkwise.robot.readers.mjcf_options import switched_off
+from linkwise.robot.readers.mjcf_passive import passive_of
 from linkwise.robot.readers.mjcf_unmodelled import omissions, unused
-from linkwise.robot.robot import Mat3, Rotation, Vec3
+from linkwise.robot.robot import NOTHING, Mat3, Passive, Rotation, Vec3
 
 TYPES = ("floating", "ball", "prismatic", "revolute")
 """Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
@@ -28,7 +29,7 @@ def read_mjcf(path: Path) -> Description:
     model, warnings = _compiled(mujoco, path)
     bodies, connections = [Body(_name(model, 0))], list[Connection]()
     for number in range(1, model.nbody):
-        chain, body = _body(model, number)
+        chain, body = _body(mujoco, model, number)
         connections += chain
         bodies += [Body(c.child, invented=True) for c in chain[:-1]] + [body]
     name = model.names.split(b"\0")[0].decode()
@@ -72,9 +73,10 @@ class _Joint:
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     anchor: Vec3 = ZERO3
     rest: float = 0.0
+    passive: Passive = NOTHING
 
 
-def _body(model: Any, number: int) -> tuple[list[Connection], Body]:
+def _body(mujoco: Any, model: Any, number: int) -> tuple[list[Connection], Body]:
     """Return a body behind the chain of its joints, and massless bodies between them.
 
     Its frame is the file's, whose origin need not be the last joint's anchor.
@@ -83,7 +85,7 @@ def _body(model: Any, number: int) -> tuple[list[Connection], Body]:
     turn, snapped = transforms.snapped(transforms.from_quaternion(*map(float, model.body_quat[number])))
     position = _vector(model.body_pos[number])
     chain: list[Connection] = []
-    joints, last, start = _joints(model, number, name), ZERO3, _name(model, parent)
+    joints, last, start = _joints(mujoco, model, number, name), ZERO3, _name(model, parent)
     for joint in joints:
         if joint.type == "floating":
             turn, position, snapped = IDENTITY, ZERO3, False
@@ -96,7 +98,7 @@ def _body(model: Any, number: int) -> tuple[list[Connection], Body]:
             turn = transforms.compose(turn, _about(joint.axis, -joint.rest))
         child = name if joint is joints[-1] else f"{name}_{joint.name}"
         place = start, child, turn, position
-        chain.append(Connection(joint.name, joint.type, *place, joint.axis, None, snapped))
+        chain.append(Connection(joint.name, joint.type, *place, joint.axis, None, snapped, joint.passive))
         turn, position, last, start, snapped = IDENTITY, ZERO3, joint.anchor, child, False
     mass, com = float(model.body_mass[number]), _vector(model.body_ipos[number])
     return chain, Body(name, mass, com, _inertia(model, number), origin=transforms.minus(last))
@@ -116,12 +118,12 @@ def _sites(model: Any, links: list[str]) -> tuple[Site, ...]:
     )
 
 
-def _joints(model: Any, number: int, body: str) -> list[_Joint]:
+def _joints(mujoco: Any, model: Any, number: int, body: str) -> list[_Joint]:
     """Return the joints of a body, a fixed one if it has none."""
     first, count = int(model.body_jntadr[number]), int(model.body_jntnum[number])
     if not count:
         return [_Joint(f"{body}_weld", "fixed")]
-    joints = []
+    joints, off = [], switched_off(mujoco, model)
     for index in range(first, first + count):
         kind = TYPES[int(model.jnt_type[index])]
         single = kind in ("prismatic", "revolute")
@@ -133,6 +135,7 @@ def _joints(model: Any, number: int, body: str) -> list[_Joint]:
                 (x, y, z),
                 _vector(model.jnt_pos[index]),
                 float(model.qpos0[model.jnt_qposadr[index]]) if single else 0.0,
+                passive_of(mujoco, model, index, off),
             )
         )
     return joints

@@ -1,4 +1,4 @@
-"""What a compiled MJCF model says beyond the dynamics of rigid bodies.
+"""What a compiled MJCF model says beyond the dynamics of rigid bodies and what `mjcf_passive` reads.
 
 Of everything in MuJoCo's mjModel that exerts a force or adds inertia there is one row in `ACTING`. A robot's
 torques are those that its actuators must give while it touches nothing and stays within its limits.
@@ -12,6 +12,14 @@ import numpy as np
 
 from linkwise.robot.notes import Note, Omission
 from linkwise.robot.readers.mjcf_options import switched_off, switched_on
+from linkwise.robot.readers.mjcf_passive import (
+    ARMATURE,
+    DAMPING,
+    FRICTION,
+    SPRING,
+    is_passive,
+    numbers_of,
+)
 from linkwise.robot.readers.mjcf_tendons import bodies_along, joints_of
 
 COUNTS = {
@@ -48,10 +56,10 @@ class _Acting:
 
 
 ACTING = (
-    _Acting("damping", "dof", ("dof_damping", "dof_dampingpoly"), "damping", ("N·m·s/rad", "N·s/m")),
-    _Acting("friction", "dof", ("dof_frictionloss",), "friction", ("N·m", "N")),
-    _Acting("armature", "dof", ("dof_armature",), "", ("kg·m²", "kg")),
-    _Acting("spring", "joint", ("jnt_stiffness", "jnt_stiffnesspoly"), "spring", ("N·m/rad", "N/m")),
+    _Acting("damping", "dof", DAMPING, "damping", ("N·m·s/rad", "N·s/m")),
+    _Acting("friction", "dof", FRICTION, "friction", ("N·m", "N")),
+    _Acting("armature", "dof", ARMATURE, "", ("kg·m²", "kg")),
+    _Acting("spring", "joint", SPRING, "spring", ("N·m/rad", "N/m")),
     _Acting(
         "gravity compensation", "body", ("body_gravcomp",), "gravity compensation", ("of its weight",) * 2
     ),
@@ -84,9 +92,8 @@ class _CompiledModel:
         return tuple(self.joints[j] for j in joints), tuple(self.bodies[b] for b in bodies)
 
     def values(self, acting: _Acting, index: int) -> list[float]:
-        """Numbers of one joint, body or tendon; a field that this MuJoCo lacks has none."""
-        arrays = (getattr(self.model, name, None) for name in acting.fields)
-        return [float(value) for array in arrays if array is not None for value in np.ravel(array[index])]
+        """Numbers of one joint, body or tendon."""
+        return numbers_of(self.model, acting.fields, index)
 
 
 def omissions(mujoco: Any, model: Any, joints: Sequence[str], bodies: Sequence[str]) -> tuple[Omission, ...]:
@@ -105,7 +112,10 @@ def unused(model: Any) -> tuple[Note, ...]:
 
 
 def _of_joints(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
+    """What `Passive` cannot say, of balls and free joints, or of a higher order."""
     for number, name in enumerate(names.joints):
+        if is_passive(names.mujoco, names.model, number, acting.fields):
+            continue
         index = int(names.model.jnt_dofadr[number]) if acting.owner == "dof" else number
         if any(values := names.values(acting, index)):
             slides = names.model.jnt_type[number] == names.mujoco.mjtJoint.mjJNT_SLIDE

@@ -9,13 +9,15 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
+from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.readers.bounded import MIB, check_toml_bounds, content
 from linkwise.robot.readers.formula import parse_formula
-from linkwise.robot.robot import Mat3, Scalar, Vec3, unusable
+from linkwise.robot.robot import Mat3, Passive, Scalar, Vec3, unusable
 
 TOP = {"schema", "name", "gravity", "base", "parameters", "link", "joint"}
 LINK = {"name", "mass", "com", "inertia", "allow_unphysical"}
-JOINT = {"name", "type", "parent", "child", "xyz", "rpy", "axis", "mimic"}
+PASSIVE = ("stiffness", "rest", "damping", "friction", "armature")
+JOINT = {"name", "type", "parent", "child", "xyz", "rpy", "axis", "mimic", *PASSIVE}
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
@@ -45,6 +47,12 @@ class _Table:
             with within(f"{self.place}, {key}"):
                 return parse_formula(value, self.parameters)
         raise LinkwiseError(f"{self.place}: {key!r} must be a number or a formula in quotes")
+
+    def number(self, key: str) -> float:
+        value = self.scalar(key, self.data[key])
+        if not isinstance(value, float):
+            raise LinkwiseError(f"{self.place}: {key!r} takes a number only, without parameters")
+        return value
 
     def vector(self, key: str, default: list[float] | None) -> Vec3:
         value = self.data.get(key, default)
@@ -151,7 +159,16 @@ def _connection(data: dict[str, Any], parameters: Mapping[str, float]) -> Connec
         table.numbers("axis", [0.0, 0.0, 1.0]),
         _mimic(table, data["mimic"]) if "mimic" in data else None,
         snapped=snapped,
+        passive=_passive(table),
     )
+
+
+def _passive(table: _Table) -> Passive:
+    there = [key for key in PASSIVE if key in table.data]
+    kind = table.data.get("type", "revolute")
+    if there and kind not in SINGLE:
+        raise LinkwiseError(f"{table.place} is {kind}, and only a joint of one axis takes {there[0]!r}")
+    return Passive(**{key: table.number(key) for key in there})
 
 
 def _mimic(table: _Table, data: Any) -> Mimic:

@@ -1,13 +1,16 @@
 """The dynamics of a URDF file; what it says beyond them is noted as ignored. Meshes are never opened."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
+from linkwise.robot.readers.urdf_passive import passives
 from linkwise.robot.readers.urdf_unmodelled import ignored, omissions
 from linkwise.robot.readers.xml_file import numbers, parse
+from linkwise.robot.robot import NOTHING, Passive
 
 
 def read_urdf(path: Path) -> Description:
@@ -18,10 +21,11 @@ def read_urdf(path: Path) -> Description:
     links, joints = robot.findall("link"), robot.findall("joint")
     if not links:
         raise LinkwiseError("<robot> is empty: the file has no <link>; give one that describes a robot")
+    passive = passives(robot)
     return Description(
         robot.get("name") or path.stem,
         tuple(_body(element) for element in links),
-        tuple(_connection(element) for element in joints),
+        tuple(_connection(element, passive) for element in joints),
         notes=ignored([robot, *links, *joints]),
         omissions=tuple(omissions(robot)),
     )
@@ -62,7 +66,7 @@ def _body(element: Element) -> Body:
     return Body(name, numbers(mass, "value", "", 1, place)[0], com, turned)
 
 
-def _connection(element: Element) -> Connection:
+def _connection(element: Element, passive: Mapping[str, Passive]) -> Connection:
     name = element.get("name", "")
     place = f"joint {name!r}"
     raw, translation = _origin(element, place)
@@ -79,6 +83,7 @@ def _connection(element: Element) -> Connection:
         (x, y, z),
         _mimic(element, place),
         snapped,
+        passive.get(name, NOTHING),
     )
 
 

@@ -1,10 +1,12 @@
-"""What a URDF file says beyond the dynamics of rigid bodies."""
+"""What a URDF file says beyond the dynamics of rigid bodies and what `urdf_passive` reads."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from xml.etree.ElementTree import Element
 
+from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.notes import Note, Omission
+from linkwise.robot.readers.urdf_passive import given_numbers
 from linkwise.robot.readers.xml_file import numbers
 
 USED = {
@@ -14,8 +16,8 @@ USED = {
 }
 """What the dynamics use of each element; every other kind of child is noted as ignored."""
 
-LOSSES = {"damping": ("N·m·s/rad", "N·s/m"), "friction": ("N·m", "N")}
-"""Attributes of <dynamics>, with their units about an axis and along one."""
+LOSSES = ("damping", "friction")
+"""Attributes of <dynamics>."""
 
 ACTING = {
     "dampingFactor": "damping",  # Gazebo's, of a link's velocity
@@ -42,12 +44,13 @@ def omissions(robot: Element) -> Iterator[Omission]:
     """Return each force and inertia that the torques leave out."""
     links = {link.get("name", "") for link in robot.findall("link")}
     for joint in robot.findall("joint"):
-        name, slides = joint.get("name", ""), joint.get("type") == "prismatic"
-        for losses in joint.findall("dynamics"):
-            for what, units in LOSSES.items():
+        name = joint.get("name", "")
+        for losses in joint.findall("dynamics") if joint.get("type") not in SINGLE else ():
+            for what in LOSSES:
                 (number,) = numbers(losses, what, "0", 1, f"joint {name!r}")
                 if number:
-                    yield Omission(what, name, f"{number!r} {units[slides]}", joints=(name,))
+                    yield Omission(what, name, f"{number!r} on {joint.get('type')}", joints=(name,))
+    read = {id(given.element) for given in given_numbers(robot)}
     for part in robot:
         if part.tag == "gazebo":
             owners = [part.get("reference", "")]
@@ -58,13 +61,15 @@ def omissions(robot: Element) -> Iterator[Omission]:
         named = ", ".join(owners) or str(part.tag)
         bodies = tuple(owner for owner in owners if owner in links)
         joints = tuple(owner for owner in owners if owner and owner not in links)
-        for what, detail in _acting(part):
+        for what, detail in _acting(part, read):
             yield Omission(what, named, detail, joints, bodies)
 
 
-def _acting(part: Element) -> Iterator[tuple[str, str]]:
-    """Return what of an extension loads joints, with its value."""
+def _acting(part: Element, read: Collection[int]) -> Iterator[tuple[str, str]]:
+    """Return what of an extension loads joints, with its value, but for elements that were `read`, by id."""
     for element in part.iter():
+        if id(element) in read:
+            continue
         tag = str(element.tag).rpartition("}")[2].rpartition(":")[2]
         text = (element.get("value") or element.text or "").strip()
         if tag in ACTING and _number(text):

@@ -1,0 +1,56 @@
+"""What joints take of their own against the manifest's numbers, joint by joint."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from linkwise.check.compare import Entries, Result, compare
+from linkwise.check.model_calls import FLOAT32
+from linkwise.check.states import States
+from linkwise.package.entries import PassiveEntry
+from linkwise.package.load import Array, Model
+
+SHARES = ("spring", "damping", "friction", "armature")
+
+
+def passive_calls(
+    name: str, model: Model, joints: Sequence[PassiveEntry], states: States
+) -> Iterator[Result]:
+    """The call for many states, for one, and in single precision; all zeros where no joint has anything."""
+    values, scales = passive_reference(joints, states)
+
+    def entries(dtype: Any, rows: Any) -> Iterator[Entries]:
+        motion: list[Any] = [x[rows].astype(dtype) for x in states.motion]
+        found = model.passive_torque(*motion)
+        for what, value, expected, scale in zip(SHARES, found, values, scales, strict=True):
+            # Rows of one state stand for a batch of one, as errors are told by sample.
+            shape = (-1, expected.shape[1])
+            yield Entries(what, np.asarray(value).reshape(shape), expected[rows].reshape(shape), scale[rows])
+
+    every = [*entries(float, slice(None)), *(entries(float, 0) if len(states.q) else ())]
+    yield compare(f"{name}: passive torques of the joints", every)
+    single = entries(np.float32, slice(None))
+    yield compare(f"{name}: passive torques in single precision", single, **FLOAT32)
+
+
+def passive_reference(joints: Sequence[PassiveEntry], states: States) -> tuple[Array, Array]:
+    """Shares (4, samples, n), and the sizes of what they are summed from.
+
+    Of a joint at p = r q a torque f does the work f dp = r f dq: it counts r times on the coordinate.
+    """
+    q, qd, qdd = states.motion
+    values, scales = np.zeros((2, len(SHARES), *q.shape))
+    for joint in joints:
+        k, r = joint.coordinate, joint.ratio
+        p, pd, pdd = (r * x[:, k] for x in (q, qd, qdd))
+        own = (
+            joint.stiffness * (p - joint.rest),
+            joint.damping * pd,
+            joint.friction * np.sign(pd),
+            joint.armature * pdd,
+        )
+        values[..., k] += r * np.stack(own)
+        scales[..., k] += abs(r) * np.abs(own)
+        scales[0, :, k] += abs(r * joint.stiffness) * (np.abs(p) + abs(joint.rest))
+    return values, scales

@@ -1,0 +1,52 @@
+"""Springs, damping, friction and armature of a compiled MJCF model's hinges and slides."""
+
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+
+from linkwise.robot.robot import Passive
+
+SPRING = ("jnt_stiffness", "jnt_stiffnesspoly")
+DAMPING = ("dof_damping", "dof_dampingpoly")
+FRICTION = ("dof_frictionloss",)
+ARMATURE = ("dof_armature",)
+"""Fields of mjModel: the first is proportional to the motion, or constant; the next are of higher order."""
+
+YIELDS = "jnt_springyield"
+"""Where a spring gives way; the law is then no longer that of a spring."""
+
+
+def numbers_of(model: Any, fields: Collection[str], index: int) -> list[float]:
+    """Numbers of one joint, body or tendon; a field that this MuJoCo lacks has none."""
+    arrays = (getattr(model, name, None) for name in fields)
+    return [float(value) for array in arrays if array is not None for value in np.ravel(array[index])]
+
+
+def is_passive(mujoco: Any, model: Any, joint: int, fields: tuple[str, ...]) -> bool:
+    """Whether `Passive` can say what these fields say of a joint: of one axis, nothing of higher order."""
+    kinds = mujoco.mjtJoint
+    if kinds(int(model.jnt_type[joint])) not in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE):
+        return False
+    _, *higher = numbers_of(model, fields, _index(model, joint, fields))
+    return not any(higher) and not (fields == SPRING and any(numbers_of(model, (YIELDS,), joint)))
+
+
+def passive_of(mujoco: Any, model: Any, joint: int, off: Collection[str]) -> Passive:
+    """Return what a joint has, but for forces that flags switch `off`, in the words of `mjcf_options`."""
+
+    def number(fields: tuple[str, ...], switch: str = "") -> float:
+        if switch in off or not is_passive(mujoco, model, joint, fields):
+            return 0.0
+        return numbers_of(model, fields, _index(model, joint, fields))[0]
+
+    stiffness = number(SPRING, "spring")
+    rest = float(model.qpos_spring[model.jnt_qposadr[joint]]) if stiffness else 0.0
+    return Passive(
+        stiffness, rest, number(DAMPING, "damping"), number(FRICTION, "friction"), number(ARMATURE)
+    )
+
+
+def _index(model: Any, joint: int, fields: tuple[str, ...]) -> int:
+    """Of a joint, or of its first degree of freedom, in the arrays of these fields."""
+    return joint if fields[0].startswith("jnt_") else int(model.jnt_dofadr[joint])

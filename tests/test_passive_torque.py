@@ -1,0 +1,174 @@
+"""What joints take for springs, damping, friction and armature of their own, on every back end."""
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from answers import random_states, relative_error
+from conftest import PANDA, needs_compiler
+from linkwise import generate, read_system, write_package
+from linkwise.check.checks import check_package
+from linkwise.package.load import import_package
+from urdf_text import joint, link, mimic, robot
+
+BACKENDS = ("numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler))
+DYNAMICS = '<dynamics damping="{}" friction="{}"/>'
+SPRINGS = """<gazebo reference="{}"><springStiffness>{}</springStiffness>
+<springReference>{}</springReference></gazebo>"""
+HAND = robot(
+    *map(link, "abcd"),
+    joint("ab", "a", "b", inner=DYNAMICS.format(0.5, 0.2)),
+    joint("bc", "b", "c", inner=DYNAMICS.format(0.7, 0.3)),
+    joint("cd", "c", "d", inner=mimic("bc", -2.0, 0.3) + DYNAMICS.format(0.11, 0.13)),
+    SPRINGS.format("bc", 4, 0.1),
+    SPRINGS.format("cd", 3, -0.2),
+    """<transmission xmlns:drake="http://drake.mit.edu"><joint name="cd"/><actuator>
+    <drake:rotor_inertia value="1e-4"/><drake:gear_ratio value="50"/></actuator></transmission>""",
+)
+
+
+def by_hand(q: Any, qd: Any, qdd: Any) -> tuple[Any, ...]:
+    """Virtual work of the joints of HAND, that of cd at -2 q + 0.3 on the second coordinate."""
+    (_, q), (a, b), (_, c) = (np.moveaxis(x, -1, 0) for x in (q, qd, qdd))
+    none = 0.0 * q
+    shares = (
+        (none, 4 * (q - 0.1) - 2 * 3 * ((0.3 - 2 * q) + 0.2)),
+        (0.5 * a, 0.7 * b - 2 * 0.11 * (-2 * b)),
+        (0.2 * np.sign(a), 0.3 * np.sign(b) - 2 * 0.13 * np.sign(-2 * b)),
+        (none, -2 * 0.25 * (-2 * c)),
+    )
+    return tuple(np.stack(share, -1) for share in shares)
+
+
+def written(folder: Path, backends: list[str] | None = None) -> Path:
+    (folder / "hand.urdf").write_text(HAND)
+    write_package(generate(read_system(folder / "hand.urdf"), backends, kernel="loops"), folder / "hand")
+    return folder / "hand"
+
+
+@pytest.fixture(scope="module")
+def hand(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    return import_package(written(tmp_path_factory.mktemp("hand")))
+
+
+def taken(model: Any, arrays: Any) -> Any:
+    if not model.backend.takes_tensors:
+        return arrays
+    import torch
+
+    return [torch.from_numpy(a) for a in arrays]
+
+
+@pytest.mark.parametrize(("dtype", "most"), [("float64", 1e-15), ("float32", 1e-6)])
+@pytest.mark.parametrize("batch", [(), (2, 3), (0,)])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_shares_are_what_the_joints_of_each_coordinate_take(
+    backend: str, batch: tuple[int, ...], dtype: str, most: float, hand: ModuleType
+) -> None:
+    model = hand.load(backend)
+    motion = np.random.default_rng(3).uniform(-2.0, 2.0, (3, *batch, 2)).astype(dtype)
+    found = model.passive_torque(*taken(model, motion))
+    out = taken(model, [np.empty((*batch, 2), dtype) for _ in found])
+    assert model.passive_torque(*taken(model, motion), out=out)[0] is out[0]
+    for value, written, expected in zip(found, out, by_hand(*motion.astype(float)), strict=True):
+        assert str(value.dtype).endswith(dtype)
+        np.testing.assert_allclose(np.asarray(value), expected, rtol=0, atol=20 * most)
+        assert np.array_equal(np.asarray(value), np.asarray(written))
+    assert np.array_equal(np.asarray(found.total), np.asarray(sum(found[1:], start=found[0])))
+
+
+@pytest.mark.parametrize("backend", ["torch", "autograd", pytest.param("native", marks=needs_compiler)])
+def test_gradients_flow_through_them(backend: str, hand: ModuleType) -> None:
+    torch = pytest.importorskip("torch")
+    motion = torch.from_numpy(np.random.default_rng(3).uniform(-2.0, 2.0, (3, 2))).requires_grad_()
+    hand.load(backend).passive_torque(*motion).total.sum().backward()
+    expected = [[0.0, 4 + 4 * 3], [0.5, 0.7 + 4 * 0.11], [0.0, 4 * 0.25]]
+    np.testing.assert_allclose(motion.grad.numpy(), expected, rtol=1e-14)
+
+
+def test_motion_and_out_are_refused_by_name(hand: ModuleType) -> None:
+    model = hand.load("numpy")
+    q = np.zeros((4, 2))
+    with pytest.raises(ValueError, match=r"qd has shape \(4, 3\); its last axis must be 2"):
+        model.passive_torque(q, np.zeros((4, 3)), q)
+    with pytest.raises(ValueError, match=r"out\.armature has shape \(3, 2\); the answer has \(4, 2\)"):
+        model.passive_torque(q, q, q, out=[q.copy(), q.copy(), q.copy(), np.empty((3, 2))])
+
+
+def test_robot_without_any_has_zeros(package_of: Callable[[str], ModuleType]) -> None:
+    found = package_of("planar3").load("numpy").passive_torque(*random_states(3, 4))
+    assert not np.any(found)
+
+
+def test_a_real_robots_file_has_the_losses_that_pinocchio_reads(
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    pinocchio = pytest.importorskip("pinocchio")
+    full = pinocchio.buildModelFromUrdf(str(PANDA))
+    fingers = [full.getJointId(f"panda_finger_joint{finger}") for finger in (1, 2)]
+    model = pinocchio.buildReducedModel(full, fingers, pinocchio.neutral(full))
+    q, qd, qdd = random_states(7, 20)
+    found = package_of(str(PANDA)).load("numpy").passive_torque(q, qd, qdd)
+    assert np.any(model.damping)
+    assert relative_error(found.damping, model.damping * qd) <= 1e-15
+    np.testing.assert_array_equal(found.friction, model.friction * np.sign(qd))
+
+
+def test_armature_is_that_of_pinocchios_inverse_dynamics(tmp_path: Path) -> None:
+    pinocchio = pytest.importorskip("pinocchio")
+    rotors = """<transmission xmlns:drake="http://drake.mit.edu"><joint name="{}"/><actuator>
+    <drake:rotor_inertia value="{}"/></actuator></transmission>"""
+    text = robot(
+        *map(link, "abc"),
+        joint("ab", "a", "b"),
+        joint("bc", "b", "c", type="prismatic"),
+        rotors.format("ab", 0.7),
+        rotors.format("bc", 0.4),
+    )
+    (tmp_path / "arm.urdf").write_text(text)
+    model = pinocchio.buildModelFromXML(text)
+    model.armature[:] = [0.7, 0.4]
+    write_package(generate(read_system(tmp_path / "arm.urdf"), ["numpy"]), tmp_path / "arm")
+    arm = import_package(tmp_path / "arm").load("numpy")
+    states = random_states(2, 30)
+    data = model.createData()
+    expected = [pinocchio.rnea(model, data, *state) for state in zip(*states, strict=True)]
+    found = arm.inverse_dynamics(*states) + arm.passive_torque(*states).total
+    assert relative_error(found, expected) <= 1e-13
+
+
+def test_check_holds_them_against_the_manifest(tmp_path: Path) -> None:
+    directory = written(tmp_path, ["numpy"])
+    told = {result.name: result for result in check_package(directory, 20)}
+    assert all(result.passed for result in told.values())
+    assert "numpy: passive torques of the joints" in told
+    for file, old, new in (
+        ("names.py", "damping=0.7", "damping=0.8"),
+        ("manifest.json", '"rest": 0.1', '"rest": 0.15'),
+        ("runtime/passive_joints.py", "j.ratio**2 * j.damping", "j.ratio * j.damping"),
+    ):
+        text = (directory / file).read_text()
+        assert old in text
+        forged(directory, file, text.replace(old, new))
+        failed = {result.name for result in check_package(directory, 20) if not result.passed}
+        assert {"runtime", "numpy: passive torques of the joints"} <= failed
+        forged(directory, file, text)
+
+
+def forged(directory: Path, file: str, text: str) -> None:
+    """Write a file, with its hash in the manifest, or with the manifest's own checksums."""
+    (directory / file).write_text(text)
+    path = directory / "manifest.json"
+    data = json.loads(path.read_text())
+    if file != path.name:
+        data["files"][file] = hashlib.sha256(text.encode()).hexdigest()
+    data["checksums"] = {
+        key: hashlib.sha256(json.dumps(data[key], sort_keys=True).encode()).hexdigest()
+        for key in data["checksums"]
+    }
+    path.write_text(json.dumps(data))
