@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
+from operator import index
 from typing import Any
 
 from torch import Tensor
@@ -18,10 +19,11 @@ ORDERS = "2 for acceleration, 1 for velocity, 0 for position and gravity"
 def graph_of(backend: Any, i: Name, j: Links, k: Name | None, m: int | None) -> TorqueGraph:
     """See `Dynamics.graph`."""
     joint, through = _place(backend, i, j)
-    if m not in (None, 0, 1, 2):
+    order = None if m is None else _whole(m)
+    if order not in (0, 1, 2) and m is not None:
         raise ValueError(f"m is {m!r}; choose {ORDERS}, or leave it away for all of them")
     coordinate = None if k is None else _index("k", k, backend.structure.joint_names, "joint")
-    return torque_graphs(backend, _energies(backend), joint, through, [(coordinate, m)])[0]
+    return torque_graphs(backend, _energies(backend), joint, through, [(coordinate, order)])[0]
 
 
 def graph_parts_of(backend: Any, i: Name, j: Links) -> tuple[TorqueGraph, ...]:
@@ -50,14 +52,29 @@ def _place(backend: Any, i: Name, j: Links) -> tuple[int, tuple[int, ...]]:
     joint = _index("i", i, structure.joint_names, "joint")
     if j is None:
         return joint, tuple(range(structure.N))
-    chosen = (j,) if isinstance(j, int | str) else j
-    return joint, tuple(_index("j", link, structure.link_names, "link") for link in chosen)
+    chosen: Iterable[Any] = (
+        j if isinstance(j, Iterable) and not isinstance(j, str) and _whole(j) is None else (j,)
+    )
+    through = tuple(_index("j", link, structure.link_names, "link") for link in chosen)
+    for at, link in enumerate(through):
+        if link in through[:at]:
+            raise ValueError(f"j names link {structure.link_names[link]} twice; give each link once")
+    return joint, through
 
 
 def _index(argument: str, given: Name, names: Sequence[str], kind: str) -> int:
     if isinstance(given, str) and given in names:
         return names.index(given)
-    if isinstance(given, int) and not isinstance(given, bool) and 0 <= given < len(names):
-        return given
+    number = _whole(given)
+    if number is not None and 0 <= number < len(names):
+        return number
     choice = f"by number, 0..{len(names) - 1}, or by name: {', '.join(names)}"
     raise ValueError(f"{argument} is {given!r}; choose a {kind} {choice}")
+
+
+def _whole(given: Any) -> int | None:
+    """An integer of any kind, NumPy's too, as such; None for all else, truth values among it."""
+    try:
+        return None if isinstance(given, bool) else index(given)
+    except TypeError:
+        return None
