@@ -1,6 +1,7 @@
 """Autograd's graphs: each part runs to the number that closed forms give, and is told as it was recorded."""
 
 import json
+import pickle
 import re
 import shutil
 import sys
@@ -207,6 +208,9 @@ def test_an_energy_that_writes_in_place_is_refused(tmp_path: Path) -> None:
         ((0, "elbow"), "j is 'elbow'; choose a link by number, 0..2, or by name: link1, link2, link3"),
         ((0, 0, True), "k is True; choose a joint"),
         ((0, 0, 0, 3), "m is 3; choose 2 for acceleration, 1 for velocity, 0 for position and gravity"),
+        ((0, 0, 0, True), "m is True; choose 2 for acceleration"),
+        ((0, 0, 0, 2.0), "m is 2.0; choose 2 for acceleration"),
+        ((0, [1, "link2"]), "j names link link2 twice; give each link once"),
     ],
 )
 def test_what_is_not_there_is_refused_by_name(
@@ -214,6 +218,24 @@ def test_what_is_not_there_is_refused_by_name(
 ) -> None:
     with pytest.raises(ValueError, match=re.escape(complaint)):
         package_of("planar3").load("autograd").graph(*asked)
+
+
+def test_indices_of_numpy_are_integers_too(package_of: Packages) -> None:
+    robot = package_of("planar3").load("autograd")
+    same = robot.graph(np.int64(0), np.array([1, 2]), np.uint8(1), np.int32(2))
+    assert same.output == robot.graph(0, [1, 2], 1, 2).output
+
+
+def test_a_graph_is_told_in_a_line_and_refuses_in_one(package_of: Packages) -> None:
+    part = package_of("puma560").load("autograd").graph(0, 5, 1, 2)
+    sizes = f"{len(part.operations)} operations, {len(part.leaves)} leaves"
+    assert repr(part) == f"<TorqueGraph: torque on joint1 through link6, acceleration of joint2: {sizes}>"
+    with pytest.raises(
+        TypeError, match=r"^a TorqueGraph holds functions of torch, which are neither pick.*$"
+    ):
+        pickle.dumps(part)
+    with pytest.raises(TypeError, match=r"^shared_with takes other graphs, .*, and got 3$"):
+        part.shared_with(3)
 
 
 def test_other_back_ends_record_nothing(package_of: Packages) -> None:
@@ -234,6 +256,10 @@ def test_a_picture_shows_every_operation_once_and_folds_no_colour(package_of: Pa
     assert sizes == sorted(sizes, reverse=True)
     assert folded(graph) == next(drawing for drawing in drawings if len(drawing.nodes) <= LEGIBLE)
     text = dot_text(graph, drawings[2])
+    inertial = robot.graph(1, 5, 1, 2)
+    alone = graph.own([part.output for part in graph.parts].index(inertial.output))
+    assert f"label=<for q\u0308₂ alone<BR/>{alone} operations>" in text
+    assert not re.search(r"label=<\d+ operations", text)
     assert len(re.findall(r"^part\d+ \[", text, re.MULTILINE)) == len(graph.parts) == 13
     assert sum(len(part.operations) for part in graph.parts) > graph.operations
 
@@ -293,6 +319,15 @@ def test_a_value_added_to_itself_is_drawn_with_two_arrows(package_of: Packages) 
     drawing = folded(graph, "none")
     arrows = re.findall(r"^(n\d+ -> n\d+)", dot_text(graph, drawing), re.MULTILINE)
     assert len(arrows) == sum(count for _, _, count in drawing.edges()) > len(set(arrows))
+
+
+@needs_graphviz
+def test_a_picture_says_that_it_is_being_drawn(package_of: Packages) -> None:
+    robot, told = package_of("planar3").load("autograd"), list[tuple[str, int, int]]()
+    graph = overlay(robot, 0, 1, robot.graph_parts(0, 1))
+    graph_files(graph, ["json", "svg"], "none", lambda *step: told.append(step))
+    stage = f"draw {len(graph.nodes)} nodes"
+    assert told == [(stage, 0, 1), (stage, 1, 1)]
 
 
 @needs_graphviz

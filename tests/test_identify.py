@@ -1,6 +1,7 @@
 """What a log of motion and torques says of a robot's links, and what it does not say in time."""
 
 import json
+import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -25,6 +26,7 @@ from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.cli.app import app
 from linkwise.identification.base_parameters import base_parameters
+from linkwise.identification.identified_files import identified_files
 from linkwise.identification.pseudo_inertia import pseudo_inertia
 from linkwise.identification.urdf_file import urdf_text
 from linkwise.package.load import import_package
@@ -154,11 +156,11 @@ def test_a_robot_on_a_floating_base_is_identified_without_the_grounds_forces(tmp
     t, q, qd, qdd = swings(9, 30, 100)
     generator = np.random.default_rng(4)
     pi, noise = other_bodies(own_parameters(robot)), np.array([0.01, 0.02, 0.03])
-    torque = np.einsum("sijp,jp->si", robot.model.regressor(q, qd, qdd)[:, 6:], pi)
-    torque += noise * generator.standard_normal(torque.shape)
+    every = np.einsum("sijp,jp->si", robot.model.regressor(q, qd, qdd), pi)
+    torque = every[:, 6:] + noise * generator.standard_normal((len(t), 3))
     names = [*robot.joints, *(f"{joint}_effort" for joint in joints)]
     log = write_csv(tmp_path / "log.csv", np.column_stack([t, q, torque]), names)
-    found = identify(log, robot, fitting=Fitting(friction=False, unmeasured=base))
+    found = identify(log, robot, fitting=Fitting(unmeasured=base))
     # All that joints do not tell of is one body: the base.
     assert len(found.base.hidden) == 10
     assert all("(ground)" in text.split()[0] for text in found.base.hidden)
@@ -168,6 +170,21 @@ def test_a_robot_on_a_floating_base_is_identified_without_the_grounds_forces(tmp
     off = (found.fit.beta - found.base.combinations @ pi.reshape(-1)) / found.fit.beta_errors
     assert np.sqrt(np.mean(off**2)) <= 1.5
     assert found.fit.noise == pytest.approx(noise, rel=0.1)
+    # A base that floats rubs nowhere: where its torques are known it has no friction to be fitted.
+    every[:, 6:] += 0.2 * qd[:, 6:]
+    every += 0.02 * generator.standard_normal(every.shape)
+    names = [*robot.joints, *(f"tau/{joint}" for joint in robot.joints)]
+    log = write_csv(tmp_path / "log.csv", np.column_stack([t, q, every]), names)
+    found = identify(log, robot)
+    assert found.floating == base == tuple(f"base_{x}" for x in ("x", "y", "z", "yaw", "pitch", "roll"))
+    assert not found.fit.friction[:6].any()
+    assert found.fit.friction[6:, 0] == pytest.approx([0.2] * 3, rel=0.1)
+    # Friction there is none of is none, and not what the solver leaves.
+    slight = found.physical.friction[6:, 1] / found.fit.friction_errors[6:, 1]
+    assert ((slight == 0) | (slight >= 0.01)).all()
+    made = identified_files(found, Manifest.read(tmp_path / "crane"), {})
+    assert made["crane.urdf"].count(b"<dynamics") == 3
+    assert b"Without friction, as what floats has no bearings: base_x, " in made["identified.md"]
 
 
 def test_bodies_can_exist_where_least_squares_has_none(planar3: LoadedRobot, tmp_path: Path) -> None:
@@ -258,7 +275,12 @@ def test_the_command_writes_a_page_a_record_and_a_robot(
     assert record["choices"]["fitting"]["unseen"] == 0.2
     page = (tmp_path / "out/identified.md").read_text()
     assert "| mcx(link1) + 0.25 m(link2) + 0.25 m(link3) |" in page
+    lost = "a URDF file has no gravity, and is read with 9.81 m/s^2 along -z where the package has 9.80665"
+    assert f"warning: {log}: {lost}" in done.stderr
+    assert [text.split(":")[0] for text in record["warnings"]] == [lost]
+    assert record["gravity"] == [0.0, -9.80665, 0.0]
     assert "A URDF file has no gravity" in page
+    assert f"<!-- Gravity is lost: {lost}: " in (tmp_path / "out/planar3.urdf").read_text()
     read_system(tmp_path / "out/planar3.urdf")
 
 
@@ -301,6 +323,24 @@ BAD: dict[str, tuple[Callable[[LoadedRobot, Path], dict[str, Any]], str]] = {
         },
         "--unmeasured names every joint; at least one torque must be there",
     ),
+    "torques of zeros": (
+        lambda robot, folder: {"log": planar_log(robot, folder, factor=0.0)},
+        "every torque is 0 throughout, which tells nothing; see the columns",
+    ),
+    "torques without bounds": (
+        lambda robot, folder: {"log": planar_log(robot, folder, factor=1e200)},
+        ", which no robot's does; see its column and its unit",
+    ),
+    "two torques of a joint": (
+        lambda robot, folder: {
+            "log": altered(
+                planar_log(robot, folder), lambda t: t[:, [0, 1, 2, 3, 4, 5, 6, 4]], "joint1_moment"
+            )
+        },
+        "column 'joint1_moment' is a second torque of joint1, beside 'tau/joint1'; name the one to take with "
+        "--torque COLUMN=joint1, and leave the other out with --ignore-extra",
+    ),
+    "no file": (lambda robot, folder: {"log": folder / "away.csv"}, "away.csv: no such file"),
     "a torque of no joint": (
         lambda robot, folder: {
             "log": planar_log(robot, folder),
@@ -338,7 +378,7 @@ def test_the_command_says_what_a_missing_torque_leaves_open(
     package = str(directory_of("planar3"))
     command = ["identify", str(log), "--robot", package, "--out", str(out), "--backend", "numpy"]
     done = CliRunner().invoke(app, [*command, "--unmeasured", "joint1"])
-    assert "no joint for column 'tau/joint1'; leave such columns out with --ignore-extra" in str(
+    assert "'tau/joint1' is a torque of joint1, which is --unmeasured; leave such columns out with" in str(
         done.exception
     )
     done = CliRunner().invoke(app, [*command, "--unmeasured", "joint1", "--ignore-extra"])
@@ -366,6 +406,91 @@ def test_what_cannot_be_identified_is_said_in_a_line(case: str, planar3: LoadedR
         identify(**({"robot": planar3} | made(planar3, tmp_path)))
     assert message in str(raised.value)
     assert "\n" not in str(raised.value)
+    assert str(raised.value).count(".csv") <= 1
+
+
+def altered(log: Path, change: Callable[[Any], Any], *more: str) -> Path:
+    """The log with its numbers changed, and further columns."""
+    table = np.loadtxt(log, delimiter=",", skiprows=1)
+    return write_csv(log, change(table), (*JOINTS, *TORQUES, *more))
+
+
+def test_noise_of_positions_is_told_from_a_poor_motion(planar3: LoadedRobot, tmp_path: Path) -> None:
+    def shaken(table: Any) -> Any:
+        table[:, 1:4] += 1e-4 * np.random.default_rng(5).standard_normal((len(table), 3))
+        return table
+
+    log = altered(planar_log(planar3, tmp_path, seconds=20, noise=0.01, rate=200), shaken)
+    read = identify(log, planar3)
+    assert read.log.noise == pytest.approx([1e-4] * 3, rel=0.1)
+    (warning,) = read.warnings
+    assert re.fullmatch(
+        r"the positions of 'joint\d' and 2 more are noisy: 0.0001 rad of noise, differentiated, is 1[23] of "
+        r"the 1\d rad/s\^2 of acceleration \(root mean squares\); pass --cutoff, in Hz, .*",
+        warning,
+    )
+    assert identify(log, planar3, processing=Processing(lowpass=Lowpass(5.0))).warnings == ()
+    (warning,) = identify(log, planar3, processing=Processing(lowpass=Lowpass(80.0))).warnings
+    assert "lower --cutoff 80 towards the motion's own frequencies" in warning
+
+
+def reversed_torques(*joints: int) -> Callable[[Any], Any]:
+    return lambda table: table * [-1 if column - 4 in joints else 1 for column in range(7)]
+
+
+CONTRADICTIONS: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "all signs": (
+        reversed_torques(0, 1, 2),
+        "the torques are opposite to what the robot, as it is, needs (correlation -1.00): if the log counts "
+        "them so, pass --torque-factor -1",
+    ),
+    "one sign": (
+        reversed_torques(1),
+        "the torque of 'joint2' is opposite to what the robot, as it is, needs (correlation -1.00): see its "
+        "column, and turn its sign if it is so",
+    ),
+    "noise": (
+        lambda t: np.column_stack([t[:, :6], np.random.default_rng(6).standard_normal(len(t))]),
+        "no parameters explain the torque of 'joint3' (",
+    ),
+    "zeros": (
+        lambda t: t * [1, 1, 1, 1, 1, 1, 0],
+        "the torque of 'joint3' is 0 throughout, and is fitted as such; where nothing measured it, pass "
+        "--unmeasured joint3",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CONTRADICTIONS)
+def test_torques_that_contradict_the_robot_are_asked_about(
+    case: str, planar3: LoadedRobot, tmp_path: Path
+) -> None:
+    change, message = CONTRADICTIONS[case]
+    log = altered(planar_log(planar3, tmp_path, seconds=20, noise=0.01), change)
+    (warning,) = identify(log, planar3).warnings
+    assert message in warning
+    assert "\n" not in warning
+
+
+def test_torques_of_no_body_that_can_exist_are_asked_about(planar3: LoadedRobot, tmp_path: Path) -> None:
+    """Weights of the robot, and an inertia below zero."""
+    pi = own_parameters(planar3)
+    pi[2, -1] = -0.1
+    t, q, qd, qdd = swings(3, 20, 100)
+    torque = np.einsum("sijp,jp->si", planar3.model.regressor(q, qd, qdd), pi)
+    torque += 0.01 * np.random.default_rng(7).standard_normal(torque.shape)
+    log = write_csv(tmp_path / "log.csv", np.column_stack([t, q, torque]), (*JOINTS, *TORQUES))
+    found = identify(log, planar3)
+    assert found.errors(found.unseen)["fit"] == pytest.approx([0.01] * 3, rel=0.1)
+    (warning,) = found.warnings
+    assert "no bodies that can exist explain these torques as the base parameters do: of 'joint" in warning
+    assert "see the signs, units and order of the torques" in warning
+
+
+def test_zeros_for_a_torque_do_not_outweigh_the_others(planar3: LoadedRobot, tmp_path: Path) -> None:
+    log = altered(planar_log(planar3, tmp_path, seconds=20, noise=0.01), lambda t: t * [1, 1, 1, 1, 1, 1, 0])
+    noise = identify(log, planar3).fit.noise
+    assert noise[2] >= 0.5 * noise[:2].min()
 
 
 def test_torques_of_another_unit_are_asked_about(planar3: LoadedRobot, tmp_path: Path) -> None:

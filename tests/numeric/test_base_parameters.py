@@ -48,3 +48,16 @@ def test_base_parameters_are_as_many_as_the_rank_of_pinocchios_regressor(name: s
     shown = sizes > RANK * sizes.max()
     values = np.linalg.svd(rows[:, shown] / sizes[shown], compute_uv=False)
     assert int((values > RANK * values[0]).sum()) == base.count == expected
+
+
+@pytest.mark.parametrize("name", ["panda", "solo12"])
+def test_every_back_end_names_the_same_combinations(name: str, tmp_path: Path) -> None:
+    """Links that are built alike ask for equally much of the joints: rounding must not choose among them."""
+    system = read_system(next(ROBOTS.rglob(f"{name}.urdf")), ROBOT[name][0])
+    names = ("numpy", "torch", "native")
+    write_package(generate(system, names, "robot", kernel="loops"), tmp_path / "robot")
+    package = open_package(tmp_path / "robot")
+    first, *others = (base_parameters(package.load(backend)) for backend in names)
+    for other in others:
+        assert (other.picked, other.texts()) == (first.picked, first.texts())
+        assert other.condition == pytest.approx(first.condition, rel=1e-6)

@@ -13,6 +13,7 @@ from linkwise.graphs import FOLDS, FORMATS, Overlay, graph_files, graph_json, gr
 from linkwise.output import require_writable, write_files
 from linkwise.package.load import open_package, staying
 from linkwise.package.write import refuse_inside_package
+from linkwise.progress import progress
 from linkwise.report import position
 
 app = typer.Typer(add_completion=False)
@@ -51,7 +52,9 @@ def graph(
     k = None if coordinate == "all" else position(coordinate, robot.joint_names, "--coordinate")
     found = overlay(robot, i, j, _parts(robot, i, j, k, None if order == "all" else int(order)))
     if out is not None:
-        write_files(out, graph_files(found, wanted, None if fold == "auto" else fold))
+        with progress() as advance:
+            files = graph_files(found, wanted, None if fold == "auto" else fold, advance)
+        write_files(out, files)
     if as_json:
         print(json_text(graph_json(found), indent=1))
         return

@@ -1,7 +1,7 @@
 """The command `identify`."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -34,6 +34,7 @@ from linkwise.escape import json_text, listed
 from linkwise.identification import Fitting, Identification
 from linkwise.identification import identify as identified
 from linkwise.identification.identified_files import identified_files, record
+from linkwise.identification.urdf_file import lost_gravity
 from linkwise.output import require_writable, write_files
 from linkwise.package.manifest import Manifest
 from linkwise.package.write import refuse_inside_package
@@ -90,8 +91,12 @@ def identify(
     require_writable(out)
     with shown_progress(UNITS) as progress:
         found = identified(log, package, reading, processing, fitting, progress)
+    manifest = Manifest.read(robot)
+    assert manifest.tree is not None
+    if lost := lost_gravity(manifest.tree):
+        found = replace(found, warnings=(*found.warnings, lost))
     chosen = choices(reading, processing) | {"fitting": asdict(fitting)}
-    files = write_files(out, identified_files(found, Manifest.read(robot), chosen))
+    files = write_files(out, identified_files(found, manifest, chosen))
     for warning in found.warnings:
         tell(f"warning: {log}: {warning}", err=True)
     if found.log.ignored:
@@ -112,6 +117,8 @@ def _told(found: Identification, files: Sequence[Path]) -> Iterator[str]:
     if found.unmeasured:
         hidden = f"; not told without: {listed(found.base.hidden)}" if found.base.hidden else ""
         yield f"no torque of {listed(found.unmeasured)}{hidden}"
+    if found.floating:
+        yield f"no friction of {listed(found.floating)}: what floats has no bearings"
     for i, joint in enumerate(found.joints):
         yield (
             f"{joint}: torque {sizes[i]:.3g}, error {errors['fit'][i]:.3g} {what}, by the bodies "

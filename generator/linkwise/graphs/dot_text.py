@@ -77,12 +77,22 @@ def _node(graph: Overlay, at: int, node: DrawnNode) -> str:
     else:
         shape = "folder"
         place = f"{PLACES[node.derivative]} {node.source}".strip()
-        text = "<BR/>".join(filter(None, (html_text(place), f"{len(node.inner)} operations")))
-        tip = place
+        tip = place if node.source else _purpose(graph, node)
+        text = f"{html_text(place) if node.source else _written(tip)}<BR/>{len(node.inner)} operations"
     return (
         f'n{at} [shape={shape}, label=<{text}>, fillcolor="{fill}", fontcolor="{_ink(fill)}", '
         f'tooltip="{_quoted(tip)}"];'
     )
+
+
+def _purpose(graph: Overlay, node: DrawnNode) -> str:
+    """What folded operations of several lines, or of none, are for."""
+    if node.part is None:
+        return "for several parts"
+    order, k = graph.parts[node.part].order, graph.coordinate(node.part)
+    if k is None or order is None:
+        return f"for {part_label(graph, node.part)} alone"
+    return f"for {DOTS[order]}_{k + 1} alone"
 
 
 def _results(graph: Overlay, drawing: Drawing) -> Iterator[str]:

@@ -11,22 +11,30 @@ from linkwise.extras import extra
 from linkwise.graphs.dot_text import dot_text
 from linkwise.graphs.folding import folded
 from linkwise.graphs.overlay import KINDS, Overlay
+from linkwise.progress import Progress, silent
 
 FORMATS = ("svg", "png", "dot", "graphml", "json")
 MOTIONS = {order: name for name, order in KINDS.items()}
 
 
-def graph_files(graph: Overlay, formats: Iterable[str], fold: str | None = None) -> dict[str, bytes]:
+def graph_files(
+    graph: Overlay, formats: Iterable[str], fold: str | None = None, progress: Progress = silent
+) -> dict[str, bytes]:
     """Files by name, in these formats; `fold` is for pictures, None for the least that makes one legible.
 
     Raises LinkwiseError where a program or a library is missing.
     """
     texts: dict[str, bytes] = {}
-    dot = dot_text(graph, folded(graph, fold))
+    drawing = folded(graph, fold)
+    dot = dot_text(graph, drawing)
+    stage = f"draw {len(drawing.nodes):,} nodes"
     for kind in formats:
         match kind:
             case "svg" | "png":
+                # Graphviz says nothing on its way, and needs minutes for thousands of nodes.
+                progress(stage, 0, 1)
                 content = _drawn(dot, kind)
+                progress(stage, 1, 1)
             case "dot":
                 content = dot.encode()
             case "graphml":

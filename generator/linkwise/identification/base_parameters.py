@@ -4,7 +4,9 @@
 
 The regressor of many random motions has dependent columns. QR with column pivoting picks independent ones,
 Y P = Q [R1 R2], and the others are their combinations, Y2 = Y1 R1^-1 R2: so with pi1 the picked parameters
-Y pi = Y1 beta, beta = pi1 + R1^-1 R2 pi2, whatever the motion.
+Y pi = Y1 beta, beta = pi1 + R1^-1 R2 pi2, whatever the motion. Links that are built alike have columns of
+equal size, of which rounding would pick one: here the first in order is, so that every back end names the
+same combinations.
 
 Where some joints' torques are not measured, their rows are left out: Y1 of the others, in turn, has dependent
 columns, and the same is done once more, with beta for pi.
@@ -16,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwise.extras import extra
 from linkwise.package.load import Array, Model
 
 NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
@@ -27,6 +28,8 @@ LATER = 0.01
 """What columns of masses are scaled by: a sum is named after the first moment that a mass adds to, say."""
 RANK = 1e-8
 """Of the largest: a smaller diagonal entry of R, of columns scaled to one size, is rounding, and no rank."""
+TIE = 1e-6
+"""Of the larger: what of columns differs by less is equally large."""
 NOTHING = 1e-9
 """Of a column's size: a smaller part of another column is rounding too."""
 SPEED = 3.0
@@ -110,14 +113,32 @@ def _independent(rows: Array, weights: Array) -> tuple[NDArray[np.intp], NDArray
     sizes = np.sqrt(np.mean(rows**2, axis=0))
     sizes[sizes <= NOTHING * sizes.max(initial=0.0)] = np.inf  # what no motion shows
     sizes = sizes / weights
-    r, order = extra("scipy.linalg").qr(rows / sizes, mode="r", pivoting=True)
-    diagonal = np.abs(np.diag(r))
-    rank = int((diagonal > RANK * diagonal[0]).sum())
-    picked, rest = order[:rank], order[rank:]
-    shares = np.linalg.solve(r[:rank, :rank], r[:rank, rank:])
+    q, a, picked = _orthogonal(rows / sizes)
+    rest = np.setdiff1d(np.arange(len(sizes)), picked)
+    shares = np.linalg.solve(q.T @ a[:, picked], q.T @ a[:, rest])
     shares[np.abs(shares) < NOTHING] = 0.0
     scaled = shares * np.where(np.isinf(sizes[rest]), 0.0, sizes[rest]) / sizes[picked][:, None]
     return picked, rest, scaled
+
+
+def _orthogonal(rows: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Q, the columns in as few rows as there are columns, and which of them span all, in the order picked."""
+    a: Array = np.asarray(np.linalg.qr(rows, mode="r"))
+    left, q, picked = a.copy(), np.zeros((len(a), 0)), list[int]()
+    largest = 0.0
+    while len(picked) < min(a.shape):
+        sizes = np.linalg.norm(left, axis=0)
+        at = int(np.argmax(sizes >= (1 - TIE) * sizes.max()))
+        largest = max(largest, sizes[at])
+        if sizes[at] <= RANK * largest:
+            break
+        column = left[:, at] - q @ (q.T @ left[:, at])  # once more, for what rounding has left
+        column /= np.linalg.norm(column)
+        left -= np.outer(column, column @ left)
+        left[:, at] = 0.0
+        q = np.column_stack([q, column])
+        picked.append(at)
+    return q, a, np.array(picked, dtype=np.intp)
 
 
 def combination_text(links: Sequence[str], row: Array, own: int) -> str:
@@ -132,5 +153,6 @@ def combination_text(links: Sequence[str], row: Array, own: int) -> str:
 
 
 def _term(factor: float, name: str) -> str:
-    sign, size = ("-" if factor < 0 else "+"), f"{abs(factor):.6g}"
+    # Rounded twice: exact halves of the last digit shown are not left to what rounding errors there are.
+    sign, size = ("-" if factor < 0 else "+"), f"{float(f'{abs(factor):.10g}'):.6g}"
     return f"{sign} {name}" if size == "1" else f"{sign} {size} {name}"

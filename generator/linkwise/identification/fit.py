@@ -8,8 +8,8 @@ Engineering Practice 9(12), 2001).
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from linkwise.errors import LinkwiseError
 from linkwise.identification.base_parameters import SPEED, BaseParameters
 from linkwise.identification.normal_factors import JointEquations
 from linkwise.package.load import Array
@@ -24,9 +24,10 @@ POOR, WORST = 30.0, 1000.0
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What a log says of base parameters (base,) and friction (n, 2), viscous and Coulomb, zeros for none.
+    """What a log says of base parameters (base,) and friction (n, 2), viscous and Coulomb.
 
-    n are the joints whose torques are measured, in the robot's order.
+    Friction is zero where a joint has none. n are the joints whose torques are measured, in the robot's
+    order.
     """
 
     beta: Array
@@ -42,57 +43,71 @@ class Fit:
     """[W | tau] of all joints, weighted: the unknowns are beta and, joint by joint, its friction."""
 
 
-def weighted_fit(equations: JointEquations, base: BaseParameters, friction: bool) -> Fit:
-    """Fit all joints together; raises LinkwiseError where the log does not show a combination."""
+@dataclass(frozen=True)
+class Excitation:
+    """How well equations tell the unknowns apart: their condition number, and what they tell least."""
+
+    condition: float
+    """Of columns as large as random motions make them."""
+    worst: str
+
+
+def weighted_fit(equations: JointEquations, base: BaseParameters, rubs: NDArray[np.bool_]) -> Fit:
+    """Fit all joints together; `rubs` (n,) says which of them have friction."""
     n, noise = len(equations.triangles), np.ones(len(equations.triangles))
-    condition = _excitation(stacked(equations, noise, friction), base)
+    condition = excitation(equations, base, rubs).condition
     for _ in range(ROUNDS):
-        triangle = stacked(equations, noise, friction)
-        beta, rubbing = _solved(triangle, base, n, friction)
-        free = max(equations.rows - len(triangle) / n, 1.0)
-        left = equations.errors(beta, rubbing) * np.sqrt(equations.rows / free)
-        noise = np.maximum(left, LEAST * (equations.sizes().max() or 1.0))
-    triangle = stacked(equations, noise, friction)
-    beta, rubbing = _solved(triangle, base, n, friction)
-    inverse = np.linalg.inv(triangle[:-1, :-1])
-    errors = np.linalg.norm(inverse, axis=1)
-    own = errors[base.count :].reshape(n, 2) if friction else np.zeros((n, 2))
-    return Fit(beta, rubbing, errors[: base.count], own, noise, condition, triangle)
+        triangle = stacked(equations, noise, rubs)
+        beta, friction = _solved(triangle, base, rubs)
+        noise = _noise(equations, beta, friction, max(equations.rows - len(triangle) / n, 1.0))
+    triangle = stacked(equations, noise, rubs)
+    beta, friction = _solved(triangle, base, rubs)
+    errors = np.linalg.norm(np.linalg.inv(triangle[:-1, :-1]), axis=1)
+    own = np.zeros((n, 2))
+    own[rubs] = errors[base.count :].reshape(-1, 2)
+    return Fit(beta, friction, errors[: base.count], own, noise, condition, triangle)
 
 
-def stacked(equations: JointEquations, noise: Array, friction: bool) -> Array:
+def _noise(equations: JointEquations, beta: Array, friction: Array, free: float) -> Array:
+    """sigma of each joint, (n,), of what is left of as many equations as are `free`."""
+    left, sizes = equations.errors(beta, friction) * np.sqrt(equations.rows / free), equations.sizes()
+    noise: Array = np.maximum(left, LEAST * (sizes.max() or 1.0))
+    # A torque of zeros is met exactly by bodies without mass: it must not count as free of noise for that.
+    still = sizes == 0
+    if still.any() and not still.all():
+        noise[still] = np.maximum(noise[still], np.median(noise[~still]))
+    return noise
+
+
+def stacked(equations: JointEquations, noise: Array, rubs: NDArray[np.bool_]) -> Array:
     """Triangle of all joints' equations, each divided by its noise."""
     n, size = equations.triangles.shape[:2]
     base = size - 3
-    unknowns = base + (2 * n if friction else 0)
-    rows = np.zeros((n, size, unknowns + 1))
+    rows = np.zeros((n, size, base + 2 * int(rubs.sum()) + 1))
     rows[:, :, :base] = equations.triangles[:, :, :base]
     rows[:, :, -1] = equations.triangles[:, :, -1]
-    for i in range(n if friction else 0):
-        rows[i, :, base + 2 * i : base + 2 * i + 2] = equations.triangles[i, :, base : base + 2]
+    for at, i in enumerate(np.flatnonzero(rubs)):
+        rows[i, :, base + 2 * at : base + 2 * at + 2] = equations.triangles[i, :, base : base + 2]
     weighted = rows / noise[:, None, None]
     triangle = np.linalg.qr(weighted.reshape(n * size, -1), mode="r")
     return np.asarray(triangle)
 
 
-def _solved(triangle: Array, base: BaseParameters, n: int, friction: bool) -> tuple[Array, Array]:
-    """beta and friction."""
+def _solved(triangle: Array, base: BaseParameters, rubs: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """beta and friction (n, 2)."""
     x = np.linalg.solve(triangle[:-1, :-1], triangle[:-1, -1]).astype(float)
-    return x[: base.count], x[base.count :].reshape(n, 2) if friction else np.zeros((n, 2))
+    friction = np.zeros((len(rubs), 2))
+    friction[rubs] = x[base.count :].reshape(-1, 2)
+    return x[: base.count], friction
 
 
-def _excitation(triangle: Array, base: BaseParameters) -> float:
-    """Condition number, columns as large as random motions make them; LinkwiseError for one far too large."""
-    frictions = triangle.shape[1] - 1 - base.count
-    sizes = np.concatenate([base.sizes, np.tile([SPEED / np.sqrt(3.0), 1.0], frictions // 2)])
+def excitation(equations: JointEquations, base: BaseParameters, rubs: NDArray[np.bool_]) -> Excitation:
+    """How well a log's motion tells the unknowns apart, all joints weighing the same."""
+    triangle = stacked(equations, np.ones(len(rubs)), rubs)
+    sizes = np.concatenate([base.sizes, np.tile([SPEED / np.sqrt(3.0), 1.0], int(rubs.sum()))])
     _, values, directions = np.linalg.svd(triangle[:-1, :-1] / sizes)
-    condition = float(values[0] / max(values[-1], 1e-300))
-    if condition > WORST * base.condition:
-        worst = int(np.abs(directions[-1]).argmax())
-        what = base.texts()[worst] if worst < base.count else "a joint's friction"
-        raise LinkwiseError(
-            f"too little excitation: the log does not tell {what} from the rest (condition number "
-            f"{condition:.1g}, {base.condition:.1g} for random motions); record a motion in which every "
-            "joint moves far and fast, in many postures"
-        )
-    return condition
+    worst = int(np.abs(directions[-1]).argmax())
+    return Excitation(
+        float(values[0] / max(values[-1], 1e-300)),
+        base.texts()[worst] if worst < base.count else "a joint's friction",
+    )

@@ -9,7 +9,7 @@ from linkwise.escape import json_text, markdown
 from linkwise.identification.base_parameters import NAMES, UNITS
 from linkwise.identification.identified_links import Identification
 from linkwise.identification.pseudo_inertia import central
-from linkwise.identification.urdf_file import gravity_differs, urdf_text
+from linkwise.identification.urdf_file import lost_gravity, urdf_text
 from linkwise.package.manifest import Manifest
 
 COEFFICIENTS = {"rad": ("N m s/rad", "N m"), "m": ("N s/m", "N")}
@@ -20,11 +20,13 @@ def identified_files(found: Identification, manifest: Manifest, choices: dict[st
     """The files, by name; `choices` are recorded."""
     assert manifest.tree is not None
     pi = dict(zip(found.robot.links, found.physical.pi, strict=True))
-    friction = dict(zip(found.joints, found.physical.friction, strict=True))
+    every = zip(found.joints, found.physical.friction, strict=True)
+    friction = {joint: own for joint, own in every if joint not in found.floating}
     urdf = urdf_text(manifest.name, manifest.tree, manifest.joints, pi, friction)
+    about = record(found) | {"gravity": list(manifest.tree.gravity), "choices": choices}
     texts = {
-        "identified.json": json_text(record(found) | {"choices": choices}, indent=1) + "\n",
-        "identified.md": page(found, gravity_differs(manifest.tree)),
+        "identified.json": json_text(about, indent=1) + "\n",
+        "identified.md": page(found, lost_gravity(manifest.tree)),
         f"{manifest.name}.urdf": urdf,
     }
     return {name: text.encode() for name, text in texts.items()}
@@ -66,15 +68,16 @@ def record(found: Identification) -> dict[str, Any]:
         "base_parameters": base,
         "joints": joints,
         "unmeasured_joints": list(found.unmeasured),
+        "joints_without_bearings": list(found.floating),
         "hidden": list(found.base.hidden),
         "links": links,
         "warnings": list(found.warnings),
     }
 
 
-def page(found: Identification, gravity: bool) -> str:
+def page(found: Identification, lost: str) -> str:
     """The page, in Markdown."""
-    return "\n".join([*_head(found), *_joints(found), *_base(found), *_links(found, gravity), ""])
+    return "\n".join([*_head(found), *_joints(found), *_base(found), *_links(found), *_lost(lost), ""])
 
 
 def _head(found: Identification) -> Iterator[str]:
@@ -106,6 +109,10 @@ def _joints(found: Identification) -> Iterator[str]:
         rubs = zip(found.fit.friction[i], found.fit.friction_errors[i], strict=True)
         cells = [markdown(name), *numbers, *(f"{f:.4g} ± {e:.1g}" for f, e in rubs)]
         yield f"| {' | '.join([*cells, ', '.join(COEFFICIENTS[unit])])} |"
+    if found.floating:
+        yield ""
+        names = ", ".join(map(markdown, found.floating))
+        yield f"Without friction, as what floats has no bearings: {names}."
     if found.unmeasured:
         yield ""
         yield f"Not measured, and left out of the fit: {', '.join(map(markdown, found.unmeasured))}."
@@ -133,7 +140,7 @@ def _base(found: Identification) -> Iterator[str]:
     )
 
 
-def _links(found: Identification, gravity: bool) -> Iterator[str]:
+def _links(found: Identification) -> Iterator[str]:
     yield from ("", "## Bodies that can exist and fit", "")
     yield "| link | mass, kg | centre of mass, m | principal moments about it, kg m² | mass in the package |"
     yield "|---|---|---|---|---|"
@@ -148,9 +155,8 @@ def _links(found: Identification, gravity: bool) -> Iterator[str]:
         "the package's own bodies as the rest allows: no mass here is measured unless the table above has it "
         "alone."
     )
+
+
+def _lost(gravity: str) -> Iterator[str]:
     if gravity:
-        yield ""
-        yield (
-            "A URDF file has no gravity, and is read with 9.81 m/s² along -z: the package's is another, so "
-            "that weights will be too."
-        )
+        yield from ("", "## Gravity", "", f"{markdown(gravity[0].upper() + gravity[1:])}.")

@@ -1,16 +1,18 @@
 """`identify`: from a log and a robot to what its links carry."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.analysis.settings import Processing, Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.identification.base_parameters import BaseParameters, base_parameters
-from linkwise.identification.fit import POOR, Fit, weighted_fit
+from linkwise.identification.bearings import floating_coordinates
+from linkwise.identification.fit import WORST, Excitation, Fit, excitation, weighted_fit
+from linkwise.identification.log_warnings import doubts, noisy_positions
 from linkwise.identification.normal_factors import JointEquations, joint_equations
 from linkwise.identification.physical_fit import PhysicalFit, physical_fit
 from linkwise.identification.torque_log import TorqueLog, read_torque_log
@@ -18,9 +20,6 @@ from linkwise.package.load import Array
 from linkwise.progress import Progress, silent
 from linkwise.runtime.rule.joint_tree import Bodies
 from linkwise.runtime.rule.regressors import inertial_parameters
-
-LARGE = 100.0
-"""Times: torques so much larger, or smaller, than the robot's own are perhaps in another unit."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,8 @@ class Identification:
     unseen: JointEquations
     """Equations of the part of the log that was fitted, and of the rest."""
     warnings: tuple[str, ...]
+    floating: tuple[str, ...]
+    """Those coordinates of floating joints whose torques are measured: without bearings, and friction."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -108,13 +109,18 @@ def identify(
         joint_equations(read, span, loaded.model, base, processing, progress)
         for span in ((read.start, end), (end, read.stop))
     )
+    joints = [loaded.joints[i] for i in read.measured]
+    without = floating_coordinates(loaded.bodies or ())
+    floating = tuple(joint for joint in joints if joint in without)
+    rubs = np.array([fitting.friction and joint not in floating for joint in joints])
+    noisy = noisy_positions(read, loaded.joints, loaded.units, processing)
     with within(str(log)):
-        _refuse_few(seen, base, fitting)
-        fit = weighted_fit(seen, base, fitting.friction)
-        joints = [loaded.joints[i] for i in read.measured]
-        warnings = (*_units(seen, base, own, joints), *_poor(fit, base))
-        physical = physical_fit(fit, base, own, fitting.friction)
-    return Identification(loaded, read, base, fit, physical, own, seen, unseen, (*read.warnings, *warnings))
+        _refuse_few(seen, base, rubs)
+        _refuse_unexcited(excitation(seen, base, rubs), base, noisy)
+        fit = weighted_fit(seen, base, rubs)
+        physical = physical_fit(fit, base, own, rubs)
+    found = Identification(loaded, read, base, fit, physical, own, seen, unseen, read.warnings, floating)
+    return replace(found, warnings=(*read.warnings, *doubts(found, noisy)))
 
 
 def _own_parameters(robot: LoadedRobot) -> Array:
@@ -131,34 +137,23 @@ def _own_parameters(robot: LoadedRobot) -> Array:
     return pi
 
 
-def _refuse_few(seen: JointEquations, base: BaseParameters, fitting: Fitting) -> None:
-    unknowns = base.count + (2 * len(seen.triangles) if fitting.friction else 0)
+def _refuse_few(seen: JointEquations, base: BaseParameters, rubs: NDArray[np.bool_]) -> None:
+    if not seen.sizes().any():
+        raise LinkwiseError("every torque is 0 throughout, which tells nothing; see the columns")
+    unknowns = base.count + 2 * int(rubs.sum())
     if seen.rows * len(seen.triangles) < 2 * unknowns:
         raise LinkwiseError(
             f"{seen.rows} samples are too few for {unknowns} unknowns; give a longer log, or lower --unseen"
         )
 
 
-def _poor(fit: Fit, base: BaseParameters) -> tuple[str, ...]:
-    if fit.condition <= POOR * base.condition:
-        return ()
-    return (
-        f"little excitation: the condition number is {fit.condition:.3g}, {base.condition:.3g} for random "
-        "motions; see the standard errors, or record a motion in which every joint moves far and fast",
-    )
-
-
-def _units(seen: JointEquations, base: BaseParameters, own: Array, joints: Sequence[str]) -> tuple[str, ...]:
-    """A warning where torques are not of the size that the package expects."""
-    n, beta = len(seen.triangles), base.combinations @ own.reshape(-1)
-    # What the package expects is Y beta: the error of the equations without their torque.
-    bare = JointEquations(seen.triangles.copy(), seen.rows)
-    bare.triangles[:, :, -1] = 0.0
-    expected, found = bare.errors(beta, np.zeros((n, 2))), seen.sizes()
-    at = int(np.argmax(found))
-    if not expected[at] or 1 / LARGE < found[at] / expected[at] < LARGE:
-        return ()
-    return (
-        f"the torque of {joints[at]!r} is {found[at]:.3g} (root mean square) where the robot, as it is, "
-        f"needs {expected[at]:.3g}: if it is in another unit, pass --torque-factor, 0.001 for N mm",
+def _refuse_unexcited(found: Excitation, base: BaseParameters, noisy: str) -> None:
+    """LinkwiseError for a condition number far too large."""
+    if found.condition <= WORST * base.condition:
+        return
+    raise LinkwiseError(
+        noisy
+        or f"too little excitation: the log does not tell {found.worst} from the rest (condition number "
+        f"{found.condition:.1g}, {base.condition:.1g} for random motions); record a motion in which every "
+        "joint moves far and fast, in many postures"
     )

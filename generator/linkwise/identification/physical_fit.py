@@ -12,6 +12,7 @@ by far. Solved by Clarabel (P. Goulart, Y. Chen, arXiv:2405.12762), an interior-
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
@@ -24,6 +25,8 @@ SPECK = 1e-6
 """Of a link's size: how far inside of what can exist a body stays, so that rounding keeps it there."""
 SMALLEST = 0.05
 """Of the largest mass, or length: the least size that a link's parameters are taken to have."""
+SLIGHT = 0.01
+"""Of its standard error: less friction is what the solver leaves of none."""
 SOLVED = ("Solved", "AlmostSolved")
 
 
@@ -38,11 +41,14 @@ class PhysicalFit:
     friction: Array
 
 
-def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: bool) -> PhysicalFit:
-    """Fit bodies near the robot's `own` parameters (N, 10); raises LinkwiseError where the solver fails."""
+def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: NDArray[np.bool_]) -> PhysicalFit:
+    """Fit bodies near the robot's `own` parameters (N, 10), and friction where a joint rubs, (n,).
+
+    Raises LinkwiseError where the solver fails.
+    """
     sizes = _sizes(own)
-    n, count = len(fit.friction), own.size
-    frictions = 2 * n if rubs else 0
+    count = own.size
+    frictions = 2 * int(rubs.sum())
     rubbing = _friction_sizes(fit, rubs)
     scale = np.concatenate([sizes.reshape(-1), rubbing])
     reach = np.zeros((base.count + frictions, count + frictions))
@@ -53,7 +59,9 @@ def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: bool) -> Phys
     left = np.concatenate([equations, prior])
     right = np.concatenate([fit.triangle[:-1, -1], (own / sizes).reshape(-1)])
     x = scale * _within_cones(left, right, sizes, frictions)
-    friction = x[count:].reshape(n, 2) if rubs else np.zeros((n, 2))
+    friction = np.zeros_like(fit.friction)
+    friction[rubs] = x[count:].reshape(-1, 2)
+    friction[friction < SLIGHT * fit.friction_errors] = 0.0
     return PhysicalFit(x[:count].reshape(own.shape), np.maximum(friction, 0.0))
 
 
@@ -119,7 +127,8 @@ def _sizes(own: Array) -> Array:
     return sizes
 
 
-def _friction_sizes(fit: Fit, rubs: bool) -> Array:
+def _friction_sizes(fit: Fit, rubs: NDArray[np.bool_]) -> Array:
     """One unit for each friction: what it was found to be, or its standard error."""
-    found = np.maximum(np.abs(fit.friction), fit.friction_errors)
-    return np.where(found > 0, found, 1.0).reshape(-1) if rubs else np.zeros(0)
+    found = np.maximum(np.abs(fit.friction), fit.friction_errors)[rubs].reshape(-1)
+    sizes: Array = np.where(found > 0, found, 1.0)
+    return sizes

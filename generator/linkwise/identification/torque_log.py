@@ -14,6 +14,7 @@ from linkwise.analysis.settings import Lowpass, Processing, Reading
 from linkwise.analysis.stream import span_of
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
+from linkwise.identification.position_noise import position_noise
 from linkwise.package.load import Array
 from linkwise.progress import Progress
 
@@ -21,6 +22,8 @@ SPELLINGS = ("tau/{}", "tau_{}", "{}_moment", "{}_force", "{}_torque", "{}/effor
 """How logs name the torque of a joint: `analyze`, scripts, OpenSim's inverse dynamics, ROS."""
 PERIODS = 1.5
 """Of the cutoff, for each order: the filter's response to what is beyond an end has died down by then."""
+ENDLESS = 1e100
+"""N m, N, rad or m: no number of a robot, and its square still is a number."""
 STILL = 0.01
 """rad or m: within less, a joint's motion shows nothing but noise."""
 
@@ -32,6 +35,8 @@ class TorqueLog:
     source: str
     rate: float
     q: Array
+    noise: Array
+    """Standard deviation of the positions' noise, unfiltered, (n,)."""
     measured: tuple[int, ...]
     """Joints, counted from 0 and ascending, whose torques there are."""
     torque: Array
@@ -59,10 +64,11 @@ def read_torque_log(
     stands still.
     """
     measured = _measured(robot.joints, torques, unmeasured)
+    there = open_log(path).columns
     with within(str(path)):
-        columns = _torque_columns(
-            open_log(path).columns, robot.joints, [robot.joints[i] for i in measured], torques
-        )
+        columns = _torque_columns(there, robot.joints, [robot.joints[i] for i in measured], torques)
+        if not reading.ignore_extra:
+            _refuse_more_torques(there, robot.joints, columns, measured)
     names = tuple(f"torque of {robot.joints[i]}" for i in measured)
     mapping = (*reading.mapping, *zip(columns, names, strict=True))
     samples = read_samples(
@@ -74,14 +80,17 @@ def read_torque_log(
     )
     n = len(robot.joints)
     q, torque = samples.q[:, :n].copy(), samples.q[:, n:] * factor
+    noise = position_noise(q)
     with within(str(path)):
+        _refuse_endless(q, robot.joints, "position")
+        _refuse_endless(torque, [robot.joints[i] for i in measured], "torque")
         start, stop = span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(q, samples.rate, processing.lowpass)
             start, stop = _settled(start, stop, samples.rate, processing.lowpass)
         _refuse_still(q[start:stop], robot, measured)
     told = samples.warnings, samples.ignored
-    return TorqueLog(path.name, samples.rate, q, measured, torque, start, stop, *told)
+    return TorqueLog(path.name, samples.rate, q, noise, measured, torque, start, stop, *told)
 
 
 def _measured(
@@ -140,6 +149,35 @@ def _torque_columns(
             f"of a floating base, say so with --unmeasured {example}"
         )
     return found
+
+
+def _refuse_more_torques(
+    columns: Sequence[str], joints: Sequence[str], used: Sequence[str], measured: Sequence[int]
+) -> None:
+    """LinkwiseError for a torque's column left over: of a joint that has another, or is unmeasured."""
+    for i, joint in enumerate(joints):
+        for column in (spelling.format(joint) for spelling in SPELLINGS):
+            if column not in columns or column in (*used, *joints):
+                continue
+            if i not in measured:
+                raise LinkwiseError(
+                    f"column {column!r} is a torque of {joint}, which is --unmeasured; leave such columns "
+                    "out with --ignore-extra"
+                )
+            raise LinkwiseError(
+                f"column {column!r} is a second torque of {joint}, beside {used[measured.index(i)]!r}; name "
+                f"the one to take with --torque COLUMN={joint}, and leave the other out with --ignore-extra"
+            )
+
+
+def _refuse_endless(values: Array, joints: Sequence[str], what: str) -> None:
+    peaks = np.abs(values).max(axis=0, initial=0.0)
+    at = int(peaks.argmax())
+    if peaks[at] > ENDLESS:
+        raise LinkwiseError(
+            f"the {what} of {joints[at]!r} reaches {peaks[at]:.3g}, which no robot's does; see its column "
+            "and its unit"
+        )
 
 
 def _refuse_still(q: Array, robot: LoadedRobot, measured: Sequence[int]) -> None:

@@ -18,9 +18,16 @@ STANDARD = 9.81
 """m/s^2 along -z: a URDF file says nothing of gravity, and this is what it is read with."""
 
 
-def gravity_differs(tree: RigidTree) -> bool:
-    """Whether gravity is stronger or weaker than a URDF file is read with."""
-    return not math.isclose(float(np.linalg.norm(tree.gravity)), STANDARD, rel_tol=1e-9)
+def lost_gravity(tree: RigidTree) -> str:
+    """What is lost where gravity is stronger or weaker than a URDF file is read with; else nothing."""
+    size = float(np.linalg.norm(tree.gravity))
+    if math.isclose(size, STANDARD, rel_tol=1e-9):
+        return ""
+    heavier = f"is {STANDARD / size:.6g} times as heavy" if size else "has weight"
+    return (
+        f"a URDF file has no gravity, and is read with {STANDARD} m/s^2 along -z where the package has "
+        f"{size:.6g}: the robot generated from it {heavier}"
+    )
 
 
 def urdf_text(
@@ -34,6 +41,7 @@ def urdf_text(
     base = _unused("base", [body.link for body in tree.bodies])
     lines = [
         '<?xml version="1.0"?>',
+        *([f"<!-- Gravity is lost: {lost}. -->"] if (lost := lost_gravity(tree)) else []),
         f"<robot name={_attribute(name)}>",
         f"  <link name={_attribute(base)}/>",
     ]

@@ -1,0 +1,40 @@
+"""Noise of positions, and what differentiating makes of it.
+
+Positions move so little between samples that their sixth differences are noise alone: independent noise of
+standard deviation sigma makes differences of sigma sqrt(924), 924 being the sum of the squares of their
+weights.
+A second derivative multiplies noise by the square of the sampling rate: 1e-4 rad at 200 Hz are 12 rad/s^2.
+"""
+
+import math
+
+import numpy as np
+
+from linkwise.analysis.derivatives import derivatives
+from linkwise.analysis.filtering import lowpass
+from linkwise.analysis.settings import Processing
+from linkwise.package.load import Array
+
+ORDER = 6
+LONGEST = 1 << 16
+"""Samples that noise is told from."""
+TRIED = 1 << 13
+"""Samples of made-up noise."""
+
+
+def position_noise(q: Array) -> Array:
+    """Standard deviation of the noise of evenly spaced positions (S, n), (n,)."""
+    differences = np.diff(q[:LONGEST], n=ORDER, axis=0)
+    if not len(differences):
+        return np.zeros(q.shape[1])
+    sigma: Array = np.sqrt(np.mean(differences**2, axis=0) / math.comb(2 * ORDER, ORDER))
+    return sigma
+
+
+def noise_gain(rate: float, processing: Processing) -> float:
+    """rad/s^2 (r.m.s.) of acceleration for each rad of noise, by differentiating made-up noise likewise."""
+    noise = np.random.default_rng(0).standard_normal((TRIED, 1))
+    if processing.lowpass is not None:
+        lowpass(noise, rate, processing.lowpass)
+    middle = TRIED // 4, 3 * TRIED // 4
+    return float(np.std(derivatives(noise, rate, *middle, processing)[2]))
