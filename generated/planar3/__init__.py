@@ -14,7 +14,7 @@ from .names import ROBOT
 from .runtime.dynamics import Dynamics
 from .runtime.interface import Backend
 from .runtime.rule.joint_tree import Bodies
-from .runtime.quantities import Coefficients, GradientPropagation, Packed, Propagation
+from .runtime.quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
 from .runtime.rule.regressors import inertial_parameters
 from .runtime.structure import Layout
 
@@ -179,6 +179,7 @@ __all__ = [
     "GradientPropagation",
     "Layout",
     "Packed",
+    "PassiveTorque",
     "Propagation",
     "bodies",
     "inertial_parameters",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .chosen_names import position_of
 from .parameter_values import ParametricBody, checked_values
+from .passive_joints import PassiveJoint, PassiveSums, passive_sums
 
 Indices = NDArray[np.intp]
 
@@ -57,6 +58,8 @@ class Structure:
     """Run-time parameters and the values they have unless others are given."""
     bodies: tuple[ParametricBody, ...] = ()
     """Links that parameters may not make such as no body can be."""
+    passive: tuple[PassiveJoint, ...] = ()
+    """What joints have of their own: springs, damping, friction, armature."""
 
     @cached_property
     def n(self) -> int:
@@ -93,6 +96,11 @@ class Structure:
         """Index j of a link by number from 0 or by name; raises ValueError with the argument's name."""
         return position_of(given, self.link_names, "link", argument)
 
+    @cached_property
+    def passive_sums(self) -> PassiveSums:
+        """What joints have of their own, summed up for each coordinate."""
+        return passive_sums(self.passive, self.n)
+
     def only(self, link: int) -> "Structure":
         """The robot as if this link alone were there, its parameters aside."""
         return replace(
@@ -102,6 +110,7 @@ class Structure:
             linear=(0,) if link in self.linear else (),
             parameters={},
             bodies=(),
+            passive=(),
         )
 
     def values(self, given: Mapping[str, Any] | None, allow_unphysical: bool = False) -> dict[str, Any]:

@@ -2,9 +2,8 @@
 
 import difflib
 from collections.abc import Iterable, Sequence
+from operator import index
 from typing import Any
-
-import numpy as np
 
 MOST_NAMES = 6
 LONGEST = 60
@@ -17,12 +16,21 @@ def position_of(given: Any, names: Sequence[str], kind: str, argument: str) -> i
     """
     if isinstance(given, str) and given in names:
         return names.index(given)
-    if isinstance(given, int | np.integer) and not isinstance(given, bool) and 0 <= given < len(names):
-        return int(given)
+    number = whole_number(given)
+    if number is not None and 0 <= number < len(names):
+        return number
     raise ValueError(
         f"{argument} is {short(given)}; choose a {kind} by number, 0..{len(names) - 1}, or by name: "
         f"{choice(given, names, f'{kind}_names')}"
     )
+
+
+def whole_number(given: Any) -> int | None:
+    """An integer of any kind, NumPy's too, as such; None for all else, truth values among it."""
+    try:
+        return None if isinstance(given, bool) else index(given)
+    except TypeError:
+        return None
 
 
 def choice(given: Any, names: Iterable[str], whole: str) -> str:

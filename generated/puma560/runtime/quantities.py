@@ -92,6 +92,25 @@ class Power(NamedTuple, Generic[Array]):
         return total
 
 
+class PassiveTorque(NamedTuple, Generic[Array]):
+    """What joints take beside their links: the actuators give tau_i and `total`."""
+
+    spring: Array
+    """(..., n): stiffness times the way from rest."""
+    damping: Array
+    """(..., n): proportional to the velocity."""
+    friction: Array
+    """(..., n): Coulomb's, against the velocity; 0 at rest, where it may be anything up to its size."""
+    armature: Array
+    """(..., n): inertia of what turns behind gears, times the acceleration."""
+
+    @property
+    def total(self) -> Array:
+        """Their sum, (..., n)."""
+        total: Array = self.spring + self.damping + self.friction + self.armature
+        return total
+
+
 class Packed(NamedTuple, Generic[Array]):
     """Full decomposition without its zeros: values (..., count) whose indices are the robot's `layout`."""
 

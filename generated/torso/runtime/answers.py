@@ -9,7 +9,17 @@ from .arguments import check_numbers
 from .composed import Composed
 from .interface import Backend
 from .outputs import accepted
-from .quantities import PARAMETERS, Coefficients, Energy, GradientPropagation, Packed, Power, Propagation
+from .passive_joints import passive_torques
+from .quantities import (
+    PARAMETERS,
+    Coefficients,
+    Energy,
+    GradientPropagation,
+    Packed,
+    PassiveTorque,
+    Power,
+    Propagation,
+)
 from .structure import Structure
 
 KINDS: dict[str, Any] = {
@@ -20,6 +30,7 @@ KINDS: dict[str, Any] = {
     "coefficient_regressors": Coefficients,
     "energy": Energy,
     "power": Power,
+    "passive_torque": PassiveTorque,
 }
 """What calls with several results answer with; the others answer with one array or tensor."""
 
@@ -45,6 +56,7 @@ def answer_shapes(structure: Structure) -> dict[str, Shapes]:
         "packed_position_gradient": ((sizes.c1,),),
         "masked": ((n, links),),
         "regressor": ((n, links, PARAMETERS),),
+        "passive_torque": ((n,),) * len(PassiveTorque._fields),
         "coefficient_regressors": tuple((*shape, PARAMETERS) for shape in cubes),
     }
 
@@ -136,6 +148,18 @@ class Answers:
             return torque
         into[0][...] = torque
         return out
+
+    def passive_torque(self, q: Any, qd: Any, qdd: Any, out: Any = None) -> Any:
+        """See `Dynamics.passive_torque`."""
+        motion = self._motion((q, qd, qdd))
+        into = self._accepted("passive_torque", motion, out)
+        side = self._backend.side(motion[0])
+        values = passive_torques(side, self._structure.passive_sums, *motion)
+        if into is None:
+            return PassiveTorque(*values)
+        for place, value in zip(into, values, strict=True):
+            place[...] = value
+        return PassiveTorque(*out)
 
     def _check_rigid(self) -> None:
         if self._backend.rule is None:

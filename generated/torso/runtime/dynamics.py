@@ -17,7 +17,7 @@ from typing import Any, Literal, overload
 from numpy.typing import ArrayLike
 
 from .interface import Array, Backend
-from .quantities import Coefficients, GradientPropagation, Packed, Propagation
+from .quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
 from .robot_kinematics import Kinematics
 from .structure import Layout, Structure
 from .sum_calls import SumCalls
@@ -90,8 +90,7 @@ class Dynamics(SumCalls):
     @cached_property
     def kinematics(self) -> Kinematics[Any]:
         """Poses, Jacobians and their rates of the robot's frames; raises ValueError for links of energies."""
-        made: Any = self.backend
-        return Kinematics(made.kinematics(self.check_finite, self._answers.read_beside_motion))
+        return Kinematics(self.backend.kinematics(self.check_finite, self._answers.read_beside_motion))
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}
@@ -123,9 +122,20 @@ class Dynamics(SumCalls):
         return tau
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
-        """tau_i = sum_j tau_ij, shape (..., n)."""
+        """tau_i = sum_j tau_ij, shape (..., n): of the links, without what `passive_torque` has."""
         tau: Array = self._answers.inverse_dynamics(q, qd, qdd, out)
         return tau
+
+    def passive_torque(
+        self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None
+    ) -> PassiveTorque[Array]:
+        """What joints take for their own springs, damping, Coulomb friction and armature, (..., n) each.
+
+        No tau_ij holds it: actuators give inverse_dynamics(q, qd, qdd) + passive_torque(q, qd, qdd).total.
+        Zeros where the robot's description has none.
+        """
+        answer: PassiveTorque[Array] = self._answers.passive_torque(q, qd, qdd, out)
+        return answer
 
     def coefficients(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Coefficients[Array]:
         """c2, c1 (..., n, N, n) and g (..., n, N) of the closing convention."""

@@ -1,6 +1,6 @@
 """What the parts of a package say to each other: arrays, closed forms, back ends."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
@@ -38,8 +38,12 @@ class ClosedForms(Protocol):
     def position_gradient(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> Entries:
         """c0_ijk = d(tau_ij)/d(q_k), by i, then k."""
 
+
+class EnergyForms(ClosedForms, Protocol):
+    """Those of a link that is energies; the rule has the energies of rigid links."""
+
     def energy(self, xp: Any, q: Any, qd: Any, p: Mapping[str, Any]) -> Entries:
-        """Kinetic and potential energy, of links that are energies; the rule has those of rigid links."""
+        """Kinetic and potential energy in J."""
 
 
 class Backend(Protocol[Kind]):
@@ -54,9 +58,14 @@ class Backend(Protocol[Kind]):
     """Values of the run-time parameters by name."""
     rule: Any
     """The vectorised rule of rigid links, None without it."""
+    tree: Any
+    """Joints, links and frames of rigid links; None for energies."""
 
     def arrays(self, named: Mapping[str, Kind], n: int) -> Sequence[Kind]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
+
+    def side(self, like: Kind) -> Any:
+        """What computes with `like`, an array or a tensor: it has `constant`, and its namespace as `xp`."""
 
     def decomposition(self, q: Kind, qd: Kind, qdd: Kind) -> Sequence[Kind]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
@@ -78,6 +87,9 @@ class Backend(Protocol[Kind]):
 
     def answers(self, check_finite: bool) -> Any:
         """The calls of `Dynamics` on this back end: an `Answers`."""
+
+    def kinematics(self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]) -> Any:
+        """The calls of `Kinematics`, a `KinematicAnswers`; raises ValueError without a tree."""
 
     def constant(self, values: NDArray[Any], like: Kind) -> Kind:
         """A table of numbers, to compute with `like`."""

@@ -1,7 +1,7 @@
 """Closed forms and the vectorised rule on torch tensors."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 import torch
@@ -10,7 +10,7 @@ from torch._subclasses.fake_tensor import unset_fake_temporarily
 from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
 from ..arguments import as_array, as_weights, check_axes, check_dense, no_common_shape, precision
-from ..interface import ClosedForms
+from ..interface import ClosedForms, EnergyForms
 from ..kinematics.kinematic_answers import KinematicAnswers
 from ..parameter_values import fits
 from ..rule.joint_tree import Bodies, JointTree
@@ -141,7 +141,8 @@ class TorchBackend:
         if self.rule:
             kinetic, potential = self.rule.energies(self, (q, qd), p, self._bodies(q))
             return kinetic, potential
-        both = self.concatenate(_stacked(q, link.energy(torch, q, qd, p)) for link in self.links)
+        links = cast("Sequence[EnergyForms]", self.links)
+        both = self.concatenate(_stacked(q, link.energy(torch, q, qd, p)) for link in links)
         return both[..., 0::2], both[..., 1::2]
 
     def regressor(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:

@@ -6,6 +6,7 @@ from typing import Any
 
 from torch import Tensor
 
+from ..chosen_names import whole_number
 from ..recorded.recorded_torques import LinkEnergies, Part
 from .graph_leaves import seen_as_leaves
 from .torque_graph import TorqueGraph, torque_graphs
@@ -18,10 +19,11 @@ ORDERS = "2 for acceleration, 1 for velocity, 0 for position and gravity"
 def graph_of(backend: Any, i: Name, j: Links, k: Name | None, m: int | None) -> TorqueGraph:
     """See `Dynamics.graph`."""
     joint, through = _place(backend, i, j)
-    if m not in (None, 0, 1, 2):
+    order = None if m is None else whole_number(m)
+    if order not in (0, 1, 2) and m is not None:
         raise ValueError(f"m is {m!r}; choose {ORDERS}, or leave it away for all of them")
     coordinate = None if k is None else backend.structure.joint_index(k, "k")
-    return torque_graphs(backend, _energies(backend), joint, through, [(coordinate, m)])[0]
+    return torque_graphs(backend, _energies(backend), joint, through, [(coordinate, order)])[0]
 
 
 def graph_parts_of(backend: Any, i: Name, j: Links) -> tuple[TorqueGraph, ...]:
@@ -50,5 +52,10 @@ def _place(backend: Any, i: Name, j: Links) -> tuple[int, tuple[int, ...]]:
     joint = structure.joint_index(i, "i")
     if j is None:
         return joint, tuple(range(structure.N))
-    chosen = (j,) if isinstance(j, int | str) else j
-    return joint, tuple(structure.link_index(link, "j") for link in chosen)
+    several = isinstance(j, Iterable) and not isinstance(j, str) and whole_number(j) is None
+    chosen: Iterable[Any] = j if several else (j,)
+    through = tuple(structure.link_index(link, "j") for link in chosen)
+    for at, link in enumerate(through):
+        if link in through[:at]:
+            raise ValueError(f"j names link {structure.link_names[link]} twice; give each link once")
+    return joint, through

@@ -2,9 +2,9 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NoReturn
 
 import torch
 from torch import Tensor
@@ -15,7 +15,7 @@ from ..structure import Structure
 from .graph_leaves import learned_entries, leaves_beside_motion
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TorqueGraph:
     """Operations of torch, and the motions and parameters that they start from, up to a torque in N m or N.
 
@@ -36,8 +36,27 @@ class TorqueGraph:
     """Operands first."""
     output: str | float
     """Key of the torque; a number where it is constant, 0.0 above all."""
-    backend: Any = field(repr=False)
+    backend: Any
     """What checks the motion and has the parameters' values."""
+
+    def __repr__(self) -> str:
+        """Which torque or part of it, and how large; the operations themselves are in `operations`."""
+        words = {None: "motion", 0: "position", 1: "velocity", 2: "acceleration"}
+        every = {None: "", 0: ", gravity", 1: ", all velocities", 2: ", all accelerations"}
+        part = every[self.order] if self.coordinate is None else f", {words[self.order]} of {self.coordinate}"
+        through = ", ".join(self.links) if len(self.links) <= 3 else f"{len(self.links)} links"
+        sizes = f"{len(self.operations)} operations, {len(self.leaves)} leaves"
+        return f"<TorqueGraph: torque on {self.joint} through {through}{part}: {sizes}>"
+
+    def __copy__(self) -> "TorqueGraph":
+        """Itself: nothing of it can be changed."""
+        return self
+
+    def __reduce_ex__(self, protocol: Any) -> NoReturn:
+        raise TypeError(
+            "a TorqueGraph holds functions of torch, which are neither pickled nor copied deeply; pickle or "
+            "copy the robot, and ask it for the graph again with graph(i, j, k, m)"
+        )
 
     @property
     def nodes(self) -> tuple[Leaf | Operation, ...]:
@@ -55,6 +74,11 @@ class TorqueGraph:
 
     def shared_with(self, *others: "TorqueGraph") -> tuple[Operation, ...]:
         """Operations that are in each of the others too."""
+        for other in others:
+            if not isinstance(other, TorqueGraph):
+                raise TypeError(
+                    f"shared_with takes other graphs, as graph(i, j, k, m) gives them, and got {other!r}"
+                )
         keys = [{node.key for node in other.operations} for other in others]
         return tuple(node for node in self.operations if all(node.key in known for known in keys))
 

@@ -1,13 +1,13 @@
 """Closed forms and the vectorised rule on NumPy arrays."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import as_array, as_weights, check_axes, no_common_shape, precision, too_many_axes
-from ..interface import ClosedForms, Entries
+from ..interface import ClosedForms, EnergyForms, Entries
 from ..kinematics.kinematic_answers import KinematicAnswers
 from ..parameter_values import fits
 from ..rule.joint_tree import Bodies
@@ -141,7 +141,7 @@ class NumpyBackend:
             kinetic, potential = self.rule.energies(self, (q, qd), p, self._bodies(q))
             return kinetic, potential
         columns = _Columns(q, 2 * self.structure.N)
-        for link in self.links:
+        for link in cast("Sequence[EnergyForms]", self.links):
             columns.fill(link.energy(np, q, qd, p))
         return columns.array[..., 0::2], columns.array[..., 1::2]
 

@@ -196,7 +196,7 @@ class KinematicAnswers:
         at, count = self._asked(own, part, motion, point), math.prod(shape)
         value = _in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
         if out is None:  # its numbers side by side
-            return value.copy() if isinstance(value, np.ndarray) else value.contiguous()
+            return np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value.contiguous()
         out[...] = value
         return out
 

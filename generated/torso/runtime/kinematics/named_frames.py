@@ -1,10 +1,9 @@
 """Frames of a robot by their names, and those of links also by number."""
 
 from collections.abc import Sequence
-from operator import index
 from typing import Any
 
-from ..chosen_names import choice, short
+from ..chosen_names import choice, short, whole_number
 
 
 def frame_index(given: Any, frames: Sequence[str], links: Sequence[str]) -> int:
@@ -17,11 +16,8 @@ def frame_index(given: Any, frames: Sequence[str], links: Sequence[str]) -> int:
             return frames.index(given)
         known = choice(given, frames, "kinematics.frames")
         raise ValueError(f"frame is {short(given)}, which is not there; choose {known}")
-    try:
-        number = index(given)
-    except TypeError:
-        number = None
-    if number is None or isinstance(given, bool):
+    number = whole_number(given)
+    if number is None:
         raise TypeError(f"frame is {short(given)}; give the name of a frame, or the number of a link")
     if not 0 <= number < len(links):
         raise ValueError(
