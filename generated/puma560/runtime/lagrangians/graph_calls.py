@@ -52,8 +52,8 @@ def _place(backend: Any, i: Name, j: Links) -> tuple[int, tuple[int, ...]]:
     joint = structure.joint_index(i, "i")
     if j is None:
         return joint, tuple(range(structure.N))
-    several = isinstance(j, Iterable) and not isinstance(j, str) and whole_number(j) is None
-    chosen: Iterable[Any] = j if several else (j,)
+    single = isinstance(j, str) or whole_number(j) is not None
+    chosen: Any = (j,) if single else j
     through = tuple(structure.link_index(link, "j") for link in chosen)
     for at, link in enumerate(through):
         if link in through[:at]:
