@@ -18,6 +18,7 @@ from linkwise import (
     Options,
     generate,
     identify,
+    read_robot,
     read_system,
     write_package,
 )
@@ -35,6 +36,7 @@ from linkwise.runtime.rule.joint_tree import Bodies
 from linkwise.runtime.rule.regressors import inertial_parameters
 from motion_logs import write_csv
 from typer.testing import CliRunner
+from urdf_text import joint, link, robot
 
 JOINTS = ("joint1", "joint2", "joint3")
 TORQUES = tuple(f"tau/{joint}" for joint in JOINTS)
@@ -507,3 +509,28 @@ def test_degrees_and_other_names_are_taken_as_told(planar3: LoadedRobot, tmp_pat
     reading = Reading(units="deg", mapping=(("a", "joint1"), ("b", "joint2")))
     found = identify(log, planar3, reading, fitting=Fitting((("u", "joint3"),)))
     assert found.fit.noise == pytest.approx([0.01] * 3, rel=0.1)
+
+
+def test_springs_and_armatures_of_the_file_are_known_and_kept(tmp_path: Path) -> None:
+    text = robot(
+        *map(link, "abc"),
+        joint("ab", "a", "b", inner='<dynamics damping="0.5" friction="0.2"/>'),
+        joint("bc", "b", "c"),
+        """<gazebo reference="bc"><springStiffness>3</springStiffness><springReference>0.25</springReference>
+        </gazebo><transmission xmlns:drake="http://drake.mit.edu"><joint name="ab"/><actuator>
+        <drake:rotor_inertia value="0.125"/></actuator></transmission>""",
+    )
+    (tmp_path / "arm.urdf").write_text(text)
+    write_package(generate(read_system(tmp_path / "arm.urdf"), ["numpy"]), tmp_path / "arm")
+    arm = load_robot(tmp_path / "arm")
+    t, q, qd, qdd = swings(2, 20, 100, 1)
+    torque = arm.model.inverse_dynamics(q, qd, qdd) + arm.model.passive_torque(q, qd, qdd).total
+    log = write_csv(tmp_path / "log.csv", np.column_stack([t, q, torque]), ("ab", "bc", "tau/ab", "tau/bc"))
+    found = identify(log, arm)
+    assert found.fit.friction == pytest.approx(np.array([[0.5, 0.2], [0.0, 0.0]]), abs=1e-3)
+    assert (found.errors(found.unseen)["bodies"] < 1e-2).all()
+    manifest = Manifest.read(tmp_path / "arm")
+    (tmp_path / "again.urdf").write_bytes(identified_files(found, manifest, {})["test.urdf"])
+    kept = {axis.joint: axis.own for axis in read_robot(tmp_path / "again.urdf").passive}
+    assert kept["ab"].armature == 0.125
+    assert (kept["bc"].stiffness, kept["bc"].rest) == (3.0, 0.25)

@@ -51,19 +51,24 @@ def joint_equations(
     processing: Processing,
     progress: Progress,
 ) -> JointEquations:
-    """Equations of samples span[0] to span[1] - 1."""
+    """Equations of samples span[0] to span[1] - 1.
+
+    What a joint's own spring and armature take is known, and off; friction is found anew.
+    """
     n, columns, start = log.q.shape[1], base.combinations.shape[1], span[0]
     triangles = np.zeros((len(log.measured), base.count + 3, base.count + 3))
     picked = np.array(base.picked, dtype=np.intp)
     for first, last in _blocks(span, max(1, NUMBERS // (n * columns))):
         q, qd, qdd = derivatives(log.q, log.rate, first, last, processing)
+        known = model.passive_torque(q, qd, qdd)
+        torque = log.torque[first:last] - (known.spring + known.armature)[:, list(log.measured)]
         y = model.regressor(q, qd, qdd).reshape(last - first, n, columns)
         for at, i in enumerate(log.measured):
             own = (
                 y[:, i, picked],
                 qd[:, i : i + 1],
                 np.sign(qd[:, i : i + 1]),
-                log.torque[first:last, at : at + 1],
+                torque[:, at : at + 1],
             )
             stacked = np.concatenate([triangles[at], np.concatenate(own, axis=1)])
             triangles[at] = np.linalg.qr(stacked, mode="r")

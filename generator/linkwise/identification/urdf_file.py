@@ -11,7 +11,7 @@ import numpy as np
 
 from linkwise.escape import printable
 from linkwise.identification.pseudo_inertia import central
-from linkwise.package.entries import BodyEntry, JointEntry, RigidTree
+from linkwise.package.entries import BodyEntry, JointEntry, PassiveEntry, RigidTree
 from linkwise.package.load import Array
 
 STANDARD = 9.81
@@ -65,7 +65,32 @@ def urdf_text(
         )
         turn = np.array(body.rotation)
         lines += _joint(body.joint, kind, parent, body.link, body.translation, turn, more + limits)
+    lines += [line for entry in tree.passive for line in _passive(entry)]
     return "\n".join([*lines, "</robot>", ""])
+
+
+def _passive(entry: PassiveEntry) -> list[str]:
+    """Spring and armature of a joint, as extensions of simulators say them; friction was found anew."""
+    joint = _attribute(entry.joint)
+    lines = []
+    if entry.stiffness:
+        lines += [
+            f"  <gazebo reference={joint}>",
+            f"    <springStiffness>{entry.stiffness!r}</springStiffness>",
+            f"    <springReference>{entry.rest!r}</springReference>",
+            "  </gazebo>",
+        ]
+    if entry.armature:
+        lines += [
+            '  <transmission xmlns:drake="http://drake.mit.edu">',
+            "    <type>transmission_interface/SimpleTransmission</type>",
+            f"    <joint name={joint}/>",
+            f"    <actuator name={joint}>",
+            f'      <drake:rotor_inertia value="{entry.armature!r}"/>',
+            "    </actuator>",
+            "  </transmission>",
+        ]
+    return lines
 
 
 def _link(body: BodyEntry, pi: Mapping[str, Array]) -> list[str]:
