@@ -85,3 +85,11 @@ def test_losses_below_zero_are_taken_where_they_are_allowed(tmp_path: Path) -> N
     text = ARM.format(type="revolute", own="damping = -1")
     (found,) = read(tmp_path / "arm.toml", text, allow_unphysical=True)
     assert found.own == Passive(damping=-1.0)
+
+
+def test_numbers_that_the_format_does_not_have_are_told_as_ignored(tmp_path: Path) -> None:
+    own = '<dynamics damping="0.5" mu_coulomb="3" K="7000"/>'
+    (tmp_path / "arm.urdf").write_text(robot(*map(link, "ab"), joint("ab", "a", "b", inner=own)))
+    notes = read_robot(tmp_path / "arm.urdf").notes
+    ignored = {note.subject: note.detail for note in notes if note.kind == "ignored"}
+    assert ignored == {"limit": "1 ×", "K of <dynamics>": "1 ×", "mu_coulomb of <dynamics>": "1 ×"}

@@ -33,9 +33,19 @@ WEIGHTLESS = {"turnGravityOff": ("true", "1"), "gravity": ("false", "0")}
 
 
 def ignored(elements: list[Element]) -> tuple[Note, ...]:
-    """Return a note for each kind of child that loads no joint, with how often."""
+    """Return a note for each kind of child that loads no joint, with how often.
+
+    So it does for numbers of <dynamics> that the format does not have: who wrote them knows what they mean.
+    """
     counts = Counter(
         str(child.tag) for element in elements for child in element if child.tag not in USED[element.tag]
+    )
+    counts.update(
+        f"{key} of <dynamics>"
+        for element in elements
+        for dynamics in element.findall("dynamics")
+        for key in dynamics.attrib
+        if key not in LOSSES
     )
     return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()))
 
