@@ -91,6 +91,28 @@ def test_gradients_flow_through_them(backend: str, hand: ModuleType) -> None:
     np.testing.assert_allclose(motion.grad.numpy(), expected, rtol=1e-14)
 
 
+ARM = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body name="upper">
+<joint name="a" axis="0 1 0" stiffness="3" springref="20" damping="0.4" armature="0.05"/>
+<geom type="capsule" size=".04" fromto="0 0 0 .3 0 0"/><body name="fore" pos=".3 0 0">
+<joint name="b" axis="0 1 .2" damping="0.2" armature="0.02"/>
+<geom type="capsule" size=".03" fromto="0 0 0 .2 0 .1"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_actuators_give_moves_joints_as_mujoco_moves_them(backend: str, tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    (tmp_path / "arm.xml").write_text(ARM)
+    write_package(generate(read_system(tmp_path / "arm.xml")), tmp_path / "arm")
+    robot = import_package(tmp_path / "arm").load(backend)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.qfrc_applied[:] = [0.4, -0.7], [1.5, -2.0], [0.3, -0.1]
+    mujoco.mj_forward(model, data)
+    motion = taken(robot, [data.qpos.copy(), data.qvel.copy(), data.qfrc_applied.copy()])
+    assert relative_error(robot.forward_dynamics(*motion, passive=True), data.qacc) <= 1e-13
+    assert relative_error(robot.forward_dynamics(*motion), data.qacc) > 0.1
+
+
 def test_motion_and_out_are_refused_by_name(hand: ModuleType) -> None:
     model = hand.load("numpy")
     q = np.zeros((4, 2))

@@ -32,6 +32,22 @@ def passive_calls(
     yield compare(f"{name}: passive torques of the joints", every)
     single = entries(np.float32, slice(None))
     yield compare(f"{name}: passive torques in single precision", single, **FLOAT32)
+    if joints and len(states.q):
+        moved = [_torques_of_accelerations(model, joints, states)]
+        yield compare(f"{name}: accelerations that passive torques leave", moved)
+
+
+def _torques_of_accelerations(model: Model, joints: Sequence[PassiveEntry], states: States) -> Entries:
+    """Torques that forward dynamics was given, against those that its accelerations take."""
+    q, qd, qdd = states.motion
+    values, scales = passive_reference(joints, states)
+    tau = model.inverse_dynamics(q, qd, qdd) + values.sum(0)
+    found = model.forward_dynamics(q, qd, tau, passive=True)
+    taken, sizes = passive_reference(joints, States(q, qd, found))
+    links = model.inverse_dynamics(q, qd, found)
+    inertial = np.abs(model.mass_matrix(q)) @ (np.abs(qdd) + np.abs(found))[..., None]
+    scale = np.abs(links) + inertial[..., 0] + scales.sum(0) + sizes.sum(0)
+    return Entries("tau", links + taken.sum(0), tau, scale)
 
 
 def passive_reference(joints: Sequence[PassiveEntry], states: States) -> tuple[Array, Array]:

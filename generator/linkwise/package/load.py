@@ -78,7 +78,7 @@ class Model(Protocol):
     def gravity_torque(self, q: Array, by_link: bool = False) -> Array:
         """g (..., n), or by link (..., n, N)."""
 
-    def forward_dynamics(self, q: Array, qd: Array, tau: Array) -> Array:
+    def forward_dynamics(self, q: Array, qd: Array, tau: Array, passive: bool = False) -> Array:
         """qdd (..., n)."""
 
     def christoffel(self, q: Array, by_link: bool = False) -> Array:
