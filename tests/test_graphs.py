@@ -442,6 +442,9 @@ def test_the_page_shows_the_nodes_where_they_were_counted() -> None:
     page, data = reduction_markdown(result), reduction_json(result)
     assert f"| 3 | {three.total} | {three.kept} | {three.reduction:.4f} |" in page
     assert f"autograd's graph of τ_1 has at 3 DoF, its q̈_1 part needs {three.kept}" in page
+    nodes = f"0.76 at 2 DoF ({two.nodes.total} and {two.nodes.kept}), 0.77 at 3 DoF ({three.nodes.total} and "
+    assert nodes in page
+    assert data["recorded"]["points"][1]["kept_nodes"] == three.nodes.kept
     assert [(row["dof"], row["operations"], row["kept"]) for row in data["recorded"]["points"]] == [
         (2, two.total, two.kept),
         (3, three.total, three.kept),

@@ -34,6 +34,7 @@ from linkwise.report import (
     verdicts,
 )
 from linkwise.report.seconds import row_view
+from linkwise.report.spatial_arms import is_spatial
 from linkwise.report.uncombined_terms import uncombined_terms
 from linkwise.robot import Options, read_robot
 from linkwise.symbolic.system import RigidSystem, System, rigid_system
@@ -156,6 +157,30 @@ def test_both_conventions_give_sixteen_redundant_terms_and_one_gives_the_papers_
     assert result.uncombined_fit is not None
     assert (result.uncombined_fit.a, result.uncombined_fit.rate) == pytest.approx((0.9626, 0.4004), abs=1e-3)
     assert "misses these points by up to 0.0882" in " ".join(verdicts(result))
+
+
+def test_the_report_of_a_spatial_arm_says_what_differs_and_that_no_fit_is_a_share() -> None:
+    puma = rigid_system(read_robot("puma560", Options()))
+    result = study("puma560", puma, 1, 4, 4, 10**6, silent)
+    *before, remark = verdicts(result)
+    assert remark.startswith(
+        "**A spatial arm differs.** The paper's claim is about arms that move in a plane"
+    )
+    shares = (result.points[-1].reduction, result.uncombined[-1].reduction)
+    assert "{:.1%} of the terms are saved at 4 DoF, {:.1%} where".format(*shares) in remark
+    assert "Of its first link all terms are kept: that axis carries no weight" in remark
+    assert result.fitted is not None
+    assert result.fitted.a > 1
+    assert "an A above 1 tells of no limit" in before[0]
+
+
+def test_arms_in_a_plane_are_told_from_spatial_ones(tmp_path: Path) -> None:
+    (tmp_path / "polar.toml").write_text(POLAR)
+    flat = planar(4), rigid_system(read_robot(str(tmp_path / "polar.toml"), Options()))
+    assert [is_spatial(system, len(system.links)) for system in flat] == [False, False]
+    puma = rigid_system(read_robot("puma560", Options()))
+    assert [is_spatial(puma, links) for links in (1, 2)] == [False, True]
+    assert "spatial" not in " ".join(verdicts(study("arm", planar(3), 1, 3, 3, 10**6, silent)))
 
 
 def test_uncombined_terms_end_at_the_budget() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from linkwise.escape import json_text, markdown
 from linkwise.identification.base_parameters import NAMES, UNITS
-from linkwise.identification.identified_links import Identification
+from linkwise.identification.identification_result import Identification
 from linkwise.identification.pseudo_inertia import central
 from linkwise.identification.urdf_file import lost_gravity, urdf_text
 from linkwise.package.manifest import Manifest

@@ -4,10 +4,7 @@ The cause comes before what follows from it: noise of positions makes a motion l
 a wrong sign makes bodies not fit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,13 +12,11 @@ from linkwise.analysis.derivatives import derivatives
 from linkwise.analysis.settings import Processing
 from linkwise.escape import listed
 from linkwise.identification.fit import POOR
+from linkwise.identification.identification_result import Identification
 from linkwise.identification.normal_factors import JointEquations
 from linkwise.identification.position_noise import LONGEST, noise_gain
 from linkwise.identification.torque_log import TorqueLog
 from linkwise.package.load import Array
-
-if TYPE_CHECKING:
-    from linkwise.identification.identified_links import Identification
 
 LARGE = 100.0
 """Times: torques so much larger, or smaller, than the robot's own are perhaps in another unit."""

@@ -28,6 +28,11 @@ class Saturation:
         return math.sqrt(sum(r * r for r in self.residuals) / len(self.residuals))
 
     @property
+    def is_share(self) -> bool:
+        """Whether it ends at a share, as a saving must."""
+        return self.a <= 1.0
+
+    @property
     def largest(self) -> float:
         """Size of the largest residual."""
         return max(map(abs, self.residuals))

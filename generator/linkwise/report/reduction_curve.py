@@ -16,7 +16,8 @@ from linkwise.report.curve_fit import (
 from linkwise.report.expanded_torques import form_of, link_torques
 from linkwise.report.laurent import BudgetExceededError
 from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations, link_operations, summed
-from linkwise.report.recorded_operations import recorded_operations
+from linkwise.report.recorded_operations import RecordedPair, recorded_operations
+from linkwise.report.spatial_arms import is_spatial
 from linkwise.report.term_count import RunningCount, TermPair, TermQuery
 from linkwise.report.uncombined_terms import uncombined_terms
 from linkwise.symbolic.system import RigidSystem, System
@@ -57,6 +58,7 @@ class Study:
     uncombined: the points by the convention of `uncombined_terms`, as far as the budget reaches; none for
     energies that a user wrote
     recorded: operations of autograd's graphs, where they were asked for
+    spatial: whether the arm leaves a plane, as the paper's do not
     """
 
     robot: str
@@ -68,7 +70,8 @@ class Study:
     kept: CountPolynomial | None
     uncombined: tuple[TermPair, ...]
     uncombined_fit: Saturation | None
-    recorded: tuple[TermPair, ...] = ()
+    recorded: tuple[RecordedPair, ...] = ()
+    spatial: bool = False
 
     @property
     def dof(self) -> tuple[int, ...]:
@@ -107,6 +110,7 @@ def study(
         uncombined,
         fit(dof[: len(uncombined)], [pair.reduction for pair in uncombined]),
         tuple(recorded_operations(system, last, progress))[first - 1 :] if graphs else (),
+        is_spatial(system, last),
     )
 
 

@@ -13,7 +13,9 @@ from linkwise.report.curve_fit import (
     held_against,
 )
 from linkwise.report.recorded_operations import FORM as RECORDED
+from linkwise.report.recorded_operations import NODES
 from linkwise.report.reduction_curve import CurvePoint, Study
+from linkwise.report.spatial_arms import spatial_remark
 from linkwise.report.term_count import TermPair
 from linkwise.report.uncombined_terms import FORM as UNCOMBINED
 
@@ -21,6 +23,8 @@ DIGITS = 6
 """Decimals of a rate: more would be noise in a file that is compared byte for byte."""
 CLOSE = 0.02
 """RMSE up to which a curve is said to describe the points."""
+SHOWN = (1, 2, 3, 5, 10)
+"""Degrees of freedom that are told in a sentence."""
 PAPER_DOF = 10
 """Most degrees of freedom that the paper fitted its curve to."""
 PAPER_REDUNDANT = {5: 3, 10: 16}
@@ -51,7 +55,11 @@ def reduction_json(result: Study) -> dict[str, Any]:
 def _recorded_json(result: Study) -> dict[str, Any]:
     pairs = zip(result.dof, result.recorded, strict=True)
     rows = ({k.replace("terms", "operations"): v for k, v in pair_row(*pair).items()} for pair in pairs)
-    return {"form": RECORDED, "points": list(rows)}
+    counted = [
+        row | {"nodes": pair.nodes.total, "kept_nodes": pair.nodes.kept}
+        for row, pair in zip(rows, result.recorded, strict=True)
+    ]
+    return {"form": RECORDED, "points": counted}
 
 
 def point_row(point: CurvePoint) -> dict[str, Any]:
@@ -174,6 +182,22 @@ def verdicts(result: Study) -> Iterator[str]:
     yield _operations_verdict(result.points[-1])
     if result.recorded:
         yield _graph_verdict(result)
+        yield _nodes_verdict(result)
+    if result.spatial:
+        pairs = dict(zip(result.dof, result.uncombined, strict=False))
+        last = result.points[-1]
+        first = result.points[0] if result.dof[0] == 1 else None
+        yield " ".join(spatial_remark(last.dof, last, pairs.get(last.dof), first))
+
+
+def _nodes_verdict(result: Study) -> str:
+    """The same by the nodes that autograd keeps."""
+    told = [
+        f"{pair.nodes.reduction:.2f} at {dof} DoF ({pair.nodes.total} and {pair.nodes.kept})"
+        for dof, pair in zip(result.dof, result.recorded, strict=True)
+        if dof in SHOWN or dof == result.dof[-1]
+    ]
+    return f"**Node by node**, {NODES}, y is {', '.join(told)}."
 
 
 def _curve_verdict(result: Study) -> str:
@@ -192,8 +216,14 @@ def _curve_verdict(result: Study) -> str:
         return text + "."
     return text + (
         f"; a free fit to all points, A = {result.fitted.a:.4f} and λ = {result.fitted.rate:.4f}, misses "
-        f"them by at most {result.fitted.largest:.4f} (RMSE {result.fitted.rmse:.4f})."
+        f"them by at most {result.fitted.largest:.4f} (RMSE {result.fitted.rmse:.4f})"
+        f"{_no_share(result.fitted)}."
     )
+
+
+def _no_share(found: Saturation) -> str:
+    """What a fit means that ends above 1."""
+    return "" if found.is_share else ", but no more than all can be saved: an A above 1 tells of no limit"
 
 
 def _redundancy_verdict(point: CurvePoint) -> str:
@@ -235,8 +265,8 @@ def _convention_verdict(result: Study) -> str:
         found = result.uncombined_fit
         paper = held_against(PAPER_A, PAPER_RATE, list(pairs), [pair.reduction for pair in pairs.values()])
         told.append(
-            f"a free fit of A = {found.a:.4f} and λ = {found.rate:.4f}; the paper's curve misses these "
-            f"points by up to {paper.largest:.4f}"
+            f"a free fit of A = {found.a:.4f} and λ = {found.rate:.4f}{_no_share(found)}; the paper's curve "
+            f"misses these points by up to {paper.largest:.4f}"
         )
     last = max(pairs)
     return (
