@@ -47,13 +47,19 @@ class SumCalls:
         gravity: Array = self._answers.gravity_torque(q, by_link, out)
         return gravity
 
-    def forward_dynamics(self, q: Array, qd: Array, tau: Array, out: Array | None = None) -> Array:
+    def forward_dynamics(
+        self, q: Array, qd: Array, tau: Array, passive: bool = False, out: Array | None = None
+    ) -> Array:
         """qdd of M qdd + C qd + g = tau, shape (..., n), in rad/s^2 or m/s^2; tau (..., n) in N m or N.
+
+        passive: whether tau is what actuators give, and so has to move the joints' own springs, damping,
+        friction and armature too, as `passive_torque` has them; else it is for the links alone, the inverse
+        of `inverse_dynamics`
 
         Raises ValueError for a singular mass matrix, with the sample and the joints that can move without
         moving any mass; inside torch.func and torch.compile, qdd is then not finite.
         """
-        qdd: Array = self._answers.forward_dynamics(q, qd, tau, out)
+        qdd: Array = self._answers.forward_dynamics(q, qd, tau, passive, out)
         return qdd
 
     def energy(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Energy[Array]:

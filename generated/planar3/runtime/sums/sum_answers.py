@@ -9,7 +9,7 @@ from ..structure import Structure
 from .namespace import side_by_side
 from .summed import Summed
 
-GIVEN = {"forward_dynamics": ("q", "qd", "tau")}
+GIVEN = dict.fromkeys(("forward_dynamics", "forward_dynamics_with_passive"), ("q", "qd", "tau"))
 """Names of the arguments of calls that are not given q, qd and qdd."""
 
 
@@ -24,6 +24,7 @@ def sum_shapes(structure: Structure) -> dict[str, Shapes]:
         "gravity_torque": ((n,),),
         "gravity_torque_by_link": ((n, links),),
         "forward_dynamics": ((n,),),
+        "forward_dynamics_with_passive": ((n,),),
         "energy": ((links,), (links,)),
         "power": ((n, links, n), (n, links, n), (n, links)),
         "christoffel": ((n, n, n),),
@@ -53,9 +54,10 @@ class SumAnswers(Answers):
         """See `Dynamics.gravity_torque`."""
         return self._summed(_named("gravity_torque", by_link), (q,), out)
 
-    def forward_dynamics(self, q: Any, qd: Any, tau: Any, out: Any = None) -> Any:
+    def forward_dynamics(self, q: Any, qd: Any, tau: Any, passive: bool, out: Any = None) -> Any:
         """See `Dynamics.forward_dynamics`."""
-        return self._summed("forward_dynamics", (q, qd, tau), out)
+        call = "forward_dynamics_with_passive" if passive else "forward_dynamics"
+        return self._summed(call, (q, qd, tau), out)
 
     def energy(self, q: Any, qd: Any, out: Any = None) -> Any:
         """See `Dynamics.energy`."""

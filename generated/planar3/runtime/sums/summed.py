@@ -7,6 +7,7 @@ import numpy as np
 
 from ..dense import Dense
 from ..interface import Backend
+from ..passive_joints import passive_torques
 from ..structure import Structure
 from .inertia_solve import solved
 from .joint_matrices import JointMatrices
@@ -58,6 +59,15 @@ class Summed:
         c2, _, _, bias, _ = self._compute("packed", (q, qd, self._rest(q)))
         mass = self._matrices.summed(c2, "acceleration")
         return (solved(mass, tau - self._dense.summed(bias), self._structure.joint_names),)
+
+    def forward_dynamics_with_passive(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
+        """Solve (M + armature) qdd = tau - spring - damping - friction - (h + g)."""
+        c2, _, _, bias, _ = self._compute("packed", (q, qd, self._rest(q)))
+        sums, side = self._structure.passive_sums, self._backend.side(q)
+        spring, damping, friction, _ = passive_torques(side, sums, q, qd, self._rest(q))
+        mass = self._matrices.summed(c2, "acceleration") + side.constant(np.diag(sums.armature), q)
+        force = tau - (spring + damping + friction) - self._dense.summed(bias)
+        return (solved(mass, force, self._structure.joint_names),)
 
     def energy(self, q: Any, qd: Any) -> tuple[Any, ...]:
         """K_j and P_j."""
