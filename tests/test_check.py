@@ -497,7 +497,7 @@ def test_graphs_of_parts_are_run_against_the_recursion(
     old: str, new: str, every_text: Path, tmp_path: Path
 ) -> None:
     package = shutil.copytree(every_text, tmp_path / "planar2")
-    change_file(package, "runtime/recorded_torques.py", old, new)
+    change_file(package, "runtime/recorded/recorded_torques.py", old, new)
     failing = {name for name, mark in marks(package).items() if mark == "FAIL"}
     assert failing == {"runtime", "autograd: graphs of parts of tau_ij against Newton-Euler recursion"}
 

@@ -75,7 +75,14 @@ def first_links(system: System, n: int) -> System:
     if isinstance(system, EnergySystem):
         return replace(system, coordinates=system.coordinates[:n], links=system.links[:n])
     robot, last = system.robot, system.links[n - 1].chain[-1]
-    return rigid_system(replace(robot, coordinates=robot.coordinates[:n], links=robot.links[: last + 1]))
+    part = replace(
+        robot,
+        coordinates=robot.coordinates[:n],
+        links=robot.links[: last + 1],
+        frames=tuple(frame for frame in robot.frames if frame.link is None or frame.link <= last),
+        passive=tuple(axis for axis in robot.passive if axis.coordinate < n),
+    )
+    return rigid_system(part)
 
 
 def _generated(system: System, directory: Path) -> Package:

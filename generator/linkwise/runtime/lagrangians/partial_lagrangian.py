@@ -63,6 +63,11 @@ class PartialLagrangian(torch.nn.Module):
         q, qd = self._backend.arrays({"q": q, "qd": qd}, self._backend.structure.n)
         return lagrangians((self,), q, qd, self._backend.seen_by(q))[0]
 
+    def energies(self, q: Tensor, qd: Tensor) -> tuple[Tensor, Tensor]:
+        """Kinetic and potential energy in J, shape (...) each."""
+        kinetic, potential = self._answers.energy(q, qd)
+        return kinetic[..., 0], potential[..., 0]
+
     def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """tau_ij of this link j, the torque on each joint i through it, shape (..., n)."""
         tau: Tensor = self._answers.partial_torque(q, qd, qdd)
