@@ -1,6 +1,6 @@
 """From a recorded movement to who loads whom: torque analysis of motion logs."""
 
 from linkwise.analysis.run import Analysis, analyze
-from linkwise.analysis.settings import Lowpass, Processing, Reading
+from linkwise.analysis.settings import Lowpass, Payload, Processing, Reading
 
-__all__ = ["Analysis", "Lowpass", "Processing", "Reading", "analyze"]
+__all__ = ["Analysis", "Lowpass", "Payload", "Processing", "Reading", "analyze"]

@@ -151,6 +151,7 @@ class AnalysisResult:
                 "manifest_sha256": robot.manifest_sha256,
             },
             **choices(self.reading, self.processing),
+            "payloads": [payload.record() for payload in robot.payloads],
             "rate_hz": self.rate,
             "samples": self.total,
             "closure": asdict(self.closure),

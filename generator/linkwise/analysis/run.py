@@ -5,13 +5,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.analysis.payload import carrying
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.samples import Samples, read_samples
-from linkwise.analysis.settings import Processing, Reading, choices
+from linkwise.analysis.settings import Payload, Processing, Reading, choices
 from linkwise.analysis.show import check_figure, draw, figure_png
 from linkwise.analysis.show.page import NUMBERS, SAMPLES, on_page, report
 from linkwise.analysis.stream import KeptSamples, Sink, Streamed, span_of, stream, stride_for
@@ -62,12 +63,14 @@ def analyze(
     reading: Reading | None = None,
     processing: Processing | None = None,
     progress: Progress = silent,
+    payloads: Sequence[Payload] = (),
 ) -> Analysis:
     """Analyse a motion log with a generated robot (its directory), all samples in memory.
 
+    payloads: point masses that the robot carries, each a link of its own in the result
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
-    loaded = robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot))
+    loaded = carrying(robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot)), payloads)
     job = _prepared(Path(log), loaded, reading or Reading(), processing or Processing(), progress)
     kept = KeptSamples(len(job.decomposer.columns), 1)
     return job.analysis(job.run(kept, progress), kept)
@@ -97,7 +100,7 @@ def analyze_to(
         columns = job.decomposer.columns
         shown = sum(map(on_page, columns))
         kept = KeptSamples(len(columns), stride_for(job.count, shown, NUMBERS, SAMPLES))
-        note = json_text({"log": log.name, "robot": robot.name, **choices(reading, processing)})
+        note = json_text(job.note())
         with open_table(draft / f"analysis.{wanted.table}", columns, note) as table:
 
             def sink(block: Array) -> None:
@@ -168,6 +171,16 @@ class Job:
         """Analyse every sample, handing the blocks to `sink`."""
         with within(self.source):
             return stream(self.samples, self.decomposer, self.processing, sink, progress)
+
+    def note(self) -> dict[str, Any]:
+        """What a table says of itself: log, robot and all choices."""
+        robot = self.decomposer.robot
+        return {
+            "log": self.source,
+            "robot": robot.name,
+            **choices(self.reading, self.processing),
+            "payloads": [payload.record() for payload in robot.payloads],
+        }
 
     @property
     def count(self) -> int:

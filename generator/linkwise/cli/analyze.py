@@ -8,6 +8,7 @@ import typer
 
 from linkwise.analysis import Analysis
 from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.payload import carrying
 from linkwise.analysis.run import Wanted, analyze_to
 from linkwise.analysis.settings import Convention, Reading
 from linkwise.analysis.tables import Format
@@ -29,6 +30,7 @@ from linkwise.cli.log_options import (
     Resample,
     Time,
     Window,
+    carried,
     chosen_lowpass,
     chosen_processing,
     pairs,
@@ -45,6 +47,14 @@ Figures = Annotated[
     list[str] | None, typer.Option(help="paper, paper:JOINT, shares or power; may be repeated")
 ]
 PowerTerms = Annotated[bool, typer.Option("--power-terms", help="Write power by cause and order too")]
+Carried = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--payload",
+        metavar="BODY=KG,X,Y,Z",
+        help="Point mass on a body, at a point in its axes, m; NAME:BODY=… names it; may be repeated",
+    ),
+]
 Page = Annotated[bool, typer.Option("--page/--no-page", help="Write report.html")]
 
 app = typer.Typer(add_completion=False)
@@ -71,6 +81,7 @@ def analyze(
     format: TableFormat = "parquet",
     figure: Figures = None,
     power_terms: PowerTerms = False,
+    payload: Carried = None,
     backend: Backend = None,
     page: Page = True,
     as_json: Json = False,
@@ -82,6 +93,7 @@ def analyze(
     )
     wanted = Wanted(format, tuple(figure or ()), page, power_terms)
     package = load_robot(robot, backend)
+    package = carrying(package, carried(payload or [], package))
     with shown_progress(UNITS) as progress:
         analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress)
     for warning in analysis.warnings:

@@ -90,7 +90,7 @@ def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
     return {
         "parents": [-1 if body.parent is None else body.parent for body in bodies],
         "links": [place.get(body.link, -1) for body in bodies],
-        "coordinates": [body.coordinate for body in bodies],
+        "coordinates": [body.coordinate if body.ratio else -1 for body in bodies],
         "up": list(result.robot.up),
         "origins": _encode(origins),
         "centres": _encode(centres),

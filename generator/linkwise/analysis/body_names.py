@@ -1,0 +1,40 @@
+"""Bodies of a robot's file by name, for what is put on them: loads and payloads."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+from linkwise.package.manifest import FrameEntry
+from linkwise.runtime.chosen_names import choice
+
+
+def body_frame(what: str, body: str, robot: LoadedRobot) -> FrameEntry:
+    """The frame of a body of the file; raises LinkwiseError, which offers names near it, where none is."""
+    tree = robot.package.manifest.tree
+    frames = {} if tree is None else {frame.name: frame for frame in tree.frames}
+    if body not in frames:
+        raise LinkwiseError(
+            f"{what} on {body!r}: {robot.name} has no such body; choose"
+            f" {choice(body, list(frames), 'linkwise inspect --details')}"
+        )
+    return frames[body]
+
+
+def named_body(text: str, robot: LoadedRobot) -> tuple[str, str]:
+    """Name and body of NAME:BODY, no name of BODY alone; a body whose own name has a colon is found too."""
+    tree = robot.package.manifest.tree
+    name, colon, body = text.partition(":")
+    if not colon or (tree is not None and any(frame.name == text for frame in tree.frames)):
+        return "", text
+    return name, body
+
+
+def told_apart(what: str, names: Sequence[str], others: Sequence[str]) -> None:
+    """Raise LinkwiseError for a name that stands twice, or that another thing has."""
+    twice = [name for name, count in Counter(names).items() if count > 1 or name in others]
+    if twice:
+        raise LinkwiseError(
+            f"{what} {listed(map(repr, twice))}: another has that name; tell them apart as NAME:BODY"
+        )
