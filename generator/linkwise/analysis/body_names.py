@@ -16,7 +16,7 @@ def body_frame(what: str, body: str, robot: LoadedRobot) -> FrameEntry:
     frames = {} if tree is None else {frame.name: frame for frame in tree.frames}
     if body not in frames:
         raise LinkwiseError(
-            f"{what} on {body!r}: {robot.name} has no such body; choose"
+            f"{what} {body!r}: {robot.name} has no such body; choose"
             f" {choice(body, list(frames), 'linkwise inspect --details')}"
         )
     return frames[body]

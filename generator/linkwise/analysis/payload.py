@@ -57,7 +57,7 @@ def carrying(robot: LoadedRobot, payloads: Sequence[Payload]) -> LoadedRobot:
 
 
 def _placed(robot: LoadedRobot, tree: RigidTree, payload: Payload) -> _Placed:
-    frame: FrameEntry = body_frame("payload", payload.body, robot)
+    frame: FrameEntry = body_frame("payload on", payload.body, robot)
     body = frame.body
     if body is None:
         raise LinkwiseError(f"payload on {payload.body!r}: that stands on the ground; joints do not carry it")

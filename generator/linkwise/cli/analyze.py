@@ -8,6 +8,7 @@ import typer
 
 from linkwise.analysis import Analysis
 from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.loads import Loads
 from linkwise.analysis.payload import carrying
 from linkwise.analysis.run import Wanted, analyze_to
 from linkwise.analysis.settings import Convention, Reading
@@ -55,6 +56,13 @@ Carried = Annotated[
         help="Point mass on a body, at a point in its axes, m; NAME:BODY=… names it; may be repeated",
     ),
 ]
+LoadFiles = Annotated[
+    list[Path] | None,
+    typer.Option(help="Log of loads, columns BODY/force_x …, or OpenSim's external loads; may be repeated"),
+]
+LoadsCutoff = Annotated[
+    float | None, typer.Option(help="Zero-phase low-pass for these loads, Hz; no filter if not given")
+]
 Page = Annotated[bool, typer.Option("--page/--no-page", help="Write report.html")]
 
 app = typer.Typer(add_completion=False)
@@ -82,6 +90,8 @@ def analyze(
     figure: Figures = None,
     power_terms: PowerTerms = False,
     payload: Carried = None,
+    loads: LoadFiles = None,
+    loads_cutoff: LoadsCutoff = None,
     backend: Backend = None,
     page: Page = True,
     as_json: Json = False,
@@ -94,8 +104,9 @@ def analyze(
     wanted = Wanted(format, tuple(figure or ()), page, power_terms)
     package = load_robot(robot, backend)
     package = carrying(package, carried(payload or [], package))
+    borne = Loads.of(loads or [], loads_cutoff)
     with shown_progress(UNITS) as progress:
-        analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress)
+        analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress, borne)
     for warning in analysis.warnings:
         tell(f"warning: {log}: {warning}", err=True)
     if analysis.ignored:

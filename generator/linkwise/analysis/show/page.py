@@ -76,6 +76,7 @@ def page_data(result: AnalysisResult) -> str:
         "coloursDark": list(ON_DARK),
         "gravityColour": GRAVITY,
         "bodies": _bodies(result),
+        "loads": [{"name": printable(borne.name)} for borne in result.loads],
     }
     return script_data(data)
 
