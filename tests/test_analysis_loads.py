@@ -146,7 +146,7 @@ def test_tables_record_and_pictures_have_each_load(arm: Path, tmp_path: Path) ->
     header = (tmp_path / "out/analysis.csv").read_text().splitlines()[0].split(",")
     assert {f"{what}/{name}/tool" for what in ("tau_load", "power_load") for name in JOINTS} <= set(header)
     record = json.loads((tmp_path / "out/analysis.json").read_text())
-    assert record["loads"] == [{"name": "tool", "body": "tool", "file": "plate.mot"}]
+    assert record["loads"] == [{"name": "tool", "body": "tool", "file": "plate.mot", "cutoff": None}]
     borne = {entry["joint"]: entry["net"] for entry in record["work"]["against_loads"]}
     power = result["tau_load/cd/tool"] * result.qd[:, 2]
     np.testing.assert_allclose(borne["cd"], np.trapezoid(power, result.time), rtol=1e-9)
@@ -158,6 +158,7 @@ def test_a_low_pass_is_run_over_the_whole_log_of_loads(arm: Path, tmp_path: Path
     table = measured(columns=3)
     file = write_csv(tmp_path / "plate.csv", table, FORCE)
     result = analyze(arm / "log.csv", arm / "arm", loads=[file], loads_cutoff=30.0)
+    assert "loads filtered at 30 Hz" in result.provenance
     smooth_force = sosfiltfilt(butter(2, 30.0, fs=1000.0, output="sos"), table[:, 1:], axis=0)
     expected = analyze(
         arm / "log.csv", arm / "arm", loads=[Load("f", "tool", smooth_force, time=table[:, 0])]
@@ -190,7 +191,7 @@ REFUSED = {
     "body": (
         lambda table: table,
         [name.replace("tool", "tol") for name in FORCE],
-        r"plate.csv: load 'tol' on 'tol': test has no such body; choose a, b, c, d, tool",
+        r"plate.csv: load 'tol' on 'tol': test has no such body; its bodies are tool, a, b, c, d",
     ),
     "ground": (
         lambda table: table,

@@ -105,7 +105,7 @@ def test_files_and_page_list_them(arm, tmp_path):
 def test_what_cannot_carry_a_payload_is_named(arm):
     loaded = load_robot(arm / "arm")
     refused = {
-        "tol=1": r"payload on 'tol': test has no such body; choose a, b, c, d, tool",
+        "tol=1": r"payload on 'tol': test has no such body; its bodies are tool, a, b, c, d",
         "a=1": r"payload on 'a': that stands on the ground; joints do not carry it",
         "tool=0": r"payload on 'tool': mass 0; give kg above 0",
         "tool=nan": r"payload on 'tool': mass nan; give kg above 0",

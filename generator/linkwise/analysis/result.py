@@ -142,6 +142,8 @@ class AnalysisResult:
             else "no filter"
         )
         parts += [f"{made.edges} edges", f"{made.convention} convention"]
+        cutoffs = sorted({borne.cutoff for borne in self.loads if borne.cutoff is not None})
+        parts += [f"loads filtered at {cutoff:g} Hz" for cutoff in cutoffs]
         if self.stride > 1:
             parts.append(f"one sample in {self.stride} shown")
         return " · ".join(parts)

@@ -56,6 +56,8 @@ class PlacedLoad:
     """Rows of time, force, moment, point (S, 10); moments are about the origin where all is in the world."""
     source: str
     """The file that it is from, "" for none."""
+    cutoff: float | None = None
+    """Of the low-pass that it got, in Hz."""
 
     def wrench(self, time: Array, q: Array, pose: Pose) -> Wrench:
         """What acts at instants (S,) with the robot at q (S, n)."""
@@ -79,7 +81,8 @@ class PlacedLoad:
 
     def record(self) -> dict[str, Any]:
         """As plain data, to record in the outputs."""
-        return {"name": self.name, "body": self.seat.frame.name, "file": self.source}
+        body = self.seat.frame.name
+        return {"name": self.name, "body": body, "file": self.source, "cutoff": self.cutoff}
 
     def _at(self, time: Array) -> Array:
         """The table's rows (S, 10) at instants: linear between its samples."""

@@ -9,6 +9,7 @@ from linkwise.analysis.body_names import told_apart
 from linkwise.analysis.even_time import even_rate, usual_step
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads.external_loads import external_loads
 from linkwise.analysis.loads.load import FORCE, MOMENT, POINT, WIDTH, Load, Loads
 from linkwise.analysis.loads.load_columns import PARTS, LoadColumns, load_columns
 from linkwise.analysis.loads.placed_load import PlacedLoad, Seat, seat_of
@@ -41,6 +42,8 @@ def placed_loads(
 
 
 def _listed(path: Path, robot: LoadedRobot, ignore_extra: bool) -> tuple[LoadColumns, ...]:
+    if path.suffix.lower() == ".xml":
+        return external_loads(path)
     log = open_log(path)
     with within(str(path)):
         return load_columns(path, log.columns, robot, ignore_extra)
@@ -86,7 +89,7 @@ def _read(
             mend = "for --loads-cutoff bring it to an even rate, in Hz such as"
             rate = even_rate(table[:, 0], log.first_row, strict=True, mend=mend)
             lowpass(table[:, 1:7], rate, Lowpass(cutoff), flag="--loads-cutoff")
-    return PlacedLoad(load.name, seat, table, load.log.name)
+    return PlacedLoad(load.name, seat, table, load.log.name, cutoff)
 
 
 def _about_origin(seat: Seat, rows: Array) -> None:
