@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import TORQUE_OF, Column
 from linkwise.analysis.show.poses import poses
@@ -76,7 +77,7 @@ def page_data(result: AnalysisResult) -> str:
         "coloursDark": list(ON_DARK),
         "gravityColour": GRAVITY,
         "bodies": _bodies(result),
-        "loads": [{"name": printable(borne.name)} for borne in result.loads],
+        "loads": _loads(result),
     }
     return script_data(data)
 
@@ -96,6 +97,16 @@ def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
         "origins": _encode(origins),
         "centres": _encode(centres),
     }
+
+
+def _loads(result: AnalysisResult) -> list[dict[str, str]]:
+    """At every sample shown, where each load acts and its force, (samples, 3) each, in m and N."""
+    pose = model_pose(result.robot.model)
+    wrenches = [borne.wrench(result.time, result.q, pose) for borne in result.loads]
+    return [
+        {"name": printable(borne.name), "places": _encode(at.place), "forces": _encode(at.force)}
+        for borne, at in zip(result.loads, wrenches, strict=True)
+    ]
 
 
 def _work(result: AnalysisResult) -> list[dict[str, float]]:
