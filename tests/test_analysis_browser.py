@@ -325,6 +325,10 @@ def test_loads_are_causes_and_arrows(driver, tmp_path):
     )
     assert sum(cells[:-1]) == pytest.approx(cells[-1], rel=1e-12)
     assert cells[-1] == result.torque[40, 0]
+    choose(driver, "span", "now")
+    power = driver.execute_script("return document.getElementById('power').data[0].z")
+    into = [[*result.power[40, i], *(result.load_torque[40, i] * result.qd[40, i])] for i in range(3)]
+    assert [[x or 0 for x in row[:6]] for row in power[:3]] == [pytest.approx(row, rel=1e-12) for row in into]
     assert driver.get_log("browser") == []
 
 

@@ -110,10 +110,18 @@ def _loads(result: AnalysisResult) -> list[dict[str, str]]:
 
 
 def _work(result: AnalysisResult) -> list[dict[str, float]]:
-    """What each joint i gave to each link j and took back, in J, over all samples."""
-    given, taken = result.work.given, result.work.taken
-    pairs = [(c.joint or 0, c.link or 0) for c in result.columns if c.quantity == "power_link"]
-    return [{"i": i, "j": j, "given": float(given[i, j]), "taken": float(taken[i, j])} for i, j in pairs]
+    """What each joint i gave to each link j and took back, in J, over all samples; loads behind links."""
+    out = []
+    for c in result.columns:
+        if c.quantity == "power_link":
+            j, work, at = c.link or 0, result.work, (c.joint, c.link)
+        elif c.quantity == "power_load":
+            j, work, at = len(result.robot.links) + (c.cause or 0), result.load_work, (c.joint, c.cause)
+        else:
+            continue
+        given, taken = float(work.given[at]), float(work.taken[at])
+        out.append({"i": c.joint or 0, "j": j, "given": given, "taken": taken})
+    return out
 
 
 def _encode(values: Array) -> str:
