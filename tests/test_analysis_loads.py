@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import DATA
 from linkwise import Load, generate, read_system, write_package
 from linkwise.analysis import Processing, Reading, analyze
 from linkwise.analysis.loaded_robot import load_robot
@@ -227,6 +228,16 @@ def test_a_log_of_loads_that_lacks_something_is_refused(arm: Path, tmp_path: Pat
     file = write_csv(tmp_path / "plate.csv", change(measured(columns=3)), names)
     with pytest.raises(LinkwiseError, match=message):
         analyze(arm / "log.csv", arm / "arm", loads=[file])
+
+
+def test_robots_of_energies_bear_no_loads(tmp_path: Path) -> None:
+    write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["numpy"]), tmp_path / "cart")
+    cart = load_robot(tmp_path / "cart")
+    log = write_csv(tmp_path / "log.csv", smooth(20, len(cart.joints)), cart.joints)
+    with pytest.raises(
+        LinkwiseError, match=r"load 'f' on 'pole': the links of .* are energies, which do not"
+    ):
+        analyze(log, cart, loads=[Load("f", "pole")])
 
 
 def test_values_that_are_no_load_are_refused(arm: Path) -> None:

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from conftest import DATA
 from linkwise import Payload, generate, read_system, write_package
 from linkwise.analysis import Processing, Reading, analyze
 from linkwise.analysis.loaded_robot import load_robot
@@ -100,6 +101,15 @@ def test_files_and_page_list_them(arm, tmp_path):
     assert data["links"][3:] == ["payload tool", "bag"]
     assert data["bodies"]["links"][-2:] == [3, 4]
     assert data["bodies"]["coordinates"][-2:] == [-1, -1]
+
+
+def test_robots_that_take_no_payload_say_why(arm, tmp_path):
+    write_package(generate(read_system(arm / "arm.urdf"), ["autograd"]), tmp_path / "arm")
+    with pytest.raises(LinkwiseError, match="no back end takes a payload's mass; generate the robot again"):
+        carrying(load_robot(tmp_path / "arm"), PAYLOADS)
+    write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["numpy"]), tmp_path / "cart")
+    with pytest.raises(LinkwiseError, match=r"payload on 'tool': the links of .* are energies, which do not"):
+        carrying(load_robot(tmp_path / "cart"), PAYLOADS)
 
 
 def test_what_cannot_carry_a_payload_is_named(arm):

@@ -6,14 +6,13 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from linkwise.analysis.column_matching import time_column
-from linkwise.analysis.loads.load import WORLD
+from linkwise.analysis.loads.given_loads import WORLD
 from linkwise.analysis.loads.load_columns import LoadColumns
 from linkwise.analysis.logs import open_log
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
-from linkwise.robot.readers.xml_file import parse
 
 GROUND = "ground"
 NONE = ("", "Unassigned")
@@ -27,6 +26,10 @@ def external_loads(path: Path) -> tuple[LoadColumns, ...]:
     Raises LinkwiseError for a file without any, data that are not there, and identifiers of other than three
     columns.
     """
+    from linkwise.robot.readers.xml_file import (
+        parse,
+    )  # its room brings SymPy, which other loads can do without
+
     with within(str(path)):
         require_file(path)
         root = parse(path)

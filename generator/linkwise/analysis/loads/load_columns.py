@@ -8,7 +8,7 @@ from pathlib import Path
 from linkwise.analysis.body_names import named_body
 from linkwise.analysis.column_matching import time_column
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.load import FORCE, MOMENT, POINT, WORLD
+from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed

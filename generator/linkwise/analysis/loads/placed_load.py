@@ -13,7 +13,7 @@ import numpy as np
 
 from linkwise.analysis.body_names import body_frame
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.load import FORCE, MOMENT, POINT, WORLD
+from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array, Model
 from linkwise.package.manifest import FrameEntry, RigidTree

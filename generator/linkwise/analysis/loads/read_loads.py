@@ -10,7 +10,7 @@ from linkwise.analysis.even_time import even_rate, usual_step
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.external_loads import external_loads
-from linkwise.analysis.loads.load import FORCE, MOMENT, POINT, WIDTH, Load, Loads
+from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WIDTH, Load, Loads
 from linkwise.analysis.loads.load_columns import PARTS, LoadColumns, load_columns
 from linkwise.analysis.loads.placed_load import PlacedLoad, Seat, seat_of
 from linkwise.analysis.logs import open_log
@@ -102,7 +102,7 @@ def _check_time(time: Array, motion: Array, first_row: int) -> None:
     """Raise LinkwiseError for time that runs back, has gaps, or does not cover the motion's."""
     if len(time) < 2:
         raise LinkwiseError(f"{len(time)} samples; a load over time has 2 or more")
-    step = usual_step(time, first_row)
+    step = min(usual_step(time, first_row), float(np.diff(motion[:2]).sum()))
     for row, late, verb, own, other in (
         (first_row, time[0] - motion[0], "begins", time[0], motion[0]),
         (first_row + len(time) - 1, motion[-1] - time[-1], "ends", time[-1], motion[-1]),
