@@ -13,6 +13,7 @@ from answers import random_states, relative_error
 from compiled import STRICT, compile_library, name_of
 from conftest import DATA, needs_compiler
 from linkwise import Options, generate, read_system, write_package
+from linkwise.package.load import import_package
 from test_emitted_c import COMPILERS, strict
 from urdf_text import joint, link, robot
 
@@ -114,6 +115,16 @@ def test_forward_dynamics_says_which_joint_moves_no_mass(kernel: str, tmp_path: 
         number, qdd = answer(q, qd, tau)
         assert number == first
         assert (qdd == 7.0).all()
+
+
+def test_native_names_the_joints_that_move_no_mass(tmp_path: Path) -> None:
+    path = tmp_path / "wrist.urdf"
+    path.write_text(WRIST, encoding="utf-8")
+    write_package(generate(read_system(path), kernel="loops"), tmp_path / "wrist")
+    wrist, rest = import_package(tmp_path / "wrist").load("native"), np.zeros(3)
+    with pytest.raises(ValueError, match="singular: the joints roll, turn can move together without moving"):
+        wrist.forward_dynamics(rest, rest, rest)
+    assert np.isnan(wrist.forward_dynamics(rest + np.nan, rest, rest)).all()
 
 
 def test_where_a_sliding_base_is_does_not_matter(tmp_path: Path) -> None:

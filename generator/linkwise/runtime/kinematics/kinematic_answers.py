@@ -97,7 +97,7 @@ class KinematicAnswers:
         def answer(at: Asked) -> Any:
             return homogeneous(at.xp, at.frame(from_world=True))[:, :, 0]
 
-        return self._answer((q,), self._index(frame), None, answer, (4, 4), out)
+        return self._answer("pose", (q,), self._index(frame), None, answer, (4, 4), out)
 
     def poses(self, q: Any, out: Any) -> Any:
         """See `Kinematics.poses`."""
@@ -107,7 +107,7 @@ class KinematicAnswers:
             # (4, 4, F, samples) -> (F, 4, 4, samples)
             return at.xp.swapaxes(at.xp.swapaxes(matrices, 0, 2), 1, 2)
 
-        return self._answer((q,), ALL, None, answer, (len(self.frames), 4, 4), out)
+        return self._answer("poses", (q,), ALL, None, answer, (len(self.frames), 4, 4), out)
 
     def jacobian(self, q: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.jacobian`."""
@@ -116,20 +116,20 @@ class KinematicAnswers:
             found = at.frame()
             return jacobian(at.xp, at.tables, found, point_at(found, at.point))
 
-        return self._answer((q,), self._index(frame), point, answer, (6, self._structure.n), out)
+        return self._answer("jacobian", (q,), self._index(frame), point, answer, (6, self._structure.n), out)
 
     def jacobian_rate(self, q: Any, qd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.jacobian_rate`."""
         shape = 6, self._structure.n
-        return self._moving((q, qd), frame, point, jacobian_rate, shape, out)
+        return self._moving("jacobian_rate", (q, qd), frame, point, jacobian_rate, shape, out)
 
     def velocity(self, q: Any, qd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.velocity`."""
-        return self._moving((q, qd), frame, point, velocity_of, (6,), out)
+        return self._moving("velocity", (q, qd), frame, point, velocity_of, (6,), out)
 
     def acceleration(self, q: Any, qd: Any, qdd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.acceleration`."""
-        return self._moving((q, qd, qdd), frame, point, acceleration_of, (6,), out)
+        return self._moving("acceleration", (q, qd, qdd), frame, point, acceleration_of, (6,), out)
 
     def centre_of_mass(self, q: Any, out: Any) -> Any:
         """See `Kinematics.centre_of_mass`."""
@@ -137,7 +137,7 @@ class KinematicAnswers:
         def answer(at: Asked) -> Any:
             return centre_of_mass(at.numbers.masses, at.centres(from_world=True))
 
-        return self._answer((q,), LINKS, None, answer, (3,), out)
+        return self._answer("centre_of_mass", (q,), LINKS, None, answer, (3,), out)
 
     def centre_of_mass_jacobian(self, q: Any, out: Any) -> Any:
         """See `Kinematics.centre_of_mass_jacobian`."""
@@ -145,7 +145,7 @@ class KinematicAnswers:
         def answer(at: Asked) -> Any:
             return centre_jacobian(at.xp, at.tables, at.numbers.masses, at.centres())
 
-        return self._answer((q,), LINKS, None, answer, (3, self._structure.n), out)
+        return self._answer("centre_of_mass_jacobian", (q,), LINKS, None, answer, (3, self._structure.n), out)
 
     def centre_of_mass_jacobian_rate(self, q: Any, qd: Any, out: Any) -> Any:
         """See `Kinematics.centre_of_mass_jacobian_rate`."""
@@ -155,10 +155,18 @@ class KinematicAnswers:
             moved = at.moving(found)
             return centre_jacobian_rate(at.xp, at.tables, at.numbers.masses, found, moved)
 
-        return self._answer((q, qd), LINKS, None, answer, (3, self._structure.n), out)
+        shape = 3, self._structure.n
+        return self._answer("centre_of_mass_jacobian_rate", (q, qd), LINKS, None, answer, shape, out)
 
     def _moving(
-        self, given: Sequence[Any], frame: Any, point: Any, made: Any, shape: tuple[int, ...], out: Any
+        self,
+        call: str,
+        given: Sequence[Any],
+        frame: Any,
+        point: Any,
+        made: Any,
+        shape: tuple[int, ...],
+        out: Any,
     ) -> Any:
         """What `made` computes of a point's motion."""
 
@@ -167,13 +175,17 @@ class KinematicAnswers:
             value = made(at.xp, at.tables, at.moving(found), point_at(found, at.point))
             return value if len(shape) > 1 else value[:, 0]
 
-        return self._answer(given, self._index(frame), point, answer, shape, out)
+        return self._answer(call, given, self._index(frame), point, answer, shape, out)
 
     def _index(self, frame: Any) -> int:
         return frame_index(frame, self.frames, self._structure.link_names)
 
+    def _at_once(self, call: str, motion: Sequence[Any], part: Any, point: Any) -> Any:
+        """What a back end answers without these arrays; None where it does not."""
+
     def _answer(
         self,
+        call: str,
         given: Sequence[Any],
         part: Any,
         point: Any,
@@ -193,8 +205,10 @@ class KinematicAnswers:
             read = dict(zip(("q", "qd", "qdd"), motion, strict=False))
             read |= {} if point is None else {"point": point}
             accepted(out, (), (shape,), read, self._read_beside_motion(), False)
-        at, count = self._asked(own, part, motion, point), math.prod(shape)
-        value = _in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
+        value = self._at_once(call, motion, part, point)
+        if value is None:
+            at, count = self._asked(own, part, motion, point), math.prod(shape)
+            value = _in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
         if out is None:  # its numbers side by side
             return np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value.contiguous()
         out[...] = value
@@ -245,6 +259,8 @@ def _with_point(own: Any, motion: Sequence[Any], given: Any) -> tuple[list[Any],
         raise ValueError(
             f"point has shape {tuple(point.shape)}; its last axis must be 3: x, y, z in the frame, in m"
         )
+    if point.shape[:-1] == q.shape[:-1]:
+        return list(motion), point
     try:
         batch = np.broadcast_shapes(tuple(q.shape[:-1]), tuple(point.shape[:-1]))
     except ValueError:
