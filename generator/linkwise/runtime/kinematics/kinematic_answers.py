@@ -109,7 +109,7 @@ class KinematicAnswers:
         def answer(at: Asked) -> Any:
             return homogeneous(at.xp, at.frame(from_world=True))[:, :, 0]
 
-        return self._answer((q,), self._index(frame), {}, answer, (4, 4), out)
+        return self._answer("pose", (q,), self._index(frame), {}, answer, (4, 4), out)
 
     def poses(self, q: Any, out: Any) -> Any:
         """See `Kinematics.poses`."""
@@ -119,7 +119,7 @@ class KinematicAnswers:
             # (4, 4, F, samples) -> (F, 4, 4, samples)
             return at.xp.swapaxes(at.xp.swapaxes(matrices, 0, 2), 1, 2)
 
-        return self._answer((q,), ALL, {}, answer, (len(self.frames), 4, 4), out)
+        return self._answer("poses", (q,), ALL, {}, answer, (len(self.frames), 4, 4), out)
 
     def jacobian(self, q: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.jacobian`."""
@@ -128,20 +128,22 @@ class KinematicAnswers:
             found = at.frame()
             return jacobian(at.xp, at.tables, found, at.place(found))
 
-        return self._answer((q,), self._index(frame), {"point": point}, answer, (6, self._structure.n), out)
+        return self._answer(
+            "jacobian", (q,), self._index(frame), {"point": point}, answer, (6, self._structure.n), out
+        )
 
     def jacobian_rate(self, q: Any, qd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.jacobian_rate`."""
         shape = 6, self._structure.n
-        return self._moving((q, qd), frame, point, jacobian_rate, shape, out)
+        return self._moving("jacobian_rate", (q, qd), frame, point, jacobian_rate, shape, out)
 
     def velocity(self, q: Any, qd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.velocity`."""
-        return self._moving((q, qd), frame, point, velocity_of, (6,), out)
+        return self._moving("velocity", (q, qd), frame, point, velocity_of, (6,), out)
 
     def acceleration(self, q: Any, qd: Any, qdd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.acceleration`."""
-        return self._moving((q, qd, qdd), frame, point, acceleration_of, (6,), out)
+        return self._moving("acceleration", (q, qd, qdd), frame, point, acceleration_of, (6,), out)
 
     def load_torque(self, q: Any, frame: Any, force: Any, moment: Any, point: Any, at: Any, out: Any) -> Any:
         """See `Kinematics.load_torque`."""
@@ -161,7 +163,9 @@ class KinematicAnswers:
             return load_torque(asked.xp, asked.tables, found, x, given["force"], given.get("moment"))
 
         vectors = {"force": force, "moment": moment, "point": point, "at": at}
-        return self._answer((q,), self._index(frame), vectors, answer, (self._structure.n,), out)
+        return self._answer(
+            "load_torque", (q,), self._index(frame), vectors, answer, (self._structure.n,), out
+        )
 
     def centre_of_mass(self, q: Any, out: Any) -> Any:
         """See `Kinematics.centre_of_mass`."""
@@ -169,7 +173,7 @@ class KinematicAnswers:
         def answer(at: Asked) -> Any:
             return centre_of_mass(at.numbers.masses, at.centres(from_world=True))
 
-        return self._answer((q,), LINKS, {}, answer, (3,), out)
+        return self._answer("centre_of_mass", (q,), LINKS, {}, answer, (3,), out)
 
     def centre_of_mass_jacobian(self, q: Any, out: Any) -> Any:
         """See `Kinematics.centre_of_mass_jacobian`."""
@@ -177,7 +181,7 @@ class KinematicAnswers:
         def answer(at: Asked) -> Any:
             return centre_jacobian(at.xp, at.tables, at.numbers.masses, at.centres())
 
-        return self._answer((q,), LINKS, {}, answer, (3, self._structure.n), out)
+        return self._answer("centre_of_mass_jacobian", (q,), LINKS, {}, answer, (3, self._structure.n), out)
 
     def centre_of_mass_jacobian_rate(self, q: Any, qd: Any, out: Any) -> Any:
         """See `Kinematics.centre_of_mass_jacobian_rate`."""
@@ -187,10 +191,19 @@ class KinematicAnswers:
             moved = at.moving(found)
             return centre_jacobian_rate(at.xp, at.tables, at.numbers.masses, found, moved)
 
-        return self._answer((q, qd), LINKS, {}, answer, (3, self._structure.n), out)
+        return self._answer(
+            "centre_of_mass_jacobian_rate", (q, qd), LINKS, {}, answer, (3, self._structure.n), out
+        )
 
     def _moving(
-        self, given: Sequence[Any], frame: Any, point: Any, made: Any, shape: tuple[int, ...], out: Any
+        self,
+        call: str,
+        given: Sequence[Any],
+        frame: Any,
+        point: Any,
+        made: Any,
+        shape: tuple[int, ...],
+        out: Any,
     ) -> Any:
         """What `made` computes of a point's motion."""
 
@@ -199,13 +212,17 @@ class KinematicAnswers:
             value = made(at.xp, at.tables, at.moving(found), at.place(found))
             return value if len(shape) > 1 else value[:, 0]
 
-        return self._answer(given, self._index(frame), {"point": point}, answer, shape, out)
+        return self._answer(call, given, self._index(frame), {"point": point}, answer, shape, out)
 
     def _index(self, frame: Any) -> int:
         return frame_index(frame, self.frames, self._structure.link_names)
 
+    def _at_once(self, call: str, motion: Sequence[Any], part: Any, point: Any) -> Any:
+        """What a back end answers without these arrays; None where it does not."""
+
     def _answer(
         self,
+        call: str,
         given: Sequence[Any],
         part: Any,
         beside: dict[str, Any],
@@ -226,8 +243,10 @@ class KinematicAnswers:
         if out is not None:
             read = dict(zip(("q", "qd", "qdd"), motion, strict=False)) | vectors
             accepted(out, (), (shape,), read, self._read_beside_motion(), False)
-        at, count = self._asked(own, part, motion, vectors), math.prod(shape)
-        value = _in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
+        value = self._at_once(call, motion, part, vectors.get("point"))
+        if value is None:
+            at, count = self._asked(own, part, motion, vectors), math.prod(shape)
+            value = _in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
         if out is None:  # its numbers side by side
             return np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value.contiguous()
         out[...] = value
@@ -286,7 +305,7 @@ def _with_vectors(
                 f"{name} has shape {tuple(a.shape)}, the motion has samples of shape {samples}; "
                 f"give one {name}, or one for each sample"
             ) from None
-    if not vectors:
-        return list(motion), {}
+    if all(a.shape[:-1] == samples for a in vectors.values()):
+        return list(motion), vectors
     motion = [own.xp.broadcast_to(a, (*batch, a.shape[-1])) for a in motion]
     return motion, {name: own.xp.broadcast_to(a, (*batch, 3)) for name, a in vectors.items()}
