@@ -10,8 +10,11 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from linkwise.analysis import Processing, Reading, analyze
+from linkwise import generate, read_system, write_package
+from linkwise.analysis import Payload, Processing, Reading, analyze
 from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.loads import Load, Loads
+from linkwise.analysis.payload import carrying
 from linkwise.analysis.result import Totals
 from linkwise.analysis.result_columns import Column, columns_of
 from linkwise.analysis.run import Wanted, analyze_to
@@ -287,6 +290,46 @@ def hovered(driver, before):
         "return [...document.querySelectorAll('#shares .hovertext')].map((text) => text.textContent)"
     )
     return said if said != before[-1:] else []
+
+
+def test_loads_are_causes_and_arrows(driver, tmp_path):
+    log = write_csv(tmp_path / "a.csv", smooth(200, 3))
+    time = np.arange(250) / 100
+    push = np.column_stack([5 * np.sin(time), 3 * np.cos(time), 0 * time])
+    loads = Loads(
+        (Load("hand", "link3", push, point=(0.25, 0, 0), time=time), Load("rope", "link2", (0, 9, 0)))
+    )
+    write_package(generate(read_system("planar3"), ["numpy"]), tmp_path / "planar3")
+    robot = carrying(load_robot(tmp_path / "planar3"), (Payload("link3", 0.5, (0.25, 0, 0)),))
+    out = tmp_path / "out"
+    result, _ = analyze_to(out, log, robot, Reading(), Processing(), Wanted(), silent, loads)
+    driver.get((out / "report.html").as_uri())
+    choose(driver, "slider", 40)
+    choose(driver, "order", "tau_load")
+    _, numbers = shown_map(driver)
+    for i in range(3):
+        assert [x or 0 for x in numbers[i]] == pytest.approx(result.load_torque[40, i].tolist(), rel=1e-13)
+    assert numbers[2][1] is None  # joint 3 does not move link 2
+    arrows = driver.execute_script(
+        "return [...document.querySelectorAll('#stick g.load line')]"
+        ".map((line) => ['x1', 'y1', 'x2', 'y2'].map((at) => Number(line.getAttribute(at))))"
+    )
+    directions = [np.subtract(ends[2:], ends[:2]) for ends in arrows]
+    for direction, force in zip(directions, (push[40, :2], (0, 9)), strict=True):
+        along = direction * [1, -1] / np.hypot(*direction)
+        np.testing.assert_allclose(along, force / np.hypot(*force), atol=1e-6)
+    choose(driver, "order", "everything")
+    cells = driver.execute_script(
+        "return [...document.querySelectorAll('#numbers td[data-value]')]"
+        ".map((td) => Number(td.dataset.value))"
+    )
+    assert sum(cells[:-1]) == pytest.approx(cells[-1], rel=1e-12)
+    assert cells[-1] == result.torque[40, 0]
+    choose(driver, "span", "now")
+    power = driver.execute_script("return document.getElementById('power').data[0].z")
+    into = [[*result.power[40, i], *(result.load_torque[40, i] * result.qd[40, i])] for i in range(3)]
+    assert [[x or 0 for x in row[:6]] for row in power[:3]] == [pytest.approx(row, rel=1e-12) for row in into]
+    assert driver.get_log("browser") == []
 
 
 def test_names_are_shown_and_not_obeyed(driver, tmp_path):

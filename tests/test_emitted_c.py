@@ -34,7 +34,7 @@ COMPILERS = {
     "g++": ("g++", "-x", "c++", "-std=c++17"),
     "clang++": ("clang++", "-x", "c++", "-std=c++17"),
 }
-PARTS = ("SINES", "ONE_SAMPLE", "BLOCKS", "POSITION_GRADIENT")
+PARTS = ("SINES", "ONE_SAMPLE", "BLOCKS", "POSITION_GRADIENT", "CONTROL")
 
 
 def strict(compiler: str) -> tuple[str, ...]:

@@ -46,7 +46,14 @@ def test_every_function_agrees_with_a_recursion(options: Options, tmp_path: Path
     results = check_package(crane(tmp_path, options), samples=30)
     assert [result for result in results if not result.passed] == []
     names = " ".join(result.name for result in results)
-    for function in ("decomposition", "decomposition_blocksf", "torquef", "position_gradient", "link_5f"):
+    for function in (
+        "decomposition_blocksf",
+        "torquef",
+        "position_gradient",
+        "link_5f",
+        "posef",
+        "jacobian_rate",
+    ):
         assert f"crane_{function}" in names
     assert ("other parameters" in names) == (options.parameters == "symbolic")
 

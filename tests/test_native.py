@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from answers import relative_error
 from conftest import needs_compiler
 
 pytestmark = needs_compiler
@@ -286,3 +287,68 @@ def test_what_is_written_to_is_known_to_have_changed(package_of: Callable[[str],
     robot.partial_torque(q, q, q, out=out)
     with pytest.raises(RuntimeError, match="modified by an inplace operation"):
         product.backward()
+
+
+def for_control(robot: Any, q: Any, qd: Any, tau: Any) -> dict[str, Any]:
+    """What C has functions of one sample for."""
+    kinematics, point = robot.kinematics, [0.1, -0.2, 0.3]
+    frame = kinematics.frames[-1]
+    return {
+        "pose": kinematics.pose(q, frame),
+        "jacobian": kinematics.jacobian(q, frame, point),
+        "at the origin": kinematics.jacobian(q, frame),
+        "rate": kinematics.jacobian_rate(q, qd, frame, point),
+        "mass": robot.mass_matrix(q),
+        "qdd": robot.forward_dynamics(q, qd, tau),
+    }
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("robot", ["torso", "puma560 loops"])
+def test_c_answers_one_sample_of_what_control_needs(
+    robot: str, dtype: str, package_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Arrays have no part in it: whatever they are asked for fails."""
+    package = package_of(robot)
+    native, arrays = package.load("native"), package.load("numpy")
+    motion = np.random.default_rng(6).uniform(-1, 1, (3, native.n)).astype(dtype)
+    expected = for_control(arrays, *motion.astype(float))
+
+    def none(*asked: Any) -> None:
+        pytest.fail("arrays were asked")
+
+    monkeypatch.setattr(type(arrays.kinematics._answers), "_asked", none)
+    monkeypatch.setattr(type(native._answers), "_parts", none)
+    for given in (motion, motion[:, None], motion.tolist()):
+        for what, answer in for_control(native, *given).items():
+            value = expected[what]
+            assert answer.shape == np.shape(given)[1:-1] + value.shape
+            assert answer.dtype == (np.float64 if isinstance(given, list) else dtype)
+            error = np.abs(answer.reshape(value.shape) - value).max() / np.abs(value).max()
+            assert error <= (1e-12 if dtype == "float64" else 1e-4), what
+    out = np.empty((native.n, native.n), dtype)
+    assert native.mass_matrix(motion[0], out=out) is out
+    assert (out == native.mass_matrix(motion[0])).all()
+
+
+def test_control_counts_with_the_present_values_of_what_is_learned(planar3_symbolic: ModuleType) -> None:
+    own = dict(planar3_symbolic.parameters)
+    learned = {name: torch.tensor(value, dtype=torch.float64) for name, value in own.items()}
+    q = np.array([0.1, 0.2, 0.3])
+    robot = planar3_symbolic.load("native", parameters=learned)
+    before = robot.mass_matrix(q)
+    for value in learned.values():
+        value *= 1.5
+    heavier = planar3_symbolic.load("native", parameters={name: 1.5 * value for name, value in own.items()})
+    assert relative_error(robot.mass_matrix(q), heavier.mass_matrix(q)) <= 1e-14
+    assert relative_error(before, heavier.mass_matrix(q)) > 0.1
+    poses = [r.kinematics.pose(q, r.kinematics.frames[-1]) for r in (robot, heavier)]
+    assert relative_error(*poses) <= 1e-14
+
+
+def test_threads_that_ask_for_one_sample_keep_their_own_answers(planar3: ModuleType) -> None:
+    robot, positions = planar3.load("native"), np.random.default_rng(7).uniform(-1, 1, (200, 3))
+    expected = planar3.load("numpy").mass_matrix(positions)
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(robot.mass_matrix, positions))
+    assert relative_error(np.array(found), expected) <= 1e-13

@@ -113,6 +113,50 @@ def centres_in_files_axes(robot: Any) -> Any:
         yield np.array(frame.rotation).T @ (np.array(link.centre) - np.array(frame.translation))
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_load_asks_joints_for_the_torque_that_holds_it(arm: ModuleType, backend: str) -> None:
+    kinematics = arm.load(backend).kinematics
+    generator = np.random.default_rng(2)
+    q, (force, moment, point) = generator.uniform(-2, 2, (4, 2)), generator.uniform(-5, 5, (3, 4, 3))
+    jacobian = as_array(kinematics.jacobian(q, "tool", point))
+    expected = -np.einsum("sci,sc->si", jacobian, np.concatenate([moment, force], 1))
+    given = as_array(kinematics.load_torque(q, "tool", force, moment, point))
+    np.testing.assert_allclose(given, expected, rtol=0, atol=1e-14)
+    pose = as_array(kinematics.pose(q, "tool"))
+    world = np.einsum("sab,sb->sa", pose[:, :3, :3], point) + pose[:, :3, 3]
+    at = as_array(kinematics.load_torque(q, "tool", force, moment, at=world))
+    np.testing.assert_allclose(at, expected, rtol=0, atol=1e-13)
+    # One weight on many configurations: what holds it up is what gravity adds to the torques.
+    weight = as_array(kinematics.load_torque(q, "tool", [0, -9.81, 0]))
+    x = as_array(kinematics.jacobian(q, "tool"))[:, 4]
+    np.testing.assert_allclose(weight, 9.81 * x, rtol=0, atol=1e-14)
+    assert not as_array(kinematics.load_torque(q, "base", [1.0, 2.0, 3.0])).any()
+
+
+def test_a_loads_torque_has_gradients_and_names_what_is_wrong(arm: ModuleType) -> None:
+    kinematics = arm.load("torch").kinematics
+    q = torch.from_numpy(Q)
+    force = torch.tensor([1.0, 2.0, 3.0], dtype=torch.float64, requires_grad=True)
+    kinematics.load_torque(q, "tool", force)[0].backward()
+    torch.testing.assert_close(force.grad, -kinematics.jacobian(q, "tool")[3:, 0], rtol=0, atol=1e-15)
+    out = torch.zeros(2, dtype=torch.float64)
+    assert kinematics.load_torque(q, "tool", [1.0, 2.0, 3.0], out=out) is out
+    with pytest.raises(
+        ValueError, match=r"force has shape \(2,\); its last axis must be 3: x, y, z in the wo"
+    ):
+        kinematics.load_torque(q, "tool", [1.0, 2.0])
+    with pytest.raises(
+        ValueError, match=r"moment has shape \(4, 3\), the motion has samples of shape \(3,\)"
+    ):
+        kinematics.load_torque(np.zeros((3, 2)), "tool", [0.0, 1.0, 0.0], np.zeros((4, 3)))
+    with pytest.raises(
+        ValueError, match="point and at both say where the force acts; give point in the frame"
+    ):
+        kinematics.load_torque(q, "tool", [0.0, 1.0, 0.0], point=[0.0] * 3, at=[0.0] * 3)
+    with pytest.raises(TypeError, match="force is None; give its x, y, z in the world's axes, in N"):
+        kinematics.load_torque(q, "tool", None)
+
+
 def test_gradients_flow_and_transformations_pass(arm: ModuleType) -> None:
     length = torch.tensor(0.4, dtype=torch.float64, requires_grad=True)
     kinematics = arm.load("torch", parameters={"L": length}).kinematics

@@ -33,6 +33,7 @@ static real cos_counted(real a) { return real(std::cos(a.value), true); }
 #define ONE_SAMPLE 2
 #define BLOCKS 3
 #define POSITION_GRADIENT 4
+#define CONTROL 6
 #define PART(part) (part <= ONE_SAMPLE)
 #define SHARED static
 #include SOURCE

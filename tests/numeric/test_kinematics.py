@@ -71,6 +71,20 @@ class WithFrames(PinocchioModel):
             "acceleration": pin.getFrameClassicalAcceleration(model, data, at, WORLD).vector[swap],
         }
 
+    def torque_under_load(self, motion: Any, name: str, point: Any, moment: Any, force: Any) -> Any:
+        """Inverse dynamics with a wrench, in the world's axes, on a point of a body's frame."""
+        frame = self.model.frames[self.model.getFrameId(name, pin.BODY)]
+        state = self._state(*motion)
+        pin.forwardKinematics(self.model, self.data, state[0])
+        carrier = self.data.oMi[frame.parentJoint]
+        at = carrier.act(frame.placement.act(point))
+        loads = pin.StdVec_Force()
+        loads.extend([pin.Force.Zero()] * self.model.njoints)
+        if frame.parentJoint:
+            wrench = pin.Force(force, moment + np.cross(at, force))
+            loads[frame.parentJoint] = carrier.actInv(wrench)
+        return self.tie.T @ pin.rnea(self.model, self.data, *state, loads)
+
 
 @pytest.mark.parametrize("robot", OPTIONS)
 def test_frames_and_their_jacobians_are_pinocchios(robot: str, tmp_path: Path) -> None:
@@ -98,6 +112,12 @@ def test_frames_and_their_jacobians_are_pinocchios(robot: str, tmp_path: Path) -
             held("rate", kinematics.jacobian_rate(q, qd, name), expected["rate"])
             held("velocity", kinematics.velocity(q, qd, name), expected["velocity"])
             held("acceleration", kinematics.acceleration(q, qd, qdd, name), expected["acceleration"])
+        for name in bodies:
+            wrench = np.random.default_rng(1).uniform(-9.0, 9.0, (3, 3))
+            expected = oracle.torque_under_load((q, qd, qdd), name, *wrench)
+            point, moment, force = wrench
+            added = kinematics.load_torque(q, name, force, moment, point)
+            held("torque under a load", dynamics.inverse_dynamics(q, qd, qdd) + added, expected)
         held("centre of mass", kinematics.centre_of_mass(q), data.com[0])
         held("its Jacobian", kinematics.centre_of_mass_jacobian(q), data.Jcom @ oracle.tie)
         pin.centerOfMass(oracle.model, data, *oracle._state(q, qd, qdd))

@@ -40,7 +40,7 @@ def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> S
     twice = [name for name, count in Counter(columns).items() if count > 1]
     if twice:
         raise LinkwiseError(f"column {twice[0]!r} stands twice in the header; rename one")
-    time = _time(columns, reading)
+    time = time_column(columns, reading)
     source = _mapped(columns, joints, reading)
     at_column = {column: at for at, column in enumerate(columns)}
     missing = [joint for joint, column in source.items() if column not in at_column]
@@ -104,7 +104,8 @@ def unit_warnings(
     return tuple(warnings)
 
 
-def _time(columns: Sequence[str], reading: Reading) -> int:
+def time_column(columns: Sequence[str], reading: Reading) -> int:
+    """Number of the column of the time; raises LinkwiseError where none is."""
     if reading.time is not None:
         if reading.time not in columns:
             raise LinkwiseError(

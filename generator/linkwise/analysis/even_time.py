@@ -27,25 +27,39 @@ MOST = 100
 """How many times the log's own rate is still a plausible wish, and not a slip of the finger."""
 
 
-def even_rate(time: Array, first_row: int, strict: bool) -> float:
-    """Sampling rate in Hz of `time` (S,) in s, whose first row in the log has the number `first_row`.
+def usual_step(time: Array, first_row: int, gap: float = GAP) -> float:
+    """Median step in s of `time` (S,), two or more, whose first row in the log has the number `first_row`.
 
-    Raises LinkwiseError that names the rows for time that does not increase and for gaps; where `strict`,
-    for uneven time too, which is else left to `resampled`.
+    Raises LinkwiseError that names the rows for time that does not increase, and for steps longer than `gap`
+    usual ones.
     """
-    if len(time) < 2:
-        raise LinkwiseError(f"{len(time)} samples; a movement needs 5 or more")
     if np.abs(time).max() > EXTREME:
         raise LinkwiseError(f"time column: it comes to {np.abs(time).max():.3g} s; give seconds")
     steps = np.diff(time)
     _refuse_backwards(time, steps, first_row)
     usual = float(np.median(steps))
     worst = int(np.argmax(steps))
-    if steps[worst] > (GAP if strict else GAP_BEFORE_RESAMPLING) * usual:
+    if steps[worst] > gap * usual:
         raise LinkwiseError(
             f"rows {first_row + worst} to {first_row + worst + 1}, time column: a gap of"
             f" {steps[worst]:.6g} s where steps are {usual:.6g} s; fill it or cut the log there"
         )
+    return usual
+
+
+def even_rate(
+    time: Array, first_row: int, strict: bool, mend: str = "bring the log to an even rate with --resample"
+) -> float:
+    """Sampling rate in Hz of `time` (S,) in s, whose first row in the log has the number `first_row`.
+
+    Raises LinkwiseError that names the rows for time that does not increase and for gaps; where `strict`,
+    for uneven time too, which is else left to `resampled`; `mend` then says before the
+    mean rate what to do.
+    """
+    if len(time) < 2:
+        raise LinkwiseError(f"{len(time)} samples; a movement needs 5 or more")
+    usual_step(time, first_row, GAP if strict else GAP_BEFORE_RESAMPLING)
+    steps = np.diff(time)
     mean = (time[-1] - time[0]) / (len(time) - 1)
     if mean < 1 / EXTREME:
         raise LinkwiseError(f"time column: steps of {mean:.3g} s; give seconds")
@@ -57,7 +71,7 @@ def even_rate(time: Array, first_row: int, strict: bool) -> float:
         at = int(np.argmax(off))
         raise LinkwiseError(
             f"row {first_row + at + 1}, time column: a step of {steps[at]:.6g} s where the mean is"
-            f" {mean:.6g} s; bring the log to an even rate with --resample {1 / mean:.6g}"
+            f" {mean:.6g} s; {mend} {1 / mean:.6g}"
         )
     return float(1 / mean)
 

@@ -13,15 +13,16 @@ from linkwise.extras import extra
 from linkwise.package.load import Array
 
 
-def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536) -> None:
-    """Filter q (samples, n) in place; `rate` in Hz, `rows` the length of a block.
+def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: str = "--cutoff") -> None:
+    """Filter q (samples, n) in place; `rate` in Hz, `rows` the length of a block, `flag` that of
+    the cutoff, for messages.
 
     Raises LinkwiseError for a cutoff too low to compute, or not below half the rate, and a log too short.
     """
     signal = extra("scipy.signal")
     if settings.cutoff >= rate / 2:
         raise LinkwiseError(
-            f"--cutoff {settings.cutoff:g} Hz is not below half the sampling rate of {rate:g} Hz; lower it"
+            f"{flag} {settings.cutoff:g} Hz is not below half the sampling rate of {rate:g} Hz; lower it"
         )
     sos = signal.butter(settings.order, settings.cutoff, fs=rate, output="sos")
     pad = padding_length(sos) if settings.padding != "none" else 0
@@ -35,7 +36,7 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536) -> None
         rest = signal.sosfilt_zi(sos)[:, :, None]
     except np.linalg.LinAlgError:  # its poles round to 1
         raise LinkwiseError(
-            f"--cutoff {settings.cutoff:g} Hz is too low for a sampling rate of {rate:g} Hz; raise it"
+            f"{flag} {settings.cutoff:g} Hz is too low for a sampling rate of {rate:g} Hz; raise it"
         ) from None
     blocks = [(at, min(at + rows, len(q))) for at in range(0, len(q), rows)]
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from linkwise.analysis.settings import Payload
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Model, Package, open_package
@@ -27,10 +28,13 @@ class LoadedRobot:
     up: tuple[float, float, float]
     """Against gravity, in the base frame; z for a robot without gravity."""
     manifest_sha256: str
+    package: Package
     recursion: NewtonEuler | None = None
     """Partial torques by an independent way; None where the energies were written by hand."""
     passive: tuple[PassiveEntry, ...] = ()
     """What joints have of their own, those that have anything."""
+    payloads: tuple[Payload, ...] = ()
+    """What stands behind the robot's own links in `links`."""
 
 
 def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
@@ -52,6 +56,7 @@ def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
         tree.bodies if tree is not None else None,
         _up(tree.gravity if tree is not None else None),
         hashlib.sha256((directory / FILE).read_bytes()).hexdigest(),
+        package,
         NewtonEuler(manifest, tree) if tree is not None else None,
         tree.passive if tree is not None else (),
     )

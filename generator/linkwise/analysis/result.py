@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import MEANING, Column, Quantity
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.verify import Closure
@@ -48,6 +49,9 @@ class AnalysisResult:
     """What each joint gave to each link and took back, (n, N) in J, over all samples."""
     joint_work: Work
     """The same for all links together, (n,) in J: the integral of τ_i q̇_i where it is positive, negative."""
+    load_work: Work
+    """What each joint gave against each load and took back, (n, loads) in J."""
+    loads: tuple[PlacedLoad, ...]
     closure: Closure
     ignored: tuple[str, ...]
     """Columns of the log that no joint has."""
@@ -110,6 +114,11 @@ class AnalysisResult:
         return self._dense("tau_gravity", 2)
 
     @property
+    def load_torque(self) -> Array:
+        """τ_ie (S, n, loads), what joint i takes to bear load e, in N·m or N."""
+        return self._filled("tau_load", len(self.robot.joints), len(self.loads))
+
+    @property
     def power(self) -> Array:
         """P_ij = τ_ij q̇_i (S, n, N) in W, what joint i sends into link j; Σ_i P_ij = d(K_j + P_j)/dt."""
         return self._dense("power_link", 2)
@@ -133,6 +142,8 @@ class AnalysisResult:
             else "no filter"
         )
         parts += [f"{made.edges} edges", f"{made.convention} convention"]
+        cutoffs = sorted({borne.cutoff for borne in self.loads if borne.cutoff is not None})
+        parts += [f"loads filtered at {cutoff:g} Hz" for cutoff in cutoffs]
         if self.stride > 1:
             parts.append(f"one sample in {self.stride} shown")
         return " · ".join(parts)
@@ -151,8 +162,10 @@ class AnalysisResult:
                 "manifest_sha256": robot.manifest_sha256,
             },
             **choices(self.reading, self.processing),
+            "payloads": [payload.record() for payload in robot.payloads],
             "rate_hz": self.rate,
             "samples": self.total,
+            "loads": [borne.record() for borne in self.loads],
             "closure": asdict(self.closure),
             "work": self._work(),
             "ignored_columns": list(self.ignored),
@@ -177,6 +190,7 @@ class AnalysisResult:
             given, taken = float(work.given[at]), float(work.taken[at])
             return {"given": given, "taken_back": taken, "net": given - taken}
 
+        borne = [(c.joint or 0, c.cause or 0) for c in self.columns if c.quantity == "power_load"]
         pairs = [(c.joint or 0, c.link or 0) for c in self.columns if c.quantity == "power_link"]
         return {
             "unit": "J",
@@ -184,12 +198,19 @@ class AnalysisResult:
             "into_links": [
                 {"joint": joints[i], "link": links[j], **entry(self.work, i, j)} for i, j in pairs
             ],
+            "against_loads": [
+                {"joint": joints[i], "load": self.loads[e].name, **entry(self.load_work, i, e)}
+                for i, e in borne
+            ],
         }
 
     def _dense(self, quantity: Quantity, rank: int) -> Array:
         """Return a quantity's columns as one array (S, n, N, n)[: rank + 1], zeros where none is."""
         n, links = len(self.robot.joints), len(self.robot.links)
-        out = np.zeros((len(self.time), n, links, n)[: rank + 1])
+        return self._filled(quantity, *(n, links, n)[:rank])
+
+    def _filled(self, quantity: Quantity, *shape: int) -> Array:
+        out = np.zeros((len(self.time), *shape))
         for column, values in zip(self.columns, self.values, strict=True):
             if column.quantity == quantity:
                 found = [x for x in (column.joint, column.link, column.cause) if x is not None]

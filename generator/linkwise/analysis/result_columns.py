@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.escape import column_part
 from linkwise.package.load import PackedLayout
 
@@ -22,8 +23,10 @@ Quantity = Literal[
     "tau_damping",
     "tau_friction",
     "tau_armature",
+    "tau_load",
     "power",
     "power_link",
+    "power_load",
     "power_qdd",
     "power_qd",
     "power_gravity",
@@ -37,7 +40,7 @@ MEANING: dict[Quantity, str] = {
     "q": "joint coordinate",
     "qd": "joint velocity",
     "qdd": "joint acceleration",
-    "tau": "joint torque: all links together, and what the joint has of its own",
+    "tau": "joint torque: all links together, what the joint has of its own, and all loads",
     "tau_link": "partial torque: on the joint, through the link",
     "tau_qdd": "propagation torque: on the joint, through the link, by the cause's acceleration",
     "tau_qd": "propagation torque: on the joint, through the link, by the cause's velocity",
@@ -46,8 +49,10 @@ MEANING: dict[Quantity, str] = {
     "tau_damping": "what the joint takes for its own damping",
     "tau_friction": "what the joint takes for its own Coulomb friction",
     "tau_armature": "what the joint takes for its own armature, the inertia behind its gear",
-    "power": "power of the joint: what it sends into all links together, and into what it has of its own",
+    "tau_load": "what the joint takes to bear the load",
+    "power": "power of the joint: what it sends into all links together, what it has of its own, and loads",
     "power_link": "power that the joint sends into the link",
+    "power_load": "power that the joint sends out against the load",
     "power_qdd": "power that the joint sends into the link, by the cause's acceleration",
     "power_qd": "power that the joint sends into the link, by the cause's velocity",
     "power_gravity": "power that the joint sends into the link, by gravity and other potentials",
@@ -66,7 +71,7 @@ PASSIVE: dict[Quantity, str] = {
 }
 """Beside the links' what a joint's torque consists of, in the order of `passive_torque`, and the number that
 says whether a joint has it."""
-POWER: tuple[Quantity, ...] = ("power", "power_link")
+POWER: tuple[Quantity, ...] = ("power", "power_link", "power_load")
 POWER_TERMS: tuple[Quantity, ...] = (
     "power_qdd",
     "power_qd",
@@ -78,7 +83,7 @@ POWER_TERMS: tuple[Quantity, ...] = (
 )
 """The parts of what a joint sends into a link, or into its own; in a result where they are asked for."""
 TORQUE_OF: dict[Quantity, Quantity] = dict(
-    zip((*POWER, *POWER_TERMS), ("tau", "tau_link", *TERMS, *PASSIVE), strict=True)
+    zip((*POWER, *POWER_TERMS), ("tau", "tau_link", "tau_load", *TERMS, *PASSIVE), strict=True)
 )
 """The torque that a power is made of: P = τ q̇_i, term by term."""
 
@@ -88,7 +93,10 @@ Key = tuple[Quantity, int | None, int | None, int | None]
 
 @dataclass(frozen=True)
 class Column:
-    """One column; `joint`, `link` and `cause` are indices, None where they mean nothing."""
+    """One column; `joint`, `link` and `cause` are indices, None where they mean nothing.
+
+    The cause is a coordinate, or of what a load asks for the load.
+    """
 
     quantity: Quantity
     name: str
@@ -108,8 +116,10 @@ def load_unit(unit: str) -> str:
     return "N·m" if unit == "rad" else "N"
 
 
-def columns_of(robot: LoadedRobot, layout: PackedLayout, power_terms: bool = False) -> tuple[Column, ...]:
-    """Columns in order: time, motion, τ_i, τ_ij, terms, the joints' own, power; what is always 0 has none."""
+def columns_of(
+    robot: LoadedRobot, layout: PackedLayout, loads: Sequence[PlacedLoad] = (), power_terms: bool = False
+) -> tuple[Column, ...]:
+    """Columns in order: time, motion, τ_i, τ_ij, terms, the joints' own, loads, power; none for what is 0."""
     out = [Column("time", "time", "s")]
     motions: tuple[tuple[Quantity, str], ...] = (("q", ""), ("qd", "/s"), ("qdd", "/s²"))
     for quantity, suffix in motions:
@@ -134,6 +144,10 @@ def columns_of(robot: LoadedRobot, layout: PackedLayout, power_terms: bool = Fal
     for share, number in PASSIVE.items():
         for i in sorted({own.coordinate for own in robot.passive if getattr(own, number)}):
             out.append(Column(share, f"{share}/{column_part(robot.joints[i])}", load_unit(robot.units[i]), i))
+    for e, borne in enumerate(loads):
+        for i in borne.seat.joints:
+            name = "/".join(["tau_load", *map(column_part, (robot.joints[i], borne.name))])
+            out.append(Column("tau_load", name, load_unit(robot.units[i]), i, cause=e))
     return *out, *_powers(out, (*POWER, *POWER_TERMS) if power_terms else POWER)
 
 

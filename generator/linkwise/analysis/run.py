@@ -5,13 +5,16 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.analysis.loads import Load, Loads
+from linkwise.analysis.loads.read_loads import placed_loads
+from linkwise.analysis.payload import carrying
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.samples import Samples, read_samples
-from linkwise.analysis.settings import Processing, Reading, choices
+from linkwise.analysis.settings import Payload, Processing, Reading, choices
 from linkwise.analysis.show import check_figure, draw, figure_png
 from linkwise.analysis.show.page import NUMBERS, SAMPLES, on_page, report
 from linkwise.analysis.stream import KeptSamples, Sink, Streamed, span_of, stream, stride_for
@@ -28,6 +31,7 @@ from linkwise.progress import Progress, silent
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+NO_LOADS = Loads()
 RECORD = "analysis.json"
 """The record, and the mark by which a directory is known to hold a former result."""
 
@@ -62,13 +66,20 @@ def analyze(
     reading: Reading | None = None,
     processing: Processing | None = None,
     progress: Progress = silent,
+    payloads: Sequence[Payload] = (),
+    loads: Sequence[Load | str | Path] = (),
+    loads_cutoff: float | None = None,
 ) -> Analysis:
     """Analyse a motion log with a generated robot (its directory), all samples in memory.
 
+    payloads: point masses that the robot carries, each a link of its own in the result
+    loads: forces and moments from outside, or files of them, each a cause of its own in the result;
+    loads_cutoff in Hz is of the low-pass that those of files get
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
-    loaded = robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot))
-    job = _prepared(Path(log), loaded, reading or Reading(), processing or Processing(), progress)
+    loaded = carrying(robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot)), payloads)
+    borne = Loads.of(loads, loads_cutoff)
+    job = _prepared(Path(log), loaded, reading or Reading(), processing or Processing(), borne, progress)
     kept = KeptSamples(len(job.decomposer.columns), 1)
     return job.analysis(job.run(kept, progress), kept)
 
@@ -81,6 +92,7 @@ def analyze_to(
     processing: Processing,
     wanted: Wanted,
     progress: Progress,
+    loads: Loads = NO_LOADS,
 ) -> tuple[Analysis, Sequence[Path]]:
     """Analyse a log of any length with flat memory; `out` appears when everything is done.
 
@@ -90,14 +102,15 @@ def analyze_to(
     for name in wanted.figures:
         check_figure(name, robot)
     refuse_inside_package(out)
-    if os.path.realpath(log).startswith(os.path.join(os.path.realpath(out), "")):
-        raise LinkwiseError(f"--out {out} is to be replaced and holds the log {log}; give another --out")
+    for file in (log, *loads.paths):
+        if os.path.realpath(file).startswith(os.path.join(os.path.realpath(out), "")):
+            raise LinkwiseError(f"--out {out} is to be replaced and holds the log {file}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
-        job = _prepared(log, robot, reading, processing, progress, draft, wanted.power_terms)
+        job = _prepared(log, robot, reading, processing, loads, progress, draft, wanted.power_terms)
         columns = job.decomposer.columns
         shown = sum(map(on_page, columns))
         kept = KeptSamples(len(columns), stride_for(job.count, shown, NUMBERS, SAMPLES))
-        note = json_text({"log": log.name, "robot": robot.name, **choices(reading, processing)})
+        note = json_text(job.note())
         with open_table(draft / f"analysis.{wanted.table}", columns, note) as table:
 
             def sink(block: Array) -> None:
@@ -169,6 +182,17 @@ class Job:
         with within(self.source):
             return stream(self.samples, self.decomposer, self.processing, sink, progress)
 
+    def note(self) -> dict[str, Any]:
+        """What a table says of itself: log, robot and all choices."""
+        robot = self.decomposer.robot
+        return {
+            "log": self.source,
+            "robot": robot.name,
+            **choices(self.reading, self.processing),
+            "payloads": [payload.record() for payload in robot.payloads],
+            "loads": [borne.record() for borne in self.decomposer.loads],
+        }
+
     @property
     def count(self) -> int:
         """Samples that will be analysed."""
@@ -188,6 +212,8 @@ class Job:
             done.totals,
             done.work,
             done.joint_work,
+            done.load_work,
+            self.decomposer.loads,
             done.closure,
             self.samples.ignored,
             self.samples.warnings,
@@ -201,6 +227,7 @@ def _prepared(
     robot: LoadedRobot,
     reading: Reading,
     processing: Processing,
+    loads: Loads,
     progress: Progress,
     buffer: Path | None = None,
     power_terms: bool = False,
@@ -211,5 +238,6 @@ def _prepared(
         span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
-    decomposer = Decomposer.of(robot, processing.convention, power_terms)
+    borne = placed_loads(loads, robot, samples.time, reading.ignore_extra, progress, buffer)
+    decomposer = Decomposer.of(robot, processing.convention, power_terms, borne)
     return Job(log.name, reading, processing, samples, decomposer)

@@ -2,13 +2,13 @@
 
 import mmap
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from linkwise.analysis.column_matching import Selection, radians_per_unit, select, unit_warnings
+from linkwise.analysis.column_matching import radians_per_unit, select, unit_warnings
 from linkwise.analysis.even_time import even_rate, resampled
 from linkwise.analysis.logs import Log, open_log
 from linkwise.analysis.settings import Reading
@@ -56,31 +56,31 @@ def read_samples(
     peaks = np.zeros(1 + len(joints))
 
     def in_si() -> Iterator[Array]:
-        for block in _finite_blocks(log, path, selection, progress):
+        for block in finite_blocks(log, path, selection.columns, progress):
             np.maximum(peaks, np.abs(block).max(axis=0, initial=0.0), out=peaks)
             block[:, angles] *= factor
             yield block
 
-    samples = _collected(in_si(), 1 + len(joints), buffer)
+    samples = collected(in_si(), 1 + len(joints), buffer)
     with within(str(path)):
         rate = even_rate(samples[:, 0], log.first_row, strict=reading.resample is None)
         warnings = (*log.warnings, *_slowness(rate))
         if reading.resample is not None:
             rate = reading.resample
-            samples = _collected(resampled(samples, rate, progress=progress), 1 + len(joints), buffer)
+            samples = collected(resampled(samples, rate, progress=progress), 1 + len(joints), buffer)
     named = [(log.columns[selection.columns[at]], float(peaks[at])) for at in angles]
     warnings += unit_warnings(log, path, reading, named)
     first_row = log.first_row if reading.resample is None else None
     return Samples(samples[:, 0], samples[:, 1:], rate, selection.ignored, warnings, first_row)
 
 
-def _finite_blocks(log: Log, path: Path, selection: Selection, progress: Progress) -> Iterator[Array]:
-    """Blocks (rows, 1 + n) of the log, time first; LinkwiseError for a number that is not finite."""
+def finite_blocks(log: Log, path: Path, columns: Sequence[int], progress: Progress) -> Iterator[Array]:
+    """Blocks (rows, columns) of the log; LinkwiseError for a number that is not finite."""
     row = log.first_row
-    for block, done in log.read(selection.columns):
+    for block, done in log.read(columns):
         if not np.isfinite(block).all():
             at, column = np.argwhere(~np.isfinite(block))[0]
-            name = log.columns[selection.columns[column]]
+            name = log.columns[columns[column]]
             raise LinkwiseError(
                 f"{path}: row {row + at}, column {name!r}: {block[at, column]} is not a sample; fill the gap"
             )
@@ -95,7 +95,7 @@ def _slowness(rate: float) -> tuple[str, ...]:
     return (f"{rate:.4g} samples a second are few: if time is in ms, divide it by 1000",)
 
 
-def _collected(blocks: Iterator[Array], width: int, directory: Path | None) -> Array:
+def collected(blocks: Iterator[Array], width: int, directory: Path | None) -> Array:
     """All rows of blocks (any, width) as one writable array, in memory or in a file in `directory`."""
     if directory is None:
         return np.concatenate([np.empty((0, width)), *blocks])

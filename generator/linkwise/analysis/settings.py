@@ -1,5 +1,6 @@
 """How a log is read and its movement derived: the user's choices, as recorded in every output."""
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -85,6 +86,35 @@ class Processing:
     def span(self) -> int:
         """Samples that one derivative looks at."""
         return 5 if self.derivative == "five-point" else self.window
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A point mass in kg on a body of the robot's file, at a point in m in that body's own axes.
+
+    Its name, "payload BODY" unless given, stands beside those of the links. Raises LinkwiseError for a mass
+    that is not above 0 and a point that is not three numbers.
+    """
+
+    body: str
+    mass: float
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not 0 < self.mass < math.inf:
+            raise LinkwiseError(f"payload on {self.body!r}: mass {self.mass:g}; give kg above 0")
+        if len(self.point) != 3 or not all(map(math.isfinite, self.point)):
+            raise LinkwiseError(f"payload on {self.body!r}: give its place as three numbers x, y, z, in m")
+
+    @property
+    def title(self) -> str:
+        """What it is called among the links."""
+        return self.name or f"payload {self.body}"
+
+    def record(self) -> dict[str, Any]:
+        """As plain data, to record in the outputs; kg and m."""
+        return {"name": self.title, "body": self.body, "mass": self.mass, "point": list(self.point)}
 
 
 def choices(reading: Reading, processing: Processing) -> dict[str, Any]:

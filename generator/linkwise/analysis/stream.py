@@ -59,6 +59,7 @@ class Streamed:
     totals: Totals
     work: Work
     joint_work: Work
+    load_work: Work
     closure: Closure
     samples: int
 
@@ -103,7 +104,7 @@ def stream(
                 total += added
                 np.maximum(peak, magnitude.max(axis=1), out=peak)
                 work(out)
-            closure |= against_recursion(decomposer.robot, decomposer.columns, block)
+            closure |= against_recursion(decomposer.robot, decomposer.loads, decomposer.columns, block)
             closure.check()
             if pending is not None:
                 pending.result()
@@ -112,7 +113,7 @@ def stream(
         if pending is not None:
             pending.result()
     robot = decomposer.robot
-    works = work.work(1 / samples.rate, len(robot.joints), len(robot.links))
+    works = work.work(1 / samples.rate, len(robot.joints), len(robot.links), len(decomposer.loads))
     return Streamed(Totals(total / (stop - start), peak), *works, closure, stop - start)
 
 

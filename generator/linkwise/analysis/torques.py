@@ -1,10 +1,12 @@
 """From positions, velocities and accelerations to every torque term of a block of samples."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import (
     PASSIVE,
     TERMS,
@@ -28,25 +30,33 @@ class Decomposer:
     """Computes blocks of the result, stored by column: (columns, samples).
 
     With q̈_k and q̇_k the coordinates' motion, and index order joint i, link j, coordinate k:
-    τ_i = Σ_j τ_ij + what the joint has of its own, and τ_ij = Σ_k c2_ijk q̈_k + Σ_k c1_ijk q̇_k + g_ij
+    τ_i = Σ_j τ_ij + what the joint has of its own + Σ_e τ_ie, with τ_ie = −J_iᵀ (n, f) of load e
+    τ_ij = Σ_k c2_ijk q̈_k + Σ_k c1_ijk q̇_k + g_ij
     P_ij = τ_ij q̇_i, what joint i sends into link j
     """
 
     robot: LoadedRobot
+    loads: tuple[PlacedLoad, ...]
     convention: Convention
     columns: tuple[Column, ...]
     sources: dict[Quantity, tuple[Source, ...]]
     parts: tuple[tuple[int, tuple[int, ...]], ...]
     """Row of each τ_ij, and the rows of its terms."""
     wholes: tuple[tuple[int, tuple[int, ...]], ...]
-    """Row of each τ_i, and the rows of what it is the sum of: its τ_ij, and what the joint has of its own."""
+    """Row of each τ_i, and the rows of its parts: τ_ij, what the joint has of its own, τ_ie."""
     powers: tuple[tuple[int, int, int], ...]
     """Row of each power, the row of its torque, and the joint whose velocity multiplies."""
 
     @classmethod
-    def of(cls, robot: LoadedRobot, convention: Convention, power_terms: bool = False) -> "Decomposer":
+    def of(
+        cls,
+        robot: LoadedRobot,
+        convention: Convention,
+        power_terms: bool = False,
+        loads: Sequence[PlacedLoad] = (),
+    ) -> "Decomposer":
         """Plan where each packed value of the robot goes."""
-        columns = columns_of(robot, robot.model.layout, power_terms)
+        columns = columns_of(robot, robot.model.layout, loads, power_terms)
         row = {column.key: at for at, column in enumerate(columns)}
         parts = [
             (at, _rows(columns, TERMS, joint=c.joint, link=c.link))
@@ -54,7 +64,7 @@ class Decomposer:
             if c.quantity == "tau_link"
         ]
         wholes = [
-            (at, _rows(columns, ("tau_link", *PASSIVE), joint=c.joint))
+            (at, _rows(columns, ("tau_link", *PASSIVE, "tau_load"), joint=c.joint))
             for at, c in enumerate(columns)
             if c.quantity == "tau"
         ]
@@ -64,7 +74,9 @@ class Decomposer:
             if c.quantity in TORQUE_OF and c.joint is not None
         ]
         sources = _sources(robot.model.layout, row)
-        return cls(robot, convention, columns, sources, tuple(parts), tuple(wholes), tuple(powers))
+        return cls(
+            robot, tuple(loads), convention, columns, sources, tuple(parts), tuple(wholes), tuple(powers)
+        )
 
     def rows(self, quantity: Quantity) -> slice:
         """Where a quantity's columns stand; they stand together."""
@@ -78,6 +90,7 @@ class Decomposer:
         out[self.rows("q")], out[self.rows("qd")], out[self.rows("qdd")] = q.T, qd.T, qdd.T
         out[self.rows("tau")] = self.robot.model.inverse_dynamics(q, qd, qdd).T
         self._add_passive(out, q, qd, qdd)
+        self._add_loads(out, time, q)
         for row, source, _ in self.sources["tau_link"]:
             out[row] = packed.torque[..., source]
         for row, source, k in self.sources["tau_qdd"]:
@@ -105,6 +118,15 @@ class Decomposer:
         for column, values in zip(self.columns, out, strict=True):
             if column.quantity in PASSIVE and column.joint is not None:
                 values[:] = found[column.quantity][:, column.joint]
+                out[whole + column.joint] += values
+
+    def _add_loads(self, out: Array, time: Array, q: Array) -> None:
+        """Fill what joints take to bear loads, and add it to their torques."""
+        asked = [borne.torque(self.robot.model, time, q) for borne in self.loads]
+        whole = self.rows("tau").start
+        for column, values in zip(self.columns, out, strict=True):
+            if column.quantity == "tau_load" and column.joint is not None and column.cause is not None:
+                values[:] = asked[column.cause][:, column.joint]
                 out[whole + column.joint] += values
 
     def _closure(self, out: Array) -> Closure:

@@ -1,5 +1,6 @@
 """How far a result can be believed: its parts sum to the whole, and an independent recursion agrees."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import reduce
 from typing import Any
@@ -7,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import Column, Quantity
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
+from linkwise.package.manifest import FrameEntry
 
 LIMIT = 1e-9
 """A relative error above this is not rounding: the package does not compute what it says."""
@@ -32,12 +35,12 @@ LARGEST = 1e6
 class Closure:
     """Largest errors of Σ_k τp_ij + g_ij against τ_ij (terms) and of the sum that τ_i is (links).
 
-    That is Σ_j τ_ij, and what joint i has of its own.
+    That is Σ_j τ_ij, what joint i has of its own, and Σ_e τ_ie of loads.
 
     Absolute in N·m (N), relative to the largest sum of magnitudes in the same block of samples. Packages
     may sum τ_i from the τ_ij, so both sums say only that nothing was lost; `recursion` is the largest
-    error of τ_ij against an independent Newton–Euler recursion, and `energy` that of Σ_i P_ij, in W, against
-    dE_j/dt of link j's energy there; None where the energies are hand-written.
+    error of τ_ij and τ_ie against an independent Newton–Euler recursion, and `energy` that of Σ_i P_ij, in
+    W, against dE_j/dt of link j's energy there; None where the energies are hand-written.
     """
 
     terms_absolute: float = 0.0
@@ -94,8 +97,10 @@ def worst_of(pairs: list[tuple[float, float]]) -> tuple[float, float]:
     return error, error / scale if scale else error
 
 
-def against_recursion(robot: LoadedRobot, columns: tuple[Column, ...], block: Array) -> Closure:
-    """τ_ij and P_ij of some samples of a block (columns, S) against Newton–Euler; none for energies by hand.
+def against_recursion(
+    robot: LoadedRobot, loads: Sequence[PlacedLoad], columns: tuple[Column, ...], block: Array
+) -> Closure:
+    """τ_ij, P_ij, τ_ie of some samples of a block (columns, S) against Newton–Euler; none for energies.
 
     Relative errors are by unit: a joint that carries nothing but rounding is measured by its peers.
     """
@@ -109,12 +114,17 @@ def against_recursion(robot: LoadedRobot, columns: tuple[Column, ...], block: Ar
     if np.abs(dense("q")).max(initial=0.0) > LARGEST:
         return Closure()
     q, qd, qdd = dense("q"), dense("qd"), dense("qdd")
-    expected = robot.recursion.partial_torque(q, qd, qdd)
-    ours, power = np.zeros_like(expected), np.zeros_like(expected)
+    partial = robot.recursion.partial_torque(q, qd, qdd)
+    asked = [load_torque(robot.recursion, borne, block[0, at], q) for borne in loads]
+    expected = np.concatenate([partial, *(torque[:, :, None] for torque in asked)], axis=2)
+    ours, power = np.zeros_like(expected), np.zeros_like(partial)
     for row, column in enumerate(columns):
-        if column.quantity in ("tau_link", "power_link"):
-            into = ours if column.quantity == "tau_link" else power
-            into[:, column.joint, column.link] = block[row, at]
+        if column.quantity == "tau_link":
+            ours[:, column.joint, column.link] = block[row, at]
+        elif column.quantity == "tau_load" and column.cause is not None:
+            ours[:, column.joint, len(robot.links) + column.cause] = block[row, at]
+        elif column.quantity == "power_link":
+            power[:, column.joint, column.link] = block[row, at]
     absolute, relative, watts = 0.0, 0.0, 0.0
     for unit in set(robot.units):
         alike = [i for i, other in enumerate(robot.units) if other == unit]
@@ -123,7 +133,8 @@ def against_recursion(robot: LoadedRobot, columns: tuple[Column, ...], block: Ar
         absolute = max(absolute, error)
         relative = max(relative, error / scale if scale else error)
         # Power that is but rounding is measured by the torques and speeds that it is the rounding of.
-        watts += scale * float(np.abs(qd[:, alike]).max(initial=0.0))
+        carried = float(np.abs(partial).sum(axis=2)[:, alike].max(initial=0.0))
+        watts += carried * float(np.abs(qd[:, alike]).max(initial=0.0))
     apart = float(np.abs(power.sum(axis=1) - _gain(robot.recursion, q, qd, qdd)).max(initial=0.0))
     return Closure(
         recursion_absolute=absolute,
@@ -131,6 +142,23 @@ def against_recursion(robot: LoadedRobot, columns: tuple[Column, ...], block: Ar
         energy_absolute=apart,
         energy_relative=apart / watts if watts else apart,
     )
+
+
+def load_torque(recursion: NewtonEuler, borne: PlacedLoad, time: Array, q: Array) -> Array:
+    """τ_ie (S, n): minus the power that the load gives to the body where q̇_i = 1 and all else rests."""
+
+    def pose(frame: FrameEntry, q: Array) -> Array:
+        return recursion.poses([frame], q)[:, 0]
+
+    force, moment, place = borne.wrench(time, q, pose)
+    seat = [(borne.seat.frame.body, np.zeros(3))]
+    arm = place - recursion.places(seat, q)[:, 0]
+    out = np.zeros_like(q)
+    for i in range(recursion.n):
+        velocity, _ = recursion.points(seat, q, np.eye(recursion.n)[i] + 0.0 * q, 0.0 * q)
+        omega, v = velocity[:, 0, :3], velocity[:, 0, 3:]
+        out[:, i] = -(moment * omega).sum(-1) - (force * (v + np.cross(omega, arm))).sum(-1)
+    return out
 
 
 def _gain(recursion: NewtonEuler, q: Array, qd: Array, qdd: Array) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.analysis.result_columns import Column, Quantity
+from linkwise.analysis.result_columns import POWER, Column, Quantity
 from linkwise.package.load import Array
 
 
@@ -32,7 +32,7 @@ class WorkSum:
 
     def __init__(self, columns: Sequence[Column]) -> None:
         self._columns = columns
-        self._rows = [at for at, c in enumerate(columns) if c.quantity in ("power", "power_link")]
+        self._rows = [at for at, c in enumerate(columns) if c.quantity in POWER]
         self._sums = np.zeros((2, len(self._rows)))
         self._first: Array | None = None
         self._last = self._sums
@@ -46,17 +46,24 @@ class WorkSum:
             self._first = parts[..., 0].copy()
         self._last = parts[..., -1].copy()
 
-    def work(self, step: float, joints: int, links: int) -> tuple[Work, Work]:
-        """Work into each link (n, N) and into all together (n,) in J, samples `step` s apart."""
+    def work(self, step: float, joints: int, links: int, loads: int) -> tuple[Work, Work, Work]:
+        """Work in J into each link (n, N), into all together (n,), against each load (n, loads).
+
+        Samples are `step` s apart.
+        """
         first = self._last if self._first is None else self._first
         energy = step * (self._sums - 0.5 * (first + self._last))
-        return self._work("power_link", energy, (joints, links)), self._work("power", energy, (joints,))
+        return (
+            self._work("power_link", energy, (joints, links)),
+            self._work("power", energy, (joints,)),
+            self._work("power_load", energy, (joints, loads)),
+        )
 
     def _work(self, quantity: Quantity, energy: Array, shape: tuple[int, ...]) -> Work:
         out = np.zeros((2, *shape))
         for row, parts in zip(self._rows, energy.T, strict=True):
             column = self._columns[row]
             if column.quantity == quantity:
-                place = tuple(at for at in (column.joint, column.link) if at is not None)
+                place = tuple(at for at in (column.joint, column.link, column.cause) if at is not None)
                 out[0][place], out[1][place] = parts
         return Work(*out)

@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,12 @@ import numpy as np
 
 from linkwise.check.compare import Entries, Result, Skipped, compare
 from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype, declared
+from linkwise.check.control_functions import CONTROL, control_calls, control_prototypes
+from linkwise.check.frame_reference import FrameReference
 from linkwise.check.model_calls import FLOAT32
 from linkwise.check.packed_layout import IndexRows, Rows
 from linkwise.check.reference import Reference, dense_quantities
+from linkwise.emit.c.header import frame_constants
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
@@ -47,6 +51,15 @@ MANY = 192
 """Bytes for each result of a sample that still count as few: 24 samples in double, 48 in float."""
 
 
+@dataclass(frozen=True)
+class References:
+    """What functions are held against; links of energies have no regressors and no frames."""
+
+    reference: Reference
+    regressors: Reference | None
+    frames: FrameReference | None
+
+
 class CFunctions:
     """A package's compiled C for given parameters, beside the indices of what it answers with."""
 
@@ -68,8 +81,9 @@ class CFunctions:
             dense[(slice(None), *self.rows.tau.T)] = found["tau"].reshape(len(q), -1)
         return dense
 
-    def check(self, label: str, reference: Reference, regressors: Reference | None) -> Iterator[Result]:
+    def check(self, label: str, references: References) -> Iterator[Result]:
         """One result a function; `label` stands before its name."""
+        reference = references.reference
         for function in self.functions:
             symbol = f"{self.manifest.name}_{function.name}"
             name = f"{label}: {symbol}"
@@ -79,7 +93,9 @@ class CFunctions:
             single = FLOAT32 if function.real == "float" else {"tolerance": reference.tolerance}
             try:
                 if function.short in REGRESSORS:
-                    calls = self._regressors(function, regressors)
+                    calls = self._regressors(function, references.regressors)
+                elif function.short in CONTROL:
+                    calls = control_calls(self._call, function, self.manifest, reference, references.frames)
                 else:
                     calls = self._calls(function, reference)
                 yield compare(name, list(calls), **single)
@@ -148,7 +164,7 @@ class CFunctions:
         self,
         function: Prototype,
         count: int,
-        given: Mapping[str, Numbers],
+        given: Mapping[str, Numbers | None],
         sizes: Mapping[str, int],
         shift: int,
     ) -> dict[str, Numbers]:
@@ -177,11 +193,15 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
     for j in range(len(manifest.links)):
         own = tuple(what for what in every if j in rows.of(what)[:, 1])
         functions.append((f"link_{j + 1}", "", own))
-    return [
+    kinds = (("double", ""), ("float", "f"))
+    every_kind = [
         Prototype(name + suffix, real, counted, _inputs(name, inputs), outputs)
-        for real, suffix in (("double", ""), ("float", "f"))
+        for real, suffix in kinds
         for name, counted, outputs in functions
     ]
+    if manifest.tree is not None:
+        every_kind += [f for real, suffix in kinds for f in control_prototypes(real, suffix, inputs)]
+    return every_kind
 
 
 def _inputs(name: str, every: tuple[str, ...]) -> tuple[str, ...]:
@@ -215,6 +235,9 @@ def _wrong_number(manifest: Manifest, compiled: CompiledPackage, rows: IndexRows
     expected = {"JOINTS": len(manifest.joints), "LINKS": len(manifest.links), "BLOCK": 8, "BLOCKF": 16}
     expected |= {key: size for key, size in sizes.items() if size or key != "H1"}
     expected |= {"PARAMETERS": len(manifest.parameters)} if manifest.parameters else {}
+    if manifest.tree is not None:
+        names = [frame.name for frame in manifest.tree.frames]
+        expected |= {"FRAMES": len(names)} | {key: f for f, key in enumerate(frame_constants(names))}
     wrong = sorted(set(expected.items()) ^ set(compiled.constants.items()))
     return f"{wrong[0][0]} is wrong" if wrong else ""
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from linkwise.check.as_generated import check_files, check_manifest, check_runtime
 from linkwise.check.body_reference import body_reference
-from linkwise.check.c_functions import CFunctions, compile_c
+from linkwise.check.c_functions import CFunctions, References, compile_c
 from linkwise.check.compare import Result, Skipped
 from linkwise.check.compiled_c import CompiledPackage
 from linkwise.check.derivations import derivations
@@ -156,7 +156,8 @@ class _Checks:
             yield Skipped(f"numbers{label}", "nothing here computes with the energies")
             return
         regressors, frames = self._regressors(values, reference), self._frames(values, reference)
-        for result in _c_results(functions, f"c{label}", reference, regressors) if functions else ():
+        references = References(reference, regressors, frames)
+        for result in _c_results(functions, f"c{label}", references) if functions else ():
             c_passes &= result.passed
             yield result
         for way, model in loaded.items():
@@ -251,12 +252,10 @@ def _told(name: str, reference: Reference | None, tried: int, samples: int) -> I
         yield Result(f"{name}: are defined", True, None, detail)
 
 
-def _c_results(
-    functions: CFunctions, name: str, reference: Reference, regressors: Reference | None
-) -> list[Result]:
+def _c_results(functions: CFunctions, name: str, references: References) -> list[Result]:
     """What each function of the C gives; a wrong one may write anywhere."""
     try:
-        return in_own_process(lambda: list(functions.check(name, reference, regressors)))
+        return in_own_process(lambda: list(functions.check(name, references)))
     except Ended as ended:
         return [Result(f"{name}: runs to its end", False, None, str(ended))]
 

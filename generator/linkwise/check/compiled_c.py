@@ -30,7 +30,7 @@ LINE = 64
 class Prototype:
     """A function of the header: its name without the package's, its number type, and its arrays in order.
 
-    counted: name of the argument that says how many samples or blocks; empty for one sample
+    counted: name of the argument that says how many samples or blocks, or which frame; empty for none
     """
 
     name: str
@@ -38,13 +38,15 @@ class Prototype:
     counted: str
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    returns: str = "void"
 
     def declaration(self, package: str) -> str:
         """Its prototype, on one line."""
-        counts = [f"size_t {self.counted}"] if self.counted else []
+        kind = "int" if self.counted == "frame" else "size_t"
+        counts = [f"{kind} {self.counted}"] if self.counted else []
         inputs = [f"const {self.real} *{array}" for array in self.inputs]
         outputs = [f"{self.real} *{array}" for array in self.outputs]
-        return f"void {package}_{self.name}({', '.join([*counts, *inputs, *outputs])});"
+        return f"{self.returns} {package}_{self.name}({', '.join([*counts, *inputs, *outputs])});"
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -78,20 +80,24 @@ class CompiledPackage:
         self,
         function: Prototype,
         count: int,
-        given: Mapping[str, Numbers],
+        given: Mapping[str, Numbers | None],
         sizes: Mapping[str, int],
         shift: int,
     ) -> dict[str, Numbers] | None:
         """Outputs of the given sizes, flat; None where the function wrote beyond one of them.
 
+        count: samples, blocks or a frame's number; given: arrays by name, None for NULL
         shift: numbers between a cache line and where each output starts
         """
-        inputs = [np.ascontiguousarray(given[name], function.dtype) for name in function.inputs]
+        read = [given[name] for name in function.inputs]
+        inputs = [None if a is None else np.ascontiguousarray(a, function.dtype) for a in read]
         guarded = [_Guarded(sizes[name], function.dtype, shift) for name in function.outputs]
         entry = getattr(self.library, f"{self.name}_{function.name}")
-        entry.restype = None
-        counts = [ctypes.c_size_t(count)] if function.counted else []
-        pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in (*inputs, *(g.array for g in guarded))]
+        entry.restype = None if function.returns == "void" else ctypes.c_int
+        kind = ctypes.c_int if function.counted == "frame" else ctypes.c_size_t
+        counts = [kind(count)] if function.counted else []
+        arrays = (*inputs, *(g.array for g in guarded))
+        pointers = [ctypes.c_void_p(None if a is None else a.ctypes.data) for a in arrays]
         entry(*counts, *pointers)
         if not all(g.whole for g in guarded):
             return None

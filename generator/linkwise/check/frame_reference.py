@@ -123,6 +123,7 @@ def frame_calls(name: str, model: Model, reference: FrameReference) -> Iterator[
         poses.append(Entries(f"pose of {frame}", kinematics.pose(states.q, frame), value[:, f], scale[:, f]))
     yield compare(f"{name}: poses of frames {told}", poses)
     yield compare(f"{name}: velocities of points {told}", _of_points(kinematics, reference))
+    yield compare(f"{name}: torque of loads on points {told}", _of_loads(kinematics, reference))
     if reference.centre is not None:
         calls = (
             kinematics.centre_of_mass(states.q),
@@ -146,3 +147,25 @@ def _of_points(kinematics: Any, reference: FrameReference) -> Iterator[Entries]:
         for what, found in calls.items():
             value, scale = getattr(reference, what)
             yield Entries(f"{what} of {frame}", found, value[:, f], scale[:, f])
+
+
+def _of_loads(kinematics: Any, reference: FrameReference) -> Iterator[Entries]:
+    """-J^T (moment, force), on a point of the frame, and where that is in the world."""
+    q = reference.states.q
+    wrenches = np.random.default_rng(4).uniform(-1.0, 1.0, (len(reference.chosen), 6))
+    for f, (frame, point) in enumerate(zip(reference.chosen, reference.points, strict=True)):
+        wrench, at = wrenches[f], kinematics.frames.index(frame)
+        jacobian, scale = (a[:, f] for a in reference.jacobian)
+        pose, reach = (a[:, at] for a in reference.poses)
+        expected, bound = -wrench @ jacobian, np.abs(wrench) @ scale
+        loads = {"moment": wrench[:3], "force": wrench[3:]}
+        yield Entries(
+            f"load on {frame}", kinematics.load_torque(q, frame, point=point, **loads), expected, bound
+        )
+        place = pose[:, :3, :3] @ point + pose[:, :3, 3]
+        # The force's moment about the world's origin is a part of what this one is summed from.
+        arm = reach[:, :3, 3].sum(-1) + np.abs(point).sum()
+        bound = bound + arm[:, None] * np.abs(wrench[3:]).sum() * scale[:, :3].sum(1)
+        yield Entries(
+            f"load at {frame}", kinematics.load_torque(q, frame, at=place, **loads), expected, bound
+        )

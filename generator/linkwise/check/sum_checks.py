@@ -30,9 +30,9 @@ def sums_against_reference(name: str, model: Model, reference: Reference) -> Ite
     if reference.energies:
         energies = [each for at in batches for each in _energies(model, reference, at)]
         yield compare(f"{name}: energies of the links", energies, reference.tolerance)
-    regular = every[_regular(reference)]
-    if regular.size:
-        moved = [each for at in (regular, regular[0]) for each in _accelerations(model, reference, at)]
+    invertible = every[regular(reference)]
+    if invertible.size:
+        moved = [each for at in (invertible, invertible[0]) for each in _accelerations(model, reference, at)]
         yield compare(f"{name}: forward dynamics undoes inverse dynamics", moved, reference.tolerance)
     else:
         yield Skipped(f"{name}: forward dynamics", "no mass matrix can be inverted here")
@@ -102,22 +102,28 @@ def _energies(model: Model, reference: Reference, at: Any) -> Iterator[Entries]:
 def _accelerations(model: Model, reference: Reference, at: Any) -> Iterator[Entries]:
     """Of the reference's torques: rounding of these and of M qdd moves qdd by |M^-1| times as much."""
     q, qd, qdd = reference.states.at(at).motion
+    found = model.forward_dynamics(q, qd, reference.values["tau"][at].sum(-1))
+    yield _flat("qdd", found, qdd, acceleration_scales(reference, at), np.ndim(at))
+
+
+def acceleration_scales(reference: Reference, at: Any) -> Array:
+    """What the accelerations of some samples are summed from: |M^-1| times what their torques are."""
     mass = reference.values["c2"][at].sum(np.ndim(at) + 1)
     noise = reference.scales["tau"][at].sum(-1)[..., None]
-    noise = noise + reference.scales["c2"][at].sum(np.ndim(at) + 1) @ np.abs(qdd)[..., None]
-    scale = (np.abs(np.linalg.inv(mass)) @ noise)[..., 0]
-    found = model.forward_dynamics(q, qd, reference.values["tau"][at].sum(-1))
-    yield _flat("qdd", found, qdd, scale, np.ndim(at))
+    qdd = np.abs(reference.states.at(at).qdd)[..., None]
+    noise = noise + reference.scales["c2"][at].sum(np.ndim(at) + 1) @ qdd
+    scale: Array = (np.abs(np.linalg.inv(mass)) @ noise)[..., 0]
+    return scale
 
 
-def _regular(reference: Reference) -> NDArray[np.bool_]:
+def regular(reference: Reference, least: float = REGULAR) -> NDArray[np.bool_]:
     """Samples whose mass matrix is far from singular, however its joints are measured."""
     mass = reference.values["c2"].sum(2)
     size = np.sqrt(np.abs(np.einsum("sii->si", mass)))
     size = np.where(size > 0, size, 1.0)
     scaled = mass / (size[:, :, None] * size[:, None, :])
-    least: NDArray[np.bool_] = np.abs(np.linalg.eigvalsh(scaled)).min(-1) > REGULAR
-    return least
+    far: NDArray[np.bool_] = np.abs(np.linalg.eigvalsh(scaled)).min(-1) > least
+    return far
 
 
 def _flat(what: str, value: Array, expected: Array, scale: Array, axes: int) -> Entries:

@@ -8,6 +8,8 @@ import typer
 
 from linkwise.analysis import Analysis
 from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.loads import Loads
+from linkwise.analysis.payload import carrying
 from linkwise.analysis.run import Wanted, analyze_to
 from linkwise.analysis.settings import Convention, Reading
 from linkwise.analysis.tables import Format
@@ -29,6 +31,7 @@ from linkwise.cli.log_options import (
     Resample,
     Time,
     Window,
+    carried,
     chosen_lowpass,
     chosen_processing,
     pairs,
@@ -45,6 +48,21 @@ Figures = Annotated[
     list[str] | None, typer.Option(help="paper, paper:JOINT, shares or power; may be repeated")
 ]
 PowerTerms = Annotated[bool, typer.Option("--power-terms", help="Write power by cause and order too")]
+Carried = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--payload",
+        metavar="BODY=KG,X,Y,Z",
+        help="Point mass on a body, at a point in its axes, m; NAME:BODY=… names it; may be repeated",
+    ),
+]
+LoadFiles = Annotated[
+    list[Path] | None,
+    typer.Option(help="Log of loads, columns BODY/force_x …, or OpenSim's external loads; may be repeated"),
+]
+LoadsCutoff = Annotated[
+    float | None, typer.Option(help="Zero-phase low-pass for these loads, Hz; no filter if not given")
+]
 Page = Annotated[bool, typer.Option("--page/--no-page", help="Write report.html")]
 
 app = typer.Typer(add_completion=False)
@@ -71,6 +89,9 @@ def analyze(
     format: TableFormat = "parquet",
     figure: Figures = None,
     power_terms: PowerTerms = False,
+    payload: Carried = None,
+    loads: LoadFiles = None,
+    loads_cutoff: LoadsCutoff = None,
     backend: Backend = None,
     page: Page = True,
     as_json: Json = False,
@@ -82,8 +103,10 @@ def analyze(
     )
     wanted = Wanted(format, tuple(figure or ()), page, power_terms)
     package = load_robot(robot, backend)
+    package = carrying(package, carried(payload or [], package))
+    borne = Loads.of(loads or [], loads_cutoff)
     with shown_progress(UNITS) as progress:
-        analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress)
+        analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress, borne)
     for warning in analysis.warnings:
         tell(f"warning: {log}: {warning}", err=True)
     if analysis.ignored:

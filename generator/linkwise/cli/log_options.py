@@ -6,7 +6,18 @@ from typing import Annotated
 
 import typer
 
-from linkwise.analysis.settings import Convention, Derivative, Edges, Lowpass, Padding, Processing, Units
+from linkwise.analysis.body_names import named_body
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.settings import (
+    Convention,
+    Derivative,
+    Edges,
+    Lowpass,
+    Padding,
+    Payload,
+    Processing,
+    Units,
+)
 from linkwise.errors import LinkwiseError
 
 UNITS = {"reading": "B", "resampling": "samples", "analysing": "samples", "fitting": "samples"}
@@ -77,4 +88,21 @@ def pairs(flag: str, given: Sequence[str]) -> tuple[tuple[str, str], ...]:
         if not (sign and column and joint):
             raise LinkwiseError(f"{flag} {text}: write it as COLUMN=JOINT")
         found.append((column, joint))
+    return tuple(found)
+
+
+def carried(given: Sequence[str], robot: LoadedRobot) -> tuple[Payload, ...]:
+    """Payloads of [NAME:]BODY=MASS[,x,y,z]; raises LinkwiseError for what is written otherwise."""
+    found = []
+    for text in given:
+        where, sign, numbers = text.rpartition("=")
+        try:
+            mass, *point = map(float, numbers.split(","))
+        except ValueError:
+            sign = ""
+        if not (sign and where) or len(point) not in (0, 3):
+            raise LinkwiseError(f"--payload {text}: write it as BODY=MASS,x,y,z, in kg and m")
+        name, body = named_body(where, robot)
+        x, y, z = point or (0.0, 0.0, 0.0)
+        found.append(Payload(body, mass, (x, y, z), name))
     return tuple(found)

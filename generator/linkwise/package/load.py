@@ -116,11 +116,16 @@ class Package:
         return tuple(self.module.FASTEST_FIRST)
 
     def load(
-        self, backend: str, parameters: Mapping[str, float] | None = None, kernel: str = "auto"
+        self,
+        backend: str,
+        parameters: Mapping[str, float] | None = None,
+        kernel: str = "auto",
+        bodies: Any = None,
     ) -> Model:
-        """Model on a back end, for any parameters; passes on what the package raises."""
+        """Model on a back end, for any parameters and bodies; passes on what the package raises."""
         # A package made before there were kernels to choose from loads as it always did.
-        chosen = {} if kernel == "auto" else {"kernel": kernel}
+        chosen: dict[str, Any] = {} if kernel == "auto" else {"kernel": kernel}
+        chosen |= {} if bodies is None else {"bodies": bodies}
         with staying():
             dynamics = self.module.load(backend, parameters, allow_unphysical=True, **chosen)
         model: Model = TensorModel(dynamics) if dynamics.backend.takes_tensors else dynamics

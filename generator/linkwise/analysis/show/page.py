@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import TORQUE_OF, Column
 from linkwise.analysis.show.poses import poses
@@ -76,6 +77,7 @@ def page_data(result: AnalysisResult) -> str:
         "coloursDark": list(ON_DARK),
         "gravityColour": GRAVITY,
         "bodies": _bodies(result),
+        "loads": _loads(result),
     }
     return script_data(data)
 
@@ -90,18 +92,36 @@ def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
     return {
         "parents": [-1 if body.parent is None else body.parent for body in bodies],
         "links": [place.get(body.link, -1) for body in bodies],
-        "coordinates": [body.coordinate for body in bodies],
+        "coordinates": [body.coordinate if body.ratio else -1 for body in bodies],
         "up": list(result.robot.up),
         "origins": _encode(origins),
         "centres": _encode(centres),
     }
 
 
+def _loads(result: AnalysisResult) -> list[dict[str, str]]:
+    """At every sample shown, where each load acts and its force, (samples, 3) each, in m and N."""
+    pose = model_pose(result.robot.model)
+    wrenches = [borne.wrench(result.time, result.q, pose) for borne in result.loads]
+    return [
+        {"name": printable(borne.name), "places": _encode(at.place), "forces": _encode(at.force)}
+        for borne, at in zip(result.loads, wrenches, strict=True)
+    ]
+
+
 def _work(result: AnalysisResult) -> list[dict[str, float]]:
-    """What each joint i gave to each link j and took back, in J, over all samples."""
-    given, taken = result.work.given, result.work.taken
-    pairs = [(c.joint or 0, c.link or 0) for c in result.columns if c.quantity == "power_link"]
-    return [{"i": i, "j": j, "given": float(given[i, j]), "taken": float(taken[i, j])} for i, j in pairs]
+    """What each joint i gave to each link j and took back, in J, over all samples; loads behind links."""
+    out = []
+    for c in result.columns:
+        if c.quantity == "power_link":
+            j, work, at = c.link or 0, result.work, (c.joint, c.link)
+        elif c.quantity == "power_load":
+            j, work, at = len(result.robot.links) + (c.cause or 0), result.load_work, (c.joint, c.cause)
+        else:
+            continue
+        given, taken = float(work.given[at]), float(work.taken[at])
+        out.append({"i": c.joint or 0, "j": j, "given": given, "taken": taken})
+    return out
 
 
 def _encode(values: Array) -> str:

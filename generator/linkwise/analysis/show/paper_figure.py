@@ -29,7 +29,9 @@ class _Panel:
 def paper(result: AnalysisResult, i: int) -> "Figure":
     """Coordinates, τ_i, and for joint i: τ_ij, τp_ij(q̇_j), τp_ij(q̈_j), j's own coordinate."""
     robot, panels = result.robot, _panels(result, i)
-    legends = [_legend_rows(robot.joints), _legend_rows(robot.links)]
+    carried = (*robot.links, *(borne.name for borne in result.loads))
+    named = (("Joints", robot.joints), ("Links and loads" if result.loads else "Links", carried))
+    legends = [_legend_rows(names) for _, names in named]
     heights = [PANEL] * len(panels) + [LINE * (rows + 1) for rows in legends]
     figure = extra("matplotlib.figure").Figure(figsize=(7.6, sum(heights) + 0.9), layout="constrained")
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
@@ -42,7 +44,7 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
     axes[-1].set_xlabel("time (s)")
     axes[-1].set_xlim(result.time[0], result.time[-1])
     figure.align_ylabels(axes)
-    for row, (title, names) in enumerate([("Joints", robot.joints), ("Links", robot.links)], len(panels)):
+    for row, (title, names) in enumerate(named, len(panels)):
         _legend(figure.add_subplot(grid[row]), title, names)
     figure.suptitle(f"{drawn(robot.name, 60)} · {drawn(result.source, 60)}", x=0.01, ha="left", fontsize=11)
     foot = "\n".join([*textwrap.wrap(_left_out(result), 125), result.provenance])
@@ -65,9 +67,9 @@ def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:
         _Panel(f"Joint coordinates ({units})", "$q_i$", lambda c: c.quantity == "q"),
         _Panel(f"Joint torques ({loads})", r"$\tau_i$", lambda c: c.quantity == "tau"),
         _Panel(
-            f"Partial torques {on}, through each link",
+            f"Partial torques {on}, through each link{' and by each load' if result.loads else ''}",
             rf"$\tau_{{{number}j}}$",
-            lambda c: c.quantity == "tau_link" and c.joint == i,
+            lambda c: c.quantity in ("tau_link", "tau_load") and c.joint == i,
         ),
         _Panel(
             f"Propagation torques {on}: each link's own joint only, velocity",
@@ -102,6 +104,8 @@ def _draw(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
     for column, values in zip(result.columns, result.values, strict=True):
         if panel.wanted(column):
             at = column.joint if column.link is None else column.link
+            if column.quantity == "tau_load":
+                at = len(result.robot.links) + (column.cause or 0)
             axis.plot(result.time, values, **_style(at or 0))
     axis.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
     axis.set_title(panel.title)

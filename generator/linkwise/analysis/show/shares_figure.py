@@ -35,7 +35,12 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
         _Cause(quantity, None, quantity.removeprefix("tau_"), colour(len(robot.joints) + at), "....")
         for at, quantity in enumerate(own)
     ]
-    every = [_Cause("tau_gravity", None, "gravity", GRAVITY), *movement, *passive]
+    first = len(robot.joints) + len(passive)
+    loads = [
+        _Cause("tau_load", e, drawn(borne.name), colour(first + e), "xx")
+        for e, borne in enumerate(result.loads)
+    ]
+    every = [_Cause("tau_gravity", None, "gravity", GRAVITY), *movement, *passive, *loads]
     rows = -(-len(every) // 3)
     figure = extra("matplotlib.figure").Figure(
         figsize=(8.4, 1.3 + 0.42 * len(robot.joints) + 0.2 * rows), layout="constrained"

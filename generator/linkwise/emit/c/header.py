@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise.emit.c.sizes import Span
-from linkwise.escape import c_comment
+from linkwise.escape import c_comment, identifiers
 from linkwise.runtime.native.native_compiler import FLAGS, TUNING
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import RigidSystem, System
 
 BLOCK = {"double": 8, "float": 16}
 """Samples in a block: one cache line of each quantity, as in numbers.h."""
@@ -59,6 +59,20 @@ def joint_lines(system: System) -> Iterator[str]:
     """Return a table: each joint, its unit and its name."""
     rows = [[str(k), c.unit, c_comment(c.name)] for k, c in enumerate(system.coordinates, 1)]
     return aligned([["joint", "unit", "name"], *rows])
+
+
+def frame_constants(names: Sequence[str]) -> list[str]:
+    """What frames of these names are called in C, behind the robot's own name."""
+    return identifiers(names, "FRAME_")
+
+
+def frame_lines(system: RigidSystem) -> Iterator[tuple[str, str]]:
+    """Return each frame's constant, and its name and what carries it."""
+    frames = system.robot.named_frames
+    for constant, frame in zip(frame_constants([frame.name for frame in frames]), frames, strict=True):
+        link = None if frame.link is None else system.robot.links[frame.link]
+        moved = "on the ground" if link is None else f"behind {c_comment(link.joint.name)}"
+        yield constant, f"{c_comment(frame.name)}, {moved}"
 
 
 def parameter_lines(system: System) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Any
 from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
 from linkwise.emit.c.loop_costs import decomposition_cost, gradient_cost, torque_cost
-from linkwise.emit.c.prototypes import pointers
+from linkwise.emit.c.prototypes import at_position, pointers, under_torque
 from linkwise.emit.c.robot_files import given, header_view, path_fields, totals
 from linkwise.emit.c.robot_tables import path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
@@ -24,10 +24,13 @@ FIXED = (
     "calls.h",
     "dense.h",
     "dense_rows.h",
+    "frames.h",
     "gradient.h",
     "lanes.h",
     "loops.h",
+    "mass.h",
     "numbers.h",
+    "one_motion.h",
     "one_sample.h",
     "packed_rows.h",
     "regressors.h",
@@ -81,4 +84,6 @@ def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
         "passed": ", ".join(motion),
         "inputs_at_rest": pointers("const real", (array for array in motion if array != "qdd")),
         "passed_at_rest": ", ".join("qd" if array == "qdd" else array for array in motion),
+        "inputs_at_position": pointers("const real", at_position(motion)),
+        "inputs_under_torque": pointers("const real", under_torque(motion)),
     }

@@ -25,6 +25,9 @@ class Shapes:
     motion_blocks: str
     results_blocks: str
     motion_one: str
+    position_one: str
+    motion_one_at_rest: str
+    torque_one: str
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Functions:
     suffix: str
     inputs: str
     inputs_at_rest: str
+    inputs_at_position: str
+    inputs_under_torque: str
     outputs: str
     shapes: Shapes
     links: tuple[LinkFunction, ...]
@@ -53,6 +58,16 @@ class Functions:
 def pointers(kind: str, arrays: Iterable[str]) -> str:
     """Return declarations of array parameters; `kind` is such as const double."""
     return ", ".join(f"{kind} *{array}" for array in arrays)
+
+
+def at_position(inputs: Iterable[str]) -> list[str]:
+    """Arrays of what takes no velocity nor acceleration."""
+    return [array for array in inputs if array not in ("qd", "qdd")]
+
+
+def under_torque(inputs: Iterable[str]) -> list[str]:
+    """Arrays of what takes torques in place of accelerations."""
+    return ["tau" if array == "qdd" else array for array in inputs]
 
 
 def functions(inputs: Sequence[str], robot: Span, links: Sequence[Span]) -> Iterator[Functions]:
@@ -64,6 +79,8 @@ def functions(inputs: Sequence[str], robot: Span, links: Sequence[Span]) -> Iter
             suffix,
             pointers(f"const {kind}", inputs),
             pointers(f"const {kind}", (array for array in inputs if array != "qdd")),
+            pointers(f"const {kind}", at_position(inputs)),
+            pointers(f"const {kind}", under_torque(inputs)),
             pointers(kind, robot.size.arrays),
             Shapes(
                 _motion("p" in inputs, "count, JOINTS"),
@@ -72,6 +89,9 @@ def functions(inputs: Sequence[str], robot: Span, links: Sequence[Span]) -> Iter
                 _motion("p" in inputs, f"blocks, JOINTS, {block}"),
                 _shapes((array, f"blocks, {NUMBERS[array]}, {block}") for array in robot.size.arrays),
                 _motion("p" in inputs, "JOINTS"),
+                _motion("p" in inputs, "JOINTS", "q"),
+                _motion("p" in inputs, "JOINTS", "q, qd"),
+                _motion("p" in inputs, "JOINTS", "q, qd, tau"),
             ),
             tuple(
                 LinkFunction(

@@ -7,7 +7,7 @@ from typing import Any
 from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
 from linkwise.emit.c.calls import LinkKernels, group_calls, link_calls, motions, total
-from linkwise.emit.c.prototypes import cost, functions, pointers
+from linkwise.emit.c.prototypes import at_position, cost, functions, pointers, under_torque
 from linkwise.emit.c.quantity_table import causes, quantity_lines
 from linkwise.emit.c.sizes import EntryCounts, Span, groups, most_counts, tile, waiting_counts, whole
 from linkwise.symbolic.system import RigidSystem, System
@@ -40,6 +40,8 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
         "rows_from_s": ", ".join(array if array == "p" else f"{array} + s * N" for array in motion),
         "inputs_at_rest": pointers("const real", (array for array in motion if array != "qdd")),
         "passed_at_rest": ", ".join("qd" if array == "qdd" else array for array in motion),
+        "inputs_at_position": pointers("const real", at_position(motion)),
+        "inputs_under_torque": pointers("const real", under_torque(motion)),
         "links": calls,
         "groups": [group_calls(part, kernels, arrays) for part in parts],
         "tile": tile(waiting),
@@ -84,6 +86,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "parameters": header.parameter_lines(system),
         "blocks": tuple(header.BLOCK.values()),
         "rigid": isinstance(system, RigidSystem),
+        "frames": list(header.frame_lines(system)) if isinstance(system, RigidSystem) else [],
         "functions": list(functions(given(system), robot, links)),
     }
 

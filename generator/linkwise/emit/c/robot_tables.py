@@ -30,6 +30,14 @@ class Columns:
     sums: tuple[tuple[int, int], ...]
 
 
+@dataclass(frozen=True)
+class NamedFrame:
+    """A frame that has a name: in which frame it stands, turned how, and where, as rows of two tables."""
+
+    standing: str
+    place: str
+
+
 def columns(system: RigidSystem) -> Columns:
     """Columns of a robot."""
     frames = len(system.robot.links)
@@ -74,19 +82,17 @@ def table_view(system: RigidSystem) -> dict[str, Any]:
         "placings": list(_placings(system)),
         "bodies": list(_bodies(system)),
         "gravity": _row(_values(system, robot.gravity)),
+        "named": list(_named_frames(system)),
         "parameters": bool(system.parameters),
-        "formulas": formulas(system),
+        "formulas": formulas(system, _places(system)),
+        "offset_formulas": formulas(system, _offsets(system)),
     }
 
 
-def formulas(system: RigidSystem) -> list[str]:
-    """Statements that set the numbers `x` of a robot that hang on run-time parameters, which `p` holds."""
+def formulas(system: RigidSystem, numbers: Iterable[tuple[str, Scalar]]) -> list[str]:
+    """Statements that set those of the numbers in `x` that hang on run-time parameters, which `p` holds."""
     lower, _ = lowering(system)
-    places = [
-        (place, value)
-        for place, value in _places(system)
-        if isinstance(value, sp.Expr) and value.free_symbols
-    ]
+    places = [(place, value) for place, value in numbers if isinstance(value, sp.Expr) and value.free_symbols]
     code = straight_line(lower.graph, [lower(value) for _, value in places], CPrinter())
     names = [name for name in parameter_names(system).values() if name in code.symbols]
     return [
@@ -129,6 +135,22 @@ def _bodies(system: RigidSystem) -> Iterator[str]:
         [mass] = _values(system, (link.mass,))
         inertia = _values(system, (link.inertia[i][k] for i, k in PRODUCTS))
         yield f"{{{mass!r}, {_row(_values(system, link.com))}, {_row(inertia)}}}"
+
+
+def _named_frames(system: RigidSystem) -> Iterator[NamedFrame]:
+    for number, frame in enumerate(system.robot.named_frames):
+        stands_in = 0 if frame.link is None else frame.link + 1
+        turn = _row(entry for row in frame.rotation for entry in row)
+        yield NamedFrame(
+            f"{{{stands_in}, {turn}}}, /* {number}, {c_comment(frame.name)} */",
+            _row(_values(system, frame.translation)),
+        )
+
+
+def _offsets(system: RigidSystem) -> Iterator[tuple[str, Scalar]]:
+    """The same of `struct offsets`."""
+    for number, frame in enumerate(system.robot.named_frames):
+        yield from _entries(f"place[{number}]", frame.translation)
 
 
 def _places(system: RigidSystem) -> Iterator[tuple[str, Scalar]]:

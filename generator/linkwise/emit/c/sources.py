@@ -29,8 +29,19 @@ from linkwise.version import VERSION
 FIXED = ("numbers.h", "sines.h", "rows.h", "dense.h", "stream.h", "dense_rows.h", "calls.h")
 """Files that are the same in every package."""
 
-FIXED_OF_RIGID = ("angles.h", "blocks.h", "lanes.h", "regressors.h", "rule.h", "tree.h", "vectors.h")
-"""Those beside them in every package of rigid links, whose regressors are in loops."""
+FIXED_OF_RIGID = (
+    "angles.h",
+    "blocks.h",
+    "frames.h",
+    "lanes.h",
+    "mass.h",
+    "one_motion.h",
+    "regressors.h",
+    "rule.h",
+    "tree.h",
+    "vectors.h",
+)
+"""Those beside them in every package of rigid links, of which some functions are in loops."""
 
 
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:

@@ -39,8 +39,16 @@ def loops_stack(system: RigidSystem) -> int:
         longest * (longest + 1) // 2 + square + 2 * longest + 2 * n + cubes,
         6 * (frames + 1) + square + cubes,
     )
-    numbers = 13 * frames + 10 * len(system.links) + 3 if system.parameters else 0
-    return VALUE * (moved + wrenches + values) + 8 * numbers + OWN
+    blocks = VALUE * (moved + wrenches + values) + 8 * _numbers(system) + OWN
+    return max(blocks, control_stack(system))
+
+
+def control_stack(system: RigidSystem) -> int:
+    """Bytes that functions of one sample take at most that go over the tree: motion, bodies, mass matrix."""
+    n, frames = len(system.coordinates), len(system.robot.links)
+    moved = 24 * (frames + 1) + 12 * (frames + len(columns(system).sums)) + 3 * n + 3 * frames
+    bodies, offsets = 13 * (frames + 1), 3 * len(system.robot.named_frames)
+    return 8 * (moved + bodies + n * n + _numbers(system) + offsets) + OWN
 
 
 def straight_stack(system: System, links: tuple[Span, ...]) -> int:
@@ -50,7 +58,8 @@ def straight_stack(system: System, links: tuple[Span, ...]) -> int:
     cubes = _cubes(n, len(links), _longest(system))
     largest = max(map(waiting.of, whole_robot.arrays))
     values = max(waiting.total * blocks + max(cubes, largest), max(link.size.c1 for link in links) + cubes)
-    return VALUE * (5 * n * blocks + values) + OWN
+    stack = VALUE * (5 * n * blocks + values) + OWN
+    return max(stack, control_stack(system)) if isinstance(system, RigidSystem) else stack
 
 
 def too_large_for_loops(system: System) -> str:
@@ -78,6 +87,11 @@ def _fault(system: RigidSystem, kind: str, stack_of: Callable[[tuple[Span, ...]]
     if (stack := stack_of(links)) > MOST_STACK:
         return f"{what}it takes {stack} bytes of stack, and {MOST_STACK} are the most"
     return ""
+
+
+def _numbers(system: RigidSystem) -> int:
+    """Numbers of `struct numbers` in tree.h that functions keep, where parameters change them."""
+    return 13 * len(system.robot.links) + 10 * len(system.links) + 3 if system.parameters else 0
 
 
 def _longest(system: System) -> int:

@@ -259,3 +259,8 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
 #if PART(REGRESSORS)
 #include "regressors.h"
 #endif
+
+#if PART(CONTROL)
+#include "frames.h"
+#include "mass.h"
+#endif

@@ -1,35 +1,9 @@
 /* The functions of one sample, for a kernel in loops. The same in every package of linkwise. */
-#include "angles.h"
-
-#define W 1
-#define number real
-#define KERNEL(name) name##_one
-#define SIZED(name) name##_one
-#define TAKE(at) (*(at))
-#define PUT(at, value) (*(at) = (value))
-#include "vectors.h"
-
-#include "rule.h"
+#include "one_motion.h"
 
 #include "shares.h"
 
 #include "dense.h"
-
-/* The motion of all frames, or of the `wanted` ones. */
-static inline void moved_one(const struct numbers *x, const real *q, const real *qd, const real *qdd, const char *wanted,
-    motion *m)
-{
-    real angle[FRAMES], sine[FRAMES], cosine[FRAMES];
-    angles(x, 1, q, angle);
-    API(sines)(FRAMES, angle, sine, cosine);
-    base_one(m);
-    for (int f = 1; f <= FRAMES; ++f) {
-        const int k = joints[f - 1].coordinate;
-        if (!wanted || wanted[f])
-            frame_one(m, f, &x->placings[f - 1], sine[f - 1], cosine[f - 1], q[k], qd[k], qdd[k]);
-    }
-    sum_columns_one(m, wanted);
-}
 
 /* What link j answers with. */
 static inline void link_one(const struct numbers *x, int j, const motion *m, real *c2, real *c1, real *g, real *tau)

@@ -1,0 +1,41 @@
+"""Bodies of a robot's file by name, for what is put on them: loads and payloads."""
+
+from collections import Counter
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+from linkwise.package.manifest import FrameEntry
+
+
+def body_frame(what: str, body: str, robot: LoadedRobot) -> FrameEntry:
+    """The frame of a body of the file; raises LinkwiseError, names near it first, where there is none."""
+    tree = robot.package.manifest.tree
+    frames = {} if tree is None else {frame.name: frame for frame in tree.frames}
+    if body not in frames:
+        near = get_close_matches(body, frames, 3)
+        others = [name for name in frames if name not in near]
+        raise LinkwiseError(
+            f"{what} {body!r}: {robot.name} has no such body; its bodies are {listed([*near, *others])}"
+        )
+    return frames[body]
+
+
+def named_body(text: str, robot: LoadedRobot) -> tuple[str, str]:
+    """Name and body of NAME:BODY, no name of BODY alone; a body whose own name has a colon is found too."""
+    tree = robot.package.manifest.tree
+    name, colon, body = text.partition(":")
+    if not colon or (tree is not None and any(frame.name == text for frame in tree.frames)):
+        return "", text
+    return name, body
+
+
+def told_apart(what: str, names: Sequence[str], others: Sequence[str]) -> None:
+    """Raise LinkwiseError for a name that stands twice, or that another thing has."""
+    twice = [name for name, count in Counter(names).items() if count > 1 or name in others]
+    if twice:
+        raise LinkwiseError(
+            f"{what} {listed(map(repr, twice))}: another has that name; tell them apart as NAME:BODY"
+        )

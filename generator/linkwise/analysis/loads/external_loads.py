@@ -1,0 +1,110 @@
+"""OpenSim's ExternalLoads: which columns of a storage file are forces on which body, and in whose axes."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from linkwise.analysis.column_matching import time_column
+from linkwise.analysis.loads.given_loads import WORLD
+from linkwise.analysis.loads.load_columns import LoadColumns
+from linkwise.analysis.logs import open_log
+from linkwise.analysis.settings import Reading
+from linkwise.errors import LinkwiseError, within
+from linkwise.escape import listed
+from linkwise.input_file import require_file
+
+GROUND = "ground"
+NONE = ("", "Unassigned")
+"""What OpenSim writes where there is nothing."""
+IDENTIFIERS = {"force": "force_identifier", "moment": "torque_identifier", "point": "point_identifier"}
+
+
+def external_loads(path: Path) -> tuple[LoadColumns, ...]:
+    """The forces that are not switched off, each with the columns of its data file.
+
+    Raises LinkwiseError for a file without any, data that are not there, and identifiers of other than three
+    columns.
+    """
+    from linkwise.robot.readers.xml_file import (
+        parse,
+    )  # its room brings SymPy, which other loads can do without
+
+    with within(str(path)):
+        require_file(path)
+        root = parse(path)
+        forces = [force for force in root.iter("ExternalForce") if not _is_off(force)]
+        if not forces:
+            raise LinkwiseError("no ExternalForce that is on; give OpenSim's file of ExternalLoads")
+        loads = [_unread(force, _data_file(path, root, force)) for force in forces]
+        return tuple(_with_columns(load, force) for load, force in zip(loads, forces, strict=True))
+
+
+def _unread(force: Element, log: Path) -> LoadColumns:
+    body = _body(force, "applied_to_body", "")
+    name = force.get("name", "").strip() or body
+    if not body:
+        raise LinkwiseError(f"load {name!r} has no applied_to_body; name the body there")
+    axes, point_in = (_body(force, f"{what}_expressed_in_body", GROUND) for what in ("force", "point"))
+    return LoadColumns(
+        name, body, log, 0, {}, _world(axes), _world(point_in) if _told(force, "point_identifier") else None
+    )
+
+
+def _with_columns(load: LoadColumns, force: Element) -> LoadColumns:
+    """The load with the numbers of its columns: those three whose names begin with an identifier."""
+    columns = open_log(load.log).columns
+    found = {}
+    for part, key in IDENTIFIERS.items():
+        identifier = _told(force, key)
+        if identifier:
+            found[part] = _three(load, key, identifier, columns)
+    if not {"force", "moment"} & set(found):
+        raise LinkwiseError(f"load {load.name!r} has neither a force_identifier nor a torque_identifier")
+    return replace(load, time=time_column(columns, Reading()), columns=found)
+
+
+def _three(load: LoadColumns, key: str, identifier: str, columns: Sequence[str]) -> tuple[int, ...]:
+    exact = [at for axis in "xyz" for at, name in enumerate(columns) if name == identifier + axis]
+    if len(exact) == 3:
+        return tuple(exact)
+    found = [at for at, name in enumerate(columns) if name.startswith(identifier)]
+    if len(found) != 3:
+        there = f"{len(found)} columns of {load.log.name} begin so"
+        raise LinkwiseError(
+            f"load {load.name!r}: {key} is {identifier!r}, and {there}; it needs three, x, y and z, of"
+            f" {listed(map(repr, columns))}"
+        )
+    return tuple(found)
+
+
+def _data_file(path: Path, root: Element, force: Element) -> Path:
+    """The storage file of all forces, or of this one."""
+    told = (root.findtext(".//datafile") or "").strip()
+    if told in NONE:
+        told = _told(force, "data_source_name")
+    if not told:
+        raise LinkwiseError("no datafile; name the .mot or .sto file of the forces there")
+    return path.parent / told.replace("\\", "/")
+
+
+def _is_off(force: Element) -> bool:
+    """Whether a force is switched off, as files of OpenSim 3 and of 4 say it."""
+    return _told(force, "isDisabled").lower() in {"true", "1"} or _told(force, "appliesForce").lower() in {
+        "false",
+        "0",
+    }
+
+
+def _told(force: Element, key: str) -> str:
+    text = (force.findtext(key) or "").strip()
+    return "" if text in NONE else text
+
+
+def _body(force: Element, key: str, default: str) -> str:
+    """A body's name, without the path of the set that it is in."""
+    return _told(force, key).rpartition("/")[2] or default
+
+
+def _world(body: str) -> str:
+    return WORLD if body == GROUND else body

@@ -1,0 +1,80 @@
+"""A load as a user gives it: a force and a moment on a body, at a point, constant or over time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from linkwise.errors import LinkwiseError
+from linkwise.package.load import Array
+
+FORCE, MOMENT, POINT = slice(1, 4), slice(4, 7), slice(7, 10)
+"""Columns of a load's table behind the time in s: N, N·m, m."""
+WIDTH = 10
+WORLD = "world"
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A force in N and a moment in N·m on a body of the robot's file, (3,), or (S, 3) at `time` (S,) in s.
+
+    `axes` is whose axes they are in: the world's, or a body's by its name. The force acts at `point` in m, as
+    seen in `point_in`: the world, a body, or the loaded body itself where there is none. Between the samples
+    all is linear in time.
+    """
+
+    name: str
+    body: str
+    force: ArrayLike = (0.0, 0.0, 0.0)
+    moment: ArrayLike = (0.0, 0.0, 0.0)
+    point: ArrayLike = (0.0, 0.0, 0.0)
+    time: ArrayLike | None = None
+    axes: str = WORLD
+    point_in: str | None = None
+
+    def table(self) -> Array:
+        """Rows of time, force, moment, point, (S, 10); one row, of time 0, where all is constant.
+
+        Raises LinkwiseError for other shapes and for values that are not finite.
+        """
+        time = np.zeros(1) if self.time is None else np.asarray(self.time, dtype=float)
+        if time.ndim != 1 or not len(time):
+            raise LinkwiseError(f"load {self.name!r}: time has shape {time.shape}; give (S,), in s")
+        rows = np.zeros((len(time), WIDTH))
+        rows[:, 0] = time
+        for what, columns in (("force", FORCE), ("moment", MOMENT), ("point", POINT)):
+            values = np.asarray(getattr(self, what), dtype=float)
+            if values.shape not in ((3,), (len(time), 3)):
+                wanted = "(3,), or time beside it" if self.time is None else f"(3,) or ({len(time)}, 3)"
+                raise LinkwiseError(f"load {self.name!r}: {what} has shape {values.shape}; give {wanted}")
+            rows[:, columns] = values
+        if not np.isfinite(rows).all():
+            raise LinkwiseError(f"load {self.name!r}: a value is not finite; fill the gap")
+        return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """All loads of an analysis: values, and files, which are logs or OpenSim's external-loads XML.
+
+    `cutoff` in Hz is that of the low-pass for what the files hold, of second order, run forwards and
+    backwards; None for none. Raises LinkwiseError for a cutoff that cannot be.
+    """
+
+    given: tuple[Load, ...] = ()
+    paths: tuple[Path, ...] = ()
+    cutoff: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.cutoff is not None and not 0 < self.cutoff < float("inf"):
+            raise LinkwiseError(f"--loads-cutoff {self.cutoff:g}: give a frequency in Hz above 0")
+        if self.cutoff is not None and not self.paths:
+            raise LinkwiseError("--loads-cutoff goes with --loads; add it")
+
+    @classmethod
+    def of(cls, several: Sequence[Load | str | Path], cutoff: float | None = None) -> "Loads":
+        """Values and files in one list."""
+        given = tuple(one for one in several if isinstance(one, Load))
+        return cls(given, tuple(Path(one) for one in several if not isinstance(one, Load)), cutoff)

@@ -1,0 +1,131 @@
+"""A load on a robot: its samples brought to the motion's instants and into the world, and its torques.
+
+A load that is given in the world alone is kept as its wrench about the world's origin, for that is what a
+force plate measures: it is what is filtered and interpolated, and a centre of pressure that leaps while
+nothing presses does no harm. Of other loads force, moment and point are interpolated each.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from linkwise.analysis.body_names import body_frame
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WORLD
+from linkwise.errors import LinkwiseError
+from linkwise.package.load import Array, Model
+from linkwise.package.manifest import FrameEntry, RigidTree
+
+Pose = Callable[[FrameEntry, Array], Array]
+"""Homogeneous matrices (S, 4, 4) of a frame at q (S, n)."""
+
+
+class Wrench(NamedTuple):
+    """Force, moment about `place`, and that place, in the world: (S, 3) each, in N, N·m, m."""
+
+    force: Array
+    moment: Array
+    place: Array
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where a load acts, and the frames that its numbers are given in, None for the world."""
+
+    frame: FrameEntry
+    axes: FrameEntry | None
+    point_in: FrameEntry | None
+    joints: tuple[int, ...]
+    """Coordinates that move the body."""
+
+    @property
+    def in_world(self) -> bool:
+        """Whether all is given in the world, so that the moments of a table are about its origin."""
+        return self.axes is None and self.point_in is None
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedLoad:
+    """A load that a robot bears."""
+
+    name: str
+    seat: Seat
+    table: Array
+    """Rows of time, force, moment, point (S, 10); moments are about the origin where all is in the world."""
+    source: str
+    """The file that it is from, "" for none."""
+    cutoff: float | None = None
+    """Of the low-pass that it got, in Hz."""
+
+    def wrench(self, time: Array, q: Array, pose: Pose) -> Wrench:
+        """What acts at instants (S,) with the robot at q (S, n)."""
+        rows, seat = self._at(time), self.seat
+        force, moment, point = rows[:, FORCE], rows[:, MOMENT], rows[:, POINT]
+        if seat.in_world:
+            return Wrench(force, moment - np.cross(point, force), point)
+        if seat.axes is not None:
+            turn = pose(seat.axes, q)[:, :3, :3]
+            force, moment = (np.einsum("sab,sb->sa", turn, a) for a in (force, moment))
+        if seat.point_in is not None:
+            at = pose(seat.point_in, q)
+            point = np.einsum("sab,sb->sa", at[:, :3, :3], point) + at[:, :3, 3]
+        return Wrench(force, moment, point)
+
+    def torque(self, model: Model, time: Array, q: Array) -> Array:
+        """What it asks of each joint, τ_ie (S, n) in N·m or N."""
+        force, moment, place = self.wrench(time, q, model_pose(model))
+        found: Any = model.kinematics.load_torque(q, self.seat.frame.name, force, moment, at=place)
+        return np.asarray(found)
+
+    def record(self) -> dict[str, Any]:
+        """As plain data, to record in the outputs."""
+        body = self.seat.frame.name
+        return {"name": self.name, "body": body, "file": self.source, "cutoff": self.cutoff}
+
+    def _at(self, time: Array) -> Array:
+        """The table's rows (S, 10) at instants: linear between its samples."""
+        own = self.table[:, 0]
+        low = max(0, int(np.searchsorted(own, time[0], side="right")) - 1)
+        some = self.table[low : int(np.searchsorted(own, time[-1])) + 1]
+        if len(self.table) == 1 or not len(some):
+            some = self.table[-1:]
+        return np.stack([np.interp(time, some[:, 0], column) for column in some.T], axis=1)
+
+
+def model_pose(model: Model) -> Pose:
+    """Poses as a model has them."""
+    return lambda frame, q: np.asarray(model.kinematics.pose(q, frame.name))
+
+
+def seat_of(load: str, body: str, axes: str, point_in: str | None, robot: LoadedRobot) -> Seat:
+    """Where a load acts; raises LinkwiseError for bodies that are not there, and for one on the ground."""
+    tree = robot.package.manifest.tree
+    if tree is None:
+        raise LinkwiseError(
+            f"load {load!r} on {body!r}: the links of {robot.name} are energies, which do not say where"
+            " anything is; loads are for rigid links"
+        )
+    what = f"load {load!r}"
+    frame = body_frame(f"{what} on", body, robot)
+    if frame.body is None:
+        raise LinkwiseError(f"{what} on {body!r}: that stands on the ground, so that no joint bears it")
+    seen = frame if point_in is None else _seen_in(what, point_in, robot, tree)
+    return Seat(frame, _seen_in(what, axes, robot, tree), seen, _path(tree, frame.body))
+
+
+def _seen_in(what: str, name: str, robot: LoadedRobot, tree: RigidTree) -> FrameEntry | None:
+    """The frame of a name, None for the world, which OpenSim calls ground."""
+    own = next((frame for frame in tree.frames if frame.name == name), None)
+    if name in (WORLD, "ground") and (own is None or own.body is None):
+        return None
+    return own or body_frame(f"{what}, given in the axes of", name, robot)
+
+
+def _path(tree: RigidTree, body: int | None) -> tuple[int, ...]:
+    found = set()
+    while body is not None:
+        found.add(tree.bodies[body].coordinate)
+        body = tree.bodies[body].parent
+    return tuple(sorted(found))

@@ -1,0 +1,114 @@
+"""From files and values of loads to what a robot bears, checked against its bodies and the motion's time."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from linkwise.analysis.body_names import told_apart
+from linkwise.analysis.even_time import even_rate, usual_step
+from linkwise.analysis.filtering import lowpass
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads.external_loads import external_loads
+from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WIDTH, Load, Loads
+from linkwise.analysis.loads.load_columns import PARTS, LoadColumns, load_columns
+from linkwise.analysis.loads.placed_load import PlacedLoad, Seat, seat_of
+from linkwise.analysis.logs import open_log
+from linkwise.analysis.samples import collected, finite_blocks
+from linkwise.analysis.settings import Lowpass
+from linkwise.errors import LinkwiseError, within
+from linkwise.package.load import Array
+from linkwise.progress import Progress
+
+
+def placed_loads(
+    wanted: Loads,
+    robot: LoadedRobot,
+    motion: Array,
+    ignore_extra: bool,
+    progress: Progress,
+    buffer: Path | None = None,
+) -> tuple[PlacedLoad, ...]:
+    """All loads, over the motion's time (S,) in s; `buffer` is a folder that keeps their samples, not memory.
+
+    Raises LinkwiseError that names file, row and column for what is not there, has gaps or is too short.
+    """
+    loads = [_given(load, robot, motion) for load in wanted.given]
+    for path in wanted.paths:
+        for columns in _listed(path, robot, ignore_extra):
+            loads.append(_read(columns, path, wanted.cutoff, robot, motion, progress, buffer))
+    told_apart("load", [load.name for load in loads], ())
+    return tuple(loads)
+
+
+def _listed(path: Path, robot: LoadedRobot, ignore_extra: bool) -> tuple[LoadColumns, ...]:
+    if path.suffix.lower() == ".xml":
+        return external_loads(path)
+    log = open_log(path)
+    with within(str(path)):
+        return load_columns(path, log.columns, robot, ignore_extra)
+
+
+def _given(load: Load, robot: LoadedRobot, motion: Array) -> PlacedLoad:
+    seat = seat_of(load.name, load.body, load.axes, load.point_in, robot)
+    table = load.table()
+    _about_origin(seat, table)
+    if load.time is not None:
+        with within(f"load {load.name!r}"):
+            _check_time(table[:, 0], motion, 1)
+    return PlacedLoad(load.name, seat, table, "")
+
+
+def _read(
+    load: LoadColumns,
+    path: Path,
+    cutoff: float | None,
+    robot: LoadedRobot,
+    motion: Array,
+    progress: Progress,
+    buffer: Path | None,
+) -> PlacedLoad:
+    with within(str(path)):
+        seat = seat_of(load.name, load.body, load.axes, load.point_in, robot)
+    log = open_log(load.log)
+
+    def blocks() -> Iterator[Array]:
+        wanted = (load.time, *(at for some in load.columns.values() for at in some))
+        for block in finite_blocks(log, load.log, wanted, progress):
+            rows = np.zeros((len(block), WIDTH))
+            rows[:, 0] = block[:, 0]
+            for number, part in enumerate(load.columns):
+                rows[:, PARTS[part]] = block[:, 1 + 3 * number : 4 + 3 * number]
+            _about_origin(seat, rows)
+            yield rows
+
+    table = collected(blocks(), WIDTH, buffer)
+    with within(str(load.log)):
+        _check_time(table[:, 0], motion, log.first_row)
+        if cutoff is not None:
+            mend = "for --loads-cutoff bring it to an even rate, in Hz such as"
+            rate = even_rate(table[:, 0], log.first_row, strict=True, mend=mend)
+            lowpass(table[:, 1:7], rate, Lowpass(cutoff), flag="--loads-cutoff")
+    return PlacedLoad(load.name, seat, table, load.log.name, cutoff)
+
+
+def _about_origin(seat: Seat, rows: Array) -> None:
+    """Refer moments to the world's origin where force and point are given in the world, in place."""
+    if seat.in_world:
+        rows[:, MOMENT] += np.cross(rows[:, POINT], rows[:, FORCE])
+
+
+def _check_time(time: Array, motion: Array, first_row: int) -> None:
+    """Raise LinkwiseError for time that runs back, has gaps, or does not cover the motion's."""
+    if len(time) < 2:
+        raise LinkwiseError(f"{len(time)} samples; a load over time has 2 or more")
+    step = min(usual_step(time, first_row), float(np.diff(motion[:2]).sum()))
+    for row, late, verb, own, other in (
+        (first_row, time[0] - motion[0], "begins", time[0], motion[0]),
+        (first_row + len(time) - 1, motion[-1] - time[-1], "ends", time[-1], motion[-1]),
+    ):
+        if late > step:
+            raise LinkwiseError(
+                f"row {row}, time column: it {verb} at {own:.6g} s, the motion at {other:.6g} s; cut the"
+                " motion's log there"
+            )

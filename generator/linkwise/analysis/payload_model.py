@@ -1,0 +1,94 @@
+"""A robot's model and the models of its payloads, which answer as one, payloads behind the links."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.package.load import Array, Model
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """What `PackedLayout` lists and packed values hold, by the same names."""
+
+    acceleration: Any
+    velocity: Any
+    gravity: Any
+    torque: Any
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A payload's model, its link there, its number among all links, and where its values stand."""
+
+    model: Model
+    link: int
+    number: int
+    columns: Side
+
+
+@dataclass(frozen=True)
+class PayloadModel:
+    """The calls of a model that an analysis makes, of the links and the payloads together."""
+
+    own: Model
+    parts: tuple[_Part, ...]
+    layout: Side
+
+    @classmethod
+    def of(cls, own: Model, payloads: Sequence[tuple[int, Model]]) -> "PayloadModel":
+        """payloads: of each, the link that it hangs on, and the package with that alone."""
+        parts = []
+        for number, (link, model) in enumerate(payloads, len(own.link_names)):
+            columns = Side(*(np.flatnonzero(getattr(model.layout, name)[:, 1] == link) for name in NAMES))
+            parts.append(_Part(model, link, number, columns))
+        layouts = []
+        for name in NAMES:
+            rows = [np.asarray(getattr(own.layout, name))]
+            for part in parts:
+                there = np.array(getattr(part.model.layout, name)[getattr(part.columns, name)])
+                there[:, 1] = part.number
+                rows.append(there)
+            layouts.append(np.concatenate(rows))
+        return cls(own, tuple(parts), Side(*layouts))
+
+    def __getattr__(self, name: str) -> Any:
+        """What payloads do not change: names, kinematics, what joints have of their own."""
+        return getattr(self.own, name)
+
+    def packed(self, q: Array, qd: Array, qdd: Array) -> Side:
+        """All coefficients and τ_ij on the paths."""
+        values = [self.own.packed(q, qd, qdd), *(part.model.packed(q, qd, qdd) for part in self.parts)]
+        joined = []
+        for name in NAMES:
+            some = [getattr(values[0], name)]
+            for part, value in zip(self.parts, values[1:], strict=True):
+                some.append(getattr(value, name)[..., getattr(part.columns, name)])
+            joined.append(np.concatenate(some, axis=-1))
+        return Side(*joined)
+
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """τ_i of links and payloads."""
+        models = [self.own, *(part.model for part in self.parts)]
+        torque: Array = np.sum([model.inverse_dynamics(q, qd, qdd) for model in models], axis=0)
+        return torque
+
+    def propagation(self, q: Array, qd: Array, qdd: Array, convention: str = "closing") -> Side:
+        """τp_ij(q̈_k) and τp_ij(q̇_k) (S, n, N, n), and g_ij (S, n, N)."""
+        joined = list(self.own.propagation(q, qd, qdd, convention=convention))
+        for part in self.parts:
+            found = part.model.propagation(q, qd, qdd, convention=convention)
+            joined = [
+                np.concatenate([a, b[:, :, part.link, None]], axis=2)
+                for a, b in zip(joined, found, strict=True)
+            ]
+        acceleration, velocity, gravity = joined
+        return Side(acceleration, velocity, gravity, torque=None)
+
+
+NAMES = tuple(field.name for field in fields(Side))

@@ -1,0 +1,98 @@
+"""OpenSim's ExternalLoads: forces of a storage file on bodies, as the file of XML says."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from linkwise import Load, generate, read_system, write_package
+from linkwise.analysis import analyze
+from linkwise.errors import LinkwiseError
+from motion_logs import LEG, smooth, write_csv, write_mot
+
+NAMES = [f"{side}ground_force_{what}" for side in ("", "1_") for what in ("vx", "vy", "vz", "px", "py", "pz")]
+NAMES += [f"{side}ground_torque_{axis}" for side in ("", "1_") for axis in "xyz"]
+FORCE = """<ExternalForce name="{name}">{switch}<applied_to_body>{body}</applied_to_body>
+<force_expressed_in_body>{axes}</force_expressed_in_body>
+<point_expressed_in_body>{point_in}</point_expressed_in_body>
+<force_identifier>{side}ground_force_v</force_identifier>
+<point_identifier>{side}ground_force_p</point_identifier>
+<torque_identifier>{side}ground_torque_</torque_identifier>
+<data_source_name>Unassigned</data_source_name></ExternalForce>"""
+USUAL = {"switch": "", "axes": "ground", "point_in": "ground", "side": ""}
+RIGHT = {"name": "right", "body": "foot"}
+
+
+def write_loads(folder: Path, *forces: dict[str, str], data: str = "grf.mot") -> Path:
+    objects = "".join(FORCE.format(**(USUAL | force)) for force in forces)
+    path = folder / "grf.xml"
+    path.write_text(
+        f"""<?xml version="1.0"?><OpenSimDocument Version="30000"><ExternalLoads name="walk"><objects>
+        {objects}</objects><groups/><datafile>{data}</datafile></ExternalLoads></OpenSimDocument>"""
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def leg(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("walk")
+    write_package(generate(read_system(LEG), ["numpy"]), folder / "leg")
+    joints = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
+    write_csv(folder / "walk.csv", smooth(80, 6), joints)
+    time = np.arange(481) / 600
+    table = np.column_stack([time, 50 * np.sin((2 + np.arange(18)) * time[:, None] + np.arange(18))])
+    write_mot(folder / "grf.mot", np.round(table, 6), NAMES)
+    return folder
+
+
+def test_forces_are_on_the_bodies_and_in_the_axes_that_the_file_says(leg: Path) -> None:
+    shank = {"name": "left", "body": "/bodyset/shank", "axes": "shank", "point_in": "thigh", "side": "1_"}
+    off = {"name": "off", "body": "foot", "switch": "<isDisabled>true</isDisabled>"}
+    gone = {"name": "gone", "body": "foot", "switch": "<appliesForce>false</appliesForce>"}
+    path = write_loads(leg, RIGHT, shank, off, gone)
+    result = analyze(leg / "walk.csv", leg / "leg", loads=[path])
+    table = np.loadtxt(leg / "grf.mot", skiprows=10)
+    time, numbers = table[:, 0], np.split(table[:, 1:], 6, axis=1)
+    right, left = (
+        {"force": numbers[at], "point": numbers[at + 1], "moment": numbers[4 + at // 2], "time": time}
+        for at in (0, 2)
+    )
+    given = [
+        Load("right", "foot", **right, point_in="ground"),
+        Load("left", "shank", **left, axes="shank", point_in="thigh"),
+    ]
+    expected = analyze(leg / "walk.csv", leg / "leg", loads=given)
+    assert [borne.record() for borne in result.loads] == [
+        {"name": "right", "body": "foot", "file": "grf.mot", "cutoff": None},
+        {"name": "left", "body": "shank", "file": "grf.mot", "cutoff": None},
+    ]
+    np.testing.assert_allclose(result.load_torque, expected.load_torque, rtol=0, atol=1e-10)
+    assert np.abs(result["tau_load/knee_angle_r/right"]).max() > 1
+    assert "tau_load/ankle_angle_r/left" not in {column.name for column in result.columns}
+
+
+@pytest.mark.parametrize(
+    ("force", "message"),
+    [
+        (
+            {"body": "calcn_r"},
+            r"grf.xml: load 'right' on 'calcn_r': leg has no such body; its bodies are base, .*foot",
+        ),
+        ({"body": "base"}, r"grf.xml: load 'right' on 'base': that stands on the ground"),
+        ({"side": "2_"}, r"force_identifier is '2_ground_force_v', and 0 columns of grf.mot begin so"),
+        ({"axes": "tibia"}, r"load 'right', given in the axes of 'tibia': leg has no such body"),
+        ({"switch": "<isDisabled>true</isDisabled>"}, r"grf.xml: no ExternalForce that is on"),
+        ({"body": ""}, r"grf.xml: load 'right' has no applied_to_body; name the body there"),
+    ],
+)
+def test_what_a_file_of_external_loads_lacks_is_named(leg: Path, force: dict[str, str], message: str) -> None:
+    with pytest.raises(LinkwiseError, match=message):
+        analyze(leg / "walk.csv", leg / "leg", loads=[write_loads(leg, RIGHT | force)])
+
+
+def test_a_missing_file_of_forces_is_named(leg: Path) -> None:
+    with pytest.raises(LinkwiseError, match=r"grf.xml: .*other.mot: no such file"):
+        analyze(leg / "walk.csv", leg / "leg", loads=[write_loads(leg, RIGHT, data="other.mot")])
+    with pytest.raises(LinkwiseError, match=r"none.xml: no such file"):
+        analyze(leg / "walk.csv", leg / "leg", loads=[leg / "none.xml"])
+    with pytest.raises(LinkwiseError, match=r"grf.xml: no datafile; name the .mot or .sto file"):
+        analyze(leg / "walk.csv", leg / "leg", loads=[write_loads(leg, RIGHT, data="")])
