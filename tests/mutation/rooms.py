@@ -119,7 +119,9 @@ ROOMS: dict[str, Room] = {
         only=UNTYPED,
     ),
     "c headers": Room(
-        ("generator/linkwise/runtime/c/*.h",), ("tests/test_emitted_c.py", CHECK), only=ONE_COMPILER
+        ("generator/linkwise/runtime/c/*.h",),
+        ("tests/test_emitted_c.py", "tests/test_control_c.py", CHECK),
+        only=ONE_COMPILER,
     ),
     "output": Room(
         (

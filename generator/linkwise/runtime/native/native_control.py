@@ -2,7 +2,7 @@
 
 import ctypes
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,24 +12,7 @@ from ..structure import Structure
 from ..sums.summed import Compute, Summed
 from .native_calls import NativeCalls
 from .native_desk import Desk, new_desk
-from .native_library import NumberArray, symbol
-
-
-class Control(NamedTuple):
-    """A function: how many arrays of the motion it reads, and what is told of a frame before them."""
-
-    motion: int
-    frame: bool = False
-    point: bool = False
-
-
-CONTROL = {
-    "pose": Control(1, frame=True),
-    "jacobian": Control(1, frame=True, point=True),
-    "jacobian_rate": Control(2, frame=True, point=True),
-    "mass_matrix": Control(1),
-    "forward_dynamics": Control(3),
-}
+from .native_library import CONTROL, NumberArray, symbol
 
 
 class ControlCalls:
@@ -74,7 +57,7 @@ class ControlCalls:
         about, n = CONTROL[call], self._calls.structure.n
         memory = np.empty((0 if origin else 3) + about.motion * n, kind)
         motion = memory[memory.size - about.motion * n :].reshape(-1, n)
-        told: list[Any] = [ctypes.c_int(frame)] if about.frame and frame is not None else []
+        told: list[Any] = [] if frame is None else [ctypes.c_int(frame)]
         if about.point:
             told.append(None if origin else memory[:3])
         found = symbol(self._calls.sources, call, kind.str[1:])

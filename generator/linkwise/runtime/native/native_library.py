@@ -4,7 +4,7 @@ import ctypes
 import math
 from contextlib import suppress
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,20 @@ LITTLE = 1 << 15
 """Bytes below which where memory starts is of no account."""
 
 
-CONTROL = ("pose", "jacobian", "jacobian_rate", "mass_matrix", "forward_dynamics")
+class Control(NamedTuple):
+    """A function of one sample: how many arrays of the motion it reads, and whether a point of a frame."""
+
+    motion: int
+    point: bool = False
+
+
+CONTROL = {
+    "pose": Control(1),
+    "jacobian": Control(1, point=True),
+    "jacobian_rate": Control(2, point=True),
+    "mass_matrix": Control(1),
+    "forward_dynamics": Control(3),
+}
 """Functions that take one sample and no count."""
 
 
