@@ -60,12 +60,14 @@ typedef double real;
 #endif
 
 /* Compiled as it stands, a robot's file is whole. A build may also compile it in parts, side by side, and link them:
-   -DLINKWISE_PART=SINES, ONE_SAMPLE, BLOCKS, POSITION_GRADIENT or REGRESSORS, of which the last two may be left away. */
+   -DLINKWISE_PART=SINES, ONE_SAMPLE, BLOCKS, POSITION_GRADIENT, REGRESSORS or CONTROL, of which the last three may be left
+   away. */
 #define SINES 1
 #define ONE_SAMPLE 2
 #define BLOCKS 3
 #define POSITION_GRADIENT 4
 #define REGRESSORS 5
+#define CONTROL 6
 #ifndef LINKWISE_PART
 #define PART(part) 1
 #define SHARED static

@@ -431,12 +431,19 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 #define PASSED_AT_REST q, qd, qd
 #include "calls.h"
 
-/* ---- Regressors of rows, in loops over links and joints ---- */
-#if PART(REGRESSORS)
+/* ---- In loops over links and joints: regressors of rows; of one sample, frames and the mass matrix ---- */
 #undef W
 #undef SIZED
 #undef KERNEL
+#define AT_POSITION const real *q
+#define UNDER_TORQUE const real *q, const real *qd, const real *tau
+#if PART(REGRESSORS) || PART(CONTROL)
 #include "planar3_tree.h"
-
+#endif
+#if PART(REGRESSORS)
 #include "regressors.h"
+#endif
+#if PART(CONTROL)
+#include "frames.h"
+#include "mass.h"
 #endif

@@ -61,6 +61,15 @@ enum {
     PLANAR3_BLOCKF = 16
 };
 
+/* Frames that functions are asked for: bodies of the robot's file and its sites, in the file's own axes. */
+enum {
+    PLANAR3_FRAME_base = 0, /* 'base', on the ground */
+    PLANAR3_FRAME_link1 = 1, /* 'link1', behind 'joint1' */
+    PLANAR3_FRAME_link2 = 2, /* 'link2', behind 'joint2' */
+    PLANAR3_FRAME_link3 = 3, /* 'link3', behind 'joint3' */
+    PLANAR3_FRAMES = 4
+};
+
 /* No two arrays that are given to a function may overlap. Shapes leave PLANAR3_ out of the names above; the last index
    runs fastest. Costs are additions, multiplications and divisions for each of many samples, sines and cosines apart. */
 
@@ -142,6 +151,30 @@ void planar3_link_2(const double *q, const double *qd, const double *qdd,
 void planar3_link_3(const double *q, const double *qd, const double *qdd,
     double *c2, double *c1, double *g, double *tau);
 
+/* What control needs, of one sample, in the world's axes, in m and rad.
+
+   Matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
+   Reads q (JOINTS); writes pose (4, 4). */
+void planar3_pose(int frame, const double *q, double *pose);
+
+/* Jacobian of a point of a frame, given in the frame's axes, or of its origin where point is NULL: times qd it is the
+   frame's angular velocity, then the point's velocity. A moment n and a force f on the point load joint i with
+   column i times (n, f). Reads q (JOINTS), point (3); writes jacobian (6, JOINTS). */
+void planar3_jacobian(int frame, const double *point, const double *q, double *jacobian);
+
+/* How it changes with time, the point staying where it is in the frame.
+   Reads q, qd (JOINTS), point (3); writes rate (6, JOINTS). */
+void planar3_jacobian_rate(int frame, const double *point, const double *q, const double *qd, double *rate);
+
+/* Mass matrix M(i, k), the sum of c2(i, j, k) over the links.
+   Reads q (JOINTS); writes mass (JOINTS, JOINTS). */
+void planar3_mass_matrix(const double *q, double *mass);
+
+/* Accelerations under the torques tau(i) of the joints, by the motion and gravity: forward dynamics. Returns 0; where M is
+   singular, or the motion not finite, the number of a joint, from 1, that can move together with those before it without
+   moving any mass, and then leaves qdd as it was. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
+int planar3_forward_dynamics(const double *q, const double *qd, const double *tau, double *qdd);
+
 /* ---- All links, many samples, in float ---- */
 
 /* All quantities but c0: 146 operations.
@@ -219,6 +252,30 @@ void planar3_link_2f(const float *q, const float *qd, const float *qdd,
 /* Writes c2 (6), c1 (9), g, tau (3). */
 void planar3_link_3f(const float *q, const float *qd, const float *qdd,
     float *c2, float *c1, float *g, float *tau);
+
+/* What control needs, of one sample, in the world's axes, in m and rad.
+
+   Matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
+   Reads q (JOINTS); writes pose (4, 4). */
+void planar3_posef(int frame, const float *q, float *pose);
+
+/* Jacobian of a point of a frame, given in the frame's axes, or of its origin where point is NULL: times qd it is the
+   frame's angular velocity, then the point's velocity. A moment n and a force f on the point load joint i with
+   column i times (n, f). Reads q (JOINTS), point (3); writes jacobian (6, JOINTS). */
+void planar3_jacobianf(int frame, const float *point, const float *q, float *jacobian);
+
+/* How it changes with time, the point staying where it is in the frame.
+   Reads q, qd (JOINTS), point (3); writes rate (6, JOINTS). */
+void planar3_jacobian_ratef(int frame, const float *point, const float *q, const float *qd, float *rate);
+
+/* Mass matrix M(i, k), the sum of c2(i, j, k) over the links.
+   Reads q (JOINTS); writes mass (JOINTS, JOINTS). */
+void planar3_mass_matrixf(const float *q, float *mass);
+
+/* Accelerations under the torques tau(i) of the joints, by the motion and gravity: forward dynamics. Returns 0; where M is
+   singular, or the motion not finite, the number of a joint, from 1, that can move together with those before it without
+   moving any mass, and then leaves qdd as it was. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
+int planar3_forward_dynamicsf(const float *q, const float *qd, const float *tau, float *qdd);
 
 #ifdef __cplusplus
 }

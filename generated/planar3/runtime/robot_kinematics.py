@@ -53,6 +53,26 @@ class Kinematics(Generic[Array]):
         jacobian: Array = self._answers.jacobian(q, frame, point, out)
         return jacobian
 
+    def load_torque(
+        self,
+        q: Array,
+        frame: str | int,
+        force: Array,
+        moment: Array | None = None,
+        point: Array | None = None,
+        at: Array | None = None,
+        out: Array | None = None,
+    ) -> Array:
+        """What a load adds to the torque that joints need, -J^T (moment, force), shape (..., n), N m (N).
+
+        A force from below that bears the robot relieves its joints. Add it to `inverse_dynamics`.
+
+        force, moment: on the frame, in the world's axes, N and N m, (3,) or (..., 3); no moment unless given
+        point: where the force acts, in the frame; at: the same in the world, as of a centre of pressure
+        """
+        torque: Array = self._answers.load_torque(q, frame, force, moment, point, at, out)
+        return torque
+
     def jacobian_rate(
         self, q: Array, qd: Array, frame: str | int, point: Array | None = None, out: Array | None = None
     ) -> Array:

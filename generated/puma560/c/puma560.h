@@ -67,6 +67,18 @@ enum {
     PUMA560_BLOCKF = 16
 };
 
+/* Frames that functions are asked for: bodies of the robot's file and its sites, in the file's own axes. */
+enum {
+    PUMA560_FRAME_base = 0, /* 'base', on the ground */
+    PUMA560_FRAME_link1 = 1, /* 'link1', behind 'joint1' */
+    PUMA560_FRAME_link2 = 2, /* 'link2', behind 'joint2' */
+    PUMA560_FRAME_link3 = 3, /* 'link3', behind 'joint3' */
+    PUMA560_FRAME_link4 = 4, /* 'link4', behind 'joint4' */
+    PUMA560_FRAME_link5 = 5, /* 'link5', behind 'joint5' */
+    PUMA560_FRAME_link6 = 6, /* 'link6', behind 'joint6' */
+    PUMA560_FRAMES = 7
+};
+
 /* No two arrays that are given to a function may overlap. Shapes leave PUMA560_ out of the names above; the last index
    runs fastest. Costs are additions, multiplications and divisions for each of many samples, sines and cosines apart. */
 
@@ -160,6 +172,30 @@ void puma560_link_5(const double *q, const double *qd, const double *qdd,
 void puma560_link_6(const double *q, const double *qd, const double *qdd,
     double *c2, double *c1, double *g, double *tau);
 
+/* What control needs, of one sample, in the world's axes, in m and rad.
+
+   Matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
+   Reads q (JOINTS); writes pose (4, 4). */
+void puma560_pose(int frame, const double *q, double *pose);
+
+/* Jacobian of a point of a frame, given in the frame's axes, or of its origin where point is NULL: times qd it is the
+   frame's angular velocity, then the point's velocity. A moment n and a force f on the point load joint i with
+   column i times (n, f). Reads q (JOINTS), point (3); writes jacobian (6, JOINTS). */
+void puma560_jacobian(int frame, const double *point, const double *q, double *jacobian);
+
+/* How it changes with time, the point staying where it is in the frame.
+   Reads q, qd (JOINTS), point (3); writes rate (6, JOINTS). */
+void puma560_jacobian_rate(int frame, const double *point, const double *q, const double *qd, double *rate);
+
+/* Mass matrix M(i, k), the sum of c2(i, j, k) over the links.
+   Reads q (JOINTS); writes mass (JOINTS, JOINTS). */
+void puma560_mass_matrix(const double *q, double *mass);
+
+/* Accelerations under the torques tau(i) of the joints, by the motion and gravity: forward dynamics. Returns 0; where M is
+   singular, or the motion not finite, the number of a joint, from 1, that can move together with those before it without
+   moving any mass, and then leaves qdd as it was. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
+int puma560_forward_dynamics(const double *q, const double *qd, const double *tau, double *qdd);
+
 /* ---- All links, many samples, in float ---- */
 
 /* All quantities but c0: 1516 operations.
@@ -249,6 +285,30 @@ void puma560_link_5f(const float *q, const float *qd, const float *qdd,
 /* Writes c2 (21), c1 (36), g, tau (6). */
 void puma560_link_6f(const float *q, const float *qd, const float *qdd,
     float *c2, float *c1, float *g, float *tau);
+
+/* What control needs, of one sample, in the world's axes, in m and rad.
+
+   Matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
+   Reads q (JOINTS); writes pose (4, 4). */
+void puma560_posef(int frame, const float *q, float *pose);
+
+/* Jacobian of a point of a frame, given in the frame's axes, or of its origin where point is NULL: times qd it is the
+   frame's angular velocity, then the point's velocity. A moment n and a force f on the point load joint i with
+   column i times (n, f). Reads q (JOINTS), point (3); writes jacobian (6, JOINTS). */
+void puma560_jacobianf(int frame, const float *point, const float *q, float *jacobian);
+
+/* How it changes with time, the point staying where it is in the frame.
+   Reads q, qd (JOINTS), point (3); writes rate (6, JOINTS). */
+void puma560_jacobian_ratef(int frame, const float *point, const float *q, const float *qd, float *rate);
+
+/* Mass matrix M(i, k), the sum of c2(i, j, k) over the links.
+   Reads q (JOINTS); writes mass (JOINTS, JOINTS). */
+void puma560_mass_matrixf(const float *q, float *mass);
+
+/* Accelerations under the torques tau(i) of the joints, by the motion and gravity: forward dynamics. Returns 0; where M is
+   singular, or the motion not finite, the number of a joint, from 1, that can move together with those before it without
+   moving any mass, and then leaves qdd as it was. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
+int puma560_forward_dynamicsf(const float *q, const float *qd, const float *tau, float *qdd);
 
 #ifdef __cplusplus
 }

@@ -67,6 +67,19 @@ enum {
     TORSO_BLOCKF = 16
 };
 
+/* Frames that functions are asked for: bodies of the robot's file and its sites, in the file's own axes. */
+enum {
+    TORSO_FRAME_pelvis = 0, /* 'pelvis', on the ground */
+    TORSO_FRAME_lower_yoke = 1, /* 'lower_yoke', behind 'waist_turn' */
+    TORSO_FRAME_upper_yoke = 2, /* 'upper_yoke', behind 'waist_lean' */
+    TORSO_FRAME_chest = 3, /* 'chest', behind 'waist_bend' */
+    TORSO_FRAME_left_upper_arm = 4, /* 'left_upper_arm', behind 'left_shoulder' */
+    TORSO_FRAME_left_forearm = 5, /* 'left_forearm', behind 'left_elbow' */
+    TORSO_FRAME_right_upper_arm = 6, /* 'right_upper_arm', behind 'right_shoulder' */
+    TORSO_FRAME_right_forearm = 7, /* 'right_forearm', behind 'right_elbow' */
+    TORSO_FRAMES = 8
+};
+
 /* No two arrays that are given to a function may overlap. Shapes leave TORSO_ out of the names above; the last index
    runs fastest. Costs are additions, multiplications and divisions for each of many samples, sines and cosines apart. */
 
@@ -156,6 +169,30 @@ void torso_link_4(const double *q, const double *qd, const double *qdd,
 void torso_link_5(const double *q, const double *qd, const double *qdd,
     double *c2, double *c1, double *g, double *tau);
 
+/* What control needs, of one sample, in the world's axes, in m and rad.
+
+   Matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
+   Reads q (JOINTS); writes pose (4, 4). */
+void torso_pose(int frame, const double *q, double *pose);
+
+/* Jacobian of a point of a frame, given in the frame's axes, or of its origin where point is NULL: times qd it is the
+   frame's angular velocity, then the point's velocity. A moment n and a force f on the point load joint i with
+   column i times (n, f). Reads q (JOINTS), point (3); writes jacobian (6, JOINTS). */
+void torso_jacobian(int frame, const double *point, const double *q, double *jacobian);
+
+/* How it changes with time, the point staying where it is in the frame.
+   Reads q, qd (JOINTS), point (3); writes rate (6, JOINTS). */
+void torso_jacobian_rate(int frame, const double *point, const double *q, const double *qd, double *rate);
+
+/* Mass matrix M(i, k), the sum of c2(i, j, k) over the links.
+   Reads q (JOINTS); writes mass (JOINTS, JOINTS). */
+void torso_mass_matrix(const double *q, double *mass);
+
+/* Accelerations under the torques tau(i) of the joints, by the motion and gravity: forward dynamics. Returns 0; where M is
+   singular, or the motion not finite, the number of a joint, from 1, that can move together with those before it without
+   moving any mass, and then leaves qdd as it was. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
+int torso_forward_dynamics(const double *q, const double *qd, const double *tau, double *qdd);
+
 /* ---- All links, many samples, in float ---- */
 
 /* All quantities but c0: 1690 operations.
@@ -241,6 +278,30 @@ void torso_link_4f(const float *q, const float *qd, const float *qdd,
 /* Writes c2 (15), c1 (25), g, tau (5). */
 void torso_link_5f(const float *q, const float *qd, const float *qdd,
     float *c2, float *c1, float *g, float *tau);
+
+/* What control needs, of one sample, in the world's axes, in m and rad.
+
+   Matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
+   Reads q (JOINTS); writes pose (4, 4). */
+void torso_posef(int frame, const float *q, float *pose);
+
+/* Jacobian of a point of a frame, given in the frame's axes, or of its origin where point is NULL: times qd it is the
+   frame's angular velocity, then the point's velocity. A moment n and a force f on the point load joint i with
+   column i times (n, f). Reads q (JOINTS), point (3); writes jacobian (6, JOINTS). */
+void torso_jacobianf(int frame, const float *point, const float *q, float *jacobian);
+
+/* How it changes with time, the point staying where it is in the frame.
+   Reads q, qd (JOINTS), point (3); writes rate (6, JOINTS). */
+void torso_jacobian_ratef(int frame, const float *point, const float *q, const float *qd, float *rate);
+
+/* Mass matrix M(i, k), the sum of c2(i, j, k) over the links.
+   Reads q (JOINTS); writes mass (JOINTS, JOINTS). */
+void torso_mass_matrixf(const float *q, float *mass);
+
+/* Accelerations under the torques tau(i) of the joints, by the motion and gravity: forward dynamics. Returns 0; where M is
+   singular, or the motion not finite, the number of a joint, from 1, that can move together with those before it without
+   moving any mass, and then leaves qdd as it was. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
+int torso_forward_dynamicsf(const float *q, const float *qd, const float *tau, float *qdd);
 
 #ifdef __cplusplus
 }

@@ -5,8 +5,8 @@
    Several joints may follow one coordinate. So a link's motion has a column for each coordinate of its path: column f - 1
    is joint f, and columns from FRAMES on are sums of two others, for joints of one path that follow the same coordinate.
 
-   The file that includes this one says how many there are: N coordinates, LINKS, FRAMES but for the base, COLUMNS, and
-   LONGEST, the coordinates of the longest path. */
+   The file that includes this one says how many there are: N coordinates, LINKS, FRAMES but for the base, COLUMNS, LONGEST,
+   the coordinates of the longest path, and NAMED, the frames that have names. */
 #ifndef LINKWISE_TREE_H
 #define LINKWISE_TREE_H
 
@@ -43,6 +43,17 @@ struct numbers {
     struct placing placings[FRAMES];
     struct body bodies[LINKS];
     real gravity[3];
+};
+
+/* A frame that has a name: the frame in which it stands, and its turn there, row by row. */
+struct named_frame {
+    short frame;
+    real turn[9];
+};
+
+/* Where the origins of these frames are there. */
+struct offsets {
+    real place[NAMED][3];
 };
 
 #endif

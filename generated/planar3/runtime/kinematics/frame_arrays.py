@@ -7,6 +7,8 @@ hinge o of a path. For a point at x, seen from o,
 
 and of the centre of mass, with m_f and h_f the sums of m_j / m and of m_j c_j / m over the links j that joint
 f moves, J_f = m_f s + z x h_f and dJ_f/dt = m_f sd + zd x h_f + z x hd_f.
+
+A force F and a moment M on a point ask joint f for -J_f^T (M, F) = -(z . M + (s + z x x) . F).
 """
 
 from typing import Any, NamedTuple
@@ -58,6 +60,19 @@ def jacobian(xp: Any, tables: FrameTables, found: Carried, x: Any) -> Any:
     screws = joint_screws(xp, tables.joints, found.joints)
     z, s = screws[:, 0], screws[:, 1]
     return _by_coordinate(tables, xp.concat([z[:3], s[:3] + cross(z, around(xp, x))], 0))
+
+
+def load_torque(xp: Any, tables: FrameTables, found: Carried, x: Any, force: Any, moment: Any) -> Any:
+    """What a force, and a moment or None, (3, 1, samples) each, on a point at x ask of coordinates.
+
+    Of one frame, (n, samples).
+    """
+    screws = joint_screws(xp, tables.joints, found.joints)
+    z, s = screws[:, 0], screws[:, 1]
+    work = ((s[:3] + cross(z, around(xp, x))) * force).sum(0)
+    if moment is not None:
+        work = work + (z[:3] * moment).sum(0)
+    return -_by_coordinate(tables, work)
 
 
 def moving(

@@ -22,6 +22,7 @@ from .frame_arrays import (
     homogeneous,
     jacobian,
     jacobian_rate,
+    load_torque,
     moving,
     point_at,
     velocity_of,
@@ -34,6 +35,13 @@ CACHE = 1 << 21
 NUMBERS = 60
 """Numbers that a joint or a frame has of one sample."""
 ALL, LINKS = "all frames", "links"
+VECTORS = {
+    "point": "x, y, z in the frame, in m",
+    "at": "x, y, z in the world, in m",
+    "force": "x, y, z in the world, in N",
+    "moment": "x, y, z in the world, in N m",
+}
+"""What may be given beside motion."""
 
 
 class Asked(NamedTuple):
@@ -43,8 +51,8 @@ class Asked(NamedTuple):
     tables: FrameTables
     numbers: TreeArrays
     motion: list[Any]
-    point: Any
-    """(3, 1, samples), or None for the frame's origin."""
+    vectors: dict[str, Any]
+    """Those of `VECTORS` that were given, (3, 1, samples) each."""
 
     def frame(self, from_world: bool = False) -> Carried:
         """The frame, or all of them."""
@@ -56,6 +64,10 @@ class Asked(NamedTuple):
         q, offsets = self.motion[0], self.numbers.centres
         return carried(self.xp, self.tables, self.numbers, offsets, q, from_world)
 
+    def place(self, found: Carried) -> Any:
+        """Where the point is, the frame's origin unless given."""
+        return point_at(found, self.vectors.get("point"))
+
     def moving(self, found: Carried) -> Any:
         """Motion of the joints."""
         return moving(self.xp, self.tables, self.numbers, found, *self.motion[1:])
@@ -63,9 +75,9 @@ class Asked(NamedTuple):
     def some(self, samples: slice) -> "Asked":
         """The same for some of the samples; of a number that all share there is one."""
         numbers = (a[..., samples] if a.shape[-1] > 1 else a for a in self.numbers)
-        point = None if self.point is None else self.point[..., samples]
+        vectors = {name: a[..., samples] for name, a in self.vectors.items()}
         motion = [a[:, samples] for a in self.motion]
-        return Asked(self.xp, self.tables, TreeArrays(*numbers), motion, point)
+        return Asked(self.xp, self.tables, TreeArrays(*numbers), motion, vectors)
 
 
 class KinematicAnswers:
@@ -97,7 +109,7 @@ class KinematicAnswers:
         def answer(at: Asked) -> Any:
             return homogeneous(at.xp, at.frame(from_world=True))[:, :, 0]
 
-        return self._answer((q,), self._index(frame), None, answer, (4, 4), out)
+        return self._answer("pose", (q,), self._index(frame), {}, answer, (4, 4), out)
 
     def poses(self, q: Any, out: Any) -> Any:
         """See `Kinematics.poses`."""
@@ -107,29 +119,53 @@ class KinematicAnswers:
             # (4, 4, F, samples) -> (F, 4, 4, samples)
             return at.xp.swapaxes(at.xp.swapaxes(matrices, 0, 2), 1, 2)
 
-        return self._answer((q,), ALL, None, answer, (len(self.frames), 4, 4), out)
+        return self._answer("poses", (q,), ALL, {}, answer, (len(self.frames), 4, 4), out)
 
     def jacobian(self, q: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.jacobian`."""
 
         def answer(at: Asked) -> Any:
             found = at.frame()
-            return jacobian(at.xp, at.tables, found, point_at(found, at.point))
+            return jacobian(at.xp, at.tables, found, at.place(found))
 
-        return self._answer((q,), self._index(frame), point, answer, (6, self._structure.n), out)
+        return self._answer(
+            "jacobian", (q,), self._index(frame), {"point": point}, answer, (6, self._structure.n), out
+        )
 
     def jacobian_rate(self, q: Any, qd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.jacobian_rate`."""
         shape = 6, self._structure.n
-        return self._moving((q, qd), frame, point, jacobian_rate, shape, out)
+        return self._moving("jacobian_rate", (q, qd), frame, point, jacobian_rate, shape, out)
 
     def velocity(self, q: Any, qd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.velocity`."""
-        return self._moving((q, qd), frame, point, velocity_of, (6,), out)
+        return self._moving("velocity", (q, qd), frame, point, velocity_of, (6,), out)
 
     def acceleration(self, q: Any, qd: Any, qdd: Any, frame: Any, point: Any, out: Any) -> Any:
         """See `Kinematics.acceleration`."""
-        return self._moving((q, qd, qdd), frame, point, acceleration_of, (6,), out)
+        return self._moving("acceleration", (q, qd, qdd), frame, point, acceleration_of, (6,), out)
+
+    def load_torque(self, q: Any, frame: Any, force: Any, moment: Any, point: Any, at: Any, out: Any) -> Any:
+        """See `Kinematics.load_torque`."""
+        if force is None:
+            raise TypeError(
+                "force is None; give its x, y, z in the world's axes, in N, zeros for a moment alone"
+            )
+        if point is not None and at is not None:
+            raise ValueError(
+                "point and at both say where the force acts; give point in the frame, or at in the world"
+            )
+
+        def answer(asked: Asked) -> Any:
+            given = asked.vectors
+            found = asked.frame(from_world="at" in given)
+            x = given["at"] if "at" in given else asked.place(found)
+            return load_torque(asked.xp, asked.tables, found, x, given["force"], given.get("moment"))
+
+        vectors = {"force": force, "moment": moment, "point": point, "at": at}
+        return self._answer(
+            "load_torque", (q,), self._index(frame), vectors, answer, (self._structure.n,), out
+        )
 
     def centre_of_mass(self, q: Any, out: Any) -> Any:
         """See `Kinematics.centre_of_mass`."""
@@ -137,7 +173,7 @@ class KinematicAnswers:
         def answer(at: Asked) -> Any:
             return centre_of_mass(at.numbers.masses, at.centres(from_world=True))
 
-        return self._answer((q,), LINKS, None, answer, (3,), out)
+        return self._answer("centre_of_mass", (q,), LINKS, {}, answer, (3,), out)
 
     def centre_of_mass_jacobian(self, q: Any, out: Any) -> Any:
         """See `Kinematics.centre_of_mass_jacobian`."""
@@ -145,7 +181,7 @@ class KinematicAnswers:
         def answer(at: Asked) -> Any:
             return centre_jacobian(at.xp, at.tables, at.numbers.masses, at.centres())
 
-        return self._answer((q,), LINKS, None, answer, (3, self._structure.n), out)
+        return self._answer("centre_of_mass_jacobian", (q,), LINKS, {}, answer, (3, self._structure.n), out)
 
     def centre_of_mass_jacobian_rate(self, q: Any, qd: Any, out: Any) -> Any:
         """See `Kinematics.centre_of_mass_jacobian_rate`."""
@@ -155,52 +191,68 @@ class KinematicAnswers:
             moved = at.moving(found)
             return centre_jacobian_rate(at.xp, at.tables, at.numbers.masses, found, moved)
 
-        return self._answer((q, qd), LINKS, None, answer, (3, self._structure.n), out)
+        return self._answer(
+            "centre_of_mass_jacobian_rate", (q, qd), LINKS, {}, answer, (3, self._structure.n), out
+        )
 
     def _moving(
-        self, given: Sequence[Any], frame: Any, point: Any, made: Any, shape: tuple[int, ...], out: Any
+        self,
+        call: str,
+        given: Sequence[Any],
+        frame: Any,
+        point: Any,
+        made: Any,
+        shape: tuple[int, ...],
+        out: Any,
     ) -> Any:
         """What `made` computes of a point's motion."""
 
         def answer(at: Asked) -> Any:
             found = at.frame()
-            value = made(at.xp, at.tables, at.moving(found), point_at(found, at.point))
+            value = made(at.xp, at.tables, at.moving(found), at.place(found))
             return value if len(shape) > 1 else value[:, 0]
 
-        return self._answer(given, self._index(frame), point, answer, shape, out)
+        return self._answer(call, given, self._index(frame), {"point": point}, answer, shape, out)
 
     def _index(self, frame: Any) -> int:
         return frame_index(frame, self.frames, self._structure.link_names)
 
+    def _at_once(self, call: str, motion: Sequence[Any], part: Any, point: Any) -> Any:
+        """What a back end answers without these arrays; None where it does not."""
+
     def _answer(
         self,
+        call: str,
         given: Sequence[Any],
         part: Any,
-        point: Any,
+        beside: dict[str, Any],
         answer: Callable[[Asked], Any],
         shape: tuple[int, ...],
         out: Any,
     ) -> Any:
-        """Answer (..., *shape) to a motion; `answer` gives it with the samples last."""
+        """Answer (..., *shape) to a motion; `answer` gives it with the samples last.
+
+        beside: some of `VECTORS`, None for those that were not given
+        """
         named = dict(zip(("q", "qd", "qdd"), given, strict=False))
         motion = list(self._backend.arrays(named, self._structure.n))
         if self._check_finite:
             check_numbers(named, self._structure.joint_names)
         own = self._backend.side(motion[0])
-        if point is not None:
-            motion, point = _with_point(own, motion, point)
+        motion, vectors = _with_vectors(own, motion, beside)
         if out is not None:
-            read = dict(zip(("q", "qd", "qdd"), motion, strict=False))
-            read |= {} if point is None else {"point": point}
+            read = dict(zip(("q", "qd", "qdd"), motion, strict=False)) | vectors
             accepted(out, (), (shape,), read, self._read_beside_motion(), False)
-        at, count = self._asked(own, part, motion, point), math.prod(shape)
-        value = _in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
+        value = self._at_once(call, motion, part, vectors.get("point"))
+        if value is None:
+            at, count = self._asked(own, part, motion, vectors), math.prod(shape)
+            value = _in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
         if out is None:  # its numbers side by side
             return np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value.contiguous()
         out[...] = value
         return out
 
-    def _asked(self, own: Any, part: Any, motion: Sequence[Any], point: Any) -> Asked:
+    def _asked(self, own: Any, part: Any, motion: Sequence[Any], vectors: dict[str, Any]) -> Asked:
         """Constants, numbers and motion with samples innermost; `part` is a frame, all of them or links."""
         q, xp = motion[0], own.xp
         key = xp.__name__, q.dtype, getattr(q, "device", None)
@@ -211,9 +263,8 @@ class KinematicAnswers:
             self._tables[part, key] = converted(self._tables_of(part), own, q)
         numbers = own.tree_numbers(self._listed[key], q)
         flat = [xp.swapaxes(a.reshape(-1, a.shape[-1]), 0, 1) for a in motion]
-        if point is not None:
-            point = xp.swapaxes(point.reshape(-1, 3), 0, 1)[:, None]
-        return Asked(xp, self._tables[part, key], numbers, flat, point)
+        placed = {name: xp.swapaxes(a.reshape(-1, 3), 0, 1)[:, None] for name, a in vectors.items()}
+        return Asked(xp, self._tables[part, key], numbers, flat, placed)
 
     def _tables_of(self, part: Any) -> FrameTables:
         if part == LINKS:
@@ -237,20 +288,24 @@ def _in_pieces(own: Any, motion: Sequence[Any], at: Asked, answer: Callable[[Ask
     return whole
 
 
-def _with_point(own: Any, motion: Sequence[Any], given: Any) -> tuple[list[Any], Any]:
-    """Motion and point in one shape of samples; raises ValueError for a point that does not go with it."""
-    q = motion[0]
-    point = own.weights("point", given, q)
-    if point.ndim == 0 or point.shape[-1] != 3:
-        raise ValueError(
-            f"point has shape {tuple(point.shape)}; its last axis must be 3: x, y, z in the frame, in m"
-        )
-    try:
-        batch = np.broadcast_shapes(tuple(q.shape[:-1]), tuple(point.shape[:-1]))
-    except ValueError:
-        raise ValueError(
-            f"point has shape {tuple(point.shape)}, the motion has samples of shape {tuple(q.shape[:-1])}; "
-            "give one point, or one for each sample"
-        ) from None
+def _with_vectors(
+    own: Any, motion: Sequence[Any], beside: dict[str, Any]
+) -> tuple[list[Any], dict[str, Any]]:
+    """Motion and vectors in one shape of samples; raises ValueError for a vector that does not go with it."""
+    q, samples = motion[0], tuple(motion[0].shape[:-1])
+    batch = samples
+    vectors = {name: own.weights(name, a, q) for name, a in beside.items() if a is not None}
+    for name, a in vectors.items():
+        if a.ndim == 0 or a.shape[-1] != 3:
+            raise ValueError(f"{name} has shape {tuple(a.shape)}; its last axis must be 3: {VECTORS[name]}")
+        try:
+            batch = np.broadcast_shapes(batch, tuple(a.shape[:-1]))
+        except ValueError:
+            raise ValueError(
+                f"{name} has shape {tuple(a.shape)}, the motion has samples of shape {samples}; "
+                f"give one {name}, or one for each sample"
+            ) from None
+    if all(a.shape[:-1] == samples for a in vectors.values()):
+        return list(motion), vectors
     motion = [own.xp.broadcast_to(a, (*batch, a.shape[-1])) for a in motion]
-    return motion, own.xp.broadcast_to(point, (*batch, 3))
+    return motion, {name: own.xp.broadcast_to(a, (*batch, 3)) for name, a in vectors.items()}

@@ -4,7 +4,7 @@ import ctypes
 import math
 from contextlib import suppress
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,16 +23,41 @@ LITTLE = 1 << 15
 """Bytes below which where memory starts is of no account."""
 
 
+class Control(NamedTuple):
+    """A function of one sample: how many arrays of the motion it reads, and whether a point of a frame."""
+
+    motion: int
+    point: bool = False
+
+
+CONTROL = {
+    "pose": Control(1),
+    "jacobian": Control(1, point=True),
+    "jacobian_rate": Control(2, point=True),
+    "mass_matrix": Control(1),
+    "forward_dynamics": Control(3),
+}
+"""Functions that take one sample and no count."""
+
+
 @cache
 def function(sources: Sources, call: str, kind: str, arrays: int) -> Any:
-    """C function of a call that takes a count and `arrays` pointers; the first from a library compiles it.
+    """C function of a call that takes a count and `arrays` pointers; raises as `symbol` does."""
+    found = symbol(sources, call, kind)
+    found.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * arrays
+    found.restype = None
+    return found
 
-    call: its name in C; kind: f8 or f4. Raises RuntimeError if it cannot be had.
+
+def symbol(sources: Sources, call: str, kind: str) -> Any:
+    """C function by its name; the first from a library compiles it.
+
+    kind: f8 or f4. Raises RuntimeError if it cannot be had.
     """
     real, suffix = {"f8": ("double", ""), "f4": ("float", "f")}[kind]
     path = library(sources, real, _library_of(call))
     try:
-        found = getattr(ctypes.CDLL(str(path)), f"{sources.name}_{call}{suffix}")
+        return getattr(ctypes.CDLL(str(path)), f"{sources.name}_{call}{suffix}")
     except (OSError, AttributeError) as error:
         with suppress(OSError):
             path.unlink()  # whole as it is, it is of no use: the next time it is made anew
@@ -40,13 +65,12 @@ def function(sources: Sources, call: str, kind: str, arrays: int) -> Any:
             f"cannot load what was compiled: {error}; point CC to another C compiler, "
             "or LINKWISE_CACHE to a directory whose files may be run"
         ) from None
-    found.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * arrays
-    found.restype = None
-    return found
 
 
 def _library_of(call: str) -> str:
     """Which of a robot's libraries has a function."""
+    if call in CONTROL:
+        return "control"
     if call.endswith("position_gradient"):
         return "gradient"
     return "regressors" if "regressor" in call else "decomposition"

@@ -10,6 +10,7 @@ from ..arguments import has_tensors
 from ..interface import Backend
 from ..sums.sum_answers import SumAnswers
 from .native_calls import NativeCalls
+from .native_control import ControlCalls, NativeSums
 from .native_memory import LARGE
 from .native_module import compiled_calls
 
@@ -34,10 +35,20 @@ class NativeAnswers(SumAnswers):
     contiguous: ClassVar = True
 
     def __init__(
-        self, backend: Backend[Any], calls: NativeCalls, on_torch: Callable[[], Any], check_finite: bool
+        self,
+        backend: Backend[Any],
+        calls: NativeCalls,
+        on_torch: Callable[[], Any],
+        check_finite: bool,
+        control: ControlCalls | None,
     ) -> None:
-        """`on_torch` gives what computes with tensors, made when first asked for."""
+        """`on_torch` gives what computes with tensors, made when first asked for.
+
+        control: C functions that take one sample; links of energies have none
+        """
         super().__init__(calls.structure, backend, check_finite)
+        if control is not None:
+            self._sums = NativeSums(calls.structure, backend, self._parts, control)
         self._calls, self._on_torch = calls, on_torch
         made = compiled_calls()
         # What is learned may change from call to call, and what is looked at is looked at here.

@@ -1,6 +1,6 @@
 """Compiled C on NumPy arrays and torch CPU tensors."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -14,6 +14,7 @@ from ..rule.rule_calls import RigidRule
 from ..structure import Structure
 from .native_answers import NativeAnswers
 from .native_calls import NativeCalls, checked_threads
+from .native_control import ControlCalls, NativeKinematics
 
 if TYPE_CHECKING:
     from .native_torch import TorchSide
@@ -41,6 +42,7 @@ class NativeBackend(NumpyBackend):
         self.forms = links
         self.parameters = dict(parameters)
         self.calls = NativeCalls(structure, sources, parameters)
+        self.control = ControlCalls(self.calls)
         self._torch_side: TorchSide | None = None
 
     @property
@@ -67,7 +69,14 @@ class NativeBackend(NumpyBackend):
 
     def answers(self, check_finite: bool) -> NativeAnswers:
         """The calls of `Dynamics`: C writes the answers, but for tensors of which gradients are recorded."""
-        return NativeAnswers(self, self.calls, self.on_torch, check_finite)
+        control = None if self.tree is None else self.control
+        return NativeAnswers(self, self.calls, self.on_torch, check_finite, control)
+
+    def kinematics(
+        self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]
+    ) -> NativeKinematics:
+        """The calls of `Kinematics`: C answers for one sample, arrays and tensors else."""
+        return NativeKinematics(self.structure, self, check_finite, read_beside_motion, self.control)
 
     def side(self, like: Any) -> Any:
         """What computes with `like`, an array or a tensor."""

@@ -21,6 +21,7 @@ PARTS = {
     "decomposition": ("BLOCKS", "ONE_SAMPLE", "SINES"),
     "gradient": ("POSITION_GRADIENT", "SINES"),
     "regressors": ("REGRESSORS", "SINES"),
+    "control": ("CONTROL", "SINES"),
 }
 """Parts of a robot's file (see numbers.h) in its libraries; what nobody asks for is not compiled."""
 
@@ -55,7 +56,7 @@ def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
 
     It cannot be where the sources are not those that were loaded.
 
-    real: double or float; what: decomposition, which holds the torques alone too, gradient or regressors.
+    real: double or float; what: decomposition, which holds the torques alone too, or another of PARTS.
     A terminal is told of the wait on stderr.
     """
     digest = sources.digest or digest_of(sources.directory)

@@ -136,7 +136,8 @@ class NativeCalls:
         compute = self._functions.get((call, kind)) or self._function(call, kind)
         motion = np.empty((2 if call in AT_REST else 3, self.structure.n), kind)
         constants = [self._constants[kind]] if self.parameters else []
-        return new_desk(compute, motion, constants, [np.empty(shape, kind) for shape in self.shapes[call]])
+        results = [np.empty(shape, kind) for shape in self.shapes[call]]
+        return new_desk(compute, (ctypes.c_size_t(1), *motion, *constants), motion, results)
 
     def constants(self, kind: "np.dtype[Any]") -> NumberArray:
         """Values of the parameters in the order of the structure, as they are now."""

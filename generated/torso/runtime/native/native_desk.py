@@ -14,21 +14,30 @@ from .native_library import NumberArray, Place
 class Desk(NamedTuple):
     """Memory for one sample, and a C function that knows where it is."""
 
-    compute: Callable[[], None]
+    compute: Callable[[], int | None]
+    """Of a function that may fail, a number other than 0 says that it did."""
     motion: memoryview
-    """Bytes of q, qd and, if it is asked for, qdd, one after another."""
+    """Bytes of what changes from call to call: q, qd and qdd, say, one after another."""
     results: list[NumberArray]
 
 
-def new_desk(
-    function: Any, motion: NumberArray, constants: Sequence[NumberArray], results: list[NumberArray]
-) -> Desk:
-    """A desk for a C function that takes a count, the rows of `motion` and the others that are not empty."""
+def new_desk(function: Any, given: Sequence[Any], memory: NumberArray, results: list[NumberArray]) -> Desk:
+    """A desk for a C function that takes what is given, then results, and no arrays that are empty.
+
+    given: numbers as ctypes has them, None for NULL, and arrays, those of the motion in this memory
+    """
     bare = type(function)(ctypes.cast(function, ctypes.c_void_p).value)
-    bare.restype = None  # and no argtypes: its arguments are made here, and not converted at every call
-    arrays: list[Any] = [a for a in (*motion, *constants, *results) if a.size]
-    places = [ctypes.byref(Place.from_buffer(a)) for a in arrays]
-    return Desk(partial(bare, ctypes.c_size_t(1), *places), motion.data.cast("B"), results)
+    bare.restype = function.restype  # and no argtypes: its arguments are made here, not at every call
+    arguments = [
+        _argument(value) for value in (*given, *results) if not isinstance(value, ndarray) or value.size
+    ]
+    return Desk(partial(bare, *arguments), memory.data.cast("B"), results)
+
+
+def _argument(value: Any) -> Any:
+    """As ctypes passes it on: an array by its place."""
+    buffer: Any = value
+    return ctypes.byref(Place.from_buffer(buffer)) if isinstance(value, ndarray) else value
 
 
 class Desks:
