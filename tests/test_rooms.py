@@ -1,6 +1,7 @@
 """The house keeps its order: imports run downwards, no circle, and every name stands for one thing."""
 
 import ast
+import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -75,6 +76,12 @@ def all_files() -> list[Path]:
 
 def test_every_room_is_in_the_list() -> None:
     assert {room_of(name_of(path)) for path in all_files()} - FACE <= set(ROOMS)
+
+
+def test_what_is_installed_has_every_room() -> None:
+    settings = tomllib.loads((HOUSE.parents[1] / "pyproject.toml").read_text(encoding="utf-8"))
+    folders = {name_of(path) for path in HOUSE.rglob("__init__.py")}
+    assert set(settings["tool"]["setuptools"]["packages"]) == folders | {"linkwise.templates"}
 
 
 @pytest.mark.parametrize("path", all_files(), ids=name_of)
