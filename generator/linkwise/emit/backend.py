@@ -116,7 +116,14 @@ def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
     return formula_files(d)
 
 
-RULE = ("arrays/__init__.py", "arrays/array_kernels.py", "kinematics", "rule", "sums")
+RULE = (
+    "arrays/__init__.py",
+    "arrays/array_backend.py",
+    "arrays/array_kernels.py",
+    "kinematics",
+    "rule",
+    "sums",
+)
 """Of linkwise/runtime: the vectorised rule, the kinematics of frames, and what is summed over the links."""
 
 BACKENDS: dict[str, BackendFiles] = {

@@ -10,7 +10,8 @@ from linkwise.report.expanded_torques import LinkTorques, link_torques
 from linkwise.report.operations import LinkOperations, Operations, link_operations
 from linkwise.report.plots import SavingsLine, draw_savings, reduction_images, savings_lines, terms_images
 from linkwise.report.reduction_curve import PAPER, CurvePoint, Study, curve, study
-from linkwise.report.reduction_page import reduction_json, reduction_markdown, verdicts
+from linkwise.report.reduction_page import reduction_json, reduction_markdown
+from linkwise.report.reduction_verdicts import verdicts
 from linkwise.report.report_files import report_json, study_files, terms_files
 from linkwise.report.seconds import Timing, measure
 from linkwise.report.seconds_page import read_seconds, seconds_json, seconds_markdown

@@ -1,6 +1,6 @@
 """Closed forms and the vectorised rule on torch tensors."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -11,13 +11,12 @@ from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
 from ..arguments import as_array, as_weights, check_axes, check_dense, no_common_shape, precision
 from ..interface import ClosedForms, EnergyForms
-from ..kinematics.kinematic_answers import KinematicAnswers
 from ..parameter_values import fits
 from ..rule.joint_tree import Bodies, JointTree
 from ..rule.rule_calls import RigidRule
-from ..rule.tree_arrays import TreeArrays, checked_bodies, given_numbers
+from ..rule.tree_arrays import checked_bodies
 from ..structure import Structure
-from ..sums.sum_answers import SumAnswers
+from .array_backend import ArrayBackend
 from .array_kernels import Crossing, known_kernel, operations
 
 FLOATS = ({torch.float32}, {torch.float64})
@@ -31,7 +30,7 @@ MATRICES = 128
 """Links times samples up to which the rule is quicker in spatial matrices than with its samples innermost."""
 
 
-class TorchBackend:
+class TorchBackend(ArrayBackend):
     """Answers with tensors of the caller's dtype and device; gradients flow through motion and parameters."""
 
     name: ClassVar = "torch"
@@ -83,26 +82,6 @@ class TorchBackend:
             return torch.broadcast_tensors(*named.values())  # type: ignore[no-any-return, no-untyped-call]
         except RuntimeError:
             raise no_common_shape(named, n) from None
-
-    def answers(self, check_finite: bool) -> SumAnswers:
-        """The calls of `Dynamics`."""
-        return SumAnswers(self.structure, self, check_finite)
-
-    def kinematics(
-        self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]
-    ) -> KinematicAnswers:
-        """The calls of `Kinematics`."""
-        return KinematicAnswers(self.structure, self, check_finite, read_beside_motion)
-
-    def side(self, like: Any) -> Any:
-        """What computes with `like`, an array or a tensor."""
-        return self
-
-    def tree_numbers(self, own: tuple[TreeArrays, Any], q: Any) -> TreeArrays:
-        """The tree's numbers for the parameters and the bodies; see `given_numbers`."""
-        assert self.tree is not None  # KinematicAnswers has seen to it
-        p, bodies = self._values(q), self._bodies(q)
-        return given_numbers(torch, self.tree, own, p, bodies, tuple(q.shape[:-1]))
 
     def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""

@@ -55,19 +55,21 @@ class Summed:
         return tuple(self._compute("partial_torque", (q, rest, rest)))
 
     def forward_dynamics(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
-        """Solve M qdd = tau - (h + g), h + g the torque without acceleration."""
-        c2, _, _, bias, _ = self._compute("packed", (q, qd, self._rest(q)))
-        mass = self._matrices.summed(c2, "acceleration")
-        return (solved(mass, tau - self._dense.summed(bias), self._structure.joint_names),)
+        """Solve M qdd = tau - (h + g)."""
+        return self._accelerations(q, qd, tau)
 
     def forward_dynamics_with_passive(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
         """Solve (M + armature) qdd = tau - spring - damping - friction - (h + g)."""
-        c2, _, _, bias, _ = self._compute("packed", (q, qd, self._rest(q)))
         sums, side = self._structure.passive_sums, self._backend.side(q)
         spring, damping, friction, _ = passive_torques(side, sums, q, qd, self._rest(q))
-        mass = self._matrices.summed(c2, "acceleration") + side.constant(np.diag(sums.armature), q)
-        force = tau - (spring + damping + friction) - self._dense.summed(bias)
-        return (solved(mass, force, self._structure.joint_names),)
+        armature = side.constant(np.diag(sums.armature), q)
+        return self._accelerations(q, qd, tau - (spring + damping + friction), armature)
+
+    def _accelerations(self, q: Any, qd: Any, force: Any, armature: Any = 0.0) -> tuple[Any, ...]:
+        """Solve (M + armature) qdd = force - (h + g), h + g the torque without acceleration."""
+        c2, _, _, bias, _ = self._compute("packed", (q, qd, self._rest(q)))
+        mass = self._matrices.summed(c2, "acceleration") + armature
+        return (solved(mass, force - self._dense.summed(bias), self._structure.joint_names),)
 
     def energy(self, q: Any, qd: Any) -> tuple[Any, ...]:
         """K_j and P_j."""

@@ -1,6 +1,6 @@
 """Closed forms and the vectorised rule on NumPy arrays."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 
 from ..arguments import as_array, as_weights, check_axes, no_common_shape, precision, too_many_axes
 from ..interface import ClosedForms, EnergyForms, Entries
-from ..kinematics.kinematic_answers import KinematicAnswers
 from ..parameter_values import fits
 from ..rule.joint_tree import Bodies
 from ..rule.rule_calls import RigidRule
-from ..rule.tree_arrays import TreeArrays, checked_bodies, given_numbers
+from ..rule.tree_arrays import checked_bodies
 from ..structure import Structure
-from ..sums.sum_answers import SumAnswers
+from .array_backend import ArrayBackend
 from .array_kernels import Crossing, known_kernel, operations
 
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
@@ -28,7 +27,7 @@ MATRICES = 128
 """Links times samples up to which the rule is quicker in spatial matrices than with its samples innermost."""
 
 
-class NumpyBackend:
+class NumpyBackend(ArrayBackend):
     """Answers with NumPy arrays of the caller's dtype; parameters may be arrays (...): one value a sample."""
 
     name: ClassVar = "numpy"
@@ -81,26 +80,6 @@ class NumpyBackend:
         except RuntimeError:  # of more than 32 axes
             raise too_many_axes(arrays, n) from None
         return [a if a.shape == shape else np.broadcast_to(a, shape) for a in arrays.values()]
-
-    def answers(self, check_finite: bool) -> SumAnswers:
-        """The calls of `Dynamics`."""
-        return SumAnswers(self.structure, self, check_finite)
-
-    def kinematics(
-        self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]
-    ) -> KinematicAnswers:
-        """The calls of `Kinematics`."""
-        return KinematicAnswers(self.structure, self, check_finite, read_beside_motion)
-
-    def side(self, like: Any) -> Any:
-        """What computes with `like`, an array or a tensor."""
-        return self
-
-    def tree_numbers(self, own: tuple[TreeArrays, Any], q: Any) -> TreeArrays:
-        """The tree's numbers for the parameters and the bodies; see `given_numbers`."""
-        assert self.tree is not None  # KinematicAnswers has seen to it
-        p, bodies = self._values(q), self._bodies(q)
-        return given_numbers(np, self.tree, own, p, bodies, tuple(q.shape[:-1]))
 
     def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""

@@ -1,0 +1,48 @@
+"""What back ends of arrays and of tensors do alike: they make the calls, and give a tree's numbers."""
+
+from collections.abc import Callable, Iterable
+from typing import Any, ClassVar
+
+from ..kinematics.kinematic_answers import KinematicAnswers
+from ..rule.joint_tree import JointTree
+from ..rule.tree_arrays import TreeArrays, given_numbers
+from ..structure import Structure
+from ..sums.sum_answers import SumAnswers
+
+
+class ArrayBackend:
+    """Base of the back ends that answer in Python; `xp` is the array namespace."""
+
+    xp: ClassVar[Any]
+    structure: Structure
+    tree: JointTree | None
+    """Where frames are; None for links of energies."""
+
+    def answers(self, check_finite: bool) -> SumAnswers:
+        """The calls of `Dynamics`."""
+        own: Any = self
+        return SumAnswers(self.structure, own, check_finite)
+
+    def kinematics(
+        self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]
+    ) -> KinematicAnswers:
+        """The calls of `Kinematics`."""
+        return KinematicAnswers(self.structure, self, check_finite, read_beside_motion)
+
+    def side(self, like: Any) -> Any:
+        """What computes with `like`, an array or a tensor."""
+        return self
+
+    def tree_numbers(self, own: tuple[TreeArrays, Any], q: Any) -> TreeArrays:
+        """The tree's numbers for the parameters and the bodies; see `given_numbers`."""
+        assert self.tree is not None  # KinematicAnswers has seen to it
+        p, bodies = self._values(q), self._bodies(q)
+        return given_numbers(self.xp, self.tree, own, p, bodies, tuple(q.shape[:-1]))
+
+    def _values(self, q: Any) -> dict[str, Any]:
+        """Values of the run-time parameters, to compute with `q`."""
+        raise NotImplementedError
+
+    def _bodies(self, q: Any) -> Any:
+        """Bodies in place of the tree's, to compute with `q`; None for its own."""
+        raise NotImplementedError
