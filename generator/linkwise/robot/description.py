@@ -64,7 +64,8 @@ class AnchoredTie:
     kind: TieKind
     first: Anchor
     second: Anchor
-    length: Scalar = 0.0
+    length: float = 0.0
+    """In m, of a distance only."""
 
 
 @dataclass(frozen=True)

@@ -154,7 +154,7 @@ class Tie:
     first: int
     """Index among the robot's frames."""
     second: int
-    length: Scalar = 0.0
+    length: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,7 @@ def check_ties(ties: Iterable[AnchoredTie], bodies: Iterable[Body]) -> None:
                 raise LinkwiseError(f"constraint {tie.name!r} has {fault} in its place; give numbers")
         if fault := unusable(tie.length):
             raise LinkwiseError(f"constraint {tie.name!r} has {fault} for its length; give m")
-        if tie.kind == "distance" and isinstance(tie.length, float) and tie.length <= 0:
+        if tie.kind == "distance" and tie.length <= 0:
             raise LinkwiseError(
                 f"constraint {tie.name!r} has the length {tie.length:g}; give one above 0, or the type point"
             )
@@ -105,9 +105,7 @@ def _torn(tie: AnchoredTie, there: list[bool]) -> str:
 def _as_one(tie: AnchoredTie, first: Frame, second: Frame, values: Mapping[sp.Symbol, float]) -> Note:
     """Say that both ends move as one, and how far apart they are if that is not what the tie asks for."""
     apart = transforms.add(first.translation, transforms.minus(second.translation))
-    numbers = (float(sp.sympify(x).xreplace(dict(values))) for x in (*apart, tie.length))
-    x, y, z, length = numbers
-    off = abs(math.hypot(x, y, z) - length)
+    off = abs(math.hypot(*(float(sp.sympify(x).xreplace(dict(values))) for x in apart)) - tie.length)
     if off <= CLOSE:
         return Note("ignored", tie.name, "a constraint whose ends move as one")
     detail = f"its ends move as one, {1000 * off:.3g} mm away from it"
@@ -115,9 +113,8 @@ def _as_one(tie: AnchoredTie, first: Frame, second: Frame, values: Mapping[sp.Sy
 
 
 def tied_places(ties: Iterable[Tie], frames: Sequence[Frame]) -> Iterator[tuple[str, Scalar]]:
-    """Numbers that ties hang on, in which parameters may be, each with what it is."""
+    """Numbers of ties in which parameters may be, each with what it is."""
     for tie in ties:
         for frame in (frames[tie.first], frames[tie.second]):
             for axis, value in zip("xyz", frame.translation, strict=True):
                 yield f"place_{frame.name}_{axis}", value
-        yield f"length_{tie.name}", tie.length

@@ -3,22 +3,22 @@
 What MuJoCo asks for is in its engine_core_constraint.c, mj_instantiateEquality; eq_data of a compiled model:
 
     connect  anchor on the first body, anchor on the second; of sites: none, their origins meet
-    weld     anchor on the second body, place and quaternion of the first one's, scale of the torque; of sites:
-             the scale, their origins and axes meet
+    weld     anchor on the second body, place and quaternion of the first one's, scale of the torque; of
+             sites: the scale, their origins and axes meet
     joint    y − y0 = Σ a_p (x − x0)^p, y the first joint and x the second, a_0 … a_4; no second: y − y0 = a_0
     tendon   the same of the tendons' lengths
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from linkwise.robot import transforms
 from linkwise.robot.couplings import composed
-from linkwise.robot.description import Anchor, AnchoredTie, JointCoupling, Loop
+from linkwise.robot.description import IDENTITY, Anchor, AnchoredTie, JointCoupling, Loop
 from linkwise.robot.readers.mjcf_options import switched_off
 from linkwise.robot.readers.mjcf_tendons import joints_of, lengths_of, ties
-from linkwise.robot.robot import TieKind
+from linkwise.robot.robot import Rotation, TieKind
 
 POWERS = 5
 """Coefficients of a polynomial."""
@@ -91,13 +91,18 @@ def _tie(model: Any, equality: _Equality, bodies: list[str]) -> AnchoredTie:
     turns = equality.kind == "connect" or data[TORQUE_SCALE] == 0.0
     kind: TieKind = "point" if turns else "frame"
     if equality.of_sites:
-        ends = [_site(model, site, bodies) for site in (one, other)]
+        first, second = (_site(model, site, bodies) for site in (one, other))
     elif equality.kind == "connect":
-        ends = [Anchor(bodies[one], translation=data[0:3]), Anchor(bodies[other], translation=data[3:6])]  # type: ignore[arg-type]
+        first, second = _place(bodies[one], data[0:3]), _place(bodies[other], data[3:6])
     else:
         turn = transforms.snap(transforms.from_quaternion(*data[6:10]))
-        ends = [Anchor(bodies[one], turn, data[3:6]), Anchor(bodies[other], translation=data[0:3])]  # type: ignore[arg-type]
-    return AnchoredTie(equality.name, kind, *ends)
+        first, second = _place(bodies[one], data[3:6], turn), _place(bodies[other], data[0:3])
+    return AnchoredTie(equality.name, kind, first, second)
+
+
+def _place(body: str, place: Sequence[float], turn: Rotation = IDENTITY) -> Anchor:
+    x, y, z = place
+    return Anchor(body, turn, (x, y, z))
 
 
 def _site(model: Any, site: int, bodies: list[str]) -> Anchor:

@@ -8,10 +8,11 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
 from linkwise.robot.joint_types import SINGLE
+from linkwise.robot.readers.toml_constraints import with_constraints
 from linkwise.robot.readers.toml_table import TomlTable, named_parameters, tables, toml_data
 from linkwise.robot.robot import Mat3, Passive
 
-TOP = {"schema", "name", "gravity", "base", "parameters", "link", "joint"}
+TOP = {"schema", "name", "gravity", "base", "parameters", "link", "joint", "constraint", "independent"}
 LINK = {"name", "mass", "com", "inertia", "allow_unphysical"}
 PASSIVE = ("stiffness", "rest", "damping", "friction", "armature")
 JOINT = {"name", "type", "parent", "child", "xyz", "rpy", "axis", "mimic", *PASSIVE}
@@ -27,13 +28,14 @@ def read_toml(path: Path) -> Description:
     bodies = tuple(_body(item, parameters) for item in tables(data, "link"))
     if base not in {body.name for body in bodies}:
         bodies = (Body(base), *bodies)
-    return Description(
+    described = Description(
         top.text("name", path.stem),
         bodies,
         tuple(_connection(item, parameters) for item in tables(data, "joint")),
         top.vector("gravity", [0.0, 0.0, -9.81]),
         tuple(parameters.items()),
     )
+    return with_constraints(described, data)
 
 
 def _body(data: dict[str, Any], parameters: Mapping[str, float]) -> Body:
