@@ -1,6 +1,5 @@
 """The command `generate`."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -59,7 +58,7 @@ def generate(
         "backends": backends,
         "kernel": kernel,
         "derivation": derivation,
-        **asdict(options),
+        **options.request(),
     }
     directory = out / checked_identifier(name, system.name)
     check_target(directory, system.name)

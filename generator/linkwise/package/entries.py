@@ -94,7 +94,7 @@ class PassiveEntry:
 
 @dataclass(frozen=True)
 class TieEntry:
-    """Two frames, by their indices, that are held together as `Tie` of linkwise.robot.robot says; length in m."""
+    """Two frames, by their indices, that are held together as `Tie` in robot.robot says; length in m."""
 
     name: str
     kind: Literal["point", "hinge", "frame", "distance"]

@@ -1,7 +1,9 @@
 """From what a file says to a Robot: expand, cut, substitute, merge, and check."""
 
-from dataclasses import dataclass, field, fields, replace
-from typing import Literal
+from dataclasses import asdict, dataclass, field, fields, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
 
 import sympy as sp
 
@@ -41,6 +43,14 @@ class Options:
         """Names of the options that differ from their defaults."""
         usual = Options()
         return tuple(f.name for f in fields(self) if getattr(self, f.name) != getattr(usual, f.name))
+
+    def request(self) -> dict[str, Any]:
+        """What a manifest keeps of them; of a file its name and the SHA-256 of its content."""
+        told = asdict(self) | {"independent": list(self.independent)}
+        if self.constraints is not None:
+            path = Path(self.constraints)
+            told["constraints"] = {"file": path.name, "sha256": sha256(path.read_bytes()).hexdigest()}
+        return told
 
 
 def build(description: Description, options: Options) -> Robot:

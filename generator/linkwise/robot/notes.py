@@ -10,6 +10,8 @@ from linkwise.escape import listed
 LEFT_OUT = "left out of the torques"
 APART = "apart from the links' torques, by passive_torque"
 UNCOUPLED = "moving by themselves, their coupling left out of the torques"
+BESIDE = "beside the torques, which are those of the open tree: constraints, held by robot.constraints"
+LEAST = "constraints that hold something twice, so that how they share forces is the least-squares split"
 IMPOSSIBLE = "accepted though physically impossible"
 WARNED = "MuJoCo warns"
 TURNS = "singular at a pitch of ±90°"
@@ -44,6 +46,8 @@ class Note:
         "passive",
         "warned",
         "promoted",
+        "constraint",
+        "redundant",
     ]
     subject: str
     detail: str = ""
