@@ -2,14 +2,19 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from linkwise.emit.definition import rigid_tree
 from linkwise.emit.loop_closing import Array, closed_loops
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note
 from linkwise.robot.robot import Coupling, Robot, Tie
-from linkwise.runtime.constraints.independent_joints import chosen_independent, rank_of, redundant_rows
+from linkwise.runtime.constraints.independent_joints import rank_of, redundant_rows, scaled_rows
 from linkwise.symbolic.system import RigidSystem, System
+
+SHARE = 0.05
+"""Columns smaller than this part of the largest are not pivots, whatever joints they are of."""
 
 
 def constrained_system(system: System) -> System:
@@ -43,8 +48,7 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
             f"the constraints {constraints} leave nothing to move, so the robot stands still; remove one, or "
             "let it tie less"
         )
-    passive = [k for k in range(len(names)) if robot.driven and k not in robot.driven]
-    proposed = chosen_independent(rows, passive)
+    proposed = _proposed(robot, rows, rank)
     if not robot.wanted:
         return proposed
     chosen = sorted(names.index(name) for name in robot.wanted)
@@ -61,6 +65,33 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
             f"choose {others}, say"
         )
     return tuple(chosen)
+
+
+def _proposed(robot: Robot, rows: Array, rank: int) -> tuple[int, ...]:
+    """Return those that pivoting leaves: columns of A are taken one by one, as of dependent ones.
+
+    Of the columns that are not small beside the largest, as far as they stand across those taken, it is
+    that of a joint that nothing drives, then of the one farthest from the ground, then of the last.
+    """
+    names = [coordinate.name for coordinate in robot.coordinates]
+    depths = [min(_depths(robot, k), default=0) for k in range(len(names))]
+    left, free = scaled_rows(rows), set(range(len(names)))
+    for _ in range(rank):
+        sizes = np.linalg.norm(left, axis=0)
+        most = max(sizes[k] for k in free)
+        able = [k for k in free if sizes[k] >= SHARE * most]
+        pivot = max(able, key=lambda k: (k not in robot.driven, depths[k], k))
+        free.remove(pivot)
+        axis = left[:, pivot] / sizes[pivot]
+        for _ in range(2):  # once more for what rounding leaves
+            left = left - np.outer(axis, axis @ left)
+    return tuple(sorted(free))
+
+
+def _depths(robot: Robot, coordinate: int) -> list[int]:
+    """Return how many joints are before those of a coordinate."""
+    own = (at for at, link in enumerate(robot.links) if link.joint.coordinate == coordinate)
+    return [len(robot.chain(at)) for at in own]
 
 
 def _count(number: int) -> str:

@@ -51,7 +51,7 @@ class ClosedLoops(NamedTuple):
 
 
 def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
-    """Return one where A has its largest rank; raises LinkwiseError, which names what stays open, for none."""
+    """Return one where A has its largest rank; raises LinkwiseError, which names what stays open."""
     equations = _Equations(tree, joints)
     found: list[tuple[Array, Array]] = []
     best: Array | None = None
