@@ -125,7 +125,7 @@ RULE = (
     "rule",
     "sums",
 )
-"""Of linkwise/runtime: the vectorised rule, the kinematics of frames, constraints, and what is summed over the links."""
+"""Of linkwise/runtime: the vectorised rule, kinematics of frames, constraints, and sums over the links."""
 
 BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 
+from ..constraints.constraint_answers import ConstraintAnswers, constraint_answers
 from ..kinematics.kinematic_answers import KinematicAnswers
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays, given_numbers
@@ -28,6 +29,12 @@ class ArrayBackend:
     ) -> KinematicAnswers:
         """The calls of `Kinematics`."""
         return KinematicAnswers(self.structure, self, check_finite, read_beside_motion)
+
+    def constraints(
+        self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any
+    ) -> ConstraintAnswers:
+        """The calls of `Constraints` on a robot with this back end."""
+        return constraint_answers(robot, independent, contacts, at, tolerance)
 
     def side(self, like: Any) -> Any:
         """What computes with `like`, an array or a tensor."""
