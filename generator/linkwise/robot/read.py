@@ -10,6 +10,7 @@ from linkwise.robot.build import Options, build
 from linkwise.robot.builtin.planar import planar
 from linkwise.robot.description import Description
 from linkwise.robot.readers.mjcf import read_mjcf
+from linkwise.robot.readers.sdf import read_sdf
 from linkwise.robot.readers.toml import read_toml
 from linkwise.robot.readers.toml_constraints import with_constraint_file
 from linkwise.robot.readers.urdf import read_urdf, root_tag
@@ -18,11 +19,11 @@ from linkwise.robot.robot import Robot
 
 
 def read_xml(path: Path) -> Description:
-    """Read MJCF where the root element says so, else URDF."""
-    return read_mjcf(path) if root_tag(path) == "mujoco" else read_urdf(path)
+    """Read MJCF or SDFormat where the root element says so, else URDF."""
+    return {"mujoco": read_mjcf, "sdf": read_sdf}.get(root_tag(path), read_urdf)(path)
 
 
-READERS = {".toml": read_toml, ".urdf": read_urdf, ".xml": read_xml, ".mjcf": read_mjcf}
+READERS = {".toml": read_toml, ".urdf": read_urdf, ".sdf": read_sdf, ".xml": read_xml, ".mjcf": read_mjcf}
 """What reads a file, by the end of its name."""
 
 MAX_PLANAR = 1000
@@ -32,7 +33,7 @@ FILES = ("puma560", "torso")
 """Built-in robots that are TOML files beside `planar`."""
 
 BUILT_IN = ("planar3", f"planarN (N from 1 to {MAX_PLANAR})", *FILES)
-DESCRIPTIONS = f"{', '.join(BUILT_IN)}, or a {', '.join(READERS)} or .py file; .xml is URDF or MJCF"
+DESCRIPTIONS = f"{', '.join(BUILT_IN)}, or a {', '.join(READERS)} or .py file; .xml is URDF, MJCF or SDFormat"
 """All that a robot may be read from, in words."""
 
 

@@ -1,0 +1,158 @@
+"""The dynamics of an SDFormat model, Gazebo's; what it says beyond them is noted. Meshes are never opened.
+
+A joint whose child hangs on another joint already closes a loop: it is cut and becomes a constraint, at the
+place and along the axis that it has at q = 0, which is how the file shows the model.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+from linkwise.robot import transforms
+from linkwise.robot.description import ZERO3, Body, Description, Site
+from linkwise.robot.notes import Note, Omission
+from linkwise.robot.readers.sdf_joints import YES, SdfJoint, sdf_joints
+from linkwise.robot.readers.sdf_poses import (
+    WORLD,
+    ModelPoses,
+    Pose,
+    numbers_in,
+    numbers_of,
+    place_of,
+    pose_in,
+    text_of,
+)
+from linkwise.robot.readers.xml_file import parse
+from linkwise.robot.robot import Vec3
+
+OF_WORLD = (0.0, 0.0, -9.8)
+"""Gravity of a world that says nothing of it."""
+DOWN = (0.0, 0.0, -9.81)
+"""That of a model on its own, as of a URDF file."""
+
+USED = {
+    "model": {"link", "joint", "frame", "pose", "static"},
+    "link": {"inertial", "pose", "gravity"},
+    "joint": {"parent", "child", "pose", "axis"},
+}
+"""What is read of each element; every other kind of child is noted as ignored."""
+
+
+def read_sdf(path: Path) -> Description:
+    """Read a robot; raises LinkwiseError naming the element and the remedy."""
+    root = parse(path)
+    if root.tag != "sdf":
+        raise LinkwiseError(f"the root element is <{root.tag}>; an SDFormat file has <sdf>")
+    version, model = _version(root), _model(root)
+    links, joints = model.findall("link"), model.findall("joint")
+    if not links:
+        raise LinkwiseError(f"the model {model.get('name')!r} has no <link>; give one that has some")
+    poses = ModelPoses(model, version)
+    tree, loops = sdf_joints(joints, poses, version)
+    anchored = any(joint.parent == WORLD for joint in (*tree, *loops))
+    places = {joint.child: joint.in_child.translation for joint in tree}
+    losses = (
+        *(loss for j in tree for loss in j.losses(False)),
+        *(loss for j in loops for loss in j.losses(True)),
+    )
+    return Description(
+        model.get("name") or path.stem,
+        (*((Body(WORLD),) if anchored else ()), *(_body(link, places) for link in links)),
+        tuple(joint.connection() for joint in tree),
+        _gravity(root, model, Pose() if anchored else _root(links, tree, poses)),
+        notes=_ignored([model, *links, *joints]),
+        ties=tuple(joint.tie() for joint in loops),
+        sites=tuple(_site(frame, poses) for frame in model.findall("frame")),
+        omissions=(*_unmodelled(links), *losses),
+    )
+
+
+def _version(root: Element) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,4})\.(\d{1,4})(\..*)?", root.get("version", ""))
+    if not found:
+        raise LinkwiseError(f"<sdf version={root.get('version')!r}>; give the format's version, such as 1.9")
+    return int(found[1]), int(found[2])
+
+
+def _model(root: Element) -> Element:
+    """The one model of the file; raises LinkwiseError for others, and for what stands in other files."""
+    models = [*root.findall("model"), *root.findall("world/model")]
+    if len(models) != 1:
+        names = listed(repr(model.get("name")) for model in models)
+        raise LinkwiseError(f"the file has {len(models)} models{f' ({names})' if names else ''}; keep one")
+    (model,) = models
+    for tag in ("include", "model"):
+        if model.find(tag) is not None:
+            raise LinkwiseError(
+                f"the model {model.get('name')!r} has a <{tag}>; write all in one model, without others in it"
+            )
+    if text_of(model, "static") in YES:
+        raise LinkwiseError(f"the model {model.get('name')!r} is <static>, and never moves; remove that")
+    return model
+
+
+def _body(link: Element, places: Mapping[str, Vec3]) -> Body:
+    """A link, and where its joint is on it."""
+    name, place = link.get("name", ""), place_of(link)
+    inertial = link.find("inertial")
+    if inertial is None:
+        raise LinkwiseError(
+            f"{place} has no <inertial>, which SDFormat takes for 1 kg and 1 kg m²; write it out"
+        )
+    if inertial.get("auto") in YES:
+        raise LinkwiseError(
+            f"{place}: <inertial auto> is worked out of shapes by Gazebo; write the numbers out"
+        )
+    for path in ("mass", *(f"inertia/i{axis}" for axis in ("xx", "yy", "zz"))):
+        if inertial.find(path) is None:
+            raise LinkwiseError(f"{place}: <inertial> has no <{path.rpartition('/')[2]}>; write it out")
+    xx, yy, zz, xy, xz, yz = (
+        numbers_in(inertial, f"inertia/i{key}", 0.0, place) for key in ("xx", "yy", "zz", "xy", "xz", "yz")
+    )
+    com = pose_in(inertial, place)
+    turned = transforms.rotate_inertia(com.rotation, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+    origin = transforms.minus(places.get(name, ZERO3))
+    return Body(name, numbers_in(inertial, "mass", 0.0, place), com.translation, turned, origin=origin)
+
+
+def _root(links: Iterable[Element], tree: Sequence[SdfJoint], poses: ModelPoses) -> Pose:
+    """Pose of the link that no joint carries, whose axes are those of the robot's world."""
+    carried = {joint.child for joint in tree}
+    return next((poses.of(link) for link in links if link.get("name") not in carried), Pose())
+
+
+def _gravity(root: Element, model: Element, base: Pose) -> Vec3:
+    """Gravity in the axes of the base, whose pose in the model this is."""
+    world = root.find("world")
+    told = None if world is None else world.find("gravity")
+    down = (DOWN if world is None else OF_WORLD) if told is None else numbers_of(told, 3, "the world")
+    turn = pose_in(model, f"model {model.get('name')!r}").times(base).rotation
+    return transforms.rotate(transforms.transpose(turn), down)
+
+
+def _site(frame: Element, poses: ModelPoses) -> Site:
+    name, place = frame.get("name", ""), place_of(frame)
+    link = poses.link_of(name, place)
+    seen = poses.named(link, place).inverse().times(poses.of(frame))
+    return Site(name, link, seen.rotation, seen.translation)
+
+
+def _ignored(elements: Iterable[Element]) -> tuple[Note, ...]:
+    """Return a note for each kind of child that loads no joint, with how often."""
+    counts = Counter(
+        str(child.tag) for element in elements for child in element if child.tag not in USED[element.tag]
+    )
+    return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()))
+
+
+def _unmodelled(links: Iterable[Element]) -> Iterator[Omission]:
+    for link in links:
+        name = link.get("name", "")
+        if text_of(link, "gravity").lower() in ("false", "0"):
+            yield Omission("Gazebo's switch for gravity", name, bodies=(name,))
+        if link.find("inertial/fluid_added_mass") is not None:
+            yield Omission("added mass of a fluid", name, bodies=(name,))

@@ -1,0 +1,175 @@
+"""Joints of an SDFormat model: those of the tree, and those that close loops and become constraints."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+from linkwise.errors import LinkwiseError
+from linkwise.robot import transforms
+from linkwise.robot.description import IDENTITY, Anchor, AnchoredTie, Connection, Mimic
+from linkwise.robot.joint_types import SINGLE
+from linkwise.robot.notes import Omission
+from linkwise.robot.readers.sdf_poses import ModelPoses, Pose, numbers_in, numbers_of, place_of, text_of
+from linkwise.robot.robot import NOTHING, Passive, Rotation, Scalar, TieKind
+
+TIES: dict[str, TieKind] = {"ball": "point", "revolute": "hinge", "continuous": "hinge", "fixed": "frame"}
+"""What is left of a joint that is cut."""
+DYNAMICS = {
+    "stiffness": "spring_stiffness",
+    "rest": "spring_reference",
+    "damping": "damping",
+    "friction": "friction",
+}
+YES = ("true", "1")
+
+
+@dataclass(frozen=True)
+class SdfJoint:
+    """A joint, with the poses of its two links and its own in the model at q = 0, and its axis there."""
+
+    element: Element
+    parent: str
+    child: str
+    of_parent: Pose
+    of_child: Pose
+    here: Pose
+    axis: tuple[float, float, float]
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.element.get("name", "")
+
+    @property
+    def type(self) -> str:
+        """Its type in the file."""
+        return self.element.get("type", "")
+
+    @property
+    def in_parent(self) -> Pose:
+        """Its pose in the parent link."""
+        return self.of_parent.inverse().times(self.here)
+
+    @property
+    def in_child(self) -> Pose:
+        """Its pose in the child link."""
+        return self.of_child.inverse().times(self.here)
+
+    def connection(self) -> Connection:
+        """The joint as one of the tree."""
+        return Connection(
+            self.name,
+            self.type,
+            self.parent,
+            self.child,
+            self.of_parent.inverse().times(self.of_child).rotation,
+            self.in_parent.translation,
+            _numbers(transforms.rotate(transforms.transpose(self.of_child.rotation), self.axis)),
+            self._mimic(),
+            passive=Passive(**self._dynamics()) if self.type in SINGLE else NOTHING,
+        )
+
+    def tie(self) -> AnchoredTie:
+        """The joint as a constraint; raises LinkwiseError for one that none stands for."""
+        if self.type not in TIES or self.element.find("axis/mimic") is not None:
+            what = "mimics another" if self.type in TIES else f"is {self.type}"
+            raise LinkwiseError(
+                f"joint {self.name!r} closes a loop and {what}; such a joint may be {', '.join(TIES)},"
+                " and follow none"
+            )
+        kind, links = TIES[self.type], (self.of_parent, self.of_child)
+        first, second = (
+            Anchor(body, self._axes_in(link, kind), inside.translation)
+            for body, link, inside in zip(
+                (self.parent, self.child), links, (self.in_parent, self.in_child), strict=True
+            )
+        )
+        return AnchoredTie(self.name, kind, first, second)
+
+    def losses(self, closes: bool) -> Iterator[Omission]:
+        """What it has of its own and no torque holds: a joint that closes a loop, or not of one axis."""
+        if not closes and self.type in SINGLE:
+            return
+        why = "on a joint that closes a loop" if closes else f"on {self.type}"
+        for what, number in self._dynamics().items():
+            if number and what != "rest":
+                yield Omission(what, self.name, f"{number!r} {why}", bodies=(self.parent, self.child))
+
+    def _axes_in(self, link: Pose, kind: TieKind) -> Rotation:
+        """Axes that a tie of this kind holds together, in those of a link: z is a hinge's."""
+        back = transforms.transpose(link.rotation)
+        if kind == "point":
+            return IDENTITY
+        if kind == "frame":
+            return transforms.compose(back, self.here.rotation)
+        axis = transforms.unit(self.axis)
+        if axis is None:
+            raise LinkwiseError(f"joint {self.name!r} has a zero axis; give its direction, such as 0 0 1")
+        return transforms.compose(back, transforms.align_z(axis))
+
+    def _dynamics(self) -> dict[str, float]:
+        place = place_of(self.element)
+        return {
+            what: numbers_in(self.element, f"axis/dynamics/{tag}", 0.0, place)
+            for what, tag in DYNAMICS.items()
+        }
+
+    def _mimic(self) -> Mimic | None:
+        """SDFormat's rule is multiplier (q - reference) + offset."""
+        mimic, place = self.element.find("axis/mimic"), place_of(self.element)
+        if mimic is None:
+            return None
+        ratio = numbers_in(mimic, "multiplier", 1.0, place)
+        offset = numbers_in(mimic, "offset", 0.0, place) - ratio * numbers_in(mimic, "reference", 0.0, place)
+        return Mimic(mimic.get("joint", ""), ratio, offset)
+
+
+def sdf_joints(
+    elements: Iterable[Element], poses: ModelPoses, version: tuple[int, int]
+) -> tuple[list[SdfJoint], list[SdfJoint]]:
+    """Joints of the tree, and those that close loops, in the file's order.
+
+    Of several joints with one child, the first that is not a ball carries it. Raises LinkwiseError for one
+    without a parent or a child.
+    """
+    joints = [_joint(element, poses, version) for element in elements]
+    carrying: dict[str, SdfJoint] = {}
+    for joint in sorted(joints, key=lambda joint: joint.type == "ball"):
+        carrying.setdefault(joint.child, joint)
+    tree = [joint for joint in joints if carrying[joint.child] is joint]
+    return tree, [joint for joint in joints if carrying[joint.child] is not joint]
+
+
+def _joint(element: Element, poses: ModelPoses, version: tuple[int, int]) -> SdfJoint:
+    place = place_of(element)
+    ends = text_of(element, "parent"), text_of(element, "child")
+    for role, name in zip(("parent", "child"), ends, strict=True):
+        if not name:
+            raise LinkwiseError(f"{place} has no <{role}>; name the link")
+    if element.find("axis2") is not None:
+        raise LinkwiseError(f"{place} has two axes; write it as two joints with a link between them")
+    parent, child = (poses.link_of(name, place) for name in ends)
+    of_parent, of_child = (poses.named(name, place) for name in (parent, child))
+    here = poses.of(element)
+    axis = _axis(element, here.rotation, poses, version)
+    return SdfJoint(element, parent, child, of_parent, of_child, here, axis)
+
+
+def _axis(
+    element: Element, own: Rotation, poses: ModelPoses, version: tuple[int, int]
+) -> tuple[float, float, float]:
+    """Axis of a joint in the model's axes, given in its own, or as its version has it."""
+    axis, place = element.find("axis/xyz"), place_of(element)
+    if axis is None:
+        return _numbers(transforms.rotate(own, (0.0, 0.0, 1.0)))
+    numbers = numbers_of(axis, 3, place)
+    in_model = text_of(element, "axis/use_parent_model_frame") in YES
+    if version < (1, 5) or in_model:
+        return _numbers(numbers)
+    seen_in = axis.get("expressed_in", "") if version >= (1, 7) else ""
+    return _numbers(transforms.rotate(poses.named(seen_in, place).rotation if seen_in else own, numbers))
+
+
+def _numbers(vector: Iterable[Scalar]) -> tuple[float, float, float]:
+    x, y, z = map(float, vector)
+    return x, y, z

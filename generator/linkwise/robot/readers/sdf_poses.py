@@ -1,0 +1,163 @@
+"""Where the links, joints and frames of an SDFormat model are, in the axes of the model.
+
+From version 1.7 on, poses stand relative to any named frame, and frames hang on one another; before, links
+stand in the model and joints in their child.
+"""
+
+import math
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+from linkwise.errors import LinkwiseError
+from linkwise.robot import transforms
+from linkwise.robot.description import IDENTITY, ZERO3
+from linkwise.robot.robot import Rotation, Vec3
+
+MODEL, WORLD = "__model__", "world"
+PLACED = ("link", "joint", "frame")
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Turn and place of a frame in another: x there is rotation x + translation."""
+
+    rotation: Rotation = IDENTITY
+    translation: Vec3 = ZERO3
+
+    def times(self, inner: "Pose") -> "Pose":
+        """A pose in this frame, seen from outside."""
+        shift = transforms.rotate(self.rotation, inner.translation)
+        turn = transforms.compose(self.rotation, inner.rotation)
+        return Pose(turn, transforms.add(self.translation, shift))
+
+    def inverse(self) -> "Pose":
+        """The way back."""
+        back = transforms.transpose(self.rotation)
+        return Pose(back, transforms.minus(transforms.rotate(back, self.translation)))
+
+
+class ModelPoses:
+    """Frames of a model by name."""
+
+    def __init__(self, model: Element, version: tuple[int, int]) -> None:
+        """Raises LinkwiseError for two frames of one name."""
+        self._model, self._named = version >= (1, 7), dict[str, Element]()
+        for tag in PLACED:
+            for element in model.findall(tag):
+                name = element.get("name", "")
+                if name in self._named and (self._model or self._named[name].tag == tag):
+                    raise LinkwiseError(f"two of the links, joints and frames are named {name!r}; rename one")
+                # Before frames had names of their own, a joint could be called like a link.
+                self._named.setdefault(name if self._model or tag != "joint" else f"joint {name}", element)
+        self._roots = {MODEL, WORLD} if self._model else {MODEL, WORLD, ""}
+
+    def of(self, element: Element) -> Pose:
+        """Pose of a link, a joint or a frame in the model; raises LinkwiseError for poses in a circle."""
+        chain, seen = Pose(), set[int]()
+        at: Element | None = element
+        while at is not None:
+            if id(at) in seen:
+                raise LinkwiseError(f"the pose of {place_of(element)} is relative to itself, in a circle")
+            seen.add(id(at))
+            chain = pose_in(at, place_of(at)).times(chain)
+            at = self._before(at)
+        return chain
+
+    def named(self, name: str, asked_by: str) -> Pose:
+        """Pose of a frame by its name; raises LinkwiseError where there is none."""
+        found = self._found(name, asked_by)
+        return Pose() if found is None else self.of(found)
+
+    def link_of(self, name: str, asked_by: str) -> str:
+        """Link that carries a frame, the world's name for the world; raises LinkwiseError for none."""
+        seen = set[str]()
+        while True:
+            if name == WORLD or name in seen:
+                if name in seen:
+                    raise LinkwiseError(f"{asked_by}: frame {name!r} is attached to itself, in a circle")
+                return WORLD
+            seen.add(name)
+            element = self._found(name, asked_by)
+            if element is None:
+                return self._first_link()
+            if element.tag == "link":
+                return name
+            name = (
+                text_of(element, "child") if element.tag == "joint" else element.get("attached_to") or MODEL
+            )
+
+    def _before(self, element: Element) -> Element | None:
+        """What the pose of an element is relative to; None for the model."""
+        pose, place = element.find("pose"), place_of(element)
+        relative = pose.get("relative_to", "") if pose is not None and self._model else ""
+        if not relative and element.tag == "joint":
+            relative = text_of(element, "child")
+        if not relative and element.tag == "frame":
+            relative = element.get("attached_to", "")
+        return self._found(relative, place) if relative else None
+
+    def _found(self, name: str, asked_by: str) -> Element | None:
+        if name in self._roots:
+            return None
+        if name not in self._named:
+            hint = "; write nested models out" if "::" in name else ""
+            raise LinkwiseError(f"{asked_by} names {name!r}, which is no link, joint or frame here{hint}")
+        return self._named[name]
+
+    def _first_link(self) -> str:
+        """The model's own frame is attached to its first link."""
+        return next(name for name, element in self._named.items() if element.tag == "link")
+
+
+def pose_in(element: Element, place: str) -> Pose:
+    """What <pose> of an element says; raises LinkwiseError for other than its numbers."""
+    pose = element.find("pose")
+    if pose is None:
+        return Pose()
+    if pose.get("frame", ""):
+        raise LinkwiseError(f"{place}: <pose frame={pose.get('frame')!r}> is obsolete; write relative_to")
+    quaternion = pose.get("rotation_format", "euler_rpy") == "quat_xyzw"
+    numbers = numbers_of(pose, 7 if quaternion else 6, place)
+    x, y, z, *turn = numbers
+    if quaternion:
+        b, c, d, a = turn
+        length = sum(e * e for e in turn) ** 0.5
+        if not length:
+            raise LinkwiseError(f"{place}: <pose> has a quaternion of zeros; give 0 0 0 1 for no turn")
+        rotation = transforms.from_quaternion(a / length, b / length, c / length, d / length)
+    else:
+        degrees = pose.get("degrees", "false") in ("true", "1")
+        roll, pitch, yaw = (math.radians(e) if degrees else e for e in turn)
+        rotation = transforms.from_rpy(roll, pitch, yaw)
+    return Pose(transforms.snap(rotation), (x, y, z))
+
+
+def numbers_of(element: Element, count: int, place: str) -> tuple[float, ...]:
+    """Numbers in an element's text; of an empty pose they are zeros."""
+    words = (element.text or "").split() or ["0"] * (count if element.tag == "pose" else 0)
+    try:
+        values = tuple(float(word) for word in words)
+    except ValueError:
+        values = ()
+    if len(values) != count:
+        raise LinkwiseError(
+            f"{place}: <{element.tag}> is {(element.text or '').strip()!r}; it needs {count}"
+            f" number{'s' * (count > 1)}"
+        )
+    return values
+
+
+def numbers_in(element: Element, path: str, default: float, place: str) -> float:
+    """The number of a child, or what stands for it where there is none."""
+    found = element.find(path)
+    return default if found is None else numbers_of(found, 1, place)[0]
+
+
+def text_of(element: Element, tag: str) -> str:
+    """Text of a child, empty without it."""
+    return (element.findtext(tag) or "").strip()
+
+
+def place_of(element: Element) -> str:
+    """The element in words."""
+    return f"{element.tag} {element.get('name', '')!r}"
