@@ -15,7 +15,7 @@ from ..structure import Structure
 from .held_frames import Held, all_names, held_by
 from .independent_joints import RANK, chosen_independent, loose_base, rank_of, redundant_rows
 from .singular_positions import listed
-from .tie_arrays import ends, tie_jacobian, violation
+from .tie_arrays import pairs, tie_jacobian, violation
 from .tie_tables import tie_tables
 
 WIDTHS = (0.1, 0.3, 1.0, 2.0)
@@ -67,7 +67,7 @@ class ChosenConstraints:
     def _matrix(self) -> NDArray[np.float64]:
         """A where loops close, of the tree's own numbers."""
         numbers, q = own_numbers(self._tree), self._closed_position()[:, None]
-        found: NDArray[np.float64] = tie_jacobian(np, self.tables, q, ends(np, self.tables, numbers, q))
+        found: NDArray[np.float64] = tie_jacobian(np, self.tables, q, pairs(np, self.tables, numbers, q))
         return found[..., 0]
 
     def _independent(self, given: Any, has_contacts: bool) -> tuple[int, ...]:
@@ -130,8 +130,8 @@ class ChosenConstraints:
         if not len(tables.row_pairs) and not tables.polynomials:
             return start
         for _ in range(STEPS):
-            placed = ends(np, tables, numbers, q)
-            phi, rows = violation(np, tables, q, placed, None), tie_jacobian(np, tables, q, placed)
+            placed = pairs(np, tables, numbers, q)
+            phi, rows = violation(np, tables, q, placed), tie_jacobian(np, tables, q, placed)
             step = np.linalg.lstsq(rows[..., 0], -phi[:, 0], rcond=RANK)[0]
             size = np.abs(step).max()
             if size < SHORTEST:
