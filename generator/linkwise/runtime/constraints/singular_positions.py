@@ -68,7 +68,9 @@ def check_following(rows: Any, found: Followers, names: Sequence[str], joint_nam
         return
     a, g = _array(rows), _array(found.map)
     left, scale = np.abs(a @ g), np.abs(a) @ np.abs(g)
-    wrong = left > (AGREE if rows.dtype.itemsize == 8 else 10.0 * AGREE) * scale.max(-2, keepdims=True)
+    # A joint that moves no tie has but rounding in its column.
+    scale = np.maximum(scale.max(-2, keepdims=True), _epsilon(rows) * np.abs(a).max((-2, -1), keepdims=True))
+    wrong = left > (AGREE if rows.dtype.itemsize == 8 else 10.0 * AGREE) * scale
     if not wrong.any():
         return
     *place, row, joint = np.argwhere(wrong)[0].tolist()

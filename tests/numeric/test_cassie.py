@@ -1,0 +1,128 @@
+"""Cassie from its SDF file, whose legs are closed by rods: against a model that Pinocchio is given here."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from linkwise import generate, read_system, write_package
+from linkwise.package.load import import_package
+
+pytest.importorskip("pinocchio")
+
+import pinocchio as pin
+from corpus import ROBOTS
+
+FILE = ROBOTS / "cassie_description/robots/cassie_v2.sdf"
+if not FILE.is_file():
+    pytest.skip("needs the package example-robot-data", allow_module_level=True)
+
+ROUNDED = 1e-4
+"""The file's poses are rounded, so that the rods that move the feet close to some micrometres only."""
+
+
+class Cassie:
+    """Links stand in the model, joints in their child, as SDF 1.6 has it; the rods' balls are left open."""
+
+    def __init__(self) -> None:
+        model = ET.parse(FILE).getroot().find("model")
+        assert model is not None
+        self.links = {link.get("name", ""): _pose(link) for link in model.findall("link")}
+        self.model = pin.Model()
+        self.balls: dict[str, tuple[tuple[str, Any], tuple[str, Any]]] = {}
+        joints = list(model.findall("joint"))
+        inertias = {link.get("name", ""): _inertia(link) for link in model.findall("link")}
+        carried = {"pelvis": (0, self.links["pelvis"])}
+        while joints:
+            joint = joints.pop(0)
+            parent, child = joint.findtext("parent", ""), joint.findtext("child", "")
+            here = self.links[child] * _pose(joint)
+            if joint.get("type") == "ball":
+                ends = ((name, self.links[name].inverse() * here) for name in (parent, child))
+                self.balls[joint.get("name", "")] = tuple(ends)  # type: ignore[assignment]
+                continue
+            if parent not in carried:
+                joints.append(joint)
+                continue
+            axis = np.array([float(word) for word in joint.findtext("axis/xyz", "").split()])
+            number, place = carried[parent]
+            at = self.model.addJoint(
+                number, pin.JointModelRevoluteUnaligned(axis), place.inverse() * here, joint.get("name")
+            )
+            self.model.appendBodyToJoint(at, inertias[child], here.inverse() * self.links[child])
+            carried[child] = at, here
+            self.model.addBodyFrame(child, at, here.inverse() * self.links[child], 0)
+        self.data = self.model.createData()
+        # linkwise's world is the pelvis, which stands upright in the model.
+        self.base = self.links["pelvis"]
+
+    def order(self, names: tuple[str, ...]) -> Any:
+        """Where Pinocchio has the joints of these names."""
+        return [self.model.joints[self.model.getJointId(name)].idx_v for name in names]
+
+
+def _pose(element: ET.Element) -> Any:
+    x, y, z, roll, pitch, yaw = (float(word) for word in element.findtext("pose", "0 0 0 0 0 0").split())
+    return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array([x, y, z]))
+
+
+def _inertia(link: ET.Element) -> Any:
+    inertial = link.find("inertial")
+    assert inertial is not None
+    told = {
+        axes: float(inertial.findtext(f"inertia/i{axes}", "0"))
+        for axes in ("xx", "yy", "zz", "xy", "xz", "yz")
+    }
+    tensor = np.array([[told["".join(sorted(a + b))] for b in "xyz"] for a in "xyz"])
+    com = _pose(inertial)
+    return com.act(pin.Inertia(float(inertial.findtext("mass", "")), np.zeros(3), tensor))
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    system = read_system(FILE)
+    folder: Path = tmp_path_factory.mktemp("cassie") / system.name
+    write_package(generate(system, backends=["numpy"], kernel="loops"), folder)
+    return import_package(folder).load("numpy")
+
+
+def test_the_open_tree_is_the_files(robot: Any) -> None:
+    theirs, rng = Cassie(), np.random.default_rng(0)
+    order = theirs.order(robot.joint_names)
+    for _ in range(10):
+        motion = [rng.uniform(-1.0, 1.0, robot.n) for _ in range(3)]
+        sorted_in = [np.zeros(robot.n) for _ in motion]
+        for ours, put in zip(motion, sorted_in, strict=True):
+            put[order] = ours
+        expected = pin.rnea(theirs.model, theirs.data, *sorted_in)[order]
+        np.testing.assert_allclose(robot.inverse_dynamics(*motion), expected, rtol=0, atol=1e-10)
+
+
+def test_rods_stay_on_their_balls_while_the_motors_move(robot: Any) -> None:
+    theirs, constraints = Cassie(), robot.constrained(tolerance=ROUNDED)
+    assert set(constraints.names) == set(theirs.balls)
+    order, rng = theirs.order(robot.joint_names), np.random.default_rng(1)
+    chosen = [robot.joint_index(name) for name in constraints.independent]
+    for _ in range(5):
+        q = np.zeros(robot.n)
+        q[chosen] = rng.uniform(-0.05, 0.05, len(chosen))
+        q = constraints.closed(q)
+        moved, there = constraints.velocity(q, rng.uniform(-1.0, 1.0, len(chosen))), np.zeros(robot.n)
+        speed = np.zeros(robot.n)
+        there[order], speed[order] = q, moved
+        pin.forwardKinematics(theirs.model, theirs.data, there, speed)
+        pin.updateFramePlacements(theirs.model, theirs.data)
+        for ends in theirs.balls.values():
+            places, velocities = zip(*(theirs_end(theirs, *end) for end in ends), strict=True)
+            np.testing.assert_allclose(places[0], places[1], rtol=0, atol=ROUNDED)
+            np.testing.assert_allclose(velocities[0], velocities[1], rtol=0, atol=ROUNDED)
+
+
+def theirs_end(theirs: Cassie, body: str, end: Any) -> tuple[Any, Any]:
+    """Place and velocity of an end of a rod."""
+    frame = theirs.model.getFrameId(body)
+    place = theirs.data.oMf[frame] * end
+    twist = pin.getFrameVelocity(theirs.model, theirs.data, frame, pin.LOCAL_WORLD_ALIGNED)
+    arm = place.translation - theirs.data.oMf[frame].translation
+    return place.translation, twist.linear + np.cross(twist.angular, arm)

@@ -1,0 +1,233 @@
+"""SDFormat models: the robot that other formats describe, whichever way its poses are written."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from linkwise import LinkwiseError, Options
+from linkwise.robot import effects
+from linkwise.robot.read import read_robot
+
+URDF = """<robot name="arm">
+<link name="foot"/>
+<link name="upper"><inertial><origin xyz="0.1 0 0.2" rpy="0.3 0 0"/><mass value="2"/>
+  <inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0.001" ixz="0" iyz="0"/></inertial></link>
+<link name="lower"><inertial><origin xyz="0 0.1 0"/><mass value="1"/>
+  <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="hip" type="revolute"><parent link="foot"/><child link="upper"/>
+  <origin xyz="0 0.2 1" rpy="0 0 1.5707963267948966"/><axis xyz="0 1 0"/>
+  <limit lower="0" upper="1" effort="1" velocity="1"/><dynamics damping="0.3" friction="0.1"/></joint>
+<joint name="slide" type="prismatic"><parent link="upper"/><child link="lower"/><origin xyz="0 0 0.5"/>
+  <axis xyz="0.6 0 0.8"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+UPPER = """<inertial><pose>0.1 0 0.2 0.3 0 0</pose><mass>2</mass><inertia>
+  <ixx>0.02</ixx><iyy>0.03</iyy><izz>0.04</izz><ixy>0.001</ixy></inertia></inertial>"""
+LOWER = """<inertial><pose>0 0.1 0 0 0 0</pose><mass>1</mass><inertia>
+  <ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"""
+HIP = "<dynamics><damping>0.3</damping><friction>0.1</friction></dynamics>"
+
+# Both links are turned by a quarter from the model: 0.6 0 0.8 in their axes is 0 0.6 0.8 in the model's.
+IN_THE_MODEL = f"""<sdf version="1.4"><model name="arm">
+<link name="upper"><pose>0 0.2 1 0 0 1.5707963267948966</pose>{UPPER}</link>
+<link name="lower"><pose>0 0.2 1.5 0 0 1.5707963267948966</pose>{LOWER}</link>
+<joint name="hip" type="revolute"><parent>world</parent><child>upper</child>
+  <axis><xyz>-1 0 0</xyz>{HIP}</axis></joint>
+<joint name="slide" type="prismatic"><parent>upper</parent><child>lower</child>
+  <axis><xyz>0 0.6 0.8</xyz></axis></joint>
+</model></sdf>"""
+IN_THE_JOINT = (
+    IN_THE_MODEL.replace('version="1.4"', 'version="1.6"')
+    .replace("<xyz>-1 0 0</xyz>", "<xyz>0 1 0</xyz>")
+    .replace("<xyz>0 0.6 0.8</xyz>", "<xyz>0 0.6 0.8</xyz><use_parent_model_frame>1</use_parent_model_frame>")
+)
+RELATIVE = f"""<sdf version="1.11"><model name="arm">
+<frame name="top" attached_to="upper"><pose>0 0 0.5 0 0 0</pose></frame>
+<link name="lower"><pose relative_to="top"/>{LOWER}</link>
+<link name="upper"><pose relative_to="hip"/>{UPPER}</link>
+<joint name="hip" type="revolute"><pose relative_to="__model__" degrees="true">0 0.2 1 0 0 90</pose>
+  <parent>world</parent><child>upper</child><axis><xyz expressed_in="lower">0 1 0</xyz>{HIP}</axis></joint>
+<joint name="slide" type="prismatic"><pose rotation_format="quat_xyzw">0 0 0 0 0 1 0</pose>
+  <parent>top</parent><child>lower</child><axis><xyz>-0.6 0 0.8</xyz></axis></joint>
+</model></sdf>"""
+
+
+def robot_of(folder: Path, text: str, suffix: str = "sdf", **options: Any) -> Any:
+    path = folder / f"arm.{suffix}"
+    path.write_text(text)
+    return read_robot(path, Options(**options))
+
+
+def numbers(robot: Any) -> Any:
+    """Everything that the dynamics take from the links of a robot."""
+    joints = [(link.joint.rotation, link.joint.translation) for link in robot.links]
+    bodies = [(link.mass, link.com, link.inertia) for link in robot.links]
+    parts = [*(p for joint in joints for p in joint), *(p for body in bodies for p in body), robot.gravity]
+    return np.concatenate([np.ravel(np.array(part, dtype=float)) for part in parts])
+
+
+@pytest.mark.parametrize("text", [IN_THE_MODEL, IN_THE_JOINT, RELATIVE], ids=["1.4", "1.6", "1.11"])
+def test_poses_and_axes_of_every_version_make_the_robot_of_a_urdf_file(text: str, tmp_path: Path) -> None:
+    ours, theirs = robot_of(tmp_path, text), robot_of(tmp_path, URDF, "urdf")
+    np.testing.assert_allclose(numbers(ours), numbers(theirs), atol=1e-15)
+    assert ours.passive == theirs.passive
+    assert [c.name for c in ours.coordinates] == ["hip", "slide"]
+
+
+def test_weight_points_down_in_the_axes_of_a_base_that_the_file_turns(tmp_path: Path) -> None:
+    free = IN_THE_MODEL.replace(
+        "<parent>world</parent><child>upper</child>", "<parent>stand</parent><child>upper</child>"
+    )
+    stand = f'<link name="stand"><pose>0 0 0 1.5707963267948966 0 0</pose>{LOWER}</link>'
+    turned = robot_of(tmp_path, free.replace('<link name="upper">', f'{stand}<link name="upper">'))
+    np.testing.assert_allclose(np.array(turned.gravity, dtype=float), [0.0, -9.81, 0.0], atol=1e-15)
+    world = IN_THE_MODEL.replace("<model", "<world name='moon'><gravity>0 0 -1.6</gravity><model")
+    moon = robot_of(tmp_path, world.replace("</model>", "</model></world>"))
+    assert moon.gravity == (0.0, 0.0, -1.6)
+
+
+def test_a_mimic_has_the_offset_of_its_reference(tmp_path: Path) -> None:
+    rule = (
+        '<mimic joint="hip"><multiplier>2</multiplier><offset>0.5</offset><reference>0.1</reference></mimic>'
+    )
+    text = RELATIVE.replace("<xyz>-0.6 0 0.8</xyz>", f"<xyz>-0.6 0 0.8</xyz>{rule}")
+    robot = robot_of(tmp_path, text)
+    assert robot.links[1].joint.ratio == 2.0
+    apart = np.array(robot.links[1].joint.translation) - np.array(
+        robot_of(tmp_path, RELATIVE).links[1].joint.translation
+    )
+    assert np.linalg.norm(apart) == pytest.approx(0.3), "0.5 - 2 * 0.1 along the slide"
+
+
+FOUR_BAR = """<sdf version="1.9"><model name="four_bar">
+<link name="base">{inertial}</link>
+<link name="crank"><pose>0 0 0 0 0 0</pose>{inertial}</link>
+<link name="coupler"><pose>0 0 0.3 0 0 0</pose>{inertial}</link>
+<link name="rocker"><pose>0.5 0 0 0 0 0</pose>{inertial}</link>
+<joint name="turn" type="revolute"><parent>base</parent><child>crank</child>
+  <axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="bend" type="revolute"><parent>crank</parent><child>coupler</child>
+  <axis><xyz>0 1 0</xyz></axis></joint>
+<joint name="close" type="{closing}"><pose>0 0 0.3 0 0 0</pose><parent>coupler</parent><child>rocker</child>
+  <axis><xyz>0 1 0</xyz><dynamics><damping>{damping}</damping></dynamics></axis></joint>
+<joint name="swing" type="revolute"><parent>base</parent><child>rocker</child>
+  <axis><xyz>0 1 0</xyz></axis></joint>
+</model></sdf>"""
+
+
+@pytest.mark.parametrize(("closing", "kind"), [("ball", "point"), ("revolute", "hinge"), ("fixed", "frame")])
+def test_a_joint_that_closes_a_loop_becomes_a_constraint_where_it_is(
+    closing: str, kind: str, tmp_path: Path
+) -> None:
+    text = FOUR_BAR.format(inertial=LOWER, closing=closing, damping=0.2)
+    if closing != "ball":  # which of two is cut is that which comes later
+        first, last = text.index('<joint name="close"'), text.index('<joint name="swing"')
+        text = (
+            text[:first]
+            + text[last : text.index("</model>")]
+            + text[first:last]
+            + text[text.index("</model>") :]
+        )
+    robot = robot_of(tmp_path, text)
+    (tie,) = robot.ties
+    assert (tie.name, tie.kind) == ("close", kind)
+    ends = [robot.frames[end] for end in (tie.first, tie.second)]
+    assert [robot.links[end.link].name for end in ends if end.link is not None] == ["coupler", "rocker"]
+    assert "damping left out of the torques: close (0.2 on a joint that closes a loop)" in effects(
+        robot.notes
+    )
+    # At q = 0 the links stand where the file shows them, and the loop is closed.
+    places = [_place(robot, end) for end in ends]
+    np.testing.assert_allclose(places, [[0.5, 0.0, 0.3]] * 2, atol=1e-15)
+
+
+def _place(robot: Any, frame: Any) -> Any:
+    """Where a frame is at q = 0."""
+    x = np.array(frame.translation, dtype=float)
+    for link in reversed(robot.chain(frame.link)):
+        joint = robot.links[link].joint
+        x = np.array(joint.rotation) @ x + np.array(joint.translation, dtype=float)
+    return x
+
+
+BAD = {
+    "more models": (
+        ("</model>", '</model><model name="other"/>'),
+        "the file has 2 models ('arm', 'other'); keep one",
+    ),
+    "another file": (
+        ('<link name="lower">', '<include/><link name="lower">'),
+        "has a <include>; write all in one model",
+    ),
+    "static": (
+        ('<link name="lower">', '<static>true</static><link name="lower">'),
+        "is <static>, and never moves",
+    ),
+    "no version": (('version="1.11"', ""), "<sdf version=None>; give the format's version, such as 1.9"),
+    "no inertia": ((LOWER, ""), "link 'lower' has no <inertial>, which SDFormat takes for 1 kg and 1 kg m²"),
+    "shapes": (
+        ("<inertial><pose>0 0.1", "<inertial auto='true'><pose>0 0.1"),
+        "is worked out of shapes by Gazebo",
+    ),
+    "no such frame": (
+        ('attached_to="upper"', 'attached_to="uper"'),
+        "frame 'top' names 'uper', which is no link",
+    ),
+    "a circle": (
+        ('relative_to="hip"', 'relative_to="upper"'),
+        "the pose of link 'upper' is relative to itself",
+    ),
+    "five numbers": (
+        ("0 0.2 1 0 0 90", "0 0.2 1 0 90"),
+        "joint 'hip': <pose> is '0 0.2 1 0 90'; it needs 6 numbers",
+    ),
+    "two axes": (
+        ("<parent>top", "<axis2/><parent>top"),
+        "joint 'slide' has two axes; write it as two joints",
+    ),
+    "no child": (("<child>lower</child>", ""), "joint 'slide' has no <child>; name the link"),
+    "one name twice": (('frame name="top"', 'frame name="upper"'), "named 'upper'; rename one"),
+    "zero quaternion": (
+        ("0 0 0 0 0 1 0<", "0 0 0 0 0 0 0<"),
+        "joint 'slide': <pose> has a quaternion of zeros",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", BAD)
+def test_what_is_no_robot_is_refused_in_one_line(fault: str, tmp_path: Path) -> None:
+    (old, new), message = BAD[fault]
+    assert old in RELATIVE
+    with pytest.raises(LinkwiseError) as caught:
+        robot_of(tmp_path, RELATIVE.replace(old, new))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_slide_that_closes_a_loop_is_refused(tmp_path: Path) -> None:
+    text = (
+        FOUR_BAR.format(inertial=LOWER, closing="ball", damping=0)
+        .replace('<joint name="swing" type="revolute">', '<joint name="swing" type="ball">')
+        .replace('<joint name="close" type="ball">', '<joint name="close" type="prismatic">')
+    )
+    assert robot_of(tmp_path, text).ties[0].kind == "point"
+    swapped = text.replace('type="ball"', 'type="revolute"').replace(
+        'name="close" type="prismatic"', 'name="close" type="revolute"'
+    )
+    late = swapped.replace('<joint name="swing" type="revolute">', '<joint name="swing" type="prismatic">')
+    with pytest.raises(
+        LinkwiseError, match="joint 'swing' closes a loop and is prismatic; such a joint may be ball"
+    ):
+        robot_of(tmp_path, late)
+
+
+def test_what_gazebo_does_besides_is_told(tmp_path: Path) -> None:
+    text = RELATIVE.replace(
+        '<link name="lower">', '<link name="lower"><gravity>false</gravity><visual name="v"/>'
+    )
+    robot = robot_of(tmp_path, text)
+    assert any(
+        "Gazebo's switch for gravity left out of the torques: lower" in line for line in effects(robot.notes)
+    )
+    assert any(note.kind == "ignored" and note.subject == "visual" for note in robot.notes)
