@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,6 +63,14 @@ def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> S
         if found.count(at) > 1 or at == time:
             raise LinkwiseError(f"column {columns[at]!r} is asked to be joint {joint!r} and more")
     return Selection(time, found, tuple(free))
+
+
+def with_columns(
+    columns: Sequence[str], joints: Sequence[str], optional: Collection[str], reading: Reading
+) -> tuple[int, ...]:
+    """Which joints are to be read: those `optional` only where the log has a column for them."""
+    source = _mapped(columns, joints, reading)
+    return tuple(k for k, joint in enumerate(joints) if joint not in optional or source[joint] in columns)
 
 
 def radians_per_unit(log: Log, reading: Reading) -> float:

@@ -1,10 +1,12 @@
 """A generated robot package as the analysis uses it: names, a back end that works here, bodies, an oracle."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
+from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.settings import Payload
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
@@ -35,6 +37,25 @@ class LoadedRobot:
     """What joints have of their own, those that have anything."""
     payloads: tuple[Payload, ...] = ()
     """What stands behind the robot's own links in `links`."""
+    constrained: ConstrainedModel | None = None
+    """The robot's own links where joints are tied; `model` then asks for independent joints alone."""
+
+    @property
+    def driven(self) -> tuple[int, ...]:
+        """Joints that have torques: all, or the independent ones."""
+        every = tuple(range(len(self.joints)))
+        return every if self.constrained is None else self.constrained.following.independent
+
+    @property
+    def driven_joints(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self.joints[i] for i in self.driven)
+
+    def borne_by(self, joints: Iterable[int]) -> tuple[int, ...]:
+        """Joints with torques that bear what these joints are loaded with."""
+        if self.constrained is None:
+            return tuple(sorted(joints))
+        return tuple(sorted({y for k in joints for y in self.constrained.following.movers[k]}))
 
 
 def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
@@ -46,19 +67,21 @@ def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
     manifest = package.manifest
     chosen, model = _load(package, package.fastest_first if backend is None else (backend,))
     tree = manifest.tree
+    tied = ConstrainedModel.of(model, tree) if tree is not None and tree.independent else None
     return LoadedRobot(
         manifest.name,
         tuple(model.joint_names),
         tuple(model.joint_units),
         tuple(model.link_names),
         chosen,
-        model,
+        model if tied is None else cast(Model, tied),
         tree.bodies if tree is not None else None,
         _up(tree.gravity if tree is not None else None),
         hashlib.sha256((directory / FILE).read_bytes()).hexdigest(),
         package,
         NewtonEuler(manifest, tree) if tree is not None else None,
         tree.passive if tree is not None else (),
+        constrained=tied,
     )
 
 

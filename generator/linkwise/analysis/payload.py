@@ -7,6 +7,7 @@ from typing import cast
 import numpy as np
 
 from linkwise.analysis.body_names import body_frame, told_apart
+from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.payload_model import PayloadModel
 from linkwise.analysis.settings import Payload
@@ -49,7 +50,7 @@ def carrying(robot: LoadedRobot, payloads: Sequence[Payload]) -> LoadedRobot:
     return replace(
         robot,
         links=(*robot.links, *(payload.title for payload in payloads)),
-        model=cast(Model, PayloadModel.of(robot.model, _models(robot.package, placed))),
+        model=cast(Model, PayloadModel.of(robot.model, _models(robot.package, tree, placed))),
         bodies=loaded.bodies,
         recursion=_recursion(robot.package, loaded, placed),
         payloads=tuple(payloads),
@@ -71,7 +72,7 @@ def _placed(robot: LoadedRobot, tree: RigidTree, payload: Payload) -> _Placed:
     return _Placed(payload, robot.links.index(link), body, (float(x), float(y), float(z)))
 
 
-def _models(package: Package, placed: Sequence[_Placed]) -> list[tuple[int, Model]]:
+def _models(package: Package, tree: RigidTree, placed: Sequence[_Placed]) -> list[tuple[int, Model]]:
     """For each payload its link, and the package with nothing but that payload on that link."""
     backend = next((name for name in ("numpy", "torch") if name in package.backends), None)
     if backend is None:
@@ -85,7 +86,10 @@ def _models(package: Package, placed: Sequence[_Placed]) -> list[tuple[int, Mode
         masses, centres = np.zeros(own.masses.shape), np.zeros(own.centres.shape)
         masses[at.link], centres[at.link] = at.payload.mass, at.place
         bodies = own._replace(masses=masses, centres=centres, inertias=np.zeros(own.inertias.shape))
-        models.append((at.link, package.load(backend, bodies=bodies)))
+        model = package.load(backend, bodies=bodies)
+        if tree.independent:
+            model = cast(Model, ConstrainedModel.of(model, tree))
+        models.append((at.link, model))
     return models
 
 

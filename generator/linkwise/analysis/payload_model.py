@@ -1,25 +1,13 @@
 """A robot's model and the models of its payloads, which answer as one, payloads behind the links."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwise.analysis.model_side import NAMES, Side
 from linkwise.package.load import Array, Model
-
-Rows = NDArray[np.intp]
-
-
-@dataclass(frozen=True, eq=False)
-class Side:
-    """What `PackedLayout` lists and packed values hold, by the same names."""
-
-    acceleration: Any
-    velocity: Any
-    gravity: Any
-    torque: Any
 
 
 @dataclass(frozen=True)
@@ -90,5 +78,11 @@ class PayloadModel:
         acceleration, velocity, gravity = joined
         return Side(acceleration, velocity, gravity, torque=None)
 
-
-NAMES = tuple(field.name for field in fields(Side))
+    def forces(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """What constraints bear of links and payloads, (S, C, N), where there are any."""
+        own: Any = self.own
+        parts: Any = [part.model for part in self.parts]
+        there = [
+            model.forces(q, qd, qdd)[..., [part.link]] for model, part in zip(parts, self.parts, strict=True)
+        ]
+        return np.concatenate([own.forces(q, qd, qdd), *there], axis=-1)

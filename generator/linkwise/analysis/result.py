@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import MEANING, Column, Quantity
@@ -58,6 +59,8 @@ class AnalysisResult:
     warnings: tuple[str, ...]
     total: int
     stride: int = 1
+    closed: ClosedLog | None = None
+    """How far positions of the log were off, where joints are tied; None where none are."""
 
     def __getitem__(self, name: str) -> Array:
         """One column (S,) by its name, as in the Parquet file: "tau/joint1/link2"; else LinkwiseError."""
@@ -167,6 +170,7 @@ class AnalysisResult:
             "samples": self.total,
             "loads": [borne.record() for borne in self.loads],
             "closure": asdict(self.closure),
+            **({} if self.closed is None else {"constraints": self._constraints(self.closed)}),
             "work": self._work(),
             "ignored_columns": list(self.ignored),
             "warnings": list(self.warnings),
@@ -181,6 +185,26 @@ class AnalysisResult:
                 for column, mean, peak in zip(self.columns, self.totals.mean, self.totals.peak, strict=True)
             ],
         }
+
+    @property
+    def constraint_force(self) -> Array:
+        """What each row of the constraints bears, (S, C), in N or N·m; no column without constraints."""
+        return self._filled("force", self._rows)
+
+    @property
+    def constraint_force_by_link(self) -> Array:
+        """The part of it that each link causes, (S, N, C)."""
+        return self._filled("force_link", len(self.robot.links), self._rows)
+
+    @property
+    def _rows(self) -> int:
+        tied = self.robot.constrained
+        return 0 if tied is None else len(tied.constraints.rows)
+
+    def _constraints(self, closed: ClosedLog) -> dict[str, Any]:
+        tied = self.robot.constrained
+        names = () if tied is None else tied.constraints.independent
+        return {"independent": list(names), **closed.record()}
 
     def _work(self) -> dict[str, Any]:
         """Work in J of each joint, all links together, and of each joint into each link that it moves."""

@@ -24,6 +24,8 @@ Quantity = Literal[
     "tau_friction",
     "tau_armature",
     "tau_load",
+    "force",
+    "force_link",
     "power",
     "power_link",
     "power_load",
@@ -50,6 +52,8 @@ MEANING: dict[Quantity, str] = {
     "tau_friction": "what the joint takes for its own Coulomb friction",
     "tau_armature": "what the joint takes for its own armature, the inertia behind its gear",
     "tau_load": "what the joint takes to bear the load",
+    "force": "what the constraint bears: all links together, what joints have of their own, and loads",
+    "force_link": "what the constraint bears of the link",
     "power": "power of the joint: what it sends into all links together, what it has of its own, and loads",
     "power_link": "power that the joint sends into the link",
     "power_load": "power that the joint sends out against the load",
@@ -87,6 +91,8 @@ TORQUE_OF: dict[Quantity, Quantity] = dict(
 )
 """The torque that a power is made of: P = τ q̇_i, term by term."""
 
+FORCES: tuple[Quantity, ...] = ("force", "force_link")
+
 Key = tuple[Quantity, int | None, int | None, int | None]
 """What identifies a column, without names: quantity, joint, link, cause."""
 
@@ -95,7 +101,7 @@ Key = tuple[Quantity, int | None, int | None, int | None]
 class Column:
     """One column; `joint`, `link` and `cause` are indices, None where they mean nothing.
 
-    The cause is a coordinate, or of what a load asks for the load.
+    The cause is a coordinate; of what a load asks for the load, of what a constraint bears its row.
     """
 
     quantity: Quantity
@@ -116,6 +122,11 @@ def load_unit(unit: str) -> str:
     return "N·m" if unit == "rad" else "N"
 
 
+def force_unit(row: str) -> str:
+    """Unit of what a row of the constraints bears; a coupling's is on the unit of its sum."""
+    return "N·m" if " moment" in row else "N" if " force" in row else "N·m or N"
+
+
 def columns_of(
     robot: LoadedRobot, layout: PackedLayout, loads: Sequence[PlacedLoad] = (), power_terms: bool = False
 ) -> tuple[Column, ...]:
@@ -125,8 +136,8 @@ def columns_of(
     for quantity, suffix in motions:
         for i, joint in enumerate(robot.joints):
             out.append(Column(quantity, f"{quantity}/{column_part(joint)}", robot.units[i] + suffix, i))
-    for i, joint in enumerate(robot.joints):
-        out.append(Column("tau", f"tau/{column_part(joint)}", load_unit(robot.units[i]), i))
+    for i in robot.driven:
+        out.append(Column("tau", f"tau/{column_part(robot.joints[i])}", load_unit(robot.units[i]), i))
 
     def load(quantity: Quantity, prefix: str, i: int, j: int, k: int | None = None) -> None:
         parts = [robot.joints[i], robot.links[j], *([robot.joints[k]] if k is not None else [])]
@@ -142,13 +153,24 @@ def columns_of(
     for i, j in sorted(map(tuple, layout.gravity.tolist())):
         load("tau_gravity", "tau_gravity", i, j)
     for share, number in PASSIVE.items():
-        for i in sorted({own.coordinate for own in robot.passive if getattr(own, number)}):
+        for i in robot.borne_by({own.coordinate for own in robot.passive if getattr(own, number)}):
             out.append(Column(share, f"{share}/{column_part(robot.joints[i])}", load_unit(robot.units[i]), i))
     for e, borne in enumerate(loads):
-        for i in borne.seat.joints:
+        for i in robot.borne_by(borne.seat.joints):
             name = "/".join(["tau_load", *map(column_part, (robot.joints[i], borne.name))])
             out.append(Column("tau_load", name, load_unit(robot.units[i]), i, cause=e))
-    return *out, *_powers(out, (*POWER, *POWER_TERMS) if power_terms else POWER)
+    return *out, *_forces(robot), *_powers(out, (*POWER, *POWER_TERMS) if power_terms else POWER)
+
+
+def _forces(robot: LoadedRobot) -> Iterator[Column]:
+    """What each row of the constraints bears, of all and of each link."""
+    if robot.constrained is None:
+        return
+    for row, name in enumerate(robot.constrained.constraints.rows):
+        part, unit = column_part(name), force_unit(name)
+        yield Column("force", f"force/{part}", unit, cause=row)
+        for j, link in enumerate(robot.links):
+            yield Column("force_link", f"force/{part}/{column_part(link)}", unit, link=j, cause=row)
 
 
 def _powers(columns: Sequence[Column], quantities: Sequence[Quantity]) -> Iterator[Column]:

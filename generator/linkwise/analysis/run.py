@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from linkwise.analysis.closed_motion import ClosedLog, closed_samples
+from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.loads.read_loads import placed_loads
+from linkwise.analysis.logs import open_log
 from linkwise.analysis.payload import carrying
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.samples import Samples, read_samples
@@ -176,6 +179,8 @@ class Job:
     processing: Processing
     samples: Samples
     decomposer: Decomposer
+    closed: ClosedLog | None = None
+    """How far positions of the log were off, where joints are tied."""
 
     def run(self, sink: Sink, progress: Progress) -> Streamed:
         """Analyse every sample, handing the blocks to `sink`."""
@@ -219,6 +224,7 @@ class Job:
             self.samples.warnings,
             done.samples,
             kept.stride,
+            self.closed,
         )
 
 
@@ -233,11 +239,25 @@ def _prepared(
     power_terms: bool = False,
 ) -> Job:
     """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
-    samples = read_samples(log, robot.joints, robot.units, reading, progress, buffer)
+    samples, closed = _samples(log, robot, reading, progress, buffer)
     with within(str(log)):
         span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
     borne = placed_loads(loads, robot, samples.time, reading.ignore_extra, progress, buffer)
     decomposer = Decomposer.of(robot, processing.convention, power_terms, borne)
-    return Job(log.name, reading, processing, samples, decomposer)
+    return Job(log.name, reading, processing, samples, decomposer, closed)
+
+
+def _samples(
+    log: Path, robot: LoadedRobot, reading: Reading, progress: Progress, buffer: Path | None
+) -> tuple[Samples, ClosedLog | None]:
+    """Samples of all joints; where joints are tied, those that follow closed, and how far the log was off."""
+    if robot.constrained is None:
+        return read_samples(log, robot.joints, robot.units, reading, progress, buffer), None
+    followers = set(robot.constrained.constraints.dependent)
+    there = with_columns(open_log(log).columns, robot.joints, followers, reading)
+    names, units = (tuple(given[k] for k in there) for given in (robot.joints, robot.units))
+    samples = read_samples(log, names, units, reading, progress, buffer)
+    with within(str(log)):
+        return closed_samples(samples, there, robot.constrained, reading.loop_tolerance, progress, buffer)

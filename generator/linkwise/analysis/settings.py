@@ -29,10 +29,14 @@ class Reading:
     ignore_extra: bool = False
     resample: float | None = None
     """Sampling rate in Hz to bring a log of uneven time to, by cubic splines."""
+    loop_tolerance: float = 0.01
+    """How far positions of the log may be from closing the robot's loops, in m and rad."""
 
     def __post_init__(self) -> None:
         if self.resample is not None and not 0 < self.resample < float("inf"):
             raise LinkwiseError(f"--resample {self.resample:g}: give a rate in Hz above 0")
+        if not 0 <= self.loop_tolerance < float("inf"):
+            raise LinkwiseError(f"--loop-tolerance {self.loop_tolerance:g}: give m and rad, 0 or more")
 
 
 @dataclass(frozen=True)

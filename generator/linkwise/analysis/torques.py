@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from linkwise.analysis.result_columns import (
 )
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.verify import Closure, residual, worst_of
+from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array, PackedLayout
 
 Source = tuple[int, int, int]
@@ -84,11 +86,20 @@ class Decomposer:
         return slice(found[0], found[-1] + 1) if found else slice(0, 0)
 
     def fill(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> Closure:
-        """Fill `out` (columns, S) from time (S,) and q, qd, qdd (S, n); say how well it closes."""
+        """Fill `out` (columns, S) from time (S,) and q, qd, qdd (S, n); say how well it closes.
+
+        Where joints are tied, the motion of the independent ones counts. Raises LinkwiseError, with the time,
+        where ties cannot be closed or joints do not follow.
+        """
+        if self.robot.constrained is not None:
+            try:
+                q, qd, qdd = self.robot.constrained.consistent(q, qd, qdd)
+            except ValueError as error:
+                raise LinkwiseError(f"between {time[0]:.6g} and {time[-1]:.6g} s: {error}") from None
         packed = self.robot.model.packed(q, qd, qdd)
         out[0] = time
         out[self.rows("q")], out[self.rows("qd")], out[self.rows("qdd")] = q.T, qd.T, qdd.T
-        out[self.rows("tau")] = self.robot.model.inverse_dynamics(q, qd, qdd).T
+        out[self.rows("tau")] = self.robot.model.inverse_dynamics(q, qd, qdd).T[list(self.robot.driven)]
         self._add_passive(out, q, qd, qdd)
         self._add_loads(out, time, q)
         for row, source, _ in self.sources["tau_link"]:
@@ -99,6 +110,7 @@ class Decomposer:
             np.multiply(packed.velocity[..., source], qd[:, k], out=out[row])
         for row, source, _ in self.sources["tau_gravity"]:
             out[row] = packed.gravity[..., source]
+        self._fill_forces(out, time, q, qd, qdd)
         closure = self._closure(out)
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
@@ -114,20 +126,46 @@ class Decomposer:
         if not self.robot.passive:
             return
         found = dict(zip(PASSIVE, self.robot.model.passive_torque(q, qd, qdd), strict=True))
-        whole = self.rows("tau").start
+        whole = self._wholes()
         for column, values in zip(self.columns, out, strict=True):
             if column.quantity in PASSIVE and column.joint is not None:
                 values[:] = found[column.quantity][:, column.joint]
-                out[whole + column.joint] += values
+                out[whole[column.joint]] += values
 
     def _add_loads(self, out: Array, time: Array, q: Array) -> None:
         """Fill what joints take to bear loads, and add it to their torques."""
         asked = [borne.torque(self.robot.model, time, q) for borne in self.loads]
-        whole = self.rows("tau").start
+        whole = self._wholes()
         for column, values in zip(self.columns, out, strict=True):
             if column.quantity == "tau_load" and column.joint is not None and column.cause is not None:
                 values[:] = asked[column.cause][:, column.joint]
-                out[whole + column.joint] += values
+                out[whole[column.joint]] += values
+
+    def _wholes(self) -> dict[int, int]:
+        """Row of each joint's whole torque."""
+        return {
+            c.joint: at for at, c in enumerate(self.columns) if c.quantity == "tau" and c.joint is not None
+        }
+
+    def _fill_forces(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> None:
+        """Fill what constraints bear of the links, and with what joints have of their own and loads."""
+        tied = self.robot.constrained
+        if tied is None:
+            return
+        model: Any = self.robot.model
+        by_link = model.forces(q, qd, qdd)
+        beside = sum(
+            [
+                *(np.asarray(a) for a in tied.open.passive_torque(q, qd, qdd)),
+                *(borne.torque(tied.open, time, q) for borne in self.loads),
+            ]
+        )
+        whole = by_link.sum(-1) + tied.forces_of(q, beside + 0.0 * q)
+        for column, values in zip(self.columns, out, strict=True):
+            if column.quantity == "force":
+                values[:] = whole[:, column.cause]
+            elif column.quantity == "force_link":
+                values[:] = by_link[:, column.cause, column.link]
 
     def _closure(self, out: Array) -> Closure:
         """Check the closing sums, by unit: a joint that carries but rounding is measured by its peers."""

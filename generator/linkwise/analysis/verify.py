@@ -10,6 +10,7 @@ import numpy as np
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import Column, Quantity
+from linkwise.check.following import following_map
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
@@ -117,6 +118,12 @@ def against_recursion(
     partial = robot.recursion.partial_torque(q, qd, qdd)
     asked = [load_torque(robot.recursion, borne, block[0, at], q) for borne in loads]
     expected = np.concatenate([partial, *(torque[:, :, None] for torque in asked)], axis=2)
+    tree = robot.package.manifest.tree
+    if robot.constrained is not None and tree is not None:
+        mapped = following_map(robot.recursion, tree, q)
+        projected = np.einsum("snm,snj->smj", mapped, expected)
+        expected = np.zeros_like(expected)
+        expected[:, list(robot.driven)] = projected
     ours, power = np.zeros_like(expected), np.zeros_like(partial)
     for row, column in enumerate(columns):
         if column.quantity == "tau_link":

@@ -25,6 +25,7 @@ from linkwise.cli.log_options import (
     How,
     IgnoreExtra,
     Log,
+    LoopTolerance,
     Map,
     Package,
     Pad,
@@ -78,6 +79,7 @@ def analyze(
     mapping: Map = None,
     ignore_extra: IgnoreExtra = False,
     resample: Resample = None,
+    loop_tolerance: LoopTolerance = 0.01,
     derivative: How = "five-point",
     window: Window = None,
     degree: Degree = None,
@@ -97,7 +99,7 @@ def analyze(
     as_json: Json = False,
 ) -> None:
     """Who loads whom: every torque term of a recorded movement, as a table, figures and a page."""
-    reading = Reading(units, time, pairs("--map", mapping or []), ignore_extra, resample)
+    reading = Reading(units, time, pairs("--map", mapping or []), ignore_extra, resample, loop_tolerance)
     processing = chosen_processing(
         derivative, window, degree, chosen_lowpass(cutoff, filter_order, padding), edges, convention
     )

@@ -20,7 +20,13 @@ from linkwise.analysis.settings import (
 )
 from linkwise.errors import LinkwiseError
 
-UNITS = {"reading": "B", "resampling": "samples", "analysing": "samples", "fitting": "samples"}
+UNITS = {
+    "reading": "B",
+    "resampling": "samples",
+    "closing": "samples",
+    "analysing": "samples",
+    "fitting": "samples",
+}
 """What progress is counted in."""
 
 Log = Annotated[Path, typer.Argument(help="Motion log: .csv, .mot, .sto or .parquet")]
@@ -36,6 +42,9 @@ Map = Annotated[
 ]
 IgnoreExtra = Annotated[bool, typer.Option("--ignore-extra", help="Leave out columns no joint has")]
 Resample = Annotated[float | None, typer.Option(help="Bring uneven time to this rate, Hz, by splines")]
+LoopTolerance = Annotated[
+    float, typer.Option(help="How far the log may be from closing the robot's loops, m and rad")
+]
 How = Annotated[Derivative, typer.Option(help="How velocities and accelerations are made")]
 Window = Annotated[int | None, typer.Option(help="Savitzky-Golay: samples a window; 11 if not given")]
 Degree = Annotated[int | None, typer.Option(help="Savitzky-Golay: degree of the fit; 4 if not given")]

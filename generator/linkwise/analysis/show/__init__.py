@@ -30,7 +30,7 @@ def draw(result: AnalysisResult, name: str) -> "Figure":
     check_figure(name, result.robot)
     kind, _, joint = name.partition(":")
     with styled():
-        return FIGURES[kind](result, result.robot.joints.index(joint) if joint else 0)
+        return FIGURES[kind](result, result.robot.joints.index(joint) if joint else result.robot.driven[0])
 
 
 def figure_png(result: AnalysisResult, name: str) -> bytes:
@@ -42,8 +42,8 @@ def figure_png(result: AnalysisResult, name: str) -> bytes:
 def check_figure(name: str, robot: LoadedRobot) -> None:
     """Raise LinkwiseError unless `draw` knows the figure."""
     kind, _, joint = name.partition(":")
-    if kind not in FIGURES or (joint and (kind != "paper" or joint not in robot.joints)):
+    if kind not in FIGURES or (joint and (kind != "paper" or joint not in robot.driven_joints)):
         raise LinkwiseError(
             f"--figure {name}: give one of {', '.join(FIGURES)}, or paper:JOINT with a joint of"
-            f" {listed(robot.joints)}"
+            f" {listed(robot.driven_joints)}"
         )

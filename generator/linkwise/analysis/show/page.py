@@ -7,7 +7,7 @@ import numpy as np
 
 from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import TORQUE_OF, Column
+from linkwise.analysis.result_columns import FORCES, TORQUE_OF, Column
 from linkwise.analysis.show.poses import poses
 from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
@@ -36,17 +36,24 @@ def view(result: AnalysisResult) -> dict[str, str]:
 
 
 def on_page(column: Column) -> bool:
-    """Whether a page holds a column: power it does not, being the product of two that it holds."""
-    return column.quantity not in TORQUE_OF
+    """Whether a page holds a column: power it does not, being the product of two that it holds.
+
+    Nor does it hold forces of constraints.
+    """
+    return column.quantity not in (*TORQUE_OF, *FORCES)
 
 
 def page_data(result: AnalysisResult) -> str:
     """JSON with numbers as base64 of little-endian float64: the table's, to the last bit.
 
-    Names are as people read them, but for those of columns, which are the table's.
+    Names are as people read them, but for those of columns, which are the table's. Joints that follow others
+    are left out.
     """
     robot = result.robot
-    shown = [at for at, column in enumerate(result.columns) if on_page(column)]
+    place = {i: at for at, i in enumerate(robot.driven)}
+    shown = [
+        at for at, c in enumerate(result.columns) if on_page(c) and (c.joint is None or c.joint in place)
+    ]
     data = {
         "robot": printable(robot.name),
         "log": printable(result.source),
@@ -56,16 +63,18 @@ def page_data(result: AnalysisResult) -> str:
         "total": result.total,
         "stride": result.stride,
         "convention": result.processing.convention,
-        "joints": [{"name": printable(n), "unit": u} for n, u in zip(robot.joints, robot.units, strict=True)],
+        "joints": [{"name": printable(robot.joints[i]), "unit": robot.units[i]} for i in robot.driven],
         "links": list(map(printable, robot.links)),
         "columns": [
             {
                 "quantity": c.quantity,
                 "name": c.name,
                 "unit": c.unit,
-                "i": c.joint,
+                "i": None if c.joint is None else place[c.joint],
                 "j": c.link,
-                "k": c.cause,
+                "k": place.get(c.cause)
+                if c.quantity in ("tau_qdd", "tau_qd") and c.cause is not None
+                else c.cause,
             }
             for c in (result.columns[at] for at in shown)
         ],
@@ -89,10 +98,14 @@ def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
         return None
     origins, centres = poses(bodies, result.q)
     place = {link: j for j, link in enumerate(result.robot.links)}
+    order = [
+        *result.robot.driven,
+        *(i for i in range(len(result.robot.joints)) if i not in result.robot.driven),
+    ]
     return {
         "parents": [-1 if body.parent is None else body.parent for body in bodies],
         "links": [place.get(body.link, -1) for body in bodies],
-        "coordinates": [body.coordinate if body.ratio else -1 for body in bodies],
+        "coordinates": [order.index(body.coordinate) if body.ratio else -1 for body in bodies],
         "up": list(result.robot.up),
         "origins": _encode(origins),
         "centres": _encode(centres),
@@ -111,7 +124,7 @@ def _loads(result: AnalysisResult) -> list[dict[str, str]]:
 
 def _work(result: AnalysisResult) -> list[dict[str, float]]:
     """What each joint i gave to each link j and took back, in J, over all samples; loads behind links."""
-    out = []
+    out, place = [], {i: at for at, i in enumerate(result.robot.driven)}
     for c in result.columns:
         if c.quantity == "power_link":
             j, work, at = c.link or 0, result.work, (c.joint, c.link)
@@ -120,7 +133,7 @@ def _work(result: AnalysisResult) -> list[dict[str, float]]:
         else:
             continue
         given, taken = float(work.given[at]), float(work.taken[at])
-        out.append({"i": c.joint or 0, "j": j, "given": given, "taken": taken})
+        out.append({"i": place[c.joint or 0], "j": j, "given": given, "taken": taken})
     return out
 
 

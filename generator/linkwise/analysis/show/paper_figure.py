@@ -85,19 +85,17 @@ def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:
 
 
 def own_joints(result: AnalysisResult) -> tuple[int, ...]:
-    """Coordinate of each link's own joint: the manifest's, else the last that carries the link."""
+    """Coordinate of each link's own joint: the manifest's, else the last that carries the link.
+
+    Of a joint that follows others, the last of these counts.
+    """
     robot = result.robot
-    known = {body.link: body.coordinate for body in robot.bodies or ()}
-    return tuple(
-        known.get(
-            link,
-            max(
-                (c.joint or 0 for c in result.columns if c.quantity == "tau_link" and c.link == j),
-                default=0,
-            ),
-        )
-        for j, link in enumerate(robot.links)
-    )
+    known = {body.link: robot.borne_by([body.coordinate])[-1:] for body in robot.bodies or ()}
+    last = [(0,)] * len(robot.links)
+    for c in result.columns:
+        if c.quantity == "tau_link" and c.link is not None:
+            last[c.link] = max(last[c.link], (c.joint or 0,))
+    return tuple((known.get(link) or last[j])[0] for j, link in enumerate(robot.links))
 
 
 def _draw(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
@@ -147,7 +145,7 @@ def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
 def _left_out(result: AnalysisResult) -> str:
     """What the last two panels do not show."""
     own, robot = own_joints(result), result.robot
-    others = [name for at, name in enumerate(robot.joints) if at not in own]
+    others = [robot.joints[at] for at in robot.driven if at not in own]
     text = "The last two panels show each link's own joint only; the table and the page have every joint."
     if others:
         text += f" Not in them, as they carry no link with mass directly: {', '.join(map(drawn, others))}."

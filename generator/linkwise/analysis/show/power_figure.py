@@ -23,11 +23,11 @@ LEGEND = 12
 def power(result: AnalysisResult, _: int) -> "Figure":
     """Curves of P_i = τ_i q̇_i in W; for each joint bars of work in J, into links and out of them."""
     robot = result.robot
-    joints = [drawn(name) for name in robot.joints]
+    joints, driven = [drawn(name) for name in robot.driven_joints], list(robot.driven)
     height = 0.9 + 0.34 * len(joints)
     figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.4 + height), layout="constrained")
     curves, bars = figure.subplots(2, 1, height_ratios=(2.4, height))
-    for i, values in enumerate(result.joint_power.T):
+    for i, values in enumerate(result.joint_power.T[driven]):
         curves.plot(result.time, values, label=joints[i], color=colour(i), linestyle=dash(i))
     curves.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
     curves.set_title("Power of each joint")
@@ -35,7 +35,8 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     curves.set_xlabel("time (s)")
     curves.set_xlim(result.time[0], result.time[-1])
     _legend(curves, "joint", len(joints))
-    _bars(bars, result.work, [drawn(name) for name in robot.links])
+    work = Work(result.work.given[driven], result.work.taken[driven])
+    _bars(bars, work, [drawn(name) for name in robot.links])
     bars.set_title("Work: taken back out of links, and given to them")
     bars.set_yticks(range(len(joints)), joints)
     bars.invert_yaxis()

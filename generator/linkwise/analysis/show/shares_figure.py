@@ -27,15 +27,16 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     """Two bars for each joint: every cause, and those of the movement alone, in % of mean magnitudes."""
     robot = result.robot
     movement = []
-    for k, joint in enumerate(robot.joints):
-        movement.append(_Cause("tau_qdd", k, f"{drawn(joint)} acceleration", colour(k)))
-        movement.append(_Cause("tau_qd", k, f"{drawn(joint)} velocity", colour(k), "////"))
+    for at, k in enumerate(robot.driven):
+        joint = drawn(robot.joints[k])
+        movement.append(_Cause("tau_qdd", k, f"{joint} acceleration", colour(at)))
+        movement.append(_Cause("tau_qd", k, f"{joint} velocity", colour(at), "////"))
     own = dict.fromkeys(column.quantity for column in result.columns if column.quantity in PASSIVE)
     passive = [
-        _Cause(quantity, None, quantity.removeprefix("tau_"), colour(len(robot.joints) + at), "....")
+        _Cause(quantity, None, quantity.removeprefix("tau_"), colour(len(robot.driven) + at), "....")
         for at, quantity in enumerate(own)
     ]
-    first = len(robot.joints) + len(passive)
+    first = len(robot.driven) + len(passive)
     loads = [
         _Cause("tau_load", e, drawn(borne.name), colour(first + e), "xx")
         for e, borne in enumerate(result.loads)
@@ -43,14 +44,14 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     every = [_Cause("tau_gravity", None, "gravity", GRAVITY), *movement, *passive, *loads]
     rows = -(-len(every) // 3)
     figure = extra("matplotlib.figure").Figure(
-        figsize=(8.4, 1.3 + 0.42 * len(robot.joints) + 0.2 * rows), layout="constrained"
+        figsize=(8.4, 1.3 + 0.42 * len(robot.driven) + 0.2 * rows), layout="constrained"
     )
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 3))
     bars = _bars(left, result, every)
     _bars(right, result, movement)
     left.set_title("everything")
     right.set_title("the movement alone, without gravity")
-    left.set_yticks(range(len(robot.joints)), [drawn(joint) for joint in robot.joints])
+    left.set_yticks(range(len(robot.driven)), [drawn(joint) for joint in robot.driven_joints])
     left.invert_yaxis()
     left.set_ylabel("loaded joint")
     for axis in (left, right):
@@ -73,8 +74,8 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
 
 
 def _bars(axis: Any, result: AnalysisResult, causes: list[_Cause]) -> list[Any]:
-    joints = range(len(result.robot.joints))
-    loads = [[_mean(result, i, cause) for cause in causes] for i in joints]
+    joints = range(len(result.robot.driven))
+    loads = [[_mean(result, i, cause) for cause in causes] for i in result.robot.driven]
     wholes = [sum(row) or 1.0 for row in loads]
     starts = [0.0 for _ in joints]
     bars = []

@@ -1,0 +1,193 @@
+"""A model whose joints are tied, asked as if it had but the independent ones: torques of those that follow
+are zero.
+
+    tau^_aj = sum_i G_ia tau_ij = sum_b c2^_ajb ydd_b + sum_b c1^_ajb yd_b + g^_aj
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from linkwise.analysis.model_side import Rows, Side
+from linkwise.package.entries import RigidTree
+from linkwise.package.load import Array, Model
+
+
+@dataclass(frozen=True)
+class Following:
+    """Which joints move by themselves, and which of them move each joint."""
+
+    independent: tuple[int, ...]
+    movers: tuple[frozenset[int], ...]
+    """Of each joint; of an independent one itself."""
+
+
+@dataclass(frozen=True)
+class ConstrainedModel:
+    """The calls of a model that an analysis makes; motion (S, n) is of all joints, in which ties close."""
+
+    open: Model
+    """Of the tree without ties."""
+    constraints: Any
+    """The package's `Constraints`."""
+    following: Following
+    layout: Side
+
+    @classmethod
+    def of(cls, model: Model, tree: RigidTree) -> "ConstrainedModel":
+        """The model with the ties of its own description."""
+        constraints = model.constraints
+        independent = tuple(list(model.joint_names).index(name) for name in constraints.independent)
+        following = Following(independent, movers(tree, len(model.joint_names), independent))
+        return cls(model, constraints, following, _layout(model.layout, following))
+
+    def __getattr__(self, name: str) -> Any:
+        """What ties do not change: names, and what is asked of the open tree."""
+        return getattr(self.open, name)
+
+    @property
+    def kinematics(self) -> "ConstrainedKinematics":
+        """Poses of the open tree; loads are borne by the independent joints."""
+        return ConstrainedKinematics(self.open.kinematics, self._projected)
+
+    def consistent(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+        """A motion in which ties close, of that of the independent joints; q of the others is a guess."""
+        own = list(self.following.independent)
+        q = _array(self.constraints.closed(q))
+        qd = _array(self.constraints.velocity(q, qd[..., own]))
+        return q, qd, _array(self.constraints.acceleration(q, qd, qdd[..., own]))
+
+    def packed(self, q: Array, qd: Array, qdd: Array) -> Side:
+        """All coefficients and tau^_aj."""
+        cubes = (_array(a) for a in self.constraints.coefficients(q, qd))
+        torque = _array(self.constraints.partial_torque(q, qd, qdd))
+        acceleration, velocity, gravity = cubes
+        place = np.zeros(len(self.open.joint_names), dtype=np.intp)
+        place[list(self.following.independent)] = np.arange(len(self.following.independent))
+
+        def taken(cube: Array, rows: Rows) -> Array:
+            i, j, *k = rows.T
+            found: Array = cube[(..., place[i], j, *(place[other] for other in k))]
+            return found
+
+        return Side(
+            taken(acceleration, self.layout.acceleration),
+            taken(velocity, self.layout.velocity),
+            taken(gravity, self.layout.gravity),
+            taken(torque, self.layout.torque),
+        )
+
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """tau^_a of all links, (S, n)."""
+        return self._spread(_array(self.constraints.inverse_dynamics(q, qd, qdd)))
+
+    def propagation(self, q: Array, qd: Array, qdd: Array, convention: str = "closing") -> Side:
+        """What moves with q̈_k and q̇_k, (S, n, N, n), and g_ij, (S, n, N).
+
+        In the gradient convention, of rigid links, velocities have twice what they have in the closing one.
+        """
+        acceleration, velocity, gravity = map(_array, self.constraints.propagation(q, qd, qdd))
+        share = 2.0 if convention == "gradient" else 1.0
+        cubes = (self._spread(self._spread(a, 1), -1) for a in (acceleration, share * velocity))
+        return Side(next(cubes), next(cubes), self._spread(gravity, 1), torque=None)
+
+    def passive_torque(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, ...]:
+        """What the independent joints take for springs, losses and armatures of all joints, (S, n) each."""
+        return tuple(self._projected(q, _array(a)) for a in self.open.passive_torque(q, qd, qdd))
+
+    def forces(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """What constraints bear of each link, (S, C, N)."""
+        return _array(self.constraints.forces(q, qd, qdd))
+
+    def forces_of(self, q: Array, torque: Array) -> Array:
+        """What constraints bear of torques (S, n) on all joints, (S, C)."""
+        return _array(self.constraints.forces_of(q, torque))
+
+    def _projected(self, q: Array, torque: Array) -> Array:
+        """G^T torque in the places of the independent joints, (S, n)."""
+        return self._spread(_array(self.constraints.projected(q, torque)))
+
+    def _spread(self, values: Array, axis: int = -1) -> Array:
+        """Values of independent joints on an axis of all joints, zero for those that follow."""
+        shape = list(values.shape)
+        shape[axis] = len(self.open.joint_names)
+        out = np.zeros(shape)
+        np.moveaxis(out, axis, 0)[list(self.following.independent)] = np.moveaxis(values, axis, 0)
+        return out
+
+
+class ConstrainedKinematics:
+    """The kinematics of a tree whose joints are tied."""
+
+    def __init__(self, own: Any, projected: Callable[[Array, Array], Array]) -> None:
+        self._own, self._projected = own, projected
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._own, name)
+
+    def load_torque(self, q: Array, *load: Any, **options: Any) -> Array:
+        """What a load asks of the independent joints, (S, n)."""
+        return self._projected(q, _array(self._own.load_torque(q, *load, **options)))
+
+
+def movers(tree: RigidTree, n: int, independent: Sequence[int]) -> tuple[frozenset[int], ...]:
+    """Of each joint, the independent ones that may move it.
+
+    Joints that follow by one row of the constraints, or by rows that have such a joint in common, follow
+    together.
+    """
+    paths: list[frozenset[int]] = []
+    for body in tree.bodies:
+        before = frozenset[int]() if body.parent is None else paths[body.parent]
+        paths.append(before | {body.coordinate})
+
+    def path(frame: int) -> frozenset[int]:
+        body = tree.frames[frame].body
+        return frozenset() if body is None else paths[body]
+
+    rows = [path(tie.first) ^ path(tie.second) for tie in tree.ties]
+    rows += [frozenset(k for k, _ in coupling.terms) for coupling in tree.couplings]
+    own = frozenset(independent)
+    groups: list[frozenset[int]] = []
+    for row in rows:
+        joined = [group for group in groups if group & row - own]
+        groups = [group for group in groups if group not in joined] + [row.union(*joined)]
+    found = {k: group & own for group in groups for k in group - own}
+    return tuple(frozenset({k}) if k in own else found.get(k, frozenset()) for k in range(n))
+
+
+def _layout(own: Any, following: Following) -> Side:
+    """Which values are not zero for all motion.
+
+    c2^ comes of c2; c1^ of c1, and of c2 where k follows, so that its share of G changes.
+    """
+    movers, independent = following.movers, set(following.independent)
+
+    def moved(rows: Rows) -> set[tuple[int, ...]]:
+        return {
+            (mover, j, *more)
+            for i, j, *k in rows.tolist()
+            for mover, *more in product(movers[i], *(movers[e] for e in k))
+        }
+
+    inertia = _mirrored(own.acceleration)
+    changing = inertia[[k not in independent for k in inertia[:, 2]]]
+    acceleration = _rows({row for row in moved(inertia) if row[0] <= row[2]}, 3)
+    velocity = _rows(moved(own.velocity) | moved(changing), 3)
+    return Side(acceleration, velocity, _rows(moved(own.gravity), 2), _rows(moved(own.torque), 2))
+
+
+def _mirrored(rows: Rows) -> Rows:
+    """c2 with what is stored for i <= k only, both ways."""
+    return np.unique(np.concatenate([rows, rows[:, ::-1]]), axis=0)
+
+
+def _rows(found: set[tuple[int, ...]], width: int) -> Rows:
+    return np.array(sorted(found), dtype=np.intp).reshape(-1, width)
+
+
+def _array(values: Any) -> Array:
+    return np.asarray(values)

@@ -1,0 +1,222 @@
+"""Robots whose joints are tied, in analyses: a four-bar against its one equation of motion.
+
+With the crank's angle x, the places of all masses are functions of x alone, found by intersecting circles:
+
+    tau = I(x) x'' + I'(x) x'^2 / 2 + V'(x)
+
+by finite differences, which know nothing of joints, trees and multipliers.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from linkwise import LinkwiseError, Load, Payload, generate, read_system, write_package
+from linkwise.analysis import Processing, Reading, analyze
+from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.run import Wanted, analyze_to
+from linkwise.analysis.show.page import page_data
+from linkwise.progress import silent
+from motion_logs import write_csv
+
+CRANK, COUPLER, ROCKER, APART = 0.2, 0.5, 0.4, 0.5
+MASSES = {"crank": (1.0, 0.1, 0.01), "coupler": (2.0, 0.25, 0.04), "rocker": (1.5, 0.2, 0.02)}
+"""kg, m along the link, kg m^2 about the centre of mass."""
+GRAVITY = 9.81
+FOUR_BAR = """schema = 1
+name = "four_bar"
+gravity = [0, -9.81, 0]
+link = [
+    {name = "crank", mass = 1, com = [0.1, 0, 0], inertia = {yy = 0.01, zz = 0.01}},
+    {name = "coupler", mass = 2, com = [0.25, 0, 0], inertia = {yy = 0.04, zz = 0.04}},
+    {name = "rocker", mass = 1.5, com = [0.2, 0, 0], inertia = {yy = 0.02, zz = 0.02}},
+]
+joint = [
+    {name = "turn", parent = "base", child = "crank", stiffness = 2.0, rest = 0.2},
+    {name = "bend", parent = "crank", child = "coupler", xyz = [0.2, 0, 0], damping = 0.3},
+    {name = "swing", parent = "base", child = "rocker", xyz = [0.5, 0, 0], rpy = [0, 0, 1.5707963267948966]},
+]
+[[constraint]]
+name = "pin"
+type = "point"
+first = {frame = "coupler", xyz = [0.5, 0, 0]}
+second = {frame = "rocker", xyz = [0.4, 0, 0]}
+"""
+ALL = Processing(edges="trim")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The robot, and logs of its crank alone and of all its joints."""
+    made: Path = tmp_path_factory.mktemp("four_bar")
+    (made / "robot.toml").write_text(FOUR_BAR)
+    write_package(generate(read_system(made / "robot.toml"), ["numpy"]), made / "robot")
+    time = np.arange(400) / 100
+    turn = 1.0 + 0.9 * np.sin(2 * time)
+    write_csv(made / "crank.csv", np.column_stack([time, turn]), ["turn"])
+    _, coupler, rocker = angles(turn)
+    whole = np.column_stack([time, turn, coupler - turn, rocker - np.pi / 2])
+    write_csv(made / "joints.csv", whole, ["turn", "bend", "swing"])
+    return made
+
+
+def angles(x: Any, elbow: float = 1.0) -> tuple[Any, Any, Any]:
+    """Angles of crank, coupler and rocker: circles about the crank's end and the rocker's foot meet."""
+    a = np.array([CRANK * np.cos(x), CRANK * np.sin(x)])
+    foot = np.array([APART + 0.0 * x, 0.0 * x])
+    way = foot - a
+    far = np.hypot(*way)
+    along = (far**2 + COUPLER**2 - ROCKER**2) / (2 * far)
+    across = elbow * np.sqrt(COUPLER**2 - along**2)
+    pin = a + along * way / far + across * np.array([-way[1], way[0]]) / far
+    return x, np.arctan2(*(pin - a)[::-1]), np.arctan2(*(pin - foot)[::-1])
+
+
+def places(x: Any) -> dict[str, tuple[Any, Any]]:
+    """Of each link its centre of mass and its angle."""
+    starts = (0.0, 0.0), (CRANK * np.cos(x), CRANK * np.sin(x)), (APART, 0.0)
+    found = {}
+    for (name, (_, reach, _)), start, angle in zip(MASSES.items(), starts, angles(x), strict=True):
+        found[name] = (start[0] + reach * np.cos(angle), start[1] + reach * np.sin(angle)), angle
+    return found
+
+
+def slope(of: Any, x: Any, h: float = 2e-3) -> Any:
+    """Derivative to O(h^8)."""
+    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
+    return sum(w * (of(x + k * h) - of(x - k * h)) for k, w in weights.items()) / h
+
+
+def share_of(name: str, x: Any, xd: Any, xdd: Any, mass: Any = None) -> tuple[Any, Any, Any]:
+    """What the crank gives for a link: by acceleration, by velocity, by weight."""
+    m, _, inertia = MASSES[name] if mass is None else (mass[0], None, 0.0)
+
+    def point(at: Any) -> Any:
+        centre, angle = places(at)[name]
+        if mass is None:
+            return centre
+        reach = MASSES[name][1]
+        return tuple(c + (mass[1] - reach) * f(angle) for c, f in zip(centre, (np.cos, np.sin), strict=True))
+
+    def inertia_of(at: Any) -> Any:
+        vx, vy = slope(lambda y: point(y)[0], at), slope(lambda y: point(y)[1], at)
+        return m * (vx**2 + vy**2) + inertia * slope(lambda y: places(y)[name][1], at) ** 2
+
+    weight = m * GRAVITY * slope(lambda y: point(y)[1], x)
+    return inertia_of(x) * xdd, 0.5 * slope(inertia_of, x) * xd**2, weight
+
+
+def motion(result: Any) -> tuple[Any, Any, Any]:
+    return result.q[:, 0], result.qd[:, 0], result.qdd[:, 0]
+
+
+def test_the_crank_gives_what_its_one_equation_of_motion_says_link_by_link(folder: Path) -> None:
+    result = analyze(folder / "crank.csv", folder / "robot", processing=ALL)
+    assert [c.name for c in result.columns if c.quantity == "tau"] == ["tau/turn"]
+    for j, name in enumerate(MASSES):
+        acceleration, velocity, gravity = share_of(name, *motion(result))
+        np.testing.assert_allclose(result.acceleration[:, 0, j, 0], acceleration, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(result.velocity[:, 0, j, 0], velocity, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(result.gravity[:, 0, j], gravity, rtol=0, atol=1e-9)
+    assert not result.partial_torque[:, 1:].any(), "joints that follow give nothing"
+
+
+def test_springs_losses_loads_and_payloads_anywhere_are_borne_by_the_crank(folder: Path) -> None:
+    pull = Load("pull", "rocker", force=(3.0, -2.0, 0.0), point=(0.1, 0.0, 0.0))
+    bag = Payload("coupler", 0.7, (0.4, 0.0, 0.0), "bag")
+    result = analyze(folder / "crank.csv", folder / "robot", processing=ALL, loads=[pull], payloads=[bag])
+    x, xd, _ = motion(result)
+    np.testing.assert_allclose(result["tau_spring/turn"], 2.0 * (x - 0.2), rtol=0, atol=1e-12)
+    bend = slope(lambda at: angles(at)[1] - at, x)
+    np.testing.assert_allclose(result["tau_damping/turn"], 0.3 * bend**2 * xd, rtol=0, atol=1e-9)
+    at = [slope(lambda y, f=f: 0.1 * f(angles(y)[2]), x) for f in (np.cos, np.sin)]
+    np.testing.assert_allclose(result["tau_load/turn/pull"], -(3.0 * at[0] - 2.0 * at[1]), rtol=0, atol=1e-9)
+    carried = sum(share_of("coupler", *motion(result), mass=(0.7, 0.4)))
+    np.testing.assert_allclose(result["tau/turn/bag"], carried, rtol=0, atol=1e-8)
+    parts = [result[name] for name in ("tau_spring/turn", "tau_damping/turn", "tau_load/turn/pull")]
+    np.testing.assert_allclose(
+        result.torque[:, 0], result.partial_torque[:, 0].sum(1) + sum(parts), atol=1e-12
+    )
+
+
+def test_the_pin_bears_what_the_rocker_needs_to_swing(folder: Path) -> None:
+    pull = Load("pull", "rocker", force=(3.0, -2.0, 0.0), point=(0.1, 0.0, 0.0))
+    result = analyze(folder / "crank.csv", folder / "robot", processing=ALL, loads=[pull])
+    swing, swung = result.q[:, 2] + np.pi / 2, result.qdd[:, 2]
+    mass, reach, inertia = MASSES["rocker"]
+    needed = (inertia + mass * reach**2) * swung + mass * GRAVITY * reach * np.cos(swing)
+    needed = needed - 0.1 * (np.cos(swing) * -2.0 - np.sin(swing) * 3.0)
+    # The pin pulls the coupler by `force`, and the rocker the other way.
+    fx, fy = -result["force/pin force_x"], -result["force/pin force_y"]
+    np.testing.assert_allclose(ROCKER * (np.cos(swing) * fy - np.sin(swing) * fx), needed, rtol=0, atol=1e-9)
+    by_link = result.constraint_force_by_link
+    assert by_link.shape == (len(swing), 3, 3)
+    np.testing.assert_allclose(by_link[:, 0], 0.0, atol=1e-12)  # the crank turns about its own pin
+
+
+def test_a_log_of_all_joints_is_closed_and_says_how_far_off_it_was(folder: Path, tmp_path: Path) -> None:
+    table = np.loadtxt(folder / "joints.csv", delimiter=",", skiprows=1)
+    exact = analyze(folder / "joints.csv", folder / "robot")
+    alone = analyze(folder / "crank.csv", folder / "robot")
+    np.testing.assert_allclose(exact.torque, alone.torque, rtol=0, atol=1e-9)
+    assert exact.record()["constraints"]["largest_violation"] < 1e-12
+    assert alone.record()["constraints"]["largest_violation"] is None
+    table[:, 3] += 0.005
+    off = analyze(write_csv(tmp_path / "off.csv", table, ["turn", "bend", "swing"]), folder / "robot")
+    np.testing.assert_allclose(off.torque, alone.torque, rtol=0, atol=1e-9)
+    assert off.record()["constraints"]["largest_violation"] == pytest.approx(0.4 * 0.005, rel=0.1)
+    with pytest.raises(
+        LinkwiseError, match=r"off.csv: time .* s: pin force_. is open by 0.0\d* .* than 0.001"
+    ):
+        analyze(tmp_path / "off.csv", folder / "robot", Reading(loop_tolerance=0.001))
+
+
+def test_columns_of_joints_that_follow_choose_the_way_in_which_a_loop_closes(
+    folder: Path, tmp_path: Path
+) -> None:
+    time = np.arange(400) / 100
+    turn = 1.0 + 0.9 * np.sin(2 * time)
+    _, coupler, rocker = angles(turn, elbow=-1.0)
+    whole = np.column_stack([time, turn, coupler - turn, rocker - np.pi / 2])
+    other = analyze(write_csv(tmp_path / "down.csv", whole, ["turn", "bend", "swing"]), folder / "robot")
+    np.testing.assert_allclose(other.q, whole[:, 1:], rtol=0, atol=1e-9)
+    upper = analyze(folder / "crank.csv", folder / "robot")
+    np.testing.assert_allclose(upper.q[:, 1], angles(turn)[1] - turn, rtol=0, atol=1e-9)
+
+
+def test_a_loop_that_cannot_follow_is_refused_at_its_time(folder: Path, tmp_path: Path) -> None:
+    far = FOUR_BAR.replace("xyz = [0.5, 0, 0], rpy", "xyz = [0.8, 0, 0], rpy")
+    (tmp_path / "far.toml").write_text(far)
+    write_package(generate(read_system(tmp_path / "far.toml"), ["numpy"]), tmp_path / "far")
+    time = np.arange(100) / 100
+    log = write_csv(tmp_path / "log.csv", np.column_stack([time, 0.2 + 3.0 * time]), ["turn"])
+    with pytest.raises(
+        LinkwiseError, match=r"log.csv: time 0\.\d+ s: the joints that follow cannot be led there"
+    ):
+        analyze(log, tmp_path / "far")
+
+
+def test_page_table_and_record_have_the_joints_that_are_driven(folder: Path, tmp_path: Path) -> None:
+    robot, wanted = load_robot(folder / "robot"), Wanted("csv", ("paper", "shares", "power"))
+    result, files = analyze_to(
+        tmp_path / "out", folder / "crank.csv", robot, Reading(), Processing(), wanted, silent
+    )
+    assert {file.name for file in files} >= {
+        "analysis.csv",
+        "paper.png",
+        "shares.png",
+        "power.png",
+        "report.html",
+    }
+    record = json.loads((tmp_path / "out" / "analysis.json").read_text())
+    assert record["constraints"]["independent"] == ["turn"]
+    assert {"force/pin force_x", "force/pin force_x/coupler"} <= {
+        column["name"] for column in record["columns"]
+    }
+    data = json.loads(page_data(result))
+    assert [joint["name"] for joint in data["joints"]] == ["turn"]
+    assert sorted(data["bodies"]["coordinates"]) == [0, 1, 2]
+    with pytest.raises(LinkwiseError, match="paper:JOINT with a joint of turn"):
+        result.figure("paper:bend")
