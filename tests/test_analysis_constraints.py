@@ -220,3 +220,10 @@ def test_page_table_and_record_have_the_joints_that_are_driven(folder: Path, tmp
     assert sorted(data["bodies"]["coordinates"]) == [0, 1, 2]
     with pytest.raises(LinkwiseError, match="paper:JOINT with a joint of turn"):
         result.figure("paper:bend")
+
+
+def test_identification_of_a_closed_loop_is_refused(folder: Path) -> None:
+    with pytest.raises(
+        LinkwiseError, match=r"four_bar has constraints \(pin\), which identify does not know"
+    ):
+        identify(folder / "joints.csv", folder / "robot")

@@ -86,6 +86,12 @@ def identify(
 def _own_parameters(robot: LoadedRobot) -> Array:
     if robot.bodies is None:
         raise LinkwiseError(f"{robot.name} is made of energies; only rigid links have parameters to identify")
+    if robot.constrained is not None:
+        tied = ", ".join(robot.constrained.constraints.names)
+        raise LinkwiseError(
+            f"{robot.name} has constraints ({tied}), which identify does not know; measure the open tree, and"
+            " generate it without them"
+        )
     if not hasattr(robot.model, "regressor") or robot.model.backend.rule is None:
         raise LinkwiseError(
             f"{robot.name} has no back end with regressors; generate the robot again, with --backend numpy"
