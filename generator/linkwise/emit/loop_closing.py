@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError
 from linkwise.package.entries import RigidTree
-from linkwise.runtime.constraints.held_frames import ROWS, held_by
+from linkwise.runtime.constraints.held_frames import held_by
 from linkwise.runtime.constraints.independent_joints import RANK, rank_of
+from linkwise.runtime.constraints.singular_positions import open_by
 from linkwise.runtime.constraints.tie_arrays import ends, tie_jacobian, violation
 from linkwise.runtime.constraints.tie_tables import tie_tables
 from linkwise.runtime.rule.joint_tree import (
@@ -82,11 +83,9 @@ class _Equations:
         moved = joint_tree(tree)
         held = held_by(moved, [link.name for link in moved.links], ())
         self._tables, self._numbers = tie_tables(moved, joints, held), own_numbers(moved)
-        rows = [(one.name, row) for one in held for row in ROWS[one.kind]]
         couplings = [coupling.name for coupling in tree.couplings]
-        self.owners = (*(name for name, _ in rows), *couplings)
-        turns = [row.startswith("moment") for _, row in rows]
-        self._units = [*("rad" if turn else "m" for turn in turns), *("" for _ in couplings)]
+        self.owners = (*(one.name for one in held for _ in one.row_names), *couplings)
+        self._row_names = [*(row for one in held for row in one.row_names), *couplings]
 
     def closed_from(self, start: Array) -> tuple[Array, Array, Array]:
         """Return where the steps from a start end, phi and A there."""
@@ -105,11 +104,10 @@ class _Equations:
     def told(self, left: Array) -> str:
         """What stays open, by how much."""
         worst = int(np.abs(left).argmax())
-        size, unit = abs(left[worst]), self._units[worst]
-        text = f"{1000 * size:.3g} mm" if unit == "m" else f"{size:.3g} {unit}".strip()
+        size = open_by(abs(left[worst]), self._row_names[worst])
         return (
             f"constraint {self.owners[worst]!r} never closes: from {TRIES * len(WIDTHS)} positions that were "
-            f"tried, {text} are left at best; correct its places, or what it ties"
+            f"tried, {size} are left at best; correct its places, or what it ties"
         )
 
 
