@@ -300,8 +300,101 @@ def test_constraint_that_cannot_be_is_named(case: str, tmp_path: Path) -> None:
 def test_joints_that_others_do_not_follow_cannot_be_independent(tmp_path: Path) -> None:
     tree = FOURBAR.read_text().partition("[[constraint]]")[0]
     geared = tree + COUPLED.removeprefix("schema = 1\n") + "terms = { b = 1, c = -2 }\n"
-    told = "b, c cannot be independent, for the other joints do not follow from them; choose a, b, say"
+    told = "b, c cannot be independent, for the other joints do not follow from them; choose a, c, say"
     with pytest.raises(LinkwiseError, match=told):
         robot_of(written(tmp_path, "geared.toml", geared), independent=("b", "c"))
     with pytest.raises(LinkwiseError, match="--independent is for constraints, and here are none; leave it"):
         robot_of(written(tmp_path, "tree.toml", tree), independent=("b",))
+
+
+def notes_of(robot: Robot) -> set[tuple[str, str, str]]:
+    return {(note.kind, note.subject, note.detail) for note in robot.notes}
+
+
+def test_ends_that_are_held_or_cut_away_are_told(tmp_path: Path) -> None:
+    """Of the five-bar's arms one is locked, cut away, or both stand still where they do not meet."""
+    path = DATA / "fivebar.toml"
+    held = robot_of(path, lock={"left": 1.0})
+    assert [tie.name for tie in held.ties] == ["tip"]
+    assert [held.coordinates[k].name for k in held.independent] == ["elbow_left"]
+    with pytest.raises(LinkwiseError) as caught:
+        robot_of(path, tip="fore_left")
+    assert str(caught.value) == (
+        f"{path}: constraint 'tip' ties link 'fore_left' to link 'fore_right', which --root or --tip cuts "
+        "away; keep both, or remove the constraint from the file"
+    )
+    gone = robot_of(path, tip="upper_left")
+    assert not gone.ties
+    assert ("cut", "tip", "a constraint on links that are not there") in notes_of(gone)
+    wheel = "link = [ { name = 'wheel', mass = 1, inertia = { xx = 1, yy = 1, zz = 1 } },"
+    spare = path.read_text().replace("link = [", wheel)
+    spare = spare.replace("joint = [", "joint = [ { name = 'spin', parent = 'base', child = 'wheel' },")
+    arms = ("left", "elbow_left", "right", "elbow_right")
+    still = robot_of(written(tmp_path, "spare.toml", spare), lock=dict.fromkeys(arms, 0.0))
+    assert not still.ties
+    assert ("ignored", "tip", "its ends move as one, 170 mm away from it") in notes_of(still)
+    assert any(text.startswith("constraints left out of the torques: tip") for text in effects(still.notes))
+
+
+def test_couplings_pass_through_locks_and_mimic_joints(tmp_path: Path) -> None:
+    """With b = 2 a + 0.3 put in, 1 + a + 3 b^2 + d is 1.27 + 4.6 a + 12 a^2 + d."""
+    path = written(
+        tmp_path,
+        "hand.toml",
+        """schema = 1
+name = "hand"
+joint = [
+  { name = "a", parent = "base", child = "p" },
+  { name = "b", parent = "p", child = "q", mimic = { joint = "a", multiplier = 2, offset = 0.3 } },
+  { name = "c", type = "prismatic", parent = "base", child = "r" },
+  { name = "d", parent = "r", child = "s" },
+]
+link = [
+  { name = "p", mass = 1, inertia = { xx = 1, yy = 1, zz = 1 } },
+  { name = "q", mass = 1, inertia = { xx = 1, yy = 1, zz = 1 } },
+  { name = "r", mass = 1, inertia = { xx = 1, yy = 1, zz = 1 } },
+  { name = "s", mass = 1, inertia = { xx = 1, yy = 1, zz = 1 } },
+]
+[[constraint]]
+name = "gear"
+type = "coupling"
+terms = { d = 1, a = [1, 1], b = [0, 0, 3] }
+[[constraint]]
+name = "rack"
+type = "coupling"
+terms = { c = 10, d = -1 }
+""",
+    )
+    terms = {coupling.name: dict(coupling.terms) for coupling in robot_of(path).couplings}
+    assert terms["gear"] == {0: pytest.approx((1.27, 4.6, 12.0)), 2: (0.0, 1.0)}
+    assert terms["rack"] == {1: (0.0, 10.0), 2: (0.0, -1.0)}
+    locked = robot_of(path, lock={"d": -1.6})
+    assert {coupling.name: dict(coupling.terms) for coupling in locked.couplings} == {
+        "rack": {1: (1.6, 10.0)}
+    }
+    assert ("freed", "d", "locked, though coupled to 'a' and 'b' by constraint 'gear'") in notes_of(locked)
+    twice = COUPLED + "terms = { b = 1, a = -2 }"
+    with pytest.raises(LinkwiseError) as caught:
+        robot_of(path, constraints=str(written(tmp_path, "twice.toml", twice)))
+    assert "constraint 'own' cannot hold: the joints that it couples stand still or " in str(caught.value)
+    assert "move as one, and miss it by 0.3; correct it" in str(caught.value)
+    with pytest.raises(LinkwiseError) as caught:
+        robot_of(path, root="base", tip="s")
+    assert "joint 'd' is coupled to 'a' by constraint 'gear', which is not a moving joint here" in str(
+        caught.value
+    )
+    freed = robot_of(path, root="base", tip="s", free_mimic=True)
+    assert [coupling.name for coupling in freed.couplings] == ["rack"]
+    assert ("freed", "d", "coupled to 'a' and 'b' by constraint 'gear'") in notes_of(freed)
+
+
+def test_a_files_own_parameters_move_places_of_constraints() -> None:
+    robot = robot_of(FOURBAR, parameters="symbolic")
+    ends = {frame.name: str(frame.translation[0]) for frame in robot.frames if frame.name.startswith("pin")}
+    assert ends == {"pin_first": "rod", "pin_second": "rocker"}
+
+
+def test_a_base_that_floats_carries_its_loop_along(tmp_path: Path) -> None:
+    floating = robot_of(FOURBAR, base="floating", allow_unphysical=True)
+    assert [floating.coordinates[k].name for k in floating.independent][-1] == "a"
+    assert len(floating.independent) == 7
