@@ -101,7 +101,7 @@ BAD = {
     ),
     "two parents": (
         chain(AB, BC, joint("ac", "a", "c")),
-        "link 'c' has 2 parents (joints 'bc', 'ac'); loops are not supported, keep one",
+        "link 'c' has 2 parents (joints 'bc', 'ac'); keep one, and close loops by constraints",
     ),
     "cycle": (
         robot(*map(link, "abc"), AB, BC, joint("ca", "c", "a")),
