@@ -21,7 +21,8 @@ def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
         if count > 1:
             joints = ", ".join(repr(c.name) for c in description.connections if c.child == link)
             raise LinkwiseError(
-                f"link {link!r} has {count} parents (joints {joints}); keep one, and close loops by constraints"
+                f"link {link!r} has {count} parents (joints {joints}); keep one, and close loops by "
+                "constraints"
             )
     roots = [body.name for body in description.bodies if body.name not in parents]
     if not roots:
