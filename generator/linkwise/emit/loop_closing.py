@@ -1,10 +1,5 @@
-"""Where the loops of a robot close at its own numbers: found once, before anything is generated.
+"""Where the loops of a robot close at its own numbers: found once, before anything is generated."""
 
-Newton's method with least steps of all joints, q <- q - A^+ phi, from a few starts about q = 0, where itself
-loops are often stretched and A loses rank.
-"""
-
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -12,11 +7,14 @@ from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError
 from linkwise.package.entries import RigidTree
+from linkwise.runtime.constraints.closing_search import (
+    Closing,
+    TieEquations,
+    best_closing,
+    random_starts,
+)
 from linkwise.runtime.constraints.held_frames import held_by
-from linkwise.runtime.constraints.independent_joints import RANK, rank_of
 from linkwise.runtime.constraints.singular_positions import open_by
-from linkwise.runtime.constraints.tie_arrays import ends, tie_jacobian, violation
-from linkwise.runtime.constraints.tie_tables import tie_tables
 from linkwise.runtime.rule.joint_tree import (
     JointTree,
     TreeCoupling,
@@ -25,20 +23,6 @@ from linkwise.runtime.rule.joint_tree import (
     TreeLink,
     TreeTie,
 )
-from linkwise.runtime.rule.tree_arrays import own_numbers
-
-WIDTHS = (0.1, 0.3, 1.0, 2.0)
-"""How far around zero starts are, in rad and m."""
-TRIES = 6
-"""Starts of each width."""
-ENOUGH = 4
-"""Closed positions to choose among: one of them may be singular."""
-STEPS = 60
-LONGEST = 0.5
-"""Of a step, in rad and m."""
-SHORTEST = 1e-10
-CLOSED = 1e-6
-"""In m and rad, what may be left where no step leads on: numbers of files are rounded."""
 
 Array = NDArray[np.float64]
 
@@ -53,62 +37,25 @@ class ClosedLoops(NamedTuple):
 
 def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
     """Return one where A has its largest rank; raises LinkwiseError, which names what stays open."""
-    equations = _Equations(tree, joints)
-    found: list[tuple[Array, Array]] = []
-    best: Array | None = None
-    for start in _starts(joints):
-        q, left, rows = equations.closed_from(start)
-        if np.abs(left).max() < CLOSED:
-            found.append((q, rows))
-            if len(found) == ENOUGH:
-                break
-        elif best is None or np.abs(left).max() < np.abs(best).max():
-            best = left
-    if found:
-        q, rows = max(found, key=lambda closed: rank_of(closed[1]))
-        return ClosedLoops(q, rows, equations.owners)
-    assert best is not None  # there are starts
-    raise LinkwiseError(equations.told(best))
+    moved = joint_tree(tree)
+    held = held_by(moved, [link.name for link in moved.links], ())
+    starts = random_starts(joints)
+    found = best_closing(TieEquations(moved, joints, held), starts)
+    couplings = [coupling.name for coupling in tree.couplings]
+    owners = (*(one.name for one in held for _ in one.row_names), *couplings)
+    if not found.is_closed:
+        rows = [*(row for one in held for row in one.row_names), *couplings]
+        raise LinkwiseError(_told(found, owners, rows, len(starts)))
+    return ClosedLoops(found.q, found.rows, owners)
 
 
-def _starts(joints: int) -> Iterator[Array]:
-    random = np.random.default_rng(0)
-    yield from (width * random.uniform(-1.0, 1.0, joints) for width in WIDTHS for _ in range(TRIES))
-
-
-class _Equations:
-    """phi(q) = 0 of a tree's ties and couplings, in its own numbers."""
-
-    def __init__(self, tree: RigidTree, joints: int) -> None:
-        moved = joint_tree(tree)
-        held = held_by(moved, [link.name for link in moved.links], ())
-        self._tables, self._numbers = tie_tables(moved, joints, held), own_numbers(moved)
-        couplings = [coupling.name for coupling in tree.couplings]
-        self.owners = (*(one.name for one in held for _ in one.row_names), *couplings)
-        self._row_names = [*(row for one in held for row in one.row_names), *couplings]
-
-    def closed_from(self, start: Array) -> tuple[Array, Array, Array]:
-        """Return where the steps from a start end, phi and A there."""
-        q = start[:, None]
-        for _ in range(STEPS):
-            placed = ends(np, self._tables, self._numbers, q)
-            phi = violation(np, self._tables, q, placed, None)[:, 0]
-            rows: Array = tie_jacobian(np, self._tables, q, placed)[..., 0]
-            step = np.linalg.lstsq(rows, -phi, rcond=RANK)[0]
-            size = np.abs(step).max()
-            if size < SHORTEST:
-                break
-            q = q + (step * min(1.0, LONGEST / size))[:, None]
-        return q[:, 0], phi, rows
-
-    def told(self, left: Array) -> str:
-        """What stays open, by how much."""
-        worst = int(np.abs(left).argmax())
-        size = open_by(abs(left[worst]), self._row_names[worst])
-        return (
-            f"constraint {self.owners[worst]!r} never closes: from {TRIES * len(WIDTHS)} positions that were "
-            f"tried, {size} are left at best; correct its places, or what it ties"
-        )
+def _told(found: Closing, owners: tuple[str, ...], rows: list[str], tries: int) -> str:
+    """What stays open, by how much."""
+    worst = int(np.abs(found.left).argmax())
+    return (
+        f"constraint {owners[worst]!r} never closes: from {tries} positions that were tried, "
+        f"{open_by(found.open_by, rows[worst])} are left at best; correct its places, or what it ties"
+    )
 
 
 def joint_tree(tree: RigidTree) -> JointTree:
