@@ -1,5 +1,6 @@
 """Constraints as files have them: TOML's, those beside a file of any format, and MJCF's equalities."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 import urdf_text
 from answers import relative_error
 from conftest import DATA
-from linkwise import LinkwiseError, Options, generate, read_system, write_package
+from linkwise import LinkwiseError, Options, generate, read_robot, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise.robot import effects
 from linkwise.robot.robot import Robot
@@ -55,6 +56,8 @@ def test_joints_near_the_ground_move_the_others(
 
 def test_joints_that_are_asked_for_are_independent(tmp_path: Path) -> None:
     assert robot_of(DATA / "delta.toml", independent=("z", "x", "y")).independent == (3, 4, 5)
+    files = generate(read_robot(FOURBAR), ["numpy"])
+    assert json.loads(files["manifest.json"])["tree"]["independent"] == [0]
     own = written(tmp_path, "own.toml", 'independent = ["c"]\n' + FOURBAR.read_text())
     assert robot_of(own).independent == (2,)
     assert robot_of(own, independent=("b",)).independent == (1,)
@@ -215,7 +218,7 @@ COUPLED = 'schema = 1\n[[constraint]]\nname = "own"\ntype = "coupling"\n'
 BAD: dict[str, tuple[dict[str, str], str]] = {
     "unknown link": (
         {"first": 'first = "crunk"'},
-        "constraint 'own' ties 'crunk', which is not a link; correct it",
+        "constraint 'own' ties 'crunk', which is not a link or a site; correct it",
     ),
     "no end": ({"first": ""}, "constraint 'own' needs 'first', a link's name or {frame = NAME, xyz = […]}"),
     "unknown type": (
