@@ -25,9 +25,11 @@ def constrained_system(system: System) -> System:
     """
     if not isinstance(system, RigidSystem) or system.robot.independent:
         return system
-    robot, tree = system.robot, rigid_tree(system)
-    if tree is None or not (robot.ties or robot.couplings):
+    robot = system.robot
+    if not (robot.ties or robot.couplings):
         return system
+    tree = rigid_tree(system)
+    assert tree is not None  # of rigid links there is one
     loops = closed_loops(tree, len(robot.coordinates))
     chosen = _independent(robot, loops.rows)
     shared = [owner for owner, is_so in zip(loops.owners, redundant_rows(loops.rows), strict=True) if is_so]

@@ -13,24 +13,30 @@ CLOSE = 1e-9
 
 
 def coupled(
-    couplings: Iterable[JointCoupling], motion: Mapping[str, AxisRule], free: bool
+    couplings: Iterable[JointCoupling],
+    motion: Mapping[str, AxisRule],
+    lock: Collection[str],
+    free: bool,
 ) -> tuple[tuple[Coupling, ...], list[Note]]:
     """Return the couplings of the coordinates, and notes on those that are none here.
 
-    `free` lets joints of MJCF's equalities, and those whose master was cut away, move by themselves. Raises
-    LinkwiseError for a master that was cut away, and for locked joints that break a coupling.
+    As with a mimic joint, to `lock` the first joint of a coupling lets the others move by themselves, and to
+    lock others holds the first. So does `free` with MJCF's equalities, and those whose master was cut away.
+    Raises LinkwiseError for a master that was cut away, and for joints that cannot keep a coupling.
     """
     found: list[Coupling] = []
     notes: list[Note] = []
     for coupling in couplings:
         follower, *masters = (joint for joint, _ in coupling.terms)
         lost = [joint for joint in masters if joint not in motion]
+        by = "an equality" if coupling.equality else f"constraint {coupling.name!r}"
         if follower not in motion:
             notes.append(Note("cut", coupling.name, f"joint {follower!r} of that constraint is not there"))
         elif lost and not free:
             raise LinkwiseError(_orphan(coupling, follower, lost[0]))
+        elif follower in lock:
+            notes.append(Note("freed", follower, f"locked, though {coupling.rule} by {by}", UNCOUPLED))
         elif lost or (free and coupling.equality):
-            by = "an equality" if coupling.equality else f"constraint {coupling.name!r}"
             notes.append(Note("freed", follower, f"{coupling.rule} by {by}", UNCOUPLED))
         elif terms := _terms(coupling, motion):
             found.append(Coupling(coupling.name, terms))
@@ -78,7 +84,7 @@ def _terms(
     if not kept and abs(constant) > CLOSE:
         raise LinkwiseError(
             f"constraint {coupling.name!r} cannot hold: the joints that it couples stand still or move as "
-            f"one, and miss it by {abs(constant):.3g}; correct it, or hold them elsewhere with --lock"
+            f"one, and miss it by {abs(constant):.3g}; correct it"
         )
     first = min(kept, default=None)
     return tuple((k, (constant if k == first else 0.0, *total[1:])) for k, total in kept.items())
