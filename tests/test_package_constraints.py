@@ -203,7 +203,7 @@ def test_contacts_stay_where_they_took_hold(tmp_path: Path) -> None:
     contact = module.Contact("b", "point", (0.7, 0.0, 0.0), name="tip")
     robot: Any = module.load("numpy")
     constraints = robot.constrained(contacts=[contact])
-    assert (constraints.independent, constraints.redundant) == (("rocker",), ("tip",))
+    assert (constraints.independent, constraints.redundant) == (("rocker",), ())
     moved = NEAR + np.array([0.05, -0.03, 0.2])
     np.testing.assert_array_equal(constraints.closed(moved), moved)
     way = robot.kinematics.pose(moved, "b") - robot.kinematics.pose(NEAR, "b")
@@ -321,6 +321,12 @@ def test_a_torque_of_a_wrong_shape_and_forward_dynamics_of_the_open_tree_are_ref
     refused(lambda: one.forward_dynamics(q, q, q), "call constraints.forward_dynamics(q, qd, tau)")
 
 
-def test_redundant_ties_are_named(one: Any) -> None:
-    assert one.constraints.redundant == ("pin",)
+def test_ties_that_hold_something_twice_are_named(one: Any, tmp_path: Path) -> None:
+    twin = FOURBAR[FOURBAR.index("[[constraint]]") :].replace('"pin"', '"twin"')
+    robot: Any = package(tmp_path, FOURBAR + twin).load("numpy")
+    assert robot.constraints.redundant == ("pin", "twin")
+    q = robot.constraints.closed(NEAR)
+    forces = robot.constraints.forces(q, 0.0 * q, 0.0 * q)
+    np.testing.assert_allclose(forces[:3], forces[3:], atol=1e-12)  # the least squares share alike
+    assert one.constraints.redundant == (), "nothing moves the pin out of the plane"
     assert re.match(r"<constraints of 3 rows, independent crank>", repr(one.constraints))

@@ -10,7 +10,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note
 from linkwise.robot.robot import Coupling, Robot, Tie
-from linkwise.runtime.constraints.independent_joints import rank_of, redundant_rows, scaled_rows
+from linkwise.runtime.constraints.independent_joints import rank_of, redundant_rows
 from linkwise.symbolic.system import RigidSystem, System
 
 SHARE = 0.05
@@ -77,7 +77,7 @@ def _proposed(robot: Robot, rows: Array, rank: int) -> tuple[int, ...]:
     """
     names = [coordinate.name for coordinate in robot.coordinates]
     depths = [min(_depths(robot, k), default=0) for k in range(len(names))]
-    left, free = scaled_rows(rows), set(range(len(names)))
+    left, free = rows.copy(), set(range(len(names)))
     for _ in range(rank):
         sizes = np.linalg.norm(left, axis=0)
         most = max(sizes[k] for k in free)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import own_numbers
 from .held_frames import Held
-from .independent_joints import RANK, rank_of
+from .independent_joints import RANK, rank_of, scaled_rows
+from .singular_positions import OPEN
 from .tie_arrays import pairs, tie_jacobian, violation
 from .tie_tables import tie_tables
 
@@ -27,9 +28,6 @@ STEPS = 60
 LONGEST = 0.5
 """Of a step, in rad and m."""
 SHORTEST = 1e-10
-CLOSED = 1e-6
-"""In m and rad, what may be left where no step leads on: numbers of files are rounded."""
-
 Numbers = NDArray[np.float64]
 
 
@@ -42,11 +40,13 @@ class Closing(NamedTuple):
     """phi, (C,)."""
     rows: Numbers
     """A, (C, n)."""
+    scaled: Numbers
+    """The same with rows of couplings by their largest entries, to tell its rank."""
 
     @property
     def is_closed(self) -> bool:
         """Whether nothing is left open."""
-        return self.open_by < CLOSED
+        return self.open_by <= OPEN
 
     @property
     def open_by(self) -> float:
@@ -59,13 +59,14 @@ class TieEquations:
 
     def __init__(self, tree: JointTree, n: int, held: Sequence[Held]) -> None:
         self._tables, self._numbers = tie_tables(tree, n, held), own_numbers(tree)
+        self._couplings = len(tree.couplings)
 
     def at(self, q: Numbers) -> Closing:
         """phi, without what contacts have, and A at q (n,)."""
         column = q[:, None]
         placed = pairs(np, self._tables, self._numbers, column)
         phi, rows = (made(np, self._tables, column, placed) for made in (violation, tie_jacobian))
-        return Closing(q, phi[:, 0], rows[..., 0])
+        return Closing(q, phi[:, 0], rows[..., 0], scaled_rows(rows[..., 0], self._couplings))
 
     def closed_from(self, start: Numbers) -> Closing:
         """Where the steps from q (n,) end."""
@@ -93,4 +94,4 @@ def best_closing(equations: TieEquations, starts: Iterable[Numbers]) -> Closing:
         closed = [at for at in ended if at.is_closed]
         if len(closed) == ENOUGH:
             break
-    return max(closed, key=lambda at: rank_of(at.rows)) if closed else min(ended, key=lambda at: at.open_by)
+    return max(closed, key=lambda at: rank_of(at.scaled)) if closed else min(ended, key=lambda at: at.open_by)

@@ -1,7 +1,7 @@
 """Which joints may be independent: rank and pivoting of A at one position, on NumPy arrays.
 
-Metres and radians stand beside each other: rows are scaled to their largest entry, and columns are compared
-by what is left of them across those taken before.
+Metres and radians stand beside each other. Rows of ties stay as they are: what holds a planar loop in its
+plane is but rounding, and must not be made large. Those of couplings, in units of their own, are scaled.
 """
 
 from collections.abc import Sequence
@@ -20,16 +20,17 @@ SHARE = 1e-3
 """Rows that have less than this part in a sum of rows that is zero are not among those that it ties."""
 
 
-def scaled_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows by their largest entries; of zeros they stay."""
+def scaled_rows(rows: NDArray[np.float64], couplings: int) -> NDArray[np.float64]:
+    """A (C, n) with the last rows, those of couplings, by their largest entries; of zeros they stay."""
     most = np.abs(rows).max(-1, keepdims=True, initial=0.0)
+    most[: len(rows) - couplings] = 1.0
     scaled: NDArray[np.float64] = rows / np.where(most > 0.0, most, 1.0)
     return scaled
 
 
 def rank_of(rows: NDArray[np.float64], tolerance: float = RANK) -> int:
     """Rank of A (C, n)."""
-    values = np.linalg.svd(scaled_rows(rows), compute_uv=False)
+    values = np.linalg.svd(rows, compute_uv=False)
     return int((values > tolerance * max(values.max(initial=0.0), 1e-300)).sum())
 
 
@@ -40,7 +41,7 @@ def chosen_independent(
 
     rather_dependent: those that are taken before any other, as far as they can be, since nothing drives them
     """
-    left = scaled_rows(rows).copy()
+    left = rows.copy()
     largest = np.linalg.norm(left, axis=0).max(initial=0.0)
     rest = [k for k in range(rows.shape[1]) if k not in rather_dependent]
     taken: list[int] = []
@@ -60,11 +61,18 @@ def chosen_independent(
 
 
 def redundant_rows(rows: NDArray[np.float64], tolerance: float = RANK) -> NDArray[np.bool_]:
-    """Which rows of A (C, n) follow from others, so that forces on them are not unique."""
-    u, values, _ = np.linalg.svd(scaled_rows(rows))
-    rank = int((values > tolerance * values.max(initial=0.0)).sum())
-    shared: NDArray[np.bool_] = np.abs(u[:, rank:]).max(-1, initial=0.0) > SHARE
-    return shared
+    """Which rows of A (C, n) follow from others, so that forces on them are not unique.
+
+    Rows of nothing but rounding do not count: no joint moves that way, and no force is asked for there.
+    """
+    largest = np.linalg.norm(rows, 2) if rows.size else 0.0
+    there = np.abs(rows).max(-1, initial=0.0) > tolerance * largest
+    u, values, _ = np.linalg.svd(np.where(there[:, None], rows, 0.0))
+    rank = int((values > tolerance * largest).sum())
+    shared = np.abs(u[there][:, rank:]).max(-1, initial=0.0) > SHARE
+    found = np.zeros(len(rows), dtype=np.bool_)
+    found[there] = shared
+    return found
 
 
 def loose_base(tree: JointTree) -> tuple[int, ...]:

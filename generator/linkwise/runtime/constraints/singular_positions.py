@@ -12,6 +12,8 @@ from ..sums.namespace import hidden
 from .followers import Followers, JointColumns
 from .independent_joints import chosen_independent, rank_of
 
+OPEN = 1e-4
+"""In m, rad and units of couplings, what may be left open: files round their numbers."""
 AGREE = 1e-4
 """Rows that follow from others may differ from these by this part of their size: files round numbers."""
 
@@ -62,15 +64,21 @@ def _not_following(
     return f"the independent joints do not tell the others: {told}; there, choose independent={others}"
 
 
-def check_following(rows: Any, found: Followers, names: Sequence[str], joint_names: Sequence[str]) -> None:
-    """Raise ValueError for the first sample where rows that follow from others do not agree: A G != 0."""
+def check_following(
+    rows: Any, found: Followers, violation: Any, names: Sequence[str], joint_names: Sequence[str]
+) -> None:
+    """Raise ValueError for the first sample where rows that follow from others do not agree: A G != 0.
+
+    A joint before both ends of a tie moves them against each other by what the tie is open, so that columns
+    of A are not told better than phi (..., C) is.
+    """
     if rows.shape[-2] == len(found.columns.dependent) or hidden(rows):
         return
     a, g = _array(rows), _array(found.map)
     left, scale = np.abs(a @ g), np.abs(a) @ np.abs(g)
-    # A joint that moves no tie has but rounding in its column.
-    scale = np.maximum(scale.max(-2, keepdims=True), _epsilon(rows) * np.abs(a).max((-2, -1), keepdims=True))
-    wrong = left > (AGREE if rows.dtype.itemsize == 8 else 10.0 * AGREE) * scale
+    agree = AGREE if rows.dtype.itemsize == 8 else 10.0 * AGREE
+    loose = np.abs(_array(violation)).max(-1) + _epsilon(rows) * np.abs(a).max((-2, -1))
+    wrong = left > agree * scale.max(-2, keepdims=True) + loose[..., None, None]
     if not wrong.any():
         return
     *place, row, joint = np.argwhere(wrong)[0].tolist()
@@ -97,7 +105,7 @@ def worst_open(violation: Any, tolerance: float | None) -> tuple[list[int], int,
     if hidden(violation):
         return None
     size = np.abs(_array(violation))
-    allowed = (1e-6 if size.itemsize == 8 else 1e-4) if tolerance is None else tolerance
+    allowed = OPEN if tolerance is None else tolerance
     if not (size > allowed).any():
         return None
     place = np.argwhere((size > allowed).any(-1))[0].tolist()
