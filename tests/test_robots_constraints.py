@@ -401,3 +401,17 @@ def test_a_base_that_floats_carries_its_loop_along(tmp_path: Path) -> None:
     floating = robot_of(FOURBAR, base="floating", allow_unphysical=True)
     assert [floating.coordinates[k].name for k in floating.independent][-1] == "a"
     assert len(floating.independent) == 7
+
+
+def test_a_joint_that_carries_a_whole_loop_moves_none_of_it(tmp_path: Path) -> None:
+    """Columns of A that are rounding alone say nothing about what the loop allows."""
+    turret = "joint = [ { name = 't', parent = 'base', child = 'turret', rpy = [0.3, 0.7, 0], axis = [1, 0, 0.2] },"
+    carried = (
+        FOURBAR.read_text().replace("joint = [", turret).replace("link = [", "link = [ { name = 'turret' },")
+    )
+    for joint in ("a", "c"):
+        carried = carried.replace(f'"{joint}", parent = "base"', f'"{joint}", parent = "turret"')
+    constraints = loaded(written(tmp_path, "turret.toml", carried), tmp_path).constraints
+    assert constraints.independent == ("t", "a")
+    q = constraints.closed(np.random.default_rng(0).uniform(-1.0, 1.0, (50, 4)))
+    assert np.abs(constraints.velocity_map(q)[:, 2:, 0]).max() < 1e-12
