@@ -127,10 +127,13 @@ def test_one_mechanism_answers_alike_in_every_format(tmp_path: Path) -> None:
     assert relative_error(by_mjcf, own.partial_torque(q, qd, qdd)) < 1e-11
 
 
-def test_driven_joints_are_rather_independent(tmp_path: Path) -> None:
+def test_joints_with_motors_then_with_springs_are_rather_independent(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     motor = '<actuator><motor joint="c"/></actuator>'
+    sprung = PLANAR.replace('name="b"/>', 'name="b" stiffness="2"/>')
     assert robot_of(written(tmp_path, "driven.xml", PLANAR.format(more=motor))).independent == (2,)
+    assert robot_of(written(tmp_path, "sprung.xml", sprung.format(more=""))).independent == (1,)
+    assert robot_of(written(tmp_path, "both.xml", sprung.format(more=motor))).independent == (2,)
 
 
 ARMS = """<mujoco model="arms"><compiler angle="radian"/><option jacobian="dense"/><worldbody>
