@@ -268,6 +268,14 @@ BAD: dict[str, tuple[dict[str, str], str]] = {
         {"text": COUPLED + "terms = { a = 1, b = [2, 0] }"},
         "constraint 'own': 'b' in 'terms' is the same for every position; give a factor that is not 0",
     ),
+    "nan of a term": (
+        {"text": COUPLED + "terms = { a = nan, b = 1 }"},
+        "constraint 'own' has NaN or infinity in its terms; give numbers",
+    ),
+    "high power": (
+        {"text": COUPLED + f"terms = {{ a = {[1] * 10} }}"},
+        "constraint 'own': 'a' in 'terms' has the power 9; 8 is the highest",
+    ),
     "words": (
         {"text": COUPLED + 'terms = { a = "b" }'},
         "'a' in 'terms' must be a factor, or a list of numbers",
@@ -408,7 +416,8 @@ def test_a_base_that_floats_carries_its_loop_along(tmp_path: Path) -> None:
 
 def test_a_joint_that_carries_a_whole_loop_moves_none_of_it(tmp_path: Path) -> None:
     """Columns of A that are rounding alone say nothing about what the loop allows."""
-    turret = "joint = [ { name = 't', parent = 'base', child = 'turret', rpy = [0.3, 0.7, 0], axis = [1, 0, 0.2] },"
+    turned = "rpy = [0.3, 0.7, 0], axis = [1, 0, 0.2]"
+    turret = f"joint = [ {{ name = 't', parent = 'base', child = 'turret', {turned} }},"
     carried = (
         FOURBAR.read_text().replace("joint = [", turret).replace("link = [", "link = [ { name = 'turret' },")
     )

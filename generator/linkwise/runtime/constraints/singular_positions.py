@@ -65,8 +65,8 @@ def _not_following(
 def check_following(rows: Any, found: Followers, names: Sequence[str], joint_names: Sequence[str]) -> None:
     """Raise ValueError for the first sample where rows that follow from others do not agree: A G != 0.
 
-    Rows are measured by the largest of their tie's: of a loop that a joint carries as a whole, and of one that
-    is open within the tolerance, some are nothing but what is left of differences.
+    Rows are measured by the largest of their tie's: of a loop that a joint carries as a whole, or that is
+    open within the tolerance, some are nothing but what is left of differences.
     """
     if rows.shape[-2] == len(found.columns.dependent) or hidden(rows):
         return
