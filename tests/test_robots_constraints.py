@@ -127,10 +127,13 @@ def test_one_mechanism_answers_alike_in_every_format(tmp_path: Path) -> None:
     assert relative_error(by_mjcf, own.partial_torque(q, qd, qdd)) < 1e-11
 
 
-def test_driven_joints_are_rather_independent(tmp_path: Path) -> None:
+def test_joints_with_motors_then_with_springs_are_rather_independent(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     motor = '<actuator><motor joint="c"/></actuator>'
+    sprung = PLANAR.replace('name="b"/>', 'name="b" stiffness="2"/>')
     assert robot_of(written(tmp_path, "driven.xml", PLANAR.format(more=motor))).independent == (2,)
+    assert robot_of(written(tmp_path, "sprung.xml", sprung.format(more=""))).independent == (1,)
+    assert robot_of(written(tmp_path, "both.xml", sprung.format(more=motor))).independent == (2,)
 
 
 ARMS = """<mujoco model="arms"><compiler angle="radian"/><option jacobian="dense"/><worldbody>
@@ -264,6 +267,14 @@ BAD: dict[str, tuple[dict[str, str], str]] = {
     "constant term": (
         {"text": COUPLED + "terms = { a = 1, b = [2, 0] }"},
         "constraint 'own': 'b' in 'terms' is the same for every position; give a factor that is not 0",
+    ),
+    "nan of a term": (
+        {"text": COUPLED + "terms = { a = nan, b = 1 }"},
+        "constraint 'own' has NaN or infinity in its terms; give numbers",
+    ),
+    "high power": (
+        {"text": COUPLED + f"terms = {{ a = {[1] * 10} }}"},
+        "constraint 'own': 'a' in 'terms' has the power 9; 8 is the highest",
     ),
     "words": (
         {"text": COUPLED + 'terms = { a = "b" }'},
@@ -401,3 +412,61 @@ def test_a_base_that_floats_carries_its_loop_along(tmp_path: Path) -> None:
     floating = robot_of(FOURBAR, base="floating", allow_unphysical=True)
     assert [floating.coordinates[k].name for k in floating.independent][-1] == "a"
     assert len(floating.independent) == 7
+
+
+def test_a_joint_that_carries_a_whole_loop_moves_none_of_it(tmp_path: Path) -> None:
+    """Columns of A that are rounding alone say nothing about what the loop allows."""
+    turned = "rpy = [0.3, 0.7, 0], axis = [1, 0, 0.2]"
+    turret = f"joint = [ {{ name = 't', parent = 'base', child = 'turret', {turned} }},"
+    carried = (
+        FOURBAR.read_text().replace("joint = [", turret).replace("link = [", "link = [ { name = 'turret' },")
+    )
+    for joint in ("a", "c"):
+        carried = carried.replace(f'"{joint}", parent = "base"', f'"{joint}", parent = "turret"')
+    constraints = loaded(written(tmp_path, "turret.toml", carried), tmp_path).constraints
+    assert constraints.independent == ("t", "a")
+    q = constraints.closed(np.random.default_rng(0).uniform(-1.0, 1.0, (50, 4)))
+    assert np.abs(constraints.velocity_map(q)[:, 2:, 0]).max() < 1e-12
+
+
+def test_ends_are_placed_as_joints_are(tmp_path: Path) -> None:
+    """A hinge where a joint is lets it turn, and nothing else; beside it, it holds nothing."""
+    place = "xyz = ['2*L', 0.1, -0.3], rpy = [0.3, 'pi/3', -1]"
+    axis = "axis = [1, 2, -2]"
+    robot = f"""schema = 1
+name = "arm"
+parameters = {{ L = 0.2 }}
+joint = [
+  {{ name = "j", parent = "base", child = "p", {place}, {axis} }},
+  {{ name = "k", parent = "p", child = "q", xyz = [0, 0.2, 0], axis = [0, 1, 0] }},
+]
+link = [
+  {{ name = "p", mass = 1, inertia = {{ xx = 1, yy = 1, zz = 1 }} }},
+  {{ name = "q", mass = 1, inertia = {{ xx = 1, yy = 1, zz = 1 }} }},
+]
+[[constraint]]
+name = "again"
+type = "hinge"
+first = {{ frame = "base", {place}, {axis} }}
+second = {{ frame = "p", {axis} }}
+"""
+    with pytest.raises(LinkwiseError, match="the constraints 'again' hold however the joints move"):
+        robot_of(written(tmp_path, "again.toml", robot))
+    geared = robot + COUPLED.removeprefix("schema = 1\n") + "terms = { j = 2, k = -1 }\n"
+    constraints = loaded(
+        written(tmp_path, "geared.toml", geared), tmp_path, parameters="symbolic"
+    ).constraints
+    violation = constraints.violation(np.random.default_rng(0).uniform(-3, 3, (20, 2)))
+    assert np.abs(violation[:, :5]).max() < 1e-14
+    assert np.abs(violation[:, 5]).min() > 1e-3
+    assert constraints.redundant == ("again",)
+
+
+def test_a_loop_is_planar_within_the_digits_of_its_file(tmp_path: Path) -> None:
+    upright = FOURBAR.read_text().replace("gravity = [0, -9.81, 0]", "gravity = [0, 0, -9.81]")
+    for joint, roll in (("a", "1.570796"), ("c", "1.5707963")):
+        upright = upright.replace(f'name = "{joint}",', f'name = "{joint}", rpy = [{roll}, 0, 0],')
+    constraints = loaded(written(tmp_path, "upright.toml", upright), tmp_path).constraints
+    assert (constraints.independent, constraints.redundant) == (("a",), ("pin",))
+    q = constraints.closed(np.random.default_rng(0).uniform(-0.3, 0.3, (20, 3)))
+    assert constraints.velocity_map(q).shape == (20, 3, 1)

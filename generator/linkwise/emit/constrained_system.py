@@ -20,8 +20,8 @@ SHARE = 0.05
 def constrained_system(system: System) -> System:
     """Return the system with its independent coordinates found, if it has constraints; else as it is.
 
-    Raises LinkwiseError for constraints that never close, that leave nothing to move, and for coordinates
-    asked for that others do not follow.
+    Raises LinkwiseError for constraints that never close, that hold nothing or all that moves, and for
+    coordinates asked for that others do not follow.
     """
     if not isinstance(system, RigidSystem) or system.robot.independent:
         return system
@@ -45,6 +45,11 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
     rank = rank_of(rows)
     free = len(names) - rank
     constraints = listed([*(repr(tie.name) for tie in robot.ties), *(repr(c.name) for c in robot.couplings)])
+    if not rank:
+        raise LinkwiseError(
+            f"the constraints {constraints} hold however the joints move, so nothing follows from them; "
+            "remove them"
+        )
     if not free:
         raise LinkwiseError(
             f"the constraints {constraints} leave nothing to move, so the robot stands still; remove one, or "
@@ -73,16 +78,18 @@ def _proposed(robot: Robot, rows: Array, rank: int) -> tuple[int, ...]:
     """Return those that pivoting leaves: columns of A are taken one by one, as of dependent ones.
 
     Of the columns that are not small beside the largest, as far as they stand across those taken, it is
-    that of a joint that nothing drives, then of the one farthest from the ground, then of the last.
+    that of a joint that nothing drives and no spring holds, then of the one farthest from the ground, then of
+    the last.
     """
     names = [coordinate.name for coordinate in robot.coordinates]
     depths = [min(_depths(robot, k), default=0) for k in range(len(names))]
-    left, free = rows.copy(), set(range(len(names)))
+    sprung = {axis.coordinate for axis in robot.passive if axis.own.stiffness}
+    left, free = rows, set(range(len(names)))
     for _ in range(rank):
         sizes = np.linalg.norm(left, axis=0)
         most = max(sizes[k] for k in free)
         able = [k for k in free if sizes[k] >= SHARE * most]
-        pivot = max(able, key=lambda k: (k not in robot.driven, depths[k], k))
+        pivot = max(able, key=lambda k: (k not in robot.driven, k not in sprung, depths[k], k))
         free.remove(pivot)
         axis = left[:, pivot] / sizes[pivot]
         for _ in range(2):  # once more for what rounding leaves

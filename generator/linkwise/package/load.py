@@ -44,7 +44,7 @@ class Model(Protocol):
 
     @property
     def constraints(self) -> Any:
-        """What ties of the robot's description leave of its motion."""
+        """What ties leave of its motion, for rigid links with ties."""
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """τ_ij (..., n, N)."""

@@ -6,7 +6,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot.coordinates import AxisRule
 from linkwise.robot.description import JointCoupling
 from linkwise.robot.notes import UNCOUPLED, Note
-from linkwise.robot.robot import Coupling
+from linkwise.robot.robot import Coupling, unusable
 
 CLOSE = 1e-9
 """In rad and m, by which joints that stand still may miss what a coupling asks of them."""
@@ -46,8 +46,10 @@ def coupled(
 
 
 def check_joints(couplings: Iterable[JointCoupling], axes: Collection[str]) -> None:
-    """Raise LinkwiseError for a joint that the file doesn't have."""
+    """Raise LinkwiseError for a joint that the file doesn't have, and for numbers that cannot be."""
     for coupling in couplings:
+        if fault := unusable(*(c for _, coefficients in coupling.terms for c in coefficients)):
+            raise LinkwiseError(f"constraint {coupling.name!r} has {fault} in its terms; give numbers")
         for joint, _ in coupling.terms:
             if joint not in axes:
                 raise LinkwiseError(

@@ -57,5 +57,5 @@ def closed_place(
     factors = factored(rows, columns)
     check_factors(rows, factors[1], columns, names.joints)
     found = followers(rows, columns, factors)
-    check_following(rows, found, positions[..., 0], names.owners, names.joints)
+    check_following(rows, found, names.owners, names.joints)
     return ClosedPlace(found, rows_at)

@@ -1,7 +1,8 @@
 """Which joints may be independent: rank and pivoting of A at one position, on NumPy arrays.
 
-Metres and radians stand beside each other. Rows of ties stay as they are: what holds a planar loop in its
-plane is but rounding, and must not be made large. Those of couplings, in units of their own, are scaled.
+Rows are comparable, as `closing_search` has them: not each by its own largest entry, for a row that a planar
+loop leaves at zero holds nothing but rounding. Columns are compared by what is left of them across those
+taken before.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from ..rule.joint_tree import JointTree
 
 RANK = 1e-5
-"""Singular values below this part of the largest are zero, and what is left of columns likewise.
+"""Singular values below this part of the largest, or of 1, are zero; what is left of columns likewise.
 
 A file's right angle of 1.5708 tilts by 4e-6 what is meant to be parallel.
 """
@@ -20,18 +21,10 @@ SHARE = 1e-3
 """Rows that have less than this part in a sum of rows that is zero are not among those that it ties."""
 
 
-def scaled_rows(rows: NDArray[np.float64], couplings: int) -> NDArray[np.float64]:
-    """A (C, n) with the last rows, those of couplings, by their largest entries; of zeros they stay."""
-    most = np.abs(rows).max(-1, keepdims=True, initial=0.0)
-    most[: len(rows) - couplings] = 1.0
-    scaled: NDArray[np.float64] = rows / np.where(most > 0.0, most, 1.0)
-    return scaled
-
-
 def rank_of(rows: NDArray[np.float64], tolerance: float = RANK) -> int:
     """Rank of A (C, n)."""
     values = np.linalg.svd(rows, compute_uv=False)
-    return int((values > tolerance * max(values.max(initial=0.0), 1e-300)).sum())
+    return int((values > tolerance * max(1.0, values.max(initial=0.0))).sum())
 
 
 def chosen_independent(
@@ -42,7 +35,7 @@ def chosen_independent(
     rather_dependent: those that are taken before any other, as far as they can be, since nothing drives them
     """
     left = rows.copy()
-    largest = np.linalg.norm(left, axis=0).max(initial=0.0)
+    largest = np.linalg.norm(left, axis=0).max(initial=1.0)
     rest = [k for k in range(rows.shape[1]) if k not in rather_dependent]
     taken: list[int] = []
     for group in (list(rather_dependent), rest):
@@ -65,13 +58,11 @@ def redundant_rows(rows: NDArray[np.float64], tolerance: float = RANK) -> NDArra
 
     Rows of nothing but rounding do not count: no joint moves that way, and no force is asked for there.
     """
-    largest = np.linalg.norm(rows, 2) if rows.size else 0.0
-    there = np.abs(rows).max(-1, initial=0.0) > tolerance * largest
-    u, values, _ = np.linalg.svd(np.where(there[:, None], rows, 0.0))
-    rank = int((values > tolerance * largest).sum())
-    shared = np.abs(u[there][:, rank:]).max(-1, initial=0.0) > SHARE
+    least = tolerance * max(1.0, np.linalg.svd(rows, compute_uv=False).max(initial=0.0))
+    there = np.abs(rows).max(-1, initial=0.0) > least
+    u, values, _ = np.linalg.svd(rows[there])
     found = np.zeros(len(rows), dtype=np.bool_)
-    found[there] = shared
+    found[there] = np.abs(u[:, int((values > least).sum()) :]).max(-1, initial=0.0) > SHARE
     return found
 
 
