@@ -120,11 +120,12 @@ RULE = (
     "arrays/__init__.py",
     "arrays/array_backend.py",
     "arrays/array_kernels.py",
+    "induced",
     "kinematics",
     "rule",
     "sums",
 )
-"""Of linkwise/runtime: the vectorised rule, the kinematics of frames, and what is summed over the links."""
+"""Of linkwise/runtime: the vectorised rule, and what is composed of it."""
 
 BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend

@@ -17,13 +17,14 @@ from typing import Any, Literal, overload
 from numpy.typing import ArrayLike
 
 from .interface import Array, Backend
+from .motion_calls import MotionCalls
 from .quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
 from .robot_kinematics import Kinematics
 from .structure import Layout, Structure
 from .sum_calls import SumCalls
 
 
-class Dynamics(SumCalls):
+class Dynamics(SumCalls, MotionCalls):
     """Partial torques of a robot on one back end; made by the package's `load`.
 
     q, qd, qdd: positions, velocities and accelerations of shape (..., n): rad, rad/s, rad/s^2 for a revolute

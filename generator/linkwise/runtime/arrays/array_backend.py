@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 
+from ..induced.induced_answers import InducedAnswers
 from ..kinematics.kinematic_answers import KinematicAnswers
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays, given_numbers
@@ -28,6 +29,10 @@ class ArrayBackend:
     ) -> KinematicAnswers:
         """The calls of `Kinematics`."""
         return KinematicAnswers(self.structure, self, check_finite, read_beside_motion)
+
+    def induced(self, robot: Any) -> InducedAnswers:
+        """The calls for induced accelerations of a robot on this back end."""
+        return InducedAnswers(robot)
 
     def side(self, like: Any) -> Any:
         """What computes with `like`, an array or a tensor."""
