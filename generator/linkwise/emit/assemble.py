@@ -39,6 +39,7 @@ SHARED_RUNTIME = (
     "parameter_values.py",
     "passive_joints.py",
     "quantities.py",
+    "robot_constraints.py",
     "robot_kinematics.py",
     "structure.py",
     "sum_calls.py",

@@ -120,6 +120,7 @@ RULE = (
     "arrays/__init__.py",
     "arrays/array_backend.py",
     "arrays/array_kernels.py",
+    "constraints",
     "induced",
     "kinematics",
     "rule",

@@ -35,8 +35,9 @@ class MotionCalls:
         passive: whether springs, damping, friction and armature of the joints count, as in forward_dynamics
         frame: what accelerates: the coordinates unless given, or a frame, with its `point`, as
         `robot.kinematics` takes them, or "centre of mass"
-        constraints: what the motion keeps, a `robot.constraints`; of a measured qdd the actuators are then
-        those of the independent coordinates
+        constraints: what the motion keeps, the file's ties unless given, else what `robot.constrained`
+        makes, or False for the open tree; q, qd are then as `Constraints` has them, and the actuators that a
+        qdd asks for are those of the independent joints
 
         The frame's own dJ/dt qd is the share `kinematic`. Sources of acceleration are forces: what gravity
         accelerates at rest is there even where it is held, and an actuator's share cancels it.

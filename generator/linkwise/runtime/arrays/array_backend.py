@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 
+from ..constraints.constraint_answers import ConstraintAnswers, constraint_answers
 from ..induced.induced_answers import InducedAnswers
 from ..kinematics.kinematic_answers import KinematicAnswers
 from ..rule.joint_tree import JointTree
@@ -33,6 +34,12 @@ class ArrayBackend:
     def induced(self, robot: Any) -> InducedAnswers:
         """The calls for induced accelerations of a robot on this back end."""
         return InducedAnswers(robot)
+
+    def constraints(
+        self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any
+    ) -> ConstraintAnswers:
+        """The calls of `Constraints` on a robot with this back end."""
+        return constraint_answers(robot, independent, contacts, at, tolerance)
 
     def side(self, like: Any) -> Any:
         """What computes with `like`, an array or a tensor."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..arguments import check_numbers
 from ..induced_quantities import AppliedLoad, InducedAccelerations
-from .responses import Response, response_of
+from .responses import Response, constraints_of, following, response_of
 from .source_forces import SourceForces, source_forces, with_actuators
 
 CENTRE_OF_MASS = "centre of mass"
@@ -66,6 +66,8 @@ class InducedAnswers:
         q, qd, last = self._robot.backend.arrays(named, self._robot.n)
         if self._robot.check_finite:
             check_numbers(named, self._robot.joint_names)
+        constraints = constraints_of(self._robot, constraints)
+        qd = following(self._robot, constraints, q, qd)
         listed: Sequence[Any] = [loads] if isinstance(loads, AppliedLoad) else list(loads)
         others = source_forces(self._robot, q, qd, listed, passive)
         response = response_of(self._robot, constraints, q, qd, others.mass)

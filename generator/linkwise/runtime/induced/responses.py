@@ -76,14 +76,30 @@ class TiedResponse:
 
     def reactions(self, forces: Any, accelerations: Any) -> Any:
         """lambda (..., C, X), by columns of forces and what they accelerate."""
-        return self.constraints.forces_of(self.q, self.mass @ accelerations - forces)
+        return self.constraints.forces_of(self.q, self.mass @ accelerations - forces, by_link=True)
 
 
 Response = FreeResponse | TiedResponse
 
 
+def constraints_of(robot: Any, given: Any) -> Any:
+    """What a motion keeps: that which is given, or the robot's own; None where it keeps nothing."""
+    if given is not None:
+        return given or None
+    tree = robot.backend.tree
+    return robot.constraints if tree is not None and (tree.ties or tree.couplings) else None
+
+
+def following(robot: Any, constraints: Any, q: Any, qd: Any) -> Any:
+    """Velocities that keep the constraints, of which those of the independent joints are taken."""
+    if constraints is None:
+        return qd
+    own = robot.backend.index(np.array([robot.joint_index(name) for name in constraints.independent]), q)
+    return constraints.velocity(q, qd[..., own])
+
+
 def response_of(robot: Any, constraints: Any, q: Any, qd: Any, mass: Any) -> Response:
-    """How a robot with these constraints, or none, answers at a state."""
+    """How a robot with these constraints answers at a state, None for an open tree."""
     if constraints is None:
         return FreeResponse(robot, q, mass)
     return TiedResponse(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..chosen_names import MOST_NAMES, plain
-from .namespace import namespace
+from .namespace import hidden, namespace
 
 CLEAR = 1e5
 """Roundings; a matrix with ones on its diagonal whose least pivot is as large is far from singular."""
@@ -44,9 +44,9 @@ def solved_columns(mass: Any, forces: Any, joint_names: Sequence[str]) -> Any:
 
 
 def _check_tensor(scaled: Any, joint_names: Sequence[str]) -> None:
-    torch: Any = sys.modules["torch"]
-    if torch.compiler.is_compiling() or torch._C._are_functorch_transforms_active() or scaled.is_meta:
+    if hidden(scaled):
         return
+    torch: Any = sys.modules["torch"]
     factors, faults = torch.linalg.cholesky_ex(scaled.detach())
     least = factors.diagonal(0, -2, -1).amin(-1) if scaled.numel() else faults + 1.0
     clear = (faults == 0) & (least**2 > CLEAR * torch.finfo(scaled.dtype).eps)
