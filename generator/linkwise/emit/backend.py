@@ -124,6 +124,7 @@ RULE = (
     "induced",
     "kinematics",
     "rule",
+    "simulation",
     "sums",
 )
 """Of linkwise/runtime: the vectorised rule, and what is composed of it."""

@@ -97,6 +97,9 @@ class Backend(Protocol[Kind]):
     def constraints(self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any) -> Any:
         """The calls of `Constraints` on a robot with this back end; raises as `Dynamics.constrained` does."""
 
+    def simulated(self, robot: Any, *given: Any) -> Any:
+        """The motion of a robot on this back end over time, a `Trajectory`."""
+
     def constant(self, values: NDArray[Any], like: Kind) -> Kind:
         """A table of numbers, to compute with `like`."""
 

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from .induced_quantities import InducedAccelerations
 from .interface import Array
+from .motion_quantities import InducedAccelerations, Trajectory
 
 
 class MotionCalls:
@@ -47,6 +47,39 @@ class MotionCalls:
         answers, given = self.backend.induced(self), (q, qd, tau, qdd, loads, passive)
         shares: InducedAccelerations[Array] = answers.accelerations(*given, frame, point, constraints)
         return shares
+
+    def simulate(
+        self,
+        q: Array,
+        qd: Array,
+        time: Any,
+        tau: Any = None,
+        loads: Any = (),
+        passive: bool = True,
+        step: float | None = None,
+        method: str = "RK4",
+        rtol: float = 1e-9,
+        atol: float = 1e-12,
+        constraints: Any = None,
+    ) -> Trajectory[Array]:
+        """How the robot moves from q and qd on, (..., n), at the instants `time`, (T,), in s.
+
+        tau: what the actuators give: nothing unless given; (..., n), or a function of (t, q, qd) that is
+        called wherever the method evaluates, also between steps
+        loads: as in `induced_accelerations`, or a function of (t, q, qd) that gives them
+        passive: whether springs, damping, friction and armature of the joints count
+        step: of RK4 the longest, in s; from instant to instant unless given; of the others a bound
+        method: "RK4", of fixed steps, order 4, through which gradients flow; or one of SciPy's solve_ivp,
+        RK45, DOP853, Radau, ..., whose steps keep rtol and atol, and with which all starts step together
+        constraints: as in `induced_accelerations`; only the independent joints are integrated freely: the
+        others are closed by Newton's method at each evaluation and after each step, and follow with G yd
+
+        The answer's energy_drift is the energy that the integration made or lost. Raises ValueError where the
+        motion ceases to be finite, and as forward_dynamics and `Constraints` do; ImportError without SciPy.
+        """
+        given = q, qd, time, tau, loads, passive, step, method, (rtol, atol), constraints
+        trajectory: Trajectory[Array] = self.backend.simulated(self, *given)
+        return trajectory
 
     def induced_reactions(
         self,

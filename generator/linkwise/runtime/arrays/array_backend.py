@@ -8,6 +8,7 @@ from ..induced.induced_answers import InducedAnswers
 from ..kinematics.kinematic_answers import KinematicAnswers
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays, given_numbers
+from ..simulation.simulation_answers import simulated
 from ..structure import Structure
 from ..sums.sum_answers import SumAnswers
 
@@ -40,6 +41,10 @@ class ArrayBackend:
     ) -> ConstraintAnswers:
         """The calls of `Constraints` on a robot with this back end."""
         return constraint_answers(robot, independent, contacts, at, tolerance)
+
+    def simulated(self, robot: Any, *given: Any) -> Any:
+        """The motion of a robot on this back end over time; see `MotionCalls.simulate`."""
+        return simulated(robot, *given)
 
     def side(self, like: Any) -> Any:
         """What computes with `like`, an array or a tensor."""

@@ -1,14 +1,13 @@
 """The calls for induced accelerations behind their face: motion is checked, sources are solved for."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..arguments import check_numbers
-from ..induced_quantities import AppliedLoad, InducedAccelerations
+from ..motion_quantities import InducedAccelerations
 from .responses import Response, constraints_of, following, response_of
-from .source_forces import SourceForces, source_forces, with_actuators
+from .source_forces import SourceForces, listed, source_forces, with_actuators
 
 CENTRE_OF_MASS = "centre of mass"
 """What `frame` says for it; a frame of this name comes first."""
@@ -68,8 +67,7 @@ class InducedAnswers:
             check_numbers(named, self._robot.joint_names)
         constraints = constraints_of(self._robot, constraints)
         qd = following(self._robot, constraints, q, qd)
-        listed: Sequence[Any] = [loads] if isinstance(loads, AppliedLoad) else list(loads)
-        others = source_forces(self._robot, q, qd, listed, passive)
+        others = source_forces(self._robot, q, qd, listed(loads), passive)
         response = response_of(self._robot, constraints, q, qd, others.mass)
         if tau is None:
             asked = (others.mass @ last[..., None])[..., 0] - others.columns.sum(-1)

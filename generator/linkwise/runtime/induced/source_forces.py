@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..induced_quantities import AppliedLoad
+from ..motion_quantities import AppliedLoad
 from ..sums.namespace import namespace
 
 
@@ -64,6 +64,15 @@ def beside(parts: Sequence[Any]) -> Any:
     xp = namespace(parts[0])
     batch = np.broadcast_shapes(*(tuple(part.shape[:-2]) for part in parts))
     return xp.concat([xp.broadcast_to(part, (*batch, *part.shape[-2:])) for part in parts], -1)
+
+
+def listed(loads: Any) -> list[Any]:
+    """Loads as a list, of which one alone may be given; raises TypeError for what is neither."""
+    if isinstance(loads, AppliedLoad):
+        return [loads]
+    if not isinstance(loads, list | tuple):
+        raise TypeError(f"loads is a {type(loads).__name__}; give a list of AppliedLoad(frame, force, ...)")
+    return list(loads)
 
 
 def load_torques(robot: Any, q: Any, loads: Sequence[Any]) -> list[Any]:

@@ -1,4 +1,4 @@
-"""What accelerates a robot, source by source, and the loads that act on it from outside."""
+"""Loads that act on a robot from outside, what accelerates it, source by source, and how it then moves."""
 
 import math
 from typing import Any, Generic, NamedTuple
@@ -65,6 +65,29 @@ class InducedAccelerations(NamedTuple, Generic[Array]):
         """
         moved: list[Any] = [_product(jacobian, share) for share in self[:-1]]
         return InducedAccelerations(*[*moved, jacobian_rate * qd[..., None, :]])
+
+
+class Trajectory(NamedTuple, Generic[Array]):
+    """A motion over T instants, from a start of shape (..., n), or many of them at once."""
+
+    time: Array
+    """(T,), in s."""
+    q: Array
+    """(T, ..., n)."""
+    qd: Array
+    """(T, ..., n)."""
+    tau: Array
+    """(T, ..., n): what the actuators gave."""
+    energy: Array
+    """(T, ...): kinetic and potential energy of links, springs and armature, in J."""
+    work: Array
+    """(T, ...): done since the start by actuators and loads, less what damping and friction took, in J."""
+
+    @property
+    def energy_drift(self) -> Array:
+        """Energy that came from nowhere since the start, (T, ...): the error of the integration, in J."""
+        drift: Array = self.energy - self.energy[:1] - self.work
+        return drift
 
 
 def _product(jacobian: Any, share: Any) -> Any:
