@@ -3,6 +3,7 @@
     robot file ─read_robot─▶ Robot ─rigid_system─▶ RigidSystem ─┐
     energies in Python ─read_energies───────────▶ EnergySystem ─┤
                                                                 ▼
+    constrained_system   loops are closed, and independent coordinates found
     derive         closed forms, one kernel per link: by the rigid-link rule, which differentiates nothing, or
                    by Euler–Lagrange from energies, those that a user wrote or, if asked for, those of rigid
                    links; left out where the kernel is in loops
@@ -19,6 +20,7 @@ from typing import Any
 from linkwise.dynamics.derive import Method, derive
 from linkwise.emit.assemble import checked_identifier, package_files
 from linkwise.emit.backend import backends_of, chosen_backends
+from linkwise.emit.constrained_system import constrained_system
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.kernel_choice import check_size, chosen_kernel
 from linkwise.errors import LinkwiseError, within
@@ -41,7 +43,7 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
                     f"energies in Python do not accept {', '.join(rigid)}; change the energies"
                 )
             return read_energies(Path(spec), options.parameters != "numeric")
-    return rigid_system(read_robot(spec, options))
+    return constrained_system(rigid_system(read_robot(spec, options)))
 
 
 def generate(
@@ -62,7 +64,7 @@ def generate(
     `request` goes into the manifest, so that a reader sees how to make the package again.
     Raises LinkwiseError for a name, back end or kernel that cannot be, before anything is derived.
     """
-    system = rigid_system(robot) if isinstance(robot, Robot) else robot
+    system = constrained_system(rigid_system(robot) if isinstance(robot, Robot) else robot)
     kind = chosen_kernel(system, kernel, backends, derivation)
     chosen = chosen_backends(backends_of(kind) if backends is None else backends, kind)
     check_size(system, kind, backends)

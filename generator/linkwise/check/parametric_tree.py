@@ -37,7 +37,7 @@ def tree_with(tree: RigidTree, values: Mapping[str, float]) -> RigidTree:
         replace(frame, translation=at(f"frames[{f}].translation", frame.translation))
         for f, frame in enumerate(tree.frames)
     ]
-    return RigidTree(at("gravity", tree.gravity), tuple(bodies), tuple(frames), tree.passive, tree.formulas)
+    return replace(tree, gravity=at("gravity", tree.gravity), bodies=tuple(bodies), frames=tuple(frames))
 
 
 def changed_values(values: Mapping[str, float], tree: RigidTree | None) -> dict[str, float]:

@@ -1,6 +1,5 @@
 """The command `generate`."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,11 +11,13 @@ from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.assemble import checked_identifier
 from linkwise.emit.backend import BACKENDS, backends_of, chosen_backends
 from linkwise.emit.kernel_choice import chosen_kernel
+from linkwise.escape import listed
 from linkwise.input_file import is_file
 from linkwise.output import require_writable, sweep
 from linkwise.package.write import check_target, write_package
 from linkwise.progress import progress
 from linkwise.robot import Options, effects
+from linkwise.symbolic.system import RigidSystem
 
 app = typer.Typer(add_completion=False)
 
@@ -59,7 +60,7 @@ def generate(
         "backends": backends,
         "kernel": kernel,
         "derivation": derivation,
-        **asdict(options),
+        **options.request(),
     }
     directory = out / checked_identifier(name, system.name)
     check_target(directory, system.name)
@@ -73,3 +74,7 @@ def generate(
         f"wrote {directory}: {counted(len(system.coordinates), 'joint')}, "
         f"{counted(len(system.links), 'link')}, {counted(len(files), 'file')}"
     )
+    if isinstance(system, RigidSystem) and (free := system.robot.independent):
+        names = [c.name for c in system.coordinates]
+        others = [name for k, name in enumerate(names) if k not in free]
+        tell(f"independent: {listed(names[k] for k in free)}; following by constraints: {listed(others)}")

@@ -1,5 +1,6 @@
 """The command `inspect`: what a robot is made of, as data and as text."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -64,10 +65,31 @@ def inspection(system: System, details: bool = False, refused: str = "") -> dict
             }
             for j, name in enumerate(system.link_names)
         ],
+        **(_constraints(tree, [c.name for c in system.coordinates]) if tree else {}),
         **({"frames": _frames(tree)} if details and tree else {}),
         "parameters": [asdict(parameter) for parameter in parameters(system)],
         "notes": [asdict(note) for note in notes],
         "refused": refused,
+    }
+
+
+def _constraints(tree: RigidTree, joints: Sequence[str]) -> dict[str, Any]:
+    """Constraints, and the joints that move all others then; nothing without constraints."""
+    if not tree.independent:
+        return {}
+    ties = (
+        {"name": tie.name, "kind": tie.kind, "ends": [tree.frames[at].name for at in (tie.first, tie.second)]}
+        | ({"length": tie.length} if tie.kind == "distance" else {})
+        for tie in tree.ties
+    )
+    couplings = (
+        {"name": c.name, "kind": "coupling", "terms": {joints[k]: list(factors) for k, factors in c.terms}}
+        for c in tree.couplings
+    )
+    return {
+        "constraints": [*ties, *couplings],
+        "independent": [joints[k] for k in tree.independent],
+        "dependent": [joint for k, joint in enumerate(joints) if k not in tree.independent],
     }
 
 
@@ -99,6 +121,11 @@ def table(data: dict[str, Any]) -> str:
     for k, link in enumerate(data["links"], 1):
         mass = "" if link["mass"] is None else f"{link['mass']:.6g} kg; "
         lines.append(f"  {k}  {link['name']}  ({mass}{', '.join(link['path'])})")
+    if "constraints" in data:
+        lines += ["", "constraints (of `robot.constraints`; on what)"]
+        lines += [f"  {c['name']}  ({_held(c)})" for c in data["constraints"]]
+        lines.append(f"  independent: {', '.join(data['independent'])}")
+        lines.append(f"  dependent: {', '.join(data['dependent'])}")
     if "frames" in data:
         lines += ["", "frames (of `kinematics`; on which link)"]
         lines += [f"  {f['name']}  ({f['link'] or 'the ground'})" for f in data["frames"]]
@@ -107,10 +134,19 @@ def table(data: dict[str, Any]) -> str:
         width = max(map(len, heads))
         lines += ["", "parameters (of `load`, generated with --parameters symbolic or nonzero)"]
         lines += [f"  {h:<{width}}  {p['meaning']}" for h, p in zip(heads, data["parameters"], strict=True)]
-    for kind in dict.fromkeys(note["kind"] for note in data["notes"]):
+    kinds = dict.fromkeys(note["kind"] for note in data["notes"] if note["kind"] != "constraint")
+    for kind in kinds:
         lines += ["", kind]
         for note in data["notes"]:
             if note["kind"] == kind:
                 effect = f"; {note['effect']}" if note["effect"] else ""
                 lines.append(f"  {note['subject']} {note['detail']}".rstrip() + effect)
     return "\n".join(map(printable, lines))
+
+
+def _held(constraint: dict[str, Any]) -> str:
+    """What a constraint holds, in words."""
+    if constraint["kind"] == "coupling":
+        return f"coupling of {', '.join(constraint['terms'])}"
+    length = f" of {constraint['length']:g} m" if "length" in constraint else ""
+    return f"{constraint['kind']}{length}: {' and '.join(constraint['ends'])}"

@@ -4,6 +4,7 @@ import inspect
 import math
 from collections.abc import Callable, Iterable
 from functools import wraps
+from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
 import typer
@@ -42,9 +43,30 @@ def robot_options(
             help="Let a mimic joint without a master, or one that MJCF couples, move by itself",
         ),
     ] = False,
+    constraints: Annotated[
+        Path | None,
+        _flag(help="TOML file with [[constraint]]: loops and couplings beside those of the robot's own file"),
+    ] = None,
+    independent: Annotated[
+        list[str] | None,
+        _flag(
+            help="Joints whose motion gives that of all others under the constraints: A,B; may be repeated; "
+            "chosen by pivoting unless given"
+        ),
+    ] = None,
 ) -> Options:
     """Options of the flags' values; raises LinkwiseError naming the flag."""
-    return Options(parameters, _locks(lock or ()), base, root, tip, allow_unphysical, free_mimic)
+    return Options(
+        parameters,
+        _locks(lock or ()),
+        base,
+        root,
+        tip,
+        allow_unphysical,
+        free_mimic,
+        None if constraints is None else str(constraints),
+        _names(independent or ()),
+    )
 
 
 def reads_robot(
@@ -70,6 +92,14 @@ def reads_robot(
         return run
 
     return decorate
+
+
+def _names(items: Iterable[str]) -> tuple[str, ...]:
+    """Names out of lists A,B."""
+    names = tuple(name.strip() for item in items for name in item.split(","))
+    if not all(names):
+        raise LinkwiseError("--independent has an empty name; give joints as A,B")
+    return names
 
 
 def _locks(items: Iterable[str]) -> dict[str, float]:

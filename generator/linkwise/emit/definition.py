@@ -7,7 +7,15 @@ import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from linkwise.emit.formula_symbols import motion_symbol, parameter_symbols
-from linkwise.package.manifest import BodyEntry, EnergyEntry, FrameEntry, PassiveEntry, RigidTree
+from linkwise.package.manifest import (
+    BodyEntry,
+    CouplingEntry,
+    EnergyEntry,
+    FrameEntry,
+    PassiveEntry,
+    RigidTree,
+    TieEntry,
+)
 from linkwise.robot.robot import Robot, Scalar, Vec3
 from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
@@ -59,6 +67,9 @@ def rigid_tree(system: System) -> RigidTree | None:
             PassiveEntry(axis.joint, axis.coordinate, axis.ratio, *astuple(axis.own))
             for axis in robot.passive
         ),
+        tuple(TieEntry(*astuple(tie)) for tie in robot.ties),
+        tuple(CouplingEntry(*astuple(coupling)) for coupling in robot.couplings),
+        robot.independent,
         {
             place: text(value)
             for place, value in _places(robot)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from linkwise.emit.formula_symbols import parameter_symbols
 from linkwise.emit.render import render
 from linkwise.escape import python_literal
-from linkwise.package.entries import PLACE, BodyEntry, FrameEntry, RigidTree
+from linkwise.package.entries import PLACE, BodyEntry, CouplingEntry, FrameEntry, RigidTree, TieEntry
 from linkwise.version import VERSION
 
 WORD = re.compile(r"\b([A-Za-z_]\w*)(\(?)")
@@ -33,6 +33,10 @@ def tree_text(tree: RigidTree, links: Sequence[str], parameters: Sequence[str]) 
         "joints": [_joint(body) for body in tree.bodies],
         "links": [_link(b, tree.bodies[b]) for b in carriers],
         "frames": [_frame(frame) for frame in tree.frames],
+        "ties": [_tie(tie, tree) for tie in tree.ties],
+        "couplings": [_coupling(coupling) for coupling in tree.couplings],
+        "independent": repr(tree.independent) if tree.independent else "",
+        "records": _records(tree),
         "formulas": [
             (place, expression(text))
             for found, text in tree.formulas.items()
@@ -57,6 +61,25 @@ def _link(b: int, body: BodyEntry) -> TreeText:
 def _frame(frame: FrameEntry) -> TreeText:
     entries = f"{frame.body!r}", f"{frame.rotation!r}", f"{frame.translation!r}"
     return TreeText(python_literal(frame.name), entries)
+
+
+def _tie(tie: TieEntry, tree: RigidTree) -> str:
+    """The arguments of a TreeTie, and which frames it joins as a comment."""
+    length = f", {tie.length!r}" if tie.kind == "distance" else ""
+    ends = " and ".join(python_literal(tree.frames[frame].name) for frame in (tie.first, tie.second))
+    named = python_literal(tie.name)
+    return f"TreeTie({named}, {tie.kind!r}, {tie.first}, {tie.second}{length}),  # {ends}"
+
+
+def _coupling(coupling: CouplingEntry) -> str:
+    return f"TreeCoupling({python_literal(coupling.name)}, {coupling.terms!r}),"
+
+
+def _records(tree: RigidTree) -> str:
+    """What the file needs of joint_tree.py."""
+    constraints = {"TreeCoupling": tree.couplings, "TreeTie": tree.ties}
+    used = [name for name, found in constraints.items() if found]
+    return ", ".join(sorted(["JointTree", "TreeFrame", "TreeJoint", "TreeLink", *used]))
 
 
 def _place(place: str, carriers: dict[int, int]) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """The joints, links, rigid bodies and energies of a manifest, and what must hold among them."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -92,10 +93,32 @@ class PassiveEntry:
 
 
 @dataclass(frozen=True)
+class TieEntry:
+    """Two frames, by their indices, that are held together as `Tie` in robot.robot says; length in m."""
+
+    name: str
+    kind: Literal["point", "hinge", "frame", "distance"]
+    first: int
+    second: int
+    length: float
+
+
+@dataclass(frozen=True)
+class CouplingEntry:
+    """Joints of the manifest, by their indices, whose sum of c_0 + c_1 q + c_2 q² + … is 0."""
+
+    name: str
+    terms: tuple[tuple[int, tuple[float, ...]], ...]
+
+
+@dataclass(frozen=True)
 class RigidTree:
     """The rigid bodies, parents before children, the frames, and gravity in m/s² in the base's axes.
 
     passive: what joints have of their own, those that have anything
+
+    ties, couplings: what holds beside the tree; independent: the joints whose motion gives that of all others
+    then, by their indices in ascending order, none where nothing holds
 
     formulas: by its place, such as bodies[2].com[0], each number that hangs on run-time parameters, as text
     in their symbols; the numbers themselves are those of the parameters' own values
@@ -105,6 +128,9 @@ class RigidTree:
     bodies: tuple[BodyEntry, ...]
     frames: tuple[FrameEntry, ...]
     passive: tuple[PassiveEntry, ...]
+    ties: tuple[TieEntry, ...]
+    couplings: tuple[CouplingEntry, ...]
+    independent: tuple[int, ...]
     formulas: Mapping[str, str]
 
 
@@ -140,6 +166,7 @@ def check_tree(tree: RigidTree, joints: Sequence[JointEntry], links: Sequence[Li
     _check_joints(tree, joints)
     _check_frames(tree, links)
     _check_passive(tree)
+    _check_constraints(tree, len(joints))
     for place in tree.formulas:
         found = PLACE.fullmatch(place)
         known = found and (
@@ -179,6 +206,32 @@ def _check_passive(tree: RigidTree) -> None:
     for index, entry in enumerate(tree.passive):
         if moved.get(entry.joint) != (entry.coordinate, entry.ratio):
             raise ValueError(f"passive entry {index} of the tree is not of a joint that moves so")
+
+
+def _check_constraints(tree: RigidTree, count: int) -> None:
+    """Raise ValueError for what ties no frames or joints, and for independent joints that cannot be."""
+    names = Counter([tie.name for tie in tree.ties] + [coupling.name for coupling in tree.couplings])
+    for name, times in names.items():
+        if times > 1:
+            raise ValueError(f"tree.ties and tree.couplings have {name[:80]!a} twice")
+    for tie in tree.ties:
+        if not max(tie.first, tie.second) < len(tree.frames) or tie.first == tie.second:
+            raise ValueError(f"the tie {tie.name[:80]!a} of the tree is not between two of its frames")
+        if (tie.length > 0) != (tie.kind == "distance"):
+            raise ValueError(f"the tie {tie.name[:80]!a} of the tree has a length that it cannot have")
+    for coupling in tree.couplings:
+        found = [k for k, coefficients in coupling.terms if any(coefficients[1:])]
+        if not found or len(found) < len(coupling.terms) or found != sorted(set(found)):
+            raise ValueError(
+                f"the coupling {coupling.name[:80]!a} of the tree does not couple joints in order"
+            )
+        if not found[-1] < count:
+            raise ValueError(f"the coupling {coupling.name[:80]!a} of the tree has a joint that is not there")
+    free = tree.independent
+    if list(free) != sorted(set(free)) or not all(k < count for k in free):
+        raise ValueError("tree.independent is not of joints, in ascending order")
+    if bool(names) != bool(free) or (names and len(free) == count):
+        raise ValueError("tree.independent is not of some joints where there are constraints, else of none")
 
 
 def _check_joints(tree: RigidTree, joints: Sequence[JointEntry]) -> None:

@@ -14,6 +14,7 @@ from linkwise.output import sweep
 from linkwise.package.decode import decoded, parsed, require
 from linkwise.package.entries import (
     BodyEntry,
+    CouplingEntry,
     EnergyEntry,
     FrameEntry,
     JointEntry,
@@ -21,15 +22,17 @@ from linkwise.package.entries import (
     LinkEntry,
     PassiveEntry,
     RigidTree,
+    TieEntry,
     check_tree,
 )
 
-SCHEMA = 7
+SCHEMA = 8
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [
     "FILE",
     "BodyEntry",
+    "CouplingEntry",
     "EnergyEntry",
     "FrameEntry",
     "JointEntry",
@@ -37,6 +40,7 @@ __all__ = [
     "Manifest",
     "PassiveEntry",
     "RigidTree",
+    "TieEntry",
     "altered_entries",
     "is_inside",
 ]
@@ -47,7 +51,8 @@ CONVENTIONS = {
     "decomposition": "tau_ij = sum_k c2_ijk qdd_k + sum_k c1_ijk qd_k + g_ij: joint i, link j, coordinate k",
     "velocity": "closing: c1 = 1/2 d(tau)/d(qd) of the part quadratic in the velocities",
     "indices": "in this file they count from 0; parent, and body of a frame, is an index of tree.bodies, "
-    "None for the ground",
+    "None for the ground; first and second of a tie are of tree.frames, those of couplings' terms and "
+    "independent of joints",
     "operations": "additions, multiplications and divisions for one sample; sines and the like apart",
 }
 

@@ -1,12 +1,15 @@
 """From what a file says to a Robot: expand, cut, substitute, merge, and check."""
 
-from dataclasses import dataclass, field, fields, replace
-from typing import Literal
+from dataclasses import asdict, dataclass, field, fields, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
 
 import sympy as sp
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot.coordinates import AxisRule, check_couplings, movement
+from linkwise.robot.constrained import check_constraints, constrained
+from linkwise.robot.coordinates import AxisRule, movement
 from linkwise.robot.description import Connection, Description
 from linkwise.robot.joint_types import Axis, expand, expansion_notes
 from linkwise.robot.links import moving_links
@@ -17,6 +20,7 @@ from linkwise.robot.notes import Note
 from linkwise.robot.parameters import numeric
 from linkwise.robot.passive import checked_passive, passive_axes, passive_notes
 from linkwise.robot.robot import Frame, Link, Parameter, Robot, Scalar, unusable
+from linkwise.robot.ties import anchor_frames, tied_places
 from linkwise.robot.tree import check_loops, cut, depth_first
 
 
@@ -31,6 +35,8 @@ class Options:
     tip: str | None = None
     allow_unphysical: bool = False
     free_mimic: bool = False
+    constraints: str | None = None
+    independent: tuple[str, ...] = ()
 
     @property
     def given(self) -> tuple[str, ...]:
@@ -38,10 +44,19 @@ class Options:
         usual = Options()
         return tuple(f.name for f in fields(self) if getattr(self, f.name) != getattr(usual, f.name))
 
+    def request(self) -> dict[str, Any]:
+        """What a manifest keeps of them; of a file its name and the SHA-256 of its content."""
+        told = asdict(self) | {"independent": list(self.independent)}
+        if self.constraints is not None:
+            path = Path(self.constraints)
+            told["constraints"] = {"file": path.name, "sha256": sha256(path.read_bytes()).hexdigest()}
+        return told
+
 
 def build(description: Description, options: Options) -> Robot:
     """Build the robot; raises LinkwiseError that names the link or joint and the remedy."""
-    description = cut(description, options.root, options.tip)
+    whole, description = description, cut(description, options.root, options.tip)
+    check_constraints(numeric(whole))
     plain = numeric(description)
     unphysical = check_bodies(plain.bodies, options.allow_unphysical)
     if fault := unusable(*plain.gravity):
@@ -52,14 +67,17 @@ def build(description: Description, options: Options) -> Robot:
     root, connections = _connections(description, options.base)
     joints = [(connection, expand(connection)) for connection in connections]
     axes = tuple(axis for _, parts in joints for axis in parts)
-    uncoupled = check_couplings(description.couplings, axes, options.lock, options.free_mimic)
     moving = movement(axes, connections, options.lock, options.free_mimic)
     checked_passive(connections, options.allow_unphysical)
     passive = passive_axes(connections, moving.motion)
-    assembly = moving_links(description.bodies, joints, moving.motion, naming, description.sites)
+    sites, ends = anchor_frames(
+        description, (f"{c.child}_{axis.suffix}" for c, axes in joints for axis in axes)
+    )
+    assembly = moving_links(description.bodies, joints, moving.motion, naming, sites)
     check_loops(description.loops, assembly.carrier)
     numbers = assembly.links if naming is None else _links(plain, options, moving.motion)
     named = {body.name for body in plain.bodies if not body.invented}
+    held = constrained(description, ends, assembly.frames, moving, options.free_mimic, options.independent)
     singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical)
     if numbers and all(link.massless for link in numbers):
         raise LinkwiseError("no moving link has mass, so no torque is to be had; give one mass and inertia")
@@ -68,7 +86,7 @@ def build(description: Description, options: Options) -> Robot:
         *unphysical,
         *(_on_the_ground(plain, root) if options.base == "fixed" else ()),
         *expansion_notes(connections),
-        *uncoupled,
+        *held.notes,
         *moving.notes,
         *assembly.notes,
         *singular,
@@ -77,7 +95,8 @@ def build(description: Description, options: Options) -> Robot:
         *passive_notes(connections, passive),
         *_left_out(description, joints, moving.motion, assembly.carrier),
     )
-    parameters = naming.parameters(assembly.links, description.gravity) if naming else ()
+    places = tied_places(held.ties, assembly.frames)
+    parameters = naming.parameters(assembly.links, description.gravity, places) if naming else ()
     return Robot(
         description.name,
         moving.coordinates,
@@ -88,6 +107,10 @@ def build(description: Description, options: Options) -> Robot:
         options.allow_unphysical,
         _with_known(assembly.frames, parameters, dict(description.parameters)),
         passive,
+        held.ties,
+        held.couplings,
+        held.wanted,
+        held.driven,
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.robot.description import Connection, Coupling, Mimic
+from linkwise.robot.description import Connection, Mimic
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.notes import UNCOUPLED, Note
 from linkwise.robot.robot import Coordinate, unusable
@@ -61,25 +61,6 @@ def movement(
         ),
     ]
     return Movement(tuple(moving), motion, (*notes, *freed))
-
-
-def check_couplings(
-    couplings: tuple[Coupling, ...], axes: tuple[Axis, ...], lock: dict[str, float], free: bool
-) -> list[Note]:
-    """Return a note for each coupled joint that moves freely here; raises LinkwiseError unless `free`."""
-    notes = []
-    for coupling in couplings:
-        joint, master = coupling.joint, coupling.master
-        if joint in lock or joint not in {axis.name for axis in axes}:
-            continue
-        rule = f"coupled to {master!r}" if master else "held"
-        if not free:
-            raise LinkwiseError(
-                f"joint {joint!r} is {rule} by an equality, which the torques would leave out; hold it with "
-                f"--lock {joint}=0, or let such joints move by themselves with --free-mimic"
-            )
-        notes.append(Note("freed", joint, f"{rule} by an equality", UNCOUPLED))
-    return notes
 
 
 def _rule(mimic: Mimic) -> str:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from linkwise.robot.notes import Note, Omission
-from linkwise.robot.robot import NOTHING, Mat3, Passive, Rotation, Scalar, Vec3
+from linkwise.robot.robot import NOTHING, Mat3, Passive, Rotation, Scalar, TieKind, Vec3
 
 ZERO3: Vec3 = (0.0, 0.0, 0.0)
 ZERO33: Mat3 = (ZERO3, ZERO3, ZERO3)
@@ -48,16 +48,47 @@ class Mimic:
 
 
 @dataclass(frozen=True)
-class Coupling:
-    """A joint that a constraint makes follow another one, or holds where `master` is empty."""
+class Anchor:
+    """An end of a tie: a place on a body, and axes there, in the body's frame."""
 
-    joint: str
-    master: str
+    body: str
+    rotation: Rotation = IDENTITY
+    translation: Vec3 = ZERO3
+
+
+@dataclass(frozen=True)
+class AnchoredTie:
+    """A constraint between two bodies beside the tree, as the file has it; see `Tie` for its kinds."""
+
+    name: str
+    kind: TieKind
+    first: Anchor
+    second: Anchor
+    length: float = 0.0
+    """In m, of a distance only."""
+
+
+@dataclass(frozen=True)
+class JointCoupling:
+    """Positions of joints that a sum ties together: Σ c_0 + c_1 q + c_2 q² + … over its `terms` is 0.
+
+    The first of its joints follows the others. An `equality` of MJCF may be let go with --free-mimic.
+    """
+
+    name: str
+    terms: tuple[tuple[str, tuple[float, ...]], ...]
+    equality: bool = False
+
+    @property
+    def rule(self) -> str:
+        """What it does to its first joint, in words."""
+        others = [repr(joint) for joint, _ in self.terms[1:]]
+        return f"coupled to {' and '.join(others)}" if others else "held"
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A constraint that ties pairs of bodies together outside the tree; none where it ties others.
+    """A constraint that is not modelled, on pairs of bodies; none where it ties others.
 
     `what` names it in a sentence, `remedy` says how to do without it. A tie `of_joints` is gone with either
     body of its pair; any other still loads the one that is left.
@@ -102,8 +133,13 @@ class Description:
     gravity: Vec3 = (0.0, 0.0, -9.81)
     parameters: tuple[tuple[str, float], ...] = ()
     notes: tuple[Note, ...] = field(default=())
-    couplings: tuple[Coupling, ...] = ()
+    ties: tuple[AnchoredTie, ...] = ()
+    couplings: tuple[JointCoupling, ...] = ()
     loops: tuple[Loop, ...] = ()
     only_named: bool = False
     sites: tuple[Site, ...] = ()
     omissions: tuple[Omission, ...] = ()
+    driven: tuple[str, ...] = ()
+    """Joints that actuators of the file drive."""
+    independent: tuple[str, ...] = ()
+    """Joints whose motion is to give that of all others under the constraints; none: to be chosen."""

@@ -1,6 +1,5 @@
 """Joint types as chains of revolute and prismatic axes."""
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
@@ -90,10 +89,9 @@ def _parts(connection: Connection) -> tuple[Part, ...]:
 
 
 def _unit(connection: Connection) -> Vector:
-    x, y, z = connection.axis
-    if fault := unusable(x, y, z):
+    if fault := unusable(*connection.axis):
         raise LinkwiseError(f"joint {connection.name!r} has {fault} in its axis; give numbers")
-    length = math.hypot(x, y, z)
-    if length < 1e-9:
+    axis = transforms.unit(connection.axis)
+    if axis is None:
         raise LinkwiseError(f"joint {connection.name!r} has a zero axis; give its direction, such as 0 0 1")
-    return x / length, y / length, z / length
+    return axis

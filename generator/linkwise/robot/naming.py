@@ -74,11 +74,18 @@ class Naming:
         a, b, c = (tuple(moments[min(i, k), max(i, k)] for k in range(3)) for i in range(3))
         return mass, (x, y, z), (a, b, c)  # type: ignore[return-value]
 
-    def parameters(self, links: Iterable[Link], gravity: Vec3) -> tuple[Parameter, ...]:
-        """The file's own that are used, then those made, link by link: where the joint is, then the body."""
-        for axis, value in zip("xyz", gravity, strict=True):
-            self._note(value, f"gravity_{axis}")
-        used = {symbol.name for value in (*gravity, *_numbers(links)) for symbol in _symbols(value)}
+    def parameters(
+        self, links: Iterable[Link], gravity: Vec3, tied: Iterable[tuple[str, Scalar]] = ()
+    ) -> tuple[Parameter, ...]:
+        """The file's own that are used, then those made, link by link: where the joint is, then the body.
+
+        tied: numbers of constraints, each with what it is
+        """
+        others = [*((f"gravity_{axis}", value) for axis, value in zip("xyz", gravity, strict=True)), *tied]
+        for use, value in others:
+            self._note(value, use)
+        numbers = (*(value for _, value in others), *_numbers(links))
+        used = {symbol.name for value in numbers for symbol in _symbols(value)}
         own = (
             Parameter(name, value, "", f"of the file's own, for {listed(self._uses[name], MOST_USES)}")
             for name, value in self.given.items()

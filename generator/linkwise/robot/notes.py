@@ -10,6 +10,8 @@ from linkwise.escape import listed
 LEFT_OUT = "left out of the torques"
 APART = "apart from the links' torques, by passive_torque"
 UNCOUPLED = "moving by themselves, their coupling left out of the torques"
+BESIDE = "constraints, which robot.constraints holds, beside the torques of the open tree"
+LEAST = "constraints that hold something twice, so that their forces are shared by least squares"
 IMPOSSIBLE = "accepted though physically impossible"
 WARNED = "MuJoCo warns"
 TURNS = "singular at a pitch of ±90°"
@@ -44,6 +46,8 @@ class Note:
         "passive",
         "warned",
         "promoted",
+        "constraint",
+        "redundant",
     ]
     subject: str
     detail: str = ""

@@ -6,7 +6,7 @@ from dataclasses import replace
 import sympy as sp
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot.description import Body, Description
+from linkwise.robot.description import AnchoredTie, Body, Description
 from linkwise.robot.robot import Scalar, Vec3, unusable
 
 Values = Sequence[tuple[str, float]]
@@ -26,6 +26,13 @@ def _body(body: Body, values: dict[sp.Symbol, float]) -> Body:
     return replace(body, mass=_number(body.mass, values), com=_vector(body.com, values), inertia=(a, b, c))
 
 
+def _tie(tie: AnchoredTie, values: dict[sp.Symbol, float]) -> AnchoredTie:
+    first, second = (
+        replace(end, translation=_vector(end.translation, values)) for end in (tie.first, tie.second)
+    )
+    return replace(tie, first=first, second=second)
+
+
 def _symbols(values: Values) -> dict[sp.Symbol, float]:
     for name, value in values:
         if fault := unusable(value):
@@ -43,4 +50,5 @@ def numeric(description: Description) -> Description:
             replace(c, translation=_vector(c.translation, values)) for c in description.connections
         ),
         gravity=_vector(description.gravity, values),
+        ties=tuple(_tie(tie, values) for tie in description.ties),
     )

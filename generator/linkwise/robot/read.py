@@ -11,6 +11,7 @@ from linkwise.robot.builtin.planar import planar
 from linkwise.robot.description import Description
 from linkwise.robot.readers.mjcf import read_mjcf
 from linkwise.robot.readers.toml import read_toml
+from linkwise.robot.readers.toml_constraints import with_constraint_file
 from linkwise.robot.readers.urdf import read_urdf, root_tag
 from linkwise.robot.readers.xml_file import XACRO
 from linkwise.robot.robot import Robot
@@ -42,15 +43,26 @@ def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
         raise LinkwiseError(f"the robot's name is empty; give {DESCRIPTIONS}")
     with within(str(spec)):
         if match := re.fullmatch(r"planar([1-9][0-9]*)", str(spec)):
-            return build(planar(_joints(match[1])), options)
+            return _built(planar(_joints(match[1])), options)
         if str(spec) in FILES:
             with resources.as_file(resources.files("linkwise.robot.builtin") / f"{spec}.toml") as built_in:
-                return build(read_toml(built_in), options)
+                return _built(read_toml(built_in), options)
         try:
             description = _read_file(Path(spec))
         except OSError as error:
             raise LinkwiseError(f"cannot be read: {error.strerror}") from None
-        return build(description, options)
+        return _built(description, options)
+
+
+def _built(description: Description, options: Options) -> Robot:
+    """Robot of a description and of the constraints beside it."""
+    if options.constraints is not None:
+        with within(options.constraints):
+            try:
+                description = with_constraint_file(description, Path(options.constraints))
+            except OSError as error:
+                raise LinkwiseError(f"cannot be read: {error.strerror}") from None
+    return build(description, options)
 
 
 def _joints(digits: str) -> int:

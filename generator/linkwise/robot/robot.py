@@ -138,6 +138,33 @@ class Frame:
     """In m."""
 
 
+TieKind = Literal["point", "hinge", "frame", "distance"]
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A constraint between two frames, beside the tree.
+
+    point: their origins coincide; hinge: and their z axes; frame: and all axes; distance: their origins are
+    `length` apart, in m.
+    """
+
+    name: str
+    kind: TieKind
+    first: int
+    """Index among the robot's frames."""
+    second: int
+    length: float = 0.0
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A constraint on coordinates: Σ c_0 + c_1 q_k + c_2 q_k² + … over its terms (k, (c_0, c_1, …)) is 0."""
+
+    name: str
+    terms: tuple[tuple[int, tuple[float, ...]], ...]
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A number that stays an argument: its value in the file, unit (empty: as the file has it), meaning."""
@@ -154,6 +181,10 @@ class Robot:
 
     With `allow_unphysical` its parameters may take values that no body has. `frames` are the file's own, one
     for each link among them, or none.
+
+    `ties` and `couplings` hold beside the tree. Under them the coordinates `independent` move all others, in
+    ascending order; before they are found, `wanted` are those asked for, by name, and `driven` those that
+    actuators drive.
     """
 
     name: str
@@ -165,6 +196,11 @@ class Robot:
     allow_unphysical: bool = False
     frames: tuple[Frame, ...] = ()
     passive: tuple[PassiveAxis, ...] = ()
+    ties: tuple[Tie, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    wanted: tuple[str, ...] = ()
+    driven: tuple[int, ...] = ()
+    independent: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.coordinates:
@@ -176,6 +212,7 @@ class Robot:
             ("joint", [c.name for c in self.coordinates]),
             ("link", [link.name for link in self.links]),
             ("frame", [frame.name for frame in self.frames]),
+            ("constraint", [*(tie.name for tie in self.ties), *(c.name for c in self.couplings)]),
         ):
             for name, count in Counter(names).items():
                 if not name.strip():

@@ -82,6 +82,15 @@ def about_z(angle: float) -> Rotation:
     return snap([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def unit(axis: Sequence[float]) -> tuple[float, float, float] | None:
+    """Return the direction with length 1; none of a length below 1e-9."""
+    length = math.hypot(*axis)
+    if length < 1e-9:
+        return None
+    x, y, z = (e / length for e in axis)
+    return x, y, z
+
+
 def align_z(axis: Sequence[float]) -> Rotation:
     """Return a rotation whose third column is the unit vector `axis`; a permutation for ±x, ±y, ±z."""
     x, y, z = snap([list(axis)])[0]

@@ -13,7 +13,7 @@ from linkwise.extras import extra
 from linkwise.robot import transforms
 from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Description, Site
 from linkwise.robot.notes import WARNED, Note
-from linkwise.robot.readers.mjcf_equality import couplings, loops
+from linkwise.robot.readers.mjcf_equality import equalities
 from linkwise.robot.readers.mjcf_options import switched_off
 from linkwise.robot.readers.mjcf_passive import passive_of
 from linkwise.robot.readers.mjcf_unmodelled import omissions, unused
@@ -37,16 +37,19 @@ def read_mjcf(path: Path) -> Description:
     weightless = "gravity" in switched_off(mujoco, model)
     joints = [c.name for c in connections if c.type != "fixed"]
     links = [_name(model, number) for number in range(model.nbody)]
+    equal = equalities(mujoco, model, joints, links)
     return Description(
         path.stem if name in ("", "MuJoCo Model") else name,
         tuple(bodies),
         tuple(connections),
         ZERO3 if weightless else (x, y, z),
         notes=(*(Note("warned", text, "", WARNED) for text in warnings), *unused(model)),
-        couplings=couplings(mujoco, model, joints),
-        loops=loops(mujoco, model, links),
+        ties=equal.ties,
+        couplings=equal.couplings,
+        loops=equal.loops,
         omissions=omissions(mujoco, model, joints, links),
         sites=_sites(model, links),
+        driven=_driven(mujoco, model, joints),
     )
 
 
@@ -62,6 +65,16 @@ def _compiled(mujoco: Any, path: Path) -> tuple[Any, list[str]]:
         raise LinkwiseError(f"MuJoCo cannot compile it: {told}") from None
     finally:
         mujoco.set_mju_user_warning(before)
+
+
+def _driven(mujoco: Any, model: Any, joints: list[str]) -> tuple[str, ...]:
+    """Return the joints that actuators turn or push."""
+    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    return tuple(
+        joints[int(target)]
+        for kind, (target, _) in zip(model.actuator_trntype, model.actuator_trnid, strict=True)
+        if mujoco.mjtTrn(int(kind)) in kinds
+    )
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,29 @@
-"""The active equality constraints of a compiled MJCF model: joints that follow others, and loops."""
+"""The active equality constraints of a compiled MJCF model: ties of bodies, couplings of joints, others.
 
-from collections.abc import Iterator
+What MuJoCo asks for is in its engine_core_constraint.c, mj_instantiateEquality; eq_data of a compiled model:
+
+    connect  anchor on the first body, anchor on the second; of sites: none, their origins meet
+    weld     anchor on the second body, place and quaternion of the first one's, scale of the torque; of
+             sites: the scale, their origins and axes meet
+    joint    y − y0 = Σ a_p (x − x0)^p, y the first joint and x the second, a_0 … a_4; no second: y − y0 = a_0
+    tendon   the same of the tendons' lengths
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from linkwise.robot.description import Coupling, Loop
+from linkwise.robot import transforms
+from linkwise.robot.couplings import composed
+from linkwise.robot.description import IDENTITY, Anchor, AnchoredTie, JointCoupling, Loop
 from linkwise.robot.readers.mjcf_options import switched_off
-from linkwise.robot.readers.mjcf_tendons import joints_of, ties
+from linkwise.robot.readers.mjcf_tendons import joints_of, lengths_of, ties
+from linkwise.robot.robot import Rotation, TieKind
 
-JOINT, TENDON = "joint", "tendon"
-OF_BODIES = ("connect", "weld")
+POWERS = 5
+"""Coefficients of a polynomial."""
+TORQUE_SCALE = 10
+"""Where eq_data has it."""
 
 CUT = (
     "remove it from the file, hold the joints between them with --lock, or cut off what it ties with --root "
@@ -17,43 +32,121 @@ CUT = (
 REMOVE = "remove it from the file"
 
 
-def couplings(mujoco: Any, model: Any, joints: list[str]) -> tuple[Coupling, ...]:
-    """Return which joint follows which, of the moving joints' names; no master stands for a constant."""
-    return tuple(
-        Coupling(joints[one], joints[other] if other >= 0 else "")
-        for _, kind, one, other in _active(mujoco, model)
-        if kind == JOINT
-    )
+@dataclass(frozen=True)
+class Equalities:
+    """What the equalities are: ties, couplings, and what is not modelled."""
+
+    ties: tuple[AnchoredTie, ...]
+    couplings: tuple[JointCoupling, ...]
+    loops: tuple[Loop, ...]
 
 
-def loops(mujoco: Any, model: Any, bodies: list[str]) -> tuple[Loop, ...]:
-    """Return the equalities that are not of joints, of the bodies' names."""
-    found = []
-    for number, kind, one, other in _active(mujoco, model):
-        name = model.equality(number).name
-        what = f"the {kind} equality {name!r}" if name else f"an unnamed {kind} equality"
-        if kind in OF_BODIES:
-            if mujoco.mjtObj(int(model.eq_objtype[number])) == mujoco.mjtObj.mjOBJ_SITE:
-                one, other = int(model.site_bodyid[one]), int(model.site_bodyid[other])
-            ends = bodies[one], bodies[other]
-            found.append(Loop(f"{what} ties link {ends[0]!r} to link {ends[1]!r}", CUT, (ends,)))
-        elif kind == TENDON:
-            tendons = [tendon for tendon in (one, other) if tendon >= 0]
-            names = ", ".join(repr(model.tendon(tendon).name) for tendon in tendons)
-            of_joints = any(joints_of(mujoco, model, tendon) for tendon in tendons)
-            tied = [tie for tendon in tendons for tie in ties(mujoco, model, tendon, of_joints)]
-            pairs = tuple((bodies[a], bodies[b]) for a, b in tied)
-            found.append(Loop(f"{what} ties links together by tendon {names}", CUT, pairs, of_joints))
-        elif kind != JOINT:
-            found.append(Loop(f"{what} ties parts of the model together", REMOVE))
-    return tuple(found)
+@dataclass(frozen=True)
+class _Equality:
+    """An active equality: its kind as MJCF has it, its name or one made of kind and number, its objects."""
+
+    kind: str
+    name: str
+    one: int
+    other: int
+    data: tuple[float, ...]
+    of_sites: bool
 
 
-def _active(mujoco: Any, model: Any) -> Iterator[tuple[int, str, int, int]]:
-    """Number, kind and objects of each equality that acts from the start."""
+def equalities(mujoco: Any, model: Any, joints: list[str], bodies: list[str]) -> Equalities:
+    """Return the active equalities, by the names of MuJoCo's joints and bodies."""
+    tied: list[AnchoredTie] = []
+    coupled: list[JointCoupling] = []
+    loops: list[Loop] = []
+    for equality in _active(mujoco, model):
+        if equality.kind in ("connect", "weld"):
+            tied.append(_tie(model, equality, bodies))
+        elif (coupling := _coupling(mujoco, model, equality, joints)) is not None:
+            coupled.append(coupling)
+        else:
+            loops.append(_unmodelled(mujoco, model, equality, bodies))
+    return Equalities(tuple(tied), tuple(coupled), tuple(loops))
+
+
+def _active(mujoco: Any, model: Any) -> Iterator[_Equality]:
+    """Those that act from the start."""
     if "equality" in switched_off(mujoco, model):
         return
-    for number in range(int(model.neq)):
-        if model.eq_active0[number]:
-            kind = mujoco.mjtEq(int(model.eq_type[number])).name.removeprefix("mjEQ_").lower()
-            yield number, kind, int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+    named = [model.equality(number).name for number in range(int(model.neq))]
+    for number, name in enumerate(named):
+        if not model.eq_active0[number]:
+            continue
+        kind = mujoco.mjtEq(int(model.eq_type[number])).name.removeprefix("mjEQ_").lower()
+        made = f"{kind}{number + 1}"
+        while made in named:
+            made += "_"
+        of_sites = mujoco.mjtObj(int(model.eq_objtype[number])) == mujoco.mjtObj.mjOBJ_SITE
+        objects = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+        yield _Equality(kind, name or made, *objects, tuple(map(float, model.eq_data[number])), of_sites)
+
+
+def _tie(model: Any, equality: _Equality, bodies: list[str]) -> AnchoredTie:
+    data, (one, other) = equality.data, (equality.one, equality.other)
+    # Scaled by 0, a weld leaves the bodies free to turn.
+    turns = equality.kind == "connect" or data[TORQUE_SCALE] == 0.0
+    kind: TieKind = "point" if turns else "frame"
+    if equality.of_sites:
+        first, second = (_site(model, site, bodies) for site in (one, other))
+    elif equality.kind == "connect":
+        first, second = _place(bodies[one], data[0:3]), _place(bodies[other], data[3:6])
+    else:
+        turn = transforms.snap(transforms.from_quaternion(*data[6:10]))
+        first, second = _place(bodies[one], data[3:6], turn), _place(bodies[other], data[0:3])
+    return AnchoredTie(equality.name, kind, first, second)
+
+
+def _place(body: str, place: Sequence[float], turn: Rotation = IDENTITY) -> Anchor:
+    x, y, z = place
+    return Anchor(body, turn, (x, y, z))
+
+
+def _site(model: Any, site: int, bodies: list[str]) -> Anchor:
+    turn = transforms.snap(transforms.from_quaternion(*map(float, model.site_quat[site])))
+    x, y, z = map(float, model.site_pos[site])
+    return Anchor(bodies[int(model.site_bodyid[site])], turn, (x, y, z))
+
+
+def _coupling(mujoco: Any, model: Any, equality: _Equality, joints: list[str]) -> JointCoupling | None:
+    """Return a joint equality, or one of fixed tendons that is a sum over joints; None for any other."""
+    numbers = [number for number in (equality.one, equality.other) if number >= 0]
+    if equality.kind == "joint":
+        sides = [(_itself(number), float(model.qpos0[model.jnt_qposadr[number]])) for number in numbers]
+    elif equality.kind == "tendon":
+        sides = [(lengths_of(mujoco, model, n), float(model.tendon_length0[n])) for n in numbers]
+    else:
+        return None
+    powers = equality.data[:POWERS]
+    if not all(terms for terms, _ in sides) or (any(powers[2:]) and len(sides[-1][0]) > 1):
+        return None
+    (follower, rest), *masters = sides
+    # The first side less its rest, less the polynomial of the second one less its own.
+    found: list[tuple[str, tuple[float, ...]]] = [(joints[j], (0.0, factor)) for j, factor in follower]
+    found[0] = found[0][0], (-rest - powers[0], follower[0][1])
+    for length, at in masters:
+        slopes = (0.0, *(-c for c in powers[1:]))
+        shifted = composed(slopes, 1.0, -at)
+        for number, (j, factor) in enumerate(length):
+            own = composed(shifted, factor, 0.0)
+            found.append((joints[j], own if number == 0 else (0.0, *own[1:])))
+    return JointCoupling(equality.name, tuple(found), equality.kind == "joint")
+
+
+def _itself(joint: int) -> tuple[tuple[int, float], ...]:
+    return ((joint, 1.0),)
+
+
+def _unmodelled(mujoco: Any, model: Any, equality: _Equality, bodies: list[str]) -> Loop:
+    what = f"the {equality.kind} equality {equality.name!r}"
+    if equality.kind != "tendon":
+        return Loop(f"{what} ties parts of the model together", REMOVE)
+    tendons = [tendon for tendon in (equality.one, equality.other) if tendon >= 0]
+    names = ", ".join(repr(model.tendon(tendon).name) for tendon in tendons)
+    of_joints = any(joints_of(mujoco, model, tendon) for tendon in tendons)
+    tied = [tie for tendon in tendons for tie in ties(mujoco, model, tendon, of_joints)]
+    pairs = tuple((bodies[a], bodies[b]) for a, b in tied)
+    return Loop(f"{what} ties links together by tendon {names}", CUT, pairs, of_joints)

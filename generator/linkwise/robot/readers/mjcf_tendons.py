@@ -12,6 +12,13 @@ def joints_of(mujoco: Any, model: Any, tendon: int) -> tuple[int, ...]:
     )
 
 
+def lengths_of(mujoco: Any, model: Any, tendon: int) -> tuple[tuple[int, float], ...]:
+    """Joints of a fixed tendon, whose length is the sum of their positions times these factors."""
+    first, count = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
+    joints = joints_of(mujoco, model, tendon)
+    return tuple(zip(joints, map(float, model.wrap_prm[first : first + count]), strict=False))
+
+
 def bodies_along(mujoco: Any, model: Any, tendon: int) -> tuple[int, ...]:
     """Bodies that a spatial tendon passes; none of a fixed one."""
     wrap = mujoco.mjtWrap

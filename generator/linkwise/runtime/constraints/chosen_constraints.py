@@ -10,23 +10,12 @@ from numpy.typing import NDArray
 from ..arguments import as_array
 from ..chosen_names import short
 from ..rule.joint_tree import JointTree
-from ..rule.tree_arrays import own_numbers
 from ..structure import Structure
+from .closing_search import TieEquations, best_closing, random_starts
 from .held_frames import Held, all_names, held_by
-from .independent_joints import RANK, chosen_independent, loose_base, rank_of, redundant_rows
+from .independent_joints import chosen_independent, loose_base, rank_of, redundant_rows
 from .singular_positions import listed
-from .tie_arrays import ends, tie_jacobian, violation
 from .tie_tables import tie_tables
-
-WIDTHS = (0.1, 0.3, 1.0, 2.0)
-"""How far around zero positions are looked for from which loops close, in rad and m."""
-TRIES = 6
-STEPS = 60
-LONGEST = 0.5
-"""Of a step of Newton's method, in rad and m."""
-SHORTEST = 1e-10
-CLOSED = 1e-6
-"""In m and rad, what may be left where no step leads on: numbers of files are rounded."""
 
 
 class ChosenConstraints:
@@ -65,10 +54,18 @@ class ChosenConstraints:
 
     @cached_property
     def _matrix(self) -> NDArray[np.float64]:
-        """A where loops close, of the tree's own numbers."""
-        numbers, q = own_numbers(self._tree), self._closed_position()[:, None]
-        found: NDArray[np.float64] = tie_jacobian(np, self.tables, q, ends(np, self.tables, numbers, q))
-        return found[..., 0]
+        """A where loops close beside `at`, or anywhere, of the tree's own numbers."""
+        tree, n = self._tree, self._structure.n
+        starts = random_starts(n) if self._at is None else [self._at]
+        q = starts[0]
+        if tree.ties or tree.couplings:
+            ties = TieEquations(tree, n, [one for one in self.held if one.second is not None])
+            found = best_closing(ties, starts)
+            if not found.is_closed:
+                told = "from any position that was tried; give `at`" if self._at is None else "beside `at`"
+                raise ValueError(f"{listed(self.names)} did not close {told}")
+            q = found.q
+        return TieEquations(tree, n, self.held).at(q).rows
 
     def _independent(self, given: Any, has_contacts: bool) -> tuple[int, ...]:
         if given is None and not has_contacts and self._tree.independent:
@@ -107,34 +104,3 @@ class ChosenConstraints:
             raise ValueError(f"at has shape {found.shape}; give one position of shape ({self._structure.n},)")
         position: NDArray[np.float64] = found.astype(float)
         return position
-
-    def _closed_position(self) -> NDArray[np.float64]:
-        """Where loops close: beside `at`, or beside the zero position, from where it is reached."""
-        ties = [one for one in self.held if one.second is not None]
-        tables = tie_tables(self._tree, self._structure.n, ties)
-        random = np.random.default_rng(0)
-        n = self._structure.n
-        if self._at is not None:
-            starts = [self._at]
-        else:
-            starts = [w * random.uniform(-1.0, 1.0, n) for w in WIDTHS for _ in range(TRIES)]
-        for start in starts:
-            if (closed := self._closed_from(tables, start)) is not None:
-                return closed
-        told = "beside `at`" if self._at is not None else "from any position that was tried; give `at`"
-        raise ValueError(f"{listed(self.names)} did not close {told}")
-
-    def _closed_from(self, tables: Any, start: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Newton's method with least steps of all joints."""
-        numbers, q = own_numbers(self._tree), start[:, None]
-        if not len(tables.row_pairs) and not tables.polynomials:
-            return start
-        for _ in range(STEPS):
-            placed = ends(np, tables, numbers, q)
-            phi, rows = violation(np, tables, q, placed, None), tie_jacobian(np, tables, q, placed)
-            step = np.linalg.lstsq(rows[..., 0], -phi[:, 0], rcond=RANK)[0]
-            size = np.abs(step).max()
-            if size < SHORTEST:
-                return q[:, 0] if np.abs(phi).max() < CLOSED else None
-            q = q + (step * min(1.0, LONGEST / size))[:, None]
-        return None

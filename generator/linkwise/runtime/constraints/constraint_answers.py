@@ -4,21 +4,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..quantities import Coefficients, ConstrainedMotion, Propagation
-from ..rule.kinematics import taken
 from ..sums.inertia_solve import solved
 from ..sums.namespace import namespace, side_by_side
 from .chosen_constraints import ChosenConstraints
-from .followers import (
-    Followers,
-    borne,
-    dependent_shares,
-    factored,
-    followers,
-    joint_columns,
-    projected,
-)
+from .closed_places import ClosedPlace, RowNames, closed_place
+from .followers import Followers, borne, joint_columns, projected, times
 from .newton_closing import closed
-from .singular_positions import check_closed, check_factors, check_following
 from .tie_rows import TieRows
 
 
@@ -32,6 +23,7 @@ class ConstraintAnswers:
         self.names, self.rows = chosen.names, chosen.rows
         self.independent = tuple(robot.joint_names[k] for k in self._columns.independent)
         self.dependent = tuple(robot.joint_names[k] for k in self._columns.dependent)
+        self._told = RowNames(chosen.rows, chosen.row_names, robot.joint_names)
         self._listed: dict[Any, Any] = {}
 
     @property
@@ -41,11 +33,12 @@ class ConstraintAnswers:
 
     def violation(self, q: Any, held_at: Any) -> Any:
         """See `Constraints.violation`."""
-        return self._tie_rows.violation(q, held_at)
+        return self._tie_rows.violation(q, q if held_at is None else held_at)
 
     def jacobian(self, q: Any) -> Any:
         """See `Constraints.jacobian`."""
-        return side_by_side(self._tie_rows.positions(q)[..., 1:])
+        (q,) = self._read(q=q)
+        return side_by_side(self._tie_rows.at(q).positions()[..., 1:])
 
     def jacobian_rate(self, q: Any, qd: Any) -> Any:
         """See `Constraints.jacobian_rate`."""
@@ -54,36 +47,32 @@ class ConstraintAnswers:
     def closed(self, q: Any, held_at: Any) -> Any:
         """See `Constraints.closed`."""
         (q,) = self._read(q=q)
-        names = self.rows, self._chosen.row_names, self._robot.joint_names
-        return closed(self._tie_rows, self._own_columns(q), q, held_at, self._tolerance, names)
+        return closed(self._tie_rows, self._own_columns(q), q, held_at, self._tolerance, self._told)
 
     def velocity_map(self, q: Any) -> Any:
         """See `Constraints.velocity_map`."""
         (q,) = self._read(q=q)
-        return side_by_side(self._followers(q).map)
+        return side_by_side(self._place(q).found.map)
 
     def velocity(self, q: Any, yd: Any) -> Any:
         """See `Constraints.velocity`."""
         (q,) = self._read(q=q)
-        return _times(self._followers(q).map, self._own("yd", yd, q))
+        return self._place(q).velocity(self._own("yd", yd, q))
 
     def acceleration(self, q: Any, qd: Any, ydd: Any) -> Any:
         """See `Constraints.acceleration`."""
-        q, qd = self._read(q=q, qd=qd)
-        found, qd = self._moving(q, qd)
-        return _times(found.map, self._own("ydd", ydd, q)) + self._bias(found, q, qd)
+        place, q, qd = self._moving(q, qd)
+        return place.velocity(self._own("ydd", ydd, q)) + place.bias(qd)
 
     def velocity_accelerations(self, q: Any, qd: Any) -> Any:
         """See `Constraints.velocity_accelerations`."""
-        q, qd = self._read(q=q, qd=qd)
-        found, qd = self._moving(q, qd)
-        return dependent_shares(found, self._tie_rows.rates(q, qd) * qd[..., None, :])
+        place, _, qd = self._moving(q, qd)
+        return place.bias_by_cause(qd)
 
     def projected(self, q: Any, torque: Any, by_link: bool) -> Any:
         """See `Constraints.projected`."""
         (q,) = self._read(q=q)
-        given = self._torque(torque, q, by_link)
-        answer = projected(self._followers(q), given)
+        answer = projected(self._place(q).found, self._torque(torque, q, by_link))
         return answer if by_link else answer[..., 0]
 
     def inverse_dynamics(self, q: Any, qd: Any, qdd: Any) -> Any:
@@ -98,16 +87,14 @@ class ConstraintAnswers:
 
     def coefficients(self, q: Any, qd: Any) -> Any:
         """See `Constraints.coefficients`."""
-        q, qd = self._read(q=q, qd=qd)
-        found, qd = self._moving(q, qd)
-        return self._coefficients(found, q, qd)
+        return self._coefficients(*self._moving(q, qd))
 
     def propagation(self, q: Any, qd: Any, qdd: Any) -> Any:
         """See `Constraints.propagation`."""
         q, qd, qdd = self._read(q=q, qd=qd, qdd=qdd)
-        found, qd = self._moving(q, qd)
-        c2, c1, g = self._coefficients(found, q, qd)
-        yd, ydd = (taken(a, found.columns.independent, -1)[..., None, None, :] for a in (qd, qdd))
+        place, q, qd = self._moving(q, qd)
+        c2, c1, g = self._coefficients(place, q, qd)
+        yd, ydd = (place.own(a)[..., None, None, :] for a in (qd, qdd))
         return Propagation(c2 * ydd, c1 * yd, g)
 
     def forces(self, q: Any, qd: Any, qdd: Any) -> Any:
@@ -118,35 +105,34 @@ class ConstraintAnswers:
     def forces_of(self, q: Any, torque: Any, by_link: bool) -> Any:
         """See `Constraints.forces_of`."""
         (q,) = self._read(q=q)
-        given = self._torque(torque, q, by_link)
-        answer = borne(self._followers(q), given)
+        answer = borne(self._place(q).found, self._torque(torque, q, by_link))
         return answer if by_link else answer[..., 0]
 
     def forward_dynamics(self, q: Any, qd: Any, tau: Any, passive: bool) -> Any:
         """Solve (G^T M G) ydd = G^T (tau - h - g - M bias), then A^T lambda = M qdd + h + g - tau."""
         q, qd, tau = self._read(q=q, qd=qd, tau=tau)
-        found, qd = self._moving(q, qd)
-        robot, rest = self._robot, 0.0 * qd
+        place, q, qd = self._moving(q, qd)
+        robot, found, rest = self._robot, place.found, 0.0 * qd
         mass, force = robot.mass_matrix(q), tau - robot.inverse_dynamics(q, qd, rest)
         if passive:
             armature = robot.backend.constant(robot.structure.passive_sums.armature, q)
             mass = mass + namespace(q).diag(armature)
             force = force - robot.passive_torque(q, qd, rest).total
-        bias = self._bias(found, q, qd)
-        driven = projected(found, (force - _times(mass, bias))[..., None])[..., 0]
-        ydd = solved(projected(found, mass @ found.map), driven, self.independent)
-        qdd = _times(found.map, ydd) + bias
-        forces = borne(found, (_times(mass, qdd) - force)[..., None])[..., 0]
+        bias = place.bias(qd)
+        driven = projected(found, (force - times(mass, bias))[..., None])[..., 0]
+        qdd = place.velocity(solved(projected(found, mass @ found.map), driven, self.independent)) + bias
+        forces = borne(found, (times(mass, qdd) - force)[..., None])[..., 0]
         return ConstrainedMotion(qdd, forces)
 
-    def _coefficients(self, found: Followers, q: Any, qd: Any) -> Any:
+    def _coefficients(self, place: ClosedPlace, q: Any, qd: Any) -> Any:
         """c2^ = G^T c2 G, c1^ = G^T (c2 dG/dt + c1 G), g^ = G^T g, for each link."""
         c2, c1, g = self._robot.coefficients(q, qd)
+        found, rate = place.found, place.map_rate(qd)[..., None, :, :]
         mapped = found.map[..., None, :, :]
-        rate = dependent_shares(found, self._tie_rows.rates(q, qd) @ found.map)[..., None, :, :]
-        parts = (_projected_cubes(found, part) for part in (c2 @ mapped, c2 @ rate + c1 @ mapped))
-        acceleration, velocity = parts
-        return Coefficients(acceleration, velocity, projected(found, g))
+        acceleration, velocity = c2 @ mapped, c2 @ rate + c1 @ mapped
+        return Coefficients(
+            _projected_cubes(found, acceleration), _projected_cubes(found, velocity), projected(found, g)
+        )
 
     def _read(self, **named: Any) -> Sequence[Any]:
         read: Sequence[Any] = self._robot.backend.arrays(named, self._robot.n)
@@ -175,36 +161,21 @@ class ConstraintAnswers:
             self._listed[key] = type(self._columns)(*(backend.index(a, q) for a in self._columns))
         return self._listed[key]
 
-    def _followers(self, q: Any) -> Followers:
-        """How joints follow at q, in which all ties close."""
-        positions = self._tie_rows.positions(q)
-        check_closed(positions[..., 0], self._tolerance, self.rows, self._chosen.row_names)
-        rows, columns = positions[..., 1:], self._own_columns(q)
-        factors, names = factored(rows, columns), self._robot.joint_names
-        check_factors(rows, factors[1], self._columns, names)
-        found = followers(rows, columns, factors)
-        check_following(rows, found, self._chosen.row_names, names)
-        return found
+    def _place(self, q: Any) -> ClosedPlace:
+        """How joints follow at q (..., n), in which all ties close."""
+        return closed_place(self._tie_rows, self._own_columns(q), q, self._tolerance, self._told)
 
-    def _moving(self, q: Any, qd: Any) -> tuple[Followers, Any]:
-        """The same, and qd in which all joints follow."""
-        found = self._followers(q)
-        return found, _times(found.map, taken(qd, found.columns.independent, -1))
+    def _moving(self, q: Any, qd: Any) -> tuple[ClosedPlace, Any, Any]:
+        """The same, q, and qd in which all joints follow."""
+        q, qd = self._read(q=q, qd=qd)
+        place = self._place(q)
+        return place, q, place.velocity(place.own(qd))
 
-    def _accelerated(self, q: Any, qd: Any, qdd: Any) -> tuple[Any, ...]:
+    def _accelerated(self, q: Any, qd: Any, qdd: Any) -> tuple[Followers, Any, Any, Any]:
         """How joints follow, and a motion in which they do."""
         q, qd, qdd = self._read(q=q, qd=qd, qdd=qdd)
-        found, qd = self._moving(q, qd)
-        ydd = taken(qdd, found.columns.independent, -1)
-        return found, q, qd, _times(found.map, ydd) + self._bias(found, q, qd)
-
-    def _bias(self, found: Followers, q: Any, qd: Any) -> Any:
-        """-A_d^+ dA/dt qd on the dependent joints."""
-        return dependent_shares(found, self._tie_rows.rates(q, qd) @ qd[..., None])[..., 0]
-
-
-def _times(matrix: Any, vector: Any) -> Any:
-    return (matrix @ vector[..., None])[..., 0]
+        place, q, qd = self._moving(q, qd)
+        return place.found, q, qd, place.velocity(place.own(qdd)) + place.bias(qd)
 
 
 def _projected_cubes(found: Followers, parts: Any) -> Any:

@@ -14,7 +14,7 @@ from ..rule.kinematics import taken
 from ..sums.namespace import namespace
 
 
-class Columns(NamedTuple):
+class JointColumns(NamedTuple):
     """Joints as tables of positions."""
 
     independent: Any
@@ -26,7 +26,7 @@ class Columns(NamedTuple):
 class Followers(NamedTuple):
     """The answers at one position, or at many."""
 
-    columns: Columns
+    columns: JointColumns
     orthogonal: Any
     """Q, (..., C, d)."""
     triangle: Any
@@ -35,20 +35,20 @@ class Followers(NamedTuple):
     """G, (..., n, m)."""
 
 
-def joint_columns(independent: tuple[int, ...], n: int) -> Columns:
+def joint_columns(independent: tuple[int, ...], n: int) -> JointColumns:
     """Positions in the order of all joints."""
     dependent = [k for k in range(n) if k not in independent]
     order = np.argsort([*independent, *dependent])
-    return Columns(np.array(independent, dtype=np.intp), np.array(dependent, dtype=np.intp), order)
+    return JointColumns(np.array(independent, dtype=np.intp), np.array(dependent, dtype=np.intp), order)
 
 
-def factored(rows: Any, columns: Columns) -> tuple[Any, Any]:
+def factored(rows: Any, columns: JointColumns) -> tuple[Any, Any]:
     """Q and R of A_d."""
     q, r = namespace(rows).linalg.qr(taken(rows, columns.dependent, -1))
     return q, r
 
 
-def followers(rows: Any, columns: Columns, factors: tuple[Any, Any]) -> Followers:
+def followers(rows: Any, columns: JointColumns, factors: tuple[Any, Any]) -> Followers:
     """How joints follow."""
     xp, (q, r) = namespace(rows), factors
     moved = -_solved(r, _transposed(q) @ taken(rows, columns.independent, -1))
@@ -75,6 +75,11 @@ def borne(found: Followers, torque: Any) -> Any:
 def projected(found: Followers, torque: Any) -> Any:
     """G^T of (..., n, X)."""
     return _transposed(found.map) @ torque
+
+
+def times(matrix: Any, vector: Any) -> Any:
+    """Matrices (..., a, b) times vectors (..., b)."""
+    return (matrix @ vector[..., None])[..., 0]
 
 
 def _solved(triangle: Any, right: Any, upper: bool = True) -> Any:

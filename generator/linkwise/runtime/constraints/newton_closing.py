@@ -14,7 +14,8 @@ import numpy as np
 from ..chosen_names import plain
 from ..rule.kinematics import taken
 from ..sums.namespace import hidden, namespace
-from .followers import Columns, dependent_shares, factored, followers
+from .closed_places import RowNames
+from .followers import JointColumns, dependent_shares, factored, followers
 from .singular_positions import check_factors, open_by, sample_of, worst_open
 from .tie_rows import TieRows
 
@@ -25,30 +26,30 @@ LONGEST = 0.5
 
 def closed(
     ties: TieRows,
-    columns: Columns,
+    columns: JointColumns,
     q: Any,
     held_at: Any,
     tolerance: float | None,
-    names: tuple[Sequence[str], Sequence[str], Sequence[str]],
+    names: RowNames,
 ) -> Any:
     """q (..., n) with its dependent joints moved.
 
-    held_at: where contacts took hold, q unless given; names: of the rows, of what has each of them, of joints
+    held_at: where contacts took hold, q unless given; names: what errors name
     Raises ValueError for the first sample that is singular, or stays open beyond the tolerance.
     """
     start = q if held_at is None else held_at
     if isinstance(q, np.ndarray):
-        found = _found(ties, columns, q, start, names[2])
+        found = _found(ties, columns, q, start, names.joints)
     else:
         with namespace(q).no_grad():
-            found = _found(ties, columns, q, start, names[2])
+            found = _found(ties, columns, q, start, names.joints)
         found = _with_independent_of(q, found.detach(), columns)
-        found = found + _step(ties, columns, found, start, names[2])
+        found = found + _step(ties, columns, found, start, names.joints)
     _check(ties.violation(found, start), tolerance, names)
     return found
 
 
-def _found(ties: TieRows, columns: Columns, q: Any, start: Any, joint_names: Sequence[str]) -> Any:
+def _found(ties: TieRows, columns: JointColumns, q: Any, start: Any, joint_names: Sequence[str]) -> Any:
     precise = 1e-8 if q.dtype.itemsize == 8 else 1e-4  # of a step; what is left is about its square
     for _ in range(STEPS):
         step = _step(ties, columns, q, start, joint_names)
@@ -59,27 +60,25 @@ def _found(ties: TieRows, columns: Columns, q: Any, start: Any, joint_names: Seq
     return q
 
 
-def _step(ties: TieRows, columns: Columns, q: Any, start: Any, joint_names: Sequence[str]) -> Any:
-    rows = ties.positions(q)[..., 1:]
+def _step(ties: TieRows, columns: JointColumns, q: Any, start: Any, joint_names: Sequence[str]) -> Any:
+    rows = ties.at(q).positions()[..., 1:]
     factors = factored(rows, columns)
     check_factors(rows, factors[1], columns, joint_names)
     shares = dependent_shares(followers(rows, columns, factors), ties.violation(q, start)[..., None])
     return shares[..., 0]
 
 
-def _with_independent_of(q: Any, found: Any, columns: Columns) -> Any:
+def _with_independent_of(q: Any, found: Any, columns: JointColumns) -> Any:
     """Positions found, through whose independent joints a gradient of q runs."""
     own, others = taken(q, columns.independent, -1), taken(found, columns.dependent, -1)
     return taken(namespace(q).concat([own, others], -1), columns.order, -1)
 
 
-def _check(
-    violation: Any, tolerance: float | None, names: tuple[Sequence[str], Sequence[str], Sequence[str]]
-) -> None:
+def _check(violation: Any, tolerance: float | None, names: RowNames) -> None:
     found = worst_open(violation, tolerance)
     if found is not None:
         place, row, size = found
         raise ValueError(
-            f"{plain(names[1][row])} does not close{sample_of(place)}, however the dependent joints move: "
-            f"{open_by(size, names[0][row])} remain"
+            f"{plain(names.owners[row])} does not close{sample_of(place)}, however the dependent joints "
+            f"move: {open_by(size, names.rows[row])} remain"
         )

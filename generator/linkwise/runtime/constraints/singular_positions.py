@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..chosen_names import MOST_NAMES, plain
 from ..sums.inertia_solve import SHARE
 from ..sums.namespace import hidden
-from .followers import Columns, Followers
+from .followers import Followers, JointColumns
 from .independent_joints import chosen_independent, rank_of
 
 AGREE = 1e-4
@@ -27,7 +27,7 @@ def sample_of(place: Sequence[int]) -> str:
     return f" at sample {', '.join(map(str, place))}" if len(place) else ""
 
 
-def check_factors(rows: Any, triangle: Any, columns: Columns, joint_names: Sequence[str]) -> None:
+def check_factors(rows: Any, triangle: Any, columns: JointColumns, joint_names: Sequence[str]) -> None:
     """Raise ValueError for the first sample where A_d, of which R is given, loses its rank.
 
     |R_ff| is what is left of column f across those before it.
@@ -46,7 +46,7 @@ def check_factors(rows: Any, triangle: Any, columns: Columns, joint_names: Seque
 
 
 def _not_following(
-    rows: NDArray[np.float64], columns: Columns, epsilon: float, joint_names: Sequence[str], where: str
+    rows: NDArray[np.float64], columns: JointColumns, epsilon: float, joint_names: Sequence[str], where: str
 ) -> str:
     dependent, independent = columns.dependent.tolist(), columns.independent.tolist()
     still = np.abs(np.linalg.svd(rows[:, dependent])[2][-1])

@@ -29,13 +29,23 @@ TINY = 1e-12
 
 
 class Ends(NamedTuple):
-    """Frames of the pairs where they are."""
+    """The frames of all pairs where they are."""
 
     carried: Carried
-    axes: Any
-    """(3, 3, frames, samples)"""
     places: Any
-    """Of the points, (3, frames, samples)."""
+    """Of their points, (3, frames, samples)."""
+
+
+class Pairs(NamedTuple):
+    """The same pair by pair, and what their rows take from it."""
+
+    ends: Ends
+    shift: Any
+    """d, (3, P, samples)."""
+    moves: Any
+    """J, (6, P, n, samples)."""
+    weights: Any
+    """w, (6, C, samples)."""
 
 
 def ends(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Ends | None:
@@ -43,58 +53,74 @@ def ends(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Ends | None
     if tables.frames is None:
         return None
     found = carried(xp, tables.frames, numbers, numbers.offsets, q, from_world=True)
-    return Ends(found, found.axes, point_at(found, tables.points))
+    return Ends(found, point_at(found, tables.points))
 
 
-def violation(xp: Any, tables: TieTables, q: Any, at: Ends | None, held: Ends | None) -> Any:
+def pairs(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Pairs | None:
+    """Where pairs are at q (n, samples); None without ties and contacts."""
+    at = ends(xp, tables, numbers, q)
+    if at is None or tables.frames is None:
+        return None
+    shift = at.places[:, : tables.pairs] - _seconds(xp, tables, at.places)
+    screws = joint_screws(xp, tables.frames.from_world, at.carried.joints)[:, :, None]
+    one, z = tables.moved_apart, screws[:, 0]
+    linear = one * screws[:3, 1] + cross(z, _arms(xp, tables, at.places))
+    moves = by_coordinate(tables.frames, xp.concat([one * z[:3], linear], 0))
+    return Pairs(at, shift, moves, _weights(xp, tables, at, shift))
+
+
+def violation(xp: Any, tables: TieTables, q: Any, at: Pairs | None, held: Ends | None = None) -> Any:
     """phi, (C, samples); held: where contacts took hold, where they are unless given."""
     parts = []
     if at is not None:
-        first = at.axes[:, :, : tables.pairs]
-        second = _seconds(xp, tables, at.axes, held and held.axes)
-        shift = at.places[:, : tables.pairs] - _seconds(xp, tables, at.places, held and held.places)
-        weights = _weights(xp, tables, at, shift)
-        both = xp.concat([_turn(xp, tables, first, second), shift], 0)
-        along = (weights * taken(both, tables.row_pairs)).sum(0)
-        parts.append(along * tables.placed - taken(tables.apart, tables.row_pairs))
+        axes, places = at.ends.carried.axes, at.ends.places
+        shift, weights = at.shift, at.weights
+        if held is not None:
+            shift = places[:, : tables.pairs] - _seconds(xp, tables, places, held.places)
+        along = (weights[3:] * taken(shift, tables.row_pairs)).sum(0)
+        if tables.all_axes is not None:
+            second = _seconds(xp, tables, axes, held and held.carried.axes)
+            turn = _turn(xp, tables.all_axes, axes[:, :, : tables.pairs], second)
+            along = along + (weights[:3] * taken(turn, tables.row_pairs)).sum(0)
+        parts.append(along * tables.placed - tables.apart)
     if tables.polynomials:
         parts.append(_polynomial(tables.polynomials[0], q).sum(1))
-    return xp.concat(parts, 0)
+    return _joined(xp, parts)
 
 
-def tie_jacobian(xp: Any, tables: TieTables, q: Any, at: Ends | None) -> Any:
+def tie_jacobian(xp: Any, tables: TieTables, q: Any, at: Pairs | None) -> Any:
     """A, (C, n, samples)."""
     parts = []
     if at is not None:
-        shift = at.places[:, : tables.pairs] - _seconds(xp, tables, at.places)
-        weights, moves = _weights(xp, tables, at, shift), _moves(xp, tables, at)
-        parts.append((weights[:, :, None] * taken(moves, tables.row_pairs, -3)).sum(0))
+        parts.append((at.weights[:, :, None] * taken(at.moves, tables.row_pairs, -3)).sum(0))
     if tables.polynomials:
         parts.append(_polynomial(tables.polynomials[1], q))
-    return xp.concat(parts, 0)
+    return _joined(xp, parts)
 
 
 def tie_jacobian_rate(
-    xp: Any, tables: TieTables, numbers: TreeArrays, q: Any, qd: Any, at: Ends | None
+    xp: Any, tables: TieTables, numbers: TreeArrays, q: Any, qd: Any, at: Pairs | None
 ) -> Any:
     """dA/dt, (C, n, samples)."""
     parts = []
-    if at is not None:
-        assert tables.frames is not None  # where frames are, they have tables
-        moved = moving(xp, tables.frames, numbers, at.carried, qd, from_world=True)
+    if at is not None and tables.frames is not None:
+        places = at.ends.places
+        moved = moving(xp, tables.frames, numbers, at.ends.carried, qd, from_world=True)
         twist = of_frames(tables.frames, moved.twists)
-        speeds = point_velocity(xp, twist, at.places)
-        shift, slip = (a[:, : tables.pairs] - _seconds(xp, tables, a) for a in (at.places, speeds))
-        weights = _weights(xp, tables, at, shift)
-        rates = _weight_rates(xp, tables, weights, twist[:, 0, : tables.pairs], shift, slip)
-        changes = _move_rates(xp, tables, at, moved.screws[:, 0], moved.rates, speeds)
-        total = weights[:, :, None] * taken(changes, tables.row_pairs, -3)
+        speeds = point_velocity(xp, twist, places)
+        # z x X becomes zd x X + z x dX/dt
+        z, zd, sd = moved.screws[:, 0, None], moved.rates[:, 0, None], moved.rates[:3, 1, None]
+        linear = cross(zd, _arms(xp, tables, places)) + cross(z, _arms(xp, tables, speeds))
+        one = tables.moved_apart
+        changes = by_coordinate(tables.frames, xp.concat([one * zd[:3], one * sd + linear], 0))
+        total = at.weights[:, :, None] * taken(changes, tables.row_pairs, -3)
+        rates = _weight_rates(xp, tables, at, twist[:, 0, : tables.pairs], speeds)
         if rates is not None:
-            total = total + rates[:, :, None] * taken(_moves(xp, tables, at), tables.row_pairs, -3)
+            total = total + rates[:, :, None] * taken(at.moves, tables.row_pairs, -3)
         parts.append(total.sum(0))
     if tables.polynomials:
         parts.append(_polynomial(tables.polynomials[2], q) * qd)
-    return xp.concat(parts, 0)
+    return _joined(xp, parts)
 
 
 def _seconds(xp: Any, tables: TieTables, a: Any, held: Any = None) -> Any:
@@ -106,48 +132,45 @@ def _seconds(xp: Any, tables: TieTables, a: Any, held: Any = None) -> Any:
     return xp.concat([own, kept], -2)
 
 
-def _turn(xp: Any, tables: TieTables, first: Any, second: Any) -> Any:
+def _turn(xp: Any, every: Any, first: Any, second: Any) -> Any:
     """2 sin(t/2) times the axis about which, by t, the first frames are turned from the second ones.
 
-    Of all axes a, or of z alone: v = sin t times it is half the sum of a2 x a1, or z2 x z1.
+    Of all axes a, or of z alone: sin t times it is half the sum of a2 x a1, or z2 x z1.
     """
-    products = cross(around(xp, second), around(xp, first))
+    sines = cross(around(xp, second), around(xp, first))
     cosines = (second * first).sum(0)
-    z, c = products[:, 2], cosines[2]
-    every = tables.all_axes
-    turn = every * 0.5 * products.sum(1) + (1.0 - every) * z
-    cosine = every * 0.5 * (cosines.sum(0) - 1.0) + (1.0 - every) * c
+    sine = every * 0.5 * sines.sum(1) + (1.0 - every) * sines[:, 2]
+    cosine = every * 0.5 * (cosines.sum(0) - 1.0) + (1.0 - every) * cosines[2]
     half = 0.5 * (1.0 + cosine)  # cos(t/2)^2
-    return turn / xp.where(half > TINY, half, xp.zeros_like(half) + TINY) ** 0.5
+    return sine / xp.where(half > TINY, half, 0.0 * half + TINY) ** 0.5
 
 
 def _weights(xp: Any, tables: TieTables, at: Ends, shift: Any) -> Any:
-    """w, (6, C, samples)."""
-    turns, shifts = tables.fixed[:3], tables.fixed[3:]
+    """w, (6, C, samples); one for all samples where they stay as they are."""
+    weights = tables.fixed
     if tables.turning is not None:
-        turns = turns + turned(taken(at.axes, tables.row_pairs), tables.turning)
+        turning = turned(taken(at.carried.axes, tables.row_pairs), tables.turning)
+        weights = weights + xp.concat([turning, 0.0 * turning], 0)
     if tables.along is not None:
-        shifts = shifts + tables.along[0] * taken(shift / _size(tables, shift), tables.row_pairs)
-    samples = max(turns.shape[-1], shifts.shape[-1])
-    shape = 3, len(tables.placed), samples
-    return xp.concat([xp.broadcast_to(turns, shape), xp.broadcast_to(shifts, shape)], 0)
+        along = tables.along * taken(shift / _size(tables, shift), tables.row_pairs)
+        weights = weights + xp.concat([0.0 * along, along], 0)
+    return weights
 
 
-def _weight_rates(xp: Any, tables: TieTables, weights: Any, spin: Any, shift: Any, slip: Any) -> Any:
+def _weight_rates(xp: Any, tables: TieTables, at: Pairs, spin: Any, speeds: Any) -> Any:
     """dw/dt; None where they stay as they are."""
     if tables.turning is None and tables.along is None:
         return None
-    turns, shifts = 0.0 * weights[:3], 0.0 * weights[3:]
+    turning, along = 0.0 * at.weights[:3], 0.0 * at.weights[3:]
     if tables.turning is not None:
-        turning = weights[:3] - tables.fixed[:3]
-        turns = cross(taken(spin, tables.row_pairs), around(xp, turning))
+        own = at.weights[:3] - tables.fixed[:3]
+        turning = cross(taken(spin, tables.row_pairs), around(xp, own))
     if tables.along is not None:
-        # u = d / |d|: its rate is what of the rate of d stands across it, by |d|
-        size = _size(tables, shift)
-        u = shift / size
-        rate = (slip - u * (u * slip).sum(0)) / size
-        shifts = tables.along[0] * taken(rate, tables.row_pairs)
-    return xp.concat([turns, shifts], 0)
+        # the rate of d, as far as it stands across d, by |d|
+        size = _size(tables, at.shift)
+        u, slip = at.shift / size, speeds[:, : tables.pairs] - _seconds(xp, tables, speeds)
+        along = tables.along * taken((slip - u * (u * slip).sum(0)) / size, tables.row_pairs)
+    return xp.concat([turning, along], 0)
 
 
 def _size(tables: TieTables, shift: Any) -> Any:
@@ -161,26 +184,13 @@ def _arms(xp: Any, tables: TieTables, places: Any) -> Any:
     return around(xp, tables.first * first[:, :, None] - tables.second * second[:, :, None])
 
 
-def _moves(xp: Any, tables: TieTables, at: Ends) -> Any:
-    """J of the pairs, (6, P, n, samples)."""
-    assert tables.frames is not None  # where frames are, they have tables
-    screws = joint_screws(xp, tables.frames.from_world, at.carried.joints)[:, :, None]
-    one, z = tables.first - tables.second, screws[:, 0]
-    shift = one * screws[:3, 1] + cross(z, _arms(xp, tables, at.places))
-    return by_coordinate(tables.frames, xp.concat([one * z[:3], shift], 0))
-
-
-def _move_rates(xp: Any, tables: TieTables, at: Ends, z: Any, rates: Any, speeds: Any) -> Any:
-    """Their rates: z x X becomes zd x X + z x dX/dt."""
-    assert tables.frames is not None  # where frames are, they have tables
-    one, zd, sd = tables.first - tables.second, rates[:, 0, None], rates[:3, 1, None]
-    changed = cross(zd, _arms(xp, tables, at.places)) + cross(z[:, None], _arms(xp, tables, speeds))
-    return by_coordinate(tables.frames, xp.concat([one * zd[:3], one * sd + changed], 0))
-
-
 def _polynomial(factors: tuple[Any, ...], q: Any) -> Any:
     """c_0 + c_1 q + ..., (K, n, samples), by Horner's rule."""
     value = factors[-1] + 0.0 * q
     for factor in factors[-2::-1]:
         value = value * q + factor
     return value
+
+
+def _joined(xp: Any, parts: list[Any]) -> Any:
+    return parts[0] if len(parts) == 1 else xp.concat(parts, 0)

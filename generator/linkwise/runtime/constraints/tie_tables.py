@@ -26,10 +26,12 @@ class TieTables(NamedTuple):
     """Ones where a joint moves the first frame of a pair, (P, joints, 1)."""
     second: Any
     """The same of the second; none of a contact."""
+    moved_apart: Any
+    """Their difference."""
     all_axes: Any
-    """Of a pair 1 where all axes are held, 0 where z alone may be, (P, 1)."""
+    """Of a pair 1 where all axes are held, 0 where z alone may be, (P, 1); None where none are."""
     apart: Any
-    """Of a pair its length where that is held, 0 elsewhere, (P, 1)."""
+    """Of a row the length that it holds, 0 elsewhere, (C, 1)."""
     is_apart: Any
     """Of a pair 1 where a length is held, (P, 1)."""
     row_pairs: Any
@@ -39,7 +41,7 @@ class TieTables(NamedTuple):
     turning: Any
     """(3, C, 1): the same of the turn, along the axes of the first frame; None for none."""
     along: Any
-    """(1, C, 1): the same of the shift, along the line between the frames; None for none."""
+    """(C, 1): the same of the shift, along the line between the frames; None for none."""
     placed: Any
     """(C, 1): ones for rows that a position can violate; rolling has none."""
     polynomials: tuple[tuple[Any, ...], ...]
@@ -67,7 +69,7 @@ def tie_tables(tree: JointTree, n: int, held: Sequence[Held]) -> TieTables:
         moved = frames.carried.T[..., None]
         first, second = moved[: len(held)], np.zeros_like(moved[: len(held)])
         second[:ties] = moved[len(held) :]
-    rows = _rows(held)
+    every = np.array([[float(one.kind == "frame")] for one in held])
     return TieTables(
         frames,
         ties,
@@ -75,11 +77,12 @@ def tie_tables(tree: JointTree, n: int, held: Sequence[Held]) -> TieTables:
         points,
         first,
         second,
-        np.array([[float(one.kind == "frame")] for one in held]),
-        np.array([[one.length] for one in held]),
+        first - second,
+        every if {"frame", "hinge"} & {one.kind for one in held} else None,
+        np.array([[one.length] for one in held for _ in ROWS[one.kind]]),
         np.array([[float(one.kind == "distance")] for one in held]),
         np.array([p for p, one in enumerate(held) for _ in ROWS[one.kind]], dtype=np.intp),
-        *rows,
+        *_rows(held),
         np.array([[float(one.kind != "rolling")] for one in held for _ in ROWS[one.kind]]),
         _polynomials(tree.couplings, n),
     )
@@ -89,11 +92,12 @@ def _rows(held: Sequence[Held]) -> tuple[Any, Any, Any]:
     """`fixed`, `turning` and `along`."""
     count = sum(len(ROWS[one.kind]) for one in held)
     fixed, turning, along = (np.zeros((size, count, 1)) for size in (6, 3, 1))
+    along = along[0]
     at, eye = 0, np.eye(3)
     for one in held:
         size = len(ROWS[one.kind])
         if one.kind == "distance":
-            along[0, at] = 1.0
+            along[at] = 1.0
         else:
             fixed[3:, at + size - 3 : at + size, 0] = eye
         if one.kind == "hinge":

@@ -249,7 +249,7 @@ class KinematicAnswers:
         value = self._at_once(call, motion, part, vectors.get("point"))
         if value is None:
             at, count = self._asked(own, part, motion, vectors), math.prod(shape)
-            value = _in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
+            value = in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
         if out is None:  # its numbers side by side
             return np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value.contiguous()
         out[...] = value
@@ -276,7 +276,7 @@ class KinematicAnswers:
         return frame_tables(self._tree, self._structure.n, frames)
 
 
-def _in_pieces(own: Any, motion: Sequence[Any], at: Asked, answer: Callable[[Asked], Any], count: int) -> Any:
+def in_pieces(own: Any, motion: Sequence[Any], at: Asked, answer: Callable[[Asked], Any], count: int) -> Any:
     """Answers (samples, count), as many samples at once as the back end wants."""
     xp, samples = at.xp, at.motion[0].shape[1]
     size = own.chunk(motion, max(16, CACHE // (motion[0].itemsize * (NUMBERS * at.tables.moved + count))))

@@ -1,0 +1,75 @@
+"""Where the loops of a robot close at its own numbers: found once, before anything is generated."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.errors import LinkwiseError
+from linkwise.package.entries import RigidTree
+from linkwise.runtime.constraints.closing_search import (
+    Closing,
+    TieEquations,
+    best_closing,
+    random_starts,
+)
+from linkwise.runtime.constraints.held_frames import ROWS, held_by
+from linkwise.runtime.rule.joint_tree import (
+    JointTree,
+    TreeCoupling,
+    TreeFrame,
+    TreeJoint,
+    TreeLink,
+    TreeTie,
+)
+
+Array = NDArray[np.float64]
+
+
+class ClosedLoops(NamedTuple):
+    """A position q (n,) in which constraints hold, their Jacobian A (C, n), and the name of each row's."""
+
+    q: Array
+    rows: Array
+    owners: tuple[str, ...]
+
+
+def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
+    """Return one where A has its largest rank; raises LinkwiseError, which names what stays open."""
+    moved = joint_tree(tree)
+    held = held_by(moved, [link.name for link in moved.links], ())
+    starts = random_starts(joints)
+    found = best_closing(TieEquations(moved, joints, held), starts)
+    rows = [(one.name, row) for one in held for row in ROWS[one.kind]]
+    owners = (*(name for name, _ in rows), *(coupling.name for coupling in tree.couplings))
+    if not found.is_closed:
+        units = ["rad" if row.startswith("moment") else "m" for _, row in rows]
+        raise LinkwiseError(_told(found, owners, [*units, *("" for _ in tree.couplings)], len(starts)))
+    return ClosedLoops(found.q, found.rows, owners)
+
+
+def _told(found: Closing, owners: tuple[str, ...], units: list[str], tries: int) -> str:
+    """What stays open, by how much."""
+    worst = int(np.abs(found.left).argmax())
+    size, unit = found.open_by, units[worst]
+    text = f"{1000 * size:.3g} mm" if unit == "m" else f"{size:.3g} {unit}".strip()
+    return (
+        f"constraint {owners[worst]!r} never closes: from {tries} positions that were tried, {text} are left "
+        "at best; correct its places, or what it ties"
+    )
+
+
+def joint_tree(tree: RigidTree) -> JointTree:
+    """Return what tree.py has, without the formulas of run-time parameters."""
+    return JointTree(
+        tree.gravity,
+        tuple(
+            TreeJoint(b.parent, b.kind, b.coordinate, b.ratio, b.rotation, b.translation) for b in tree.bodies
+        ),
+        tuple(TreeLink(b.link, at, b.mass, b.com, b.inertia) for at, b in enumerate(tree.bodies)),
+        tuple(TreeFrame(f.name, f.body, f.rotation, f.translation) for f in tree.frames),
+        {},
+        tuple(TreeTie(t.name, t.kind, t.first, t.second, t.length) for t in tree.ties),
+        tuple(TreeCoupling(c.name, c.terms) for c in tree.couplings),
+        tree.independent,
+    )

@@ -1,0 +1,79 @@
+"""What holds beside the tree of a robot: ties of its frames, couplings of its joints, who moves them."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+from linkwise.robot.coordinates import Movement
+from linkwise.robot.couplings import check_joints, coupled
+from linkwise.robot.description import Description
+from linkwise.robot.joint_types import expand
+from linkwise.robot.notes import Note
+from linkwise.robot.robot import Coupling, Frame, Tie
+from linkwise.robot.ties import Ends, check_ties, tied
+
+
+@dataclass(frozen=True)
+class Constrained:
+    """Constraints of a robot; `wanted` are joints asked for as independent, `driven` by actuators."""
+
+    ties: tuple[Tie, ...]
+    couplings: tuple[Coupling, ...]
+    wanted: tuple[str, ...]
+    driven: tuple[int, ...]
+    notes: tuple[Note, ...]
+
+
+def check_constraints(description: Description) -> None:
+    """Raise LinkwiseError for a constraint without a name of its own, of unknown links or joints."""
+    names = Counter([tie.name for tie in description.ties] + [c.name for c in description.couplings])
+    for name, count in names.items():
+        if not name.strip():
+            raise LinkwiseError("a constraint has an empty name; name it")
+        if count > 1:
+            raise LinkwiseError(f"{count} constraints are named {name!r}; rename all but one")
+    check_ties(description.ties, description.bodies)
+    if description.couplings:
+        check_joints(
+            description.couplings, {axis.name for c in description.connections for axis in expand(c)}
+        )
+
+
+def constrained(
+    description: Description,
+    ends: Ends,
+    frames: Sequence[Frame],
+    movement: Movement,
+    free_mimic: bool,
+    independent: tuple[str, ...],
+) -> Constrained:
+    """Return what holds among the frames and coordinates that are left.
+
+    independent: those of the command line, which go before the file's. Raises LinkwiseError for a constraint
+    of which a part was cut away, and for names that are not of coordinates.
+    """
+    values = {sp.Symbol(name, real=True): value for name, value in description.parameters}
+    ties, lost = tied(description.ties, ends, frames, values)
+    couplings, uncoupled = coupled(description.couplings, movement.motion, free_mimic)
+    wanted = independent or description.independent
+    if not (ties or couplings):
+        if independent:
+            raise LinkwiseError("--independent is for constraints, and here are none; leave it out")
+        wanted = ()
+    known = {coordinate.name: k for k, coordinate in enumerate(movement.coordinates)}
+    for name, count in Counter(wanted).items():
+        if name not in known:
+            raise LinkwiseError(
+                f"--independent {name!r} is not a moving joint; the joints are {listed(known)}"
+                if independent
+                else f"independent has {name!r}, which is not a moving joint; the joints are {listed(known)}"
+            )
+        if count > 1:
+            raise LinkwiseError(f"the independent joint {name!r} is given {count} times; give it once")
+    rules = (movement.motion[name].coordinate for name in description.driven if name in movement.motion)
+    driven = sorted({k for k in rules if k is not None})
+    return Constrained(ties, couplings, wanted, tuple(driven), (*lost, *uncoupled))

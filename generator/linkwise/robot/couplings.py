@@ -1,0 +1,96 @@
+"""Couplings of joints as constraints on coordinates: joints that are locked or follow others are put in."""
+
+from collections.abc import Collection, Iterable, Mapping
+
+from linkwise.errors import LinkwiseError
+from linkwise.robot.coordinates import AxisRule
+from linkwise.robot.description import JointCoupling
+from linkwise.robot.notes import UNCOUPLED, Note
+from linkwise.robot.robot import Coupling
+
+CLOSE = 1e-9
+"""In rad and m, by which joints that stand still may miss what a coupling asks of them."""
+
+
+def coupled(
+    couplings: Iterable[JointCoupling], motion: Mapping[str, AxisRule], free: bool
+) -> tuple[tuple[Coupling, ...], list[Note]]:
+    """Return the couplings of the coordinates, and notes on those that are none here.
+
+    `free` lets joints of MJCF's equalities, and those whose master was cut away, move by themselves. Raises
+    LinkwiseError for a master that was cut away, and for locked joints that break a coupling.
+    """
+    found: list[Coupling] = []
+    notes: list[Note] = []
+    for coupling in couplings:
+        follower, *masters = (joint for joint, _ in coupling.terms)
+        lost = [joint for joint in masters if joint not in motion]
+        if follower not in motion:
+            notes.append(Note("cut", coupling.name, f"joint {follower!r} of that constraint is not there"))
+        elif lost and not free:
+            raise LinkwiseError(_orphan(coupling, follower, lost[0]))
+        elif lost or (free and coupling.equality):
+            by = "an equality" if coupling.equality else f"constraint {coupling.name!r}"
+            notes.append(Note("freed", follower, f"{coupling.rule} by {by}", UNCOUPLED))
+        elif terms := _terms(coupling, motion):
+            found.append(Coupling(coupling.name, terms))
+        else:
+            notes.append(Note("ignored", coupling.name, "a constraint on joints that keep it anyway"))
+    return tuple(found), notes
+
+
+def check_joints(couplings: Iterable[JointCoupling], axes: Collection[str]) -> None:
+    """Raise LinkwiseError for a joint that the file doesn't have."""
+    for coupling in couplings:
+        for joint, _ in coupling.terms:
+            if joint not in axes:
+                raise LinkwiseError(
+                    f"constraint {coupling.name!r} couples {joint!r}, which is not a joint that moves; "
+                    "correct it"
+                )
+
+
+def _orphan(coupling: JointCoupling, follower: str, master: str) -> str:
+    return (
+        f"joint {follower!r} is coupled to {master!r} by constraint {coupling.name!r}, which is not a moving "
+        f"joint here; hold it with --lock {follower}=0, or let such joints move by themselves with "
+        "--free-mimic"
+    )
+
+
+def _terms(
+    coupling: JointCoupling, motion: Mapping[str, AxisRule]
+) -> tuple[tuple[int, tuple[float, ...]], ...]:
+    """Terms by coordinate, all constants in the first one; none where nothing that moves is asked for."""
+    constant, by_coordinate = 0.0, dict[int, list[float]]()
+    for joint, coefficients in coupling.terms:
+        rule = motion[joint]
+        moved = composed(coefficients, rule.ratio, rule.offset)
+        if rule.coordinate is None:
+            constant += moved[0]
+            continue
+        total = by_coordinate.setdefault(rule.coordinate, [])
+        total += [0.0] * (len(moved) - len(total))
+        for power, coefficient in enumerate(moved):
+            total[power] += coefficient
+    constant += sum(total[0] for total in by_coordinate.values())
+    kept = {k: total for k, total in sorted(by_coordinate.items()) if any(total[1:])}
+    if not kept and abs(constant) > CLOSE:
+        raise LinkwiseError(
+            f"constraint {coupling.name!r} cannot hold: the joints that it couples stand still or move as "
+            f"one, and miss it by {abs(constant):.3g}; correct it, or hold them elsewhere with --lock"
+        )
+    first = min(kept, default=None)
+    return tuple((k, (constant if k == first else 0.0, *total[1:])) for k, total in kept.items())
+
+
+def composed(coefficients: tuple[float, ...], ratio: float, offset: float) -> tuple[float, ...]:
+    """Return the polynomial p(ratio q + offset) in q, by Horner's rule."""
+    result = [0.0]
+    for coefficient in reversed(coefficients):
+        shifted = [offset * c for c in result] + [0.0]
+        for power, c in enumerate(result):
+            shifted[power + 1] += ratio * c
+        shifted[0] += coefficient
+        result = shifted
+    return tuple(result[: len(coefficients)])

@@ -1,0 +1,120 @@
+"""Ties between bodies as ties between frames: frames for their ends, and what cutting and locking left."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+import sympy as sp
+
+from linkwise.errors import LinkwiseError
+from linkwise.robot import transforms
+from linkwise.robot.description import Anchor, AnchoredTie, Body, Description, Site
+from linkwise.robot.notes import LEFT_OUT, Note
+from linkwise.robot.robot import Frame, Scalar, Tie, unusable
+
+CLOSE = 1e-6
+"""In m, by which ends that move as one may miss a tie without a word."""
+
+Ends = dict[str, tuple[str, str]]
+"""Names of the frames that a tie joins, by its name."""
+
+
+def anchor_frames(description: Description, taken: Iterable[str]) -> tuple[tuple[Site, ...], Ends]:
+    """Return the file's sites and those for ends of ties that are no frame yet, and the names of all ends.
+
+    `taken` are names of other frames. A new one is called after its tie, pin_first say.
+    """
+    bodies, sites = description.bodies, description.sites
+    known = {Anchor(body.name): body.name for body in bodies if not body.invented}
+    used = {body.name for body in bodies} | set(taken)
+    for site in sites:
+        if site.name not in used:
+            known.setdefault(Anchor(site.body, site.rotation, site.translation), site.name)
+            used.add(site.name)
+    made: list[Site] = []
+
+    def name_of(anchor: Anchor, wanted: str) -> str:
+        if anchor not in known:
+            while wanted in used:
+                wanted += "_"
+            used.add(wanted)
+            known[anchor] = wanted
+            made.append(Site(wanted, anchor.body, anchor.rotation, anchor.translation))
+        return known[anchor]
+
+    ends = {
+        tie.name: (name_of(tie.first, f"{tie.name}_first"), name_of(tie.second, f"{tie.name}_second"))
+        for tie in description.ties
+    }
+    return (*sites, *made), ends
+
+
+def check_ties(ties: Iterable[AnchoredTie], bodies: Iterable[Body]) -> None:
+    """Raise LinkwiseError for links that the file doesn't have, and numbers that cannot be."""
+    known = {body.name for body in bodies}
+    for tie in ties:
+        for anchor in (tie.first, tie.second):
+            if anchor.body not in known:
+                raise LinkwiseError(
+                    f"constraint {tie.name!r} ties {anchor.body!r}, which is not a link; correct it"
+                )
+            if fault := unusable(*anchor.translation, *(e for row in anchor.rotation for e in row)):
+                raise LinkwiseError(f"constraint {tie.name!r} has {fault} in its place; give numbers")
+        if fault := unusable(tie.length):
+            raise LinkwiseError(f"constraint {tie.name!r} has {fault} for its length; give m")
+        if tie.kind == "distance" and tie.length <= 0:
+            raise LinkwiseError(
+                f"constraint {tie.name!r} has the length {tie.length:g}; give one above 0, or the type point"
+            )
+
+
+def tied(
+    ties: Iterable[AnchoredTie],
+    ends: Ends,
+    frames: Sequence[Frame],
+    values: Mapping[sp.Symbol, float],
+) -> tuple[tuple[Tie, ...], list[Note]]:
+    """Return the ties between frames that move against each other, and notes on the others.
+
+    Raises LinkwiseError for a tie to a link that was cut away.
+    """
+    at = {frame.name: index for index, frame in enumerate(frames)}
+    found: list[Tie] = []
+    notes: list[Note] = []
+    for tie in ties:
+        there = [frames[at[name]] for name in ends[tie.name] if name in at]
+        if len(there) < 2:
+            if any(frame.link is not None for frame in there):
+                raise LinkwiseError(_torn(tie, [name in at for name in ends[tie.name]]))
+            notes.append(Note("cut", tie.name, "a constraint on links that are not there"))
+        elif there[0].link == there[1].link:
+            notes.append(_as_one(tie, there[0], there[1], values))
+        else:
+            first, second = (at[name] for name in ends[tie.name])
+            found.append(Tie(tie.name, tie.kind, first, second, tie.length))
+    return tuple(found), notes
+
+
+def _torn(tie: AnchoredTie, there: list[bool]) -> str:
+    kept, lost = (tie.first, tie.second) if there[0] else (tie.second, tie.first)
+    return (
+        f"constraint {tie.name!r} ties link {kept.body!r} to link {lost.body!r}, which --root or --tip cuts "
+        "away; keep both, or remove the constraint from the file"
+    )
+
+
+def _as_one(tie: AnchoredTie, first: Frame, second: Frame, values: Mapping[sp.Symbol, float]) -> Note:
+    """Say that both ends move as one, and how far apart they are if that is not what the tie asks for."""
+    apart = transforms.add(first.translation, transforms.minus(second.translation))
+    off = abs(math.hypot(*(float(sp.sympify(x).xreplace(dict(values))) for x in apart)) - tie.length)
+    if off <= CLOSE:
+        return Note("ignored", tie.name, "a constraint whose ends move as one")
+    detail = f"its ends move as one, {1000 * off:.3g} mm away from it"
+    return Note("ignored", tie.name, detail, f"constraints {LEFT_OUT}")
+
+
+def tied_places(ties: Iterable[Tie], frames: Sequence[Frame]) -> Iterator[tuple[str, Scalar]]:
+    """Numbers of ties in which parameters may be, each with what it is."""
+    for tie in ties:
+        for frame in (frames[tie.first], frames[tie.second]):
+            for axis, value in zip("xyz", frame.translation, strict=True):
+                yield f"place_{frame.name}_{axis}", value
