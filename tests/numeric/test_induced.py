@@ -61,6 +61,67 @@ class OneSource(PinocchioModel):
         return self.tie.T @ matrix @ self.tie
 
 
+class OnFeet(PinocchioModel):
+    """Feet held where they are, by Pinocchio's constrained dynamics."""
+
+    def held(self, feet: list[str]) -> None:
+        """Make the constraints of bodies whose origins are held."""
+        self.ties, self.kept = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+        for name in feet:
+            frame = self.model.frames[self.model.getFrameId(name, pin.BODY)]
+            place = frame.parentJoint, frame.placement
+            tie = pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, self.model, *place, pin.LOCAL)
+            self.ties.append(tie)
+            self.kept.append(tie.createData())
+
+    def answer(self, q: Any, qd: Any, tau: Any, weight: bool) -> tuple[Any, Any]:
+        """Accelerations, and forces on the feet in the world's axes, one foot after the other."""
+        gravity = self.model.gravity.linear.copy()
+        self.model.gravity.linear = gravity * weight
+        state, back = self._state(q, qd, qd), np.linalg.inv(self.tie)
+        pin.initConstraintDynamics(self.model, self.data, self.ties, self.kept)
+        settings = pin.ProximalSettings(1e-14, 0.0, 1)
+        given = self.model, self.data, *state[:2], back.T @ tau, self.ties, self.kept, settings
+        qdd = back @ pin.constraintDynamics(*given)
+        self.model.gravity.linear = gravity
+        pin.forwardKinematics(self.model, self.data, state[0])
+        forces = []
+        for tie, kept in zip(self.ties, self.kept, strict=True):
+            turn = self.data.oMi[tie.joint1_id].rotation @ tie.joint1_placement.rotation
+            forces.append(turn @ kept.contact_force.linear)
+        return qdd, np.concatenate(forces)
+
+
+def test_every_source_alone_moves_a_robot_that_stands_as_pinocchio_says(tmp_path: Path) -> None:
+    path, options = next(ROBOTS.rglob("solo12.urdf")), Options(base="floating")
+    system = read_system(path, options)
+    write_package(generate(system, ["numpy"], "robot", kernel="loops"), tmp_path / "robot")
+    module = import_package(tmp_path / "robot")
+    robot, oracle = module.load("numpy"), OnFeet(path, system, True)
+    feet = ["FL_FOOT", "HR_FOOT", "HL_FOOT"]
+    oracle.held(feet)
+    bend = {"HAA": 0.2, "HFE": 0.7, "KFE": -1.3}
+    q = np.array([0.1, 0.2, 0.3, 0.3, -0.2, 0.1, *(bend[name[-3:]] for name in robot.joint_names[6:])])
+    standing = robot.constrained(contacts=[module.Contact(foot, "point") for foot in feet], at=q)
+    generator = np.random.default_rng(4)
+    qd = standing.velocity(q, generator.uniform(-1.0, 1.0, robot.n - 9))
+    tau, rest = generator.uniform(-1.0, 1.0, robot.n), 0 * q
+    shares = robot.induced_accelerations(q, qd, tau, constraints=standing)
+    forces = robot.induced_reactions(q, qd, tau, constraints=standing)
+    units = [oracle.answer(q, rest, torque, False) for torque in np.diag(tau)]
+    for found, k in ((shares, 0), (forces, 1)):
+        own = found.velocity.sum((-2, -1)) + found.constraints.sum(-1)
+        for value, expected in (
+            (found.actuators, np.stack([unit[k] for unit in units], -1)),
+            (found.gravity.sum(-1), oracle.answer(q, rest, rest, True)[k]),
+            (own, oracle.answer(q, qd, rest, False)[k]),
+            (found.total, oracle.answer(q, qd, tau, True)[k]),
+        ):
+            assert relative_error(value, expected) <= LARGEST_ERROR
+    foot = robot.induced_accelerations(q, qd, tau, frame=feet[1], constraints=standing)
+    assert np.abs(foot.total[3:]).max() <= LARGEST_ERROR, "a foot that is held does not accelerate"
+
+
 @pytest.mark.parametrize("name", ROBOT_OPTIONS)
 def test_every_source_alone_accelerates_as_pinocchio_says(name: str, tmp_path: Path) -> None:
     path, options = next(ROBOTS.rglob(f"{name}.urdf")), ROBOT_OPTIONS[name]
