@@ -52,7 +52,7 @@ class Held(NamedTuple):
 
 def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
     """Ties of the tree, then contacts; raises as `Dynamics.constrained` does."""
-    if isinstance(contacts, Contact) or not isinstance(contacts, list | tuple):
+    if is_contact(contacts) or not isinstance(contacts, list | tuple):
         raise TypeError(f"contacts is {short(contacts)}; give a list of Contact")
     ties = [
         Held(tie.name, tie.kind, tie.first, tie.second, np.eye(3), length=tie.length) for tie in tree.ties
@@ -61,7 +61,7 @@ def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
     taken = {tie.name for tie in tree.ties} | {coupling.name for coupling in tree.couplings}
     for number, contact in enumerate(contacts):
         where = f"contacts[{number}]"
-        if not isinstance(contact, Contact):
+        if not is_contact(contact):
             raise TypeError(f"{where} is {short(contact)}; give a Contact")
         made = _held(contact, where, frames, links)
         if tree.frames[made.first].joint is None:
@@ -71,6 +71,11 @@ def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
         taken.add(made.name)
         ties.append(made)
     return ties
+
+
+def is_contact(given: Any) -> bool:
+    """Whether it is a contact, of this package or of another."""
+    return isinstance(given, tuple) and getattr(given, "_fields", None) == Contact._fields
 
 
 def _held(contact: Contact, where: str, frames: Sequence[str], links: Sequence[str]) -> Held:
