@@ -120,3 +120,16 @@ def test_the_command_writes_them_with_units_meaning_and_residual(
 def test_a_point_that_is_not_there_is_named(arm: Path, asked: list[str], message: str) -> None:
     with pytest.raises(LinkwiseError, match=message):
         analyze(arm / "log.csv", arm / "arm", induced=asked)
+
+
+def test_a_figure_shows_components_that_anything_accelerates(arm: Path) -> None:
+    found = analyze(arm / "log.csv", arm / "arm", induced=["joints", "tool"])
+    for name, labels in (("induced", JOINTS), ("induced:tool", "xyz")):
+        panels = found.figure(name).axes
+        assert [panel.get_ylabel().split(" ")[0] for panel in panels] == list(labels)
+        curves = panels[0].get_lines()
+        assert [curve.get_label() for curve in curves][:2] == ["all together", "torque of ab"]
+        parts = sum(curve.get_ydata() for curve in curves[1:-1])  # the last one is the axis
+        assert relative_error(parts, curves[0].get_ydata()) <= 1e-10
+    with pytest.raises(LinkwiseError, match=r"^--figure induced:hand: add --induced hand, whose shares it"):
+        found.figure("induced:hand")

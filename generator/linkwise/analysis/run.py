@@ -42,7 +42,8 @@ class Analysis(AnalysisResult):
     """What `analyze` returns: an `AnalysisResult` that draws itself."""
 
     def figure(self, name: str = "paper") -> "Figure":
-        """A matplotlib figure: "paper", or "paper:JOINT" for another joint than the first; "shares"; "power".
+        """A matplotlib figure: "paper", or "paper:JOINT" for another joint than the first; "shares"; "power";
+        "induced", or "induced:POINT" likewise.
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """
@@ -106,7 +107,7 @@ def analyze_to(
     `analyze` does, and where `out` holds something else than a former result or cannot be written.
     """
     for name in wanted.figures:
-        check_figure(name, robot)
+        check_figure(name, robot, wanted.induced)
     refuse_inside_package(out)
     for file in (log, *loads.paths):
         if os.path.realpath(file).startswith(os.path.join(os.path.realpath(out), "")):

@@ -45,7 +45,8 @@ Terms = Annotated[
 ]
 TableFormat = Annotated[Format, typer.Option(help="Format of the table")]
 Figures = Annotated[
-    list[str] | None, typer.Option(help="paper, paper:JOINT, shares or power; may be repeated")
+    list[str] | None,
+    typer.Option(help="paper, paper:JOINT, shares, power, induced or induced:POINT; may be repeated"),
 ]
 PowerTerms = Annotated[bool, typer.Option("--power-terms", help="Write power by cause and order too")]
 Carried = Annotated[
