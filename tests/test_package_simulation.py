@@ -1,7 +1,8 @@
-"""`robot.simulate`: closed solutions, order, energy, loads, controllers, gradients, messages."""
+"""`model.simulate`: closed solutions, order, energy, loads, controllers, gradients, messages."""
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -11,6 +12,7 @@ from answers import relative_error
 from conftest import DATA, needs_compiler
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
+from urdf_text import joint, link, robot
 
 torch = pytest.importorskip("torch")
 integrate = pytest.importorskip("scipy.integrate")
@@ -52,8 +54,8 @@ def test_a_pendulum_swings_as_its_closed_solution(rod: ModuleType) -> None:
     expected = swing(time, angle)
     found = rod.load().simulate(*start, time, method="DOP853", rtol=1e-12, atol=1e-13)
     assert np.abs(found.q[:, 0] + np.pi / 2.0 - expected).max() <= 1e-9
-    robot, angle = rod.load(), 1.0
-    ends = [robot.simulate([angle - np.pi / 2.0], [0.0], [0.0, 1.0], step=h) for h in (0.02, 0.01, 0.005)]
+    model, angle = rod.load(), 1.0
+    ends = [model.simulate([angle - np.pi / 2.0], [0.0], [0.0, 1.0], step=h) for h in (0.02, 0.01, 0.005)]
     errors = [abs(end.q[-1, 0] + np.pi / 2.0 - swing(1.0, angle)) for end in ends]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(np.abs(orders - 4.0) < 0.05), orders
@@ -62,9 +64,9 @@ def test_a_pendulum_swings_as_its_closed_solution(rod: ModuleType) -> None:
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_what_energy_changes_is_work(backend: str, package_of: Packages) -> None:
     package = package_of(CRANE)
-    robot = package.load(backend)
-    q, qd, tau = np.random.default_rng(6).uniform(-1.0, 1.0, (3, 2, robot.n))
-    load = package.AppliedLoad(robot.link_names[-1], [5.0, -4.0, 8.0], [0.5, 0.1, 0.2], [0.1, 0.0, 0.2])
+    model = package.load(backend)
+    q, qd, tau = np.random.default_rng(6).uniform(-1.0, 1.0, (3, 2, model.n))
+    load = package.AppliedLoad(model.link_names[-1], [5.0, -4.0, 8.0], [0.5, 0.1, 0.2], [0.1, 0.0, 0.2])
 
     def controller(t: float, q: Any, qd: Any) -> Any:
         return float(np.sin(3.0 * t)) - 2.0 * qd
@@ -72,9 +74,9 @@ def test_what_energy_changes_is_work(backend: str, package_of: Packages) -> None
     for given in (tau, controller):
         drifts = []
         for step in (0.04, 0.02):
-            found = robot.simulate(q, qd, [0.0, 0.04, 0.08], given, [load], step=step)
+            found = model.simulate(q, qd, [0.0, 0.04, 0.08], given, [load], step=step)
             assert [tuple(a.shape) for a in found] == [
-                *((3,), (3, 2, robot.n), (3, 2, robot.n), (3, 2, robot.n), (3, 2), (3, 2))
+                *((3,), (3, 2, model.n), (3, 2, model.n), (3, 2, model.n), (3, 2), (3, 2))
             ]
             drifts.append(float(abs(found.energy_drift).max()))
         change = float(abs(found.energy[-1] - found.energy[0]).max())
@@ -82,30 +84,62 @@ def test_what_energy_changes_is_work(backend: str, package_of: Packages) -> None
         assert drifts[1] <= drifts[0] / 8.0, drifts
 
 
+HAND = robot(
+    *map(link, "abc"),
+    joint("ab", "a", "b", inner='<dynamics damping="0.5" friction="0"/>'),
+    joint("bc", "b", "c", inner='<dynamics damping="0.1" friction="0.2"/>'),
+    """<gazebo reference="bc"><springStiffness>4</springStiffness>
+    <springReference>0.1</springReference></gazebo>
+    <transmission xmlns:drake="http://drake.mit.edu"><joint name="bc"/><actuator>
+    <drake:rotor_inertia value="1e-4"/><drake:gear_ratio value="50"/></actuator></transmission>""",
+)
+
+
+@pytest.mark.parametrize("own", ["with armature", "without"])
+def test_springs_and_gears_store_what_losses_do_not_take(own: str, tmp_path: Path) -> None:
+    text = HAND if own == "with armature" else HAND.replace("1e-4", "0")
+    (tmp_path / "hand.urdf").write_text(text)
+    write_package(generate(read_system(tmp_path / "hand.urdf"), ["numpy"]), tmp_path / "hand")
+    hand = import_package(tmp_path / "hand").load()
+    q, qd, tau = np.array([[0.3, 0.2], [0.5, 3.0], [0.4, 1.0]])
+    found = hand.simulate(q, qd, [0.0, 0.04, 0.08], tau, method="DOP853")
+    assert np.all(found.qd[:, 1] > 0.0), "friction has one sign"
+    assert np.abs(found.energy_drift).max() <= 1e-8
+    free = hand.simulate(q, qd, [0.0, 0.04, 0.08], tau, method="DOP853", passive=False)
+    assert relative_error(found.q, free.q) > 1e-3
+
+    def rates(t: float, state: Any) -> Any:
+        return np.concatenate([state[2:], hand.forward_dynamics(state[:2], state[2:], tau, passive=True)])
+
+    start = np.concatenate([q, qd])
+    own_way = integrate.solve_ivp(rates, (0.0, 0.08), start, "RK45", rtol=1e-10, atol=1e-12)
+    assert relative_error(found.q[-1], own_way.y[:2, -1]) <= 1e-8
+
+
 def test_the_energy_of_moving_bases_is_what_their_velocities_leave(package_of: Packages) -> None:
-    robot = package_of(str(DATA / "turntable.py")).load("numpy")
-    q, qd = np.random.default_rng(2).uniform(-1.0, 1.0, (2, robot.n))
-    found = robot.simulate(q, qd, np.linspace(0.0, 1.0, 5), method="DOP853")
+    model = package_of(str(DATA / "turntable.py")).load("numpy")
+    q, qd = np.random.default_rng(2).uniform(-1.0, 1.0, (2, model.n))
+    found = model.simulate(q, qd, np.linspace(0.0, 1.0, 5), method="DOP853")
     assert np.abs(found.energy_drift).max() <= 1e-7 * np.abs(found.energy).max()
 
 
 def test_steps_of_all_kinds_lead_to_one_place(package_of: Packages) -> None:
-    robot = package_of(CRANE).load("numpy")
-    q, qd, tau = np.random.default_rng(7).uniform(-1.0, 1.0, (3, 4, robot.n))
+    model = package_of(CRANE).load("numpy")
+    q, qd, tau = np.random.default_rng(7).uniform(-1.0, 1.0, (3, 4, model.n))
     time = np.array([0.5, 0.65, 0.7])
     found = [
-        robot.simulate(q, qd, time, tau, passive=False, **how)
+        model.simulate(q, qd, time, tau, passive=False, **how)
         for how in ({"step": 2e-3}, {"method": "RK45"}, {"method": "Radau", "rtol": 1e-7})
     ]
 
     def rates(t: float, state: Any) -> Any:
-        a, b = state.reshape(2, 4, robot.n)
-        return np.stack([b, robot.forward_dynamics(a, b, tau)]).ravel()
+        a, b = state.reshape(2, 4, model.n)
+        return np.stack([b, model.forward_dynamics(a, b, tau)]).ravel()
 
     own = integrate.solve_ivp(
         rates, (0.5, 0.7), np.stack([q, qd]).ravel(), "LSODA", t_eval=time, rtol=1e-11, atol=1e-12
     )
-    expected = own.y.T.reshape(3, 2, 4, robot.n)
+    expected = own.y.T.reshape(3, 2, 4, model.n)
     for one, bound in zip(found, (1e-7, 1e-7, 1e-5), strict=True):
         np.testing.assert_array_equal(one.time, time)
         assert relative_error(one.q, expected[:, 0]) <= bound
@@ -113,15 +147,15 @@ def test_steps_of_all_kinds_lead_to_one_place(package_of: Packages) -> None:
 
 
 def test_gradients_flow_through_the_steps(package_of: Packages) -> None:
-    robot = package_of(CRANE).load("torch")
-    q, qd, tau = torch.from_numpy(np.random.default_rng(8).uniform(-1, 1, (3, robot.n)))
+    model = package_of(CRANE).load("torch")
+    q, qd, tau = torch.from_numpy(np.random.default_rng(8).uniform(-1, 1, (3, model.n)))
 
     def end(*given: Any) -> Any:
-        return robot.simulate(*given[:2], [0.0, 0.03], given[2]).q[-1]
+        return model.simulate(*given[:2], [0.0, 0.03], given[2]).q[-1]
 
     assert torch.autograd.gradcheck(end, tuple(a.requires_grad_() for a in (q, qd, tau)), fast_mode=True)
     with pytest.raises(TypeError, match=r"^method 'RK45' computes with arrays and keeps no gradient"):
-        robot.simulate(q, qd, [0.0, 0.1], method="RK45")
+        model.simulate(q, qd, [0.0, 0.1], method="RK45")
 
 
 @pytest.mark.parametrize(
@@ -145,16 +179,16 @@ def test_gradients_flow_through_the_steps(package_of: Packages) -> None:
 def test_what_is_wrong_with_a_simulation_is_named(
     given: dict[str, Any], message: str, package_of: Packages
 ) -> None:
-    robot = package_of(CRANE).load("numpy")
+    model = package_of(CRANE).load("numpy")
     with pytest.raises(ValueError, match=message):
-        robot.simulate(**({"q": np.zeros(3), "qd": np.zeros(3), "time": [0.0, 0.1]} | given))
+        model.simulate(**({"q": np.zeros(3), "qd": np.zeros(3), "time": [0.0, 0.1]} | given))
 
 
 def test_without_scipy_fixed_steps_remain(rod: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "scipy.integrate", None)
-    robot = rod.load()
-    assert robot.simulate([0.0], [0.0], [0.0, 0.1]).q.shape == (2, 1)
+    model = rod.load()
+    assert model.simulate([0.0], [0.0], [0.0, 0.1]).q.shape == (2, 1)
     with pytest.raises(
         ImportError, match=r"^method 'RK45' is SciPy's, which is not installed here: pip inst"
     ):
-        robot.simulate([0.0], [0.0], [0.0, 0.1], method="RK45")
+        model.simulate([0.0], [0.0], [0.0, 0.1], method="RK45")

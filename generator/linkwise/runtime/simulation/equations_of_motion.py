@@ -30,7 +30,7 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class EquationsOfMotion:
-    """Of a robot with actuators and loads; `tau` and `loads` are functions of (t, q, qd), or values."""
+    """Of a robot; `tau` and `loads` are functions of (t, q, qd), or torques (..., n) and a list of loads."""
 
     robot: Any
     tau: Any
@@ -55,30 +55,24 @@ class EquationsOfMotion:
         q, qd = self.motion(state)
         tau, pull = self.torques(t, q, qd), self.load_torque(t, q, qd)
         given = tau if pull is None else tau - pull
-        power = given
-        if self.passive:
-            _, damping, friction, _ = self.robot.passive_torque(q, qd, 0.0 * qd)
-            power = given - damping - friction
-        work = (qd * power).sum(-1)
+        if not self.passive:
+            return State(qd, self._accelerated(q, qd, given, False), (qd * given).sum(-1))
+        spring, damping, friction, _ = self.robot.passive_torque(q, qd, 0.0 * qd)
+        work = (qd * (given - damping - friction)).sum(-1)
+        if any(self.robot.structure.passive_sums.armature):
+            return State(qd, self._accelerated(q, qd, given, True), work)
+        left = given - spring - damping - friction
+        return State(qd, self._accelerated(q, qd, left, False), work)
+
+    def _accelerated(self, q: Any, qd: Any, given: Any, passive: bool) -> Any:
+        """Rates of v."""
         if self.constraints is None:
-            return State(qd, self.robot.forward_dynamics(q, qd, given, self.passive), work)
-        qdd = self.constraints.forward_dynamics(q, qd, given, self.passive).qdd
-        return State(qd, qdd[..., self.own], work)
+            return self.robot.forward_dynamics(q, qd, given, passive)
+        return self.constraints.forward_dynamics(q, qd, given, passive).qdd[..., self.own]
 
     def torques(self, t: float, q: Any, qd: Any) -> Any:
         """What the actuators give, (..., n)."""
-        given = self.tau(t, q, qd) if callable(self.tau) else self.tau
-        if given is None:
-            return 0.0 * q
-        tau = self.robot.backend.weights("tau", given, q)
-        check_axes({"tau": tau}, self.robot.n)
-        try:
-            fits = np.broadcast_shapes(tuple(tau.shape), tuple(q.shape)) == tuple(q.shape)
-        except ValueError:
-            fits = False
-        if not fits:
-            raise no_common_shape({"q": q, "tau": tau}, self.robot.n)
-        return tau + 0.0 * q
+        return checked_torques(self.robot, self.tau(t, q, qd), q) if callable(self.tau) else self.tau
 
     def load_torque(self, t: float, q: Any, qd: Any) -> Any:
         """What loads ask of the joints, (..., n); None for none."""
@@ -96,6 +90,19 @@ class EquationsOfMotion:
             )
             total = total + ((stiffness * q / 2.0 + pull) * q + armature * qd * qd / 2.0).sum(-1)
         return total
+
+
+def checked_torques(robot: Any, given: Any, q: Any) -> Any:
+    """Torques of the shape and kind of q (..., n); raises ValueError for what does not fit."""
+    tau = robot.backend.weights("tau", given, q)
+    check_axes({"tau": tau}, robot.n)
+    try:
+        fits = np.broadcast_shapes(tuple(tau.shape), tuple(q.shape)) == tuple(q.shape)
+    except ValueError:
+        fits = False
+    if not fits:
+        raise no_common_shape({"q": q, "tau": tau}, robot.n)
+    return tau + 0.0 * q
 
 
 def _conserved(robot: Any, q: Any, qd: Any) -> Any:

@@ -11,7 +11,7 @@ from ..chosen_names import short
 from ..induced.responses import constraints_of
 from ..motion_quantities import Trajectory
 from ..sums.namespace import namespace
-from .equations_of_motion import EquationsOfMotion, State
+from .equations_of_motion import EquationsOfMotion, State, checked_torques
 from .integrators import ADAPTIVE, by_scipy, in_fixed_steps
 
 
@@ -53,6 +53,8 @@ def _started(
 ) -> tuple[EquationsOfMotion, State]:
     """The equations, and the state that they start from."""
     work, passive = 0.0 * q.sum(-1), passive and bool(robot.structure.passive)
+    if not callable(tau):
+        tau = 0.0 * q if tau is None else checked_torques(robot, tau, q)
     if constraints is None:
         return EquationsOfMotion(robot, tau, loads, passive, None, None, None), State(q, qd, work)
     own = robot.backend.index(np.array([robot.joint_index(name) for name in constraints.independent]), q)
