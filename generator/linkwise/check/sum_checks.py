@@ -100,10 +100,21 @@ def _energies(model: Model, reference: Reference, at: Any) -> Iterator[Entries]:
 
 
 def _accelerations(model: Model, reference: Reference, at: Any) -> Iterator[Entries]:
-    """Of the reference's torques: rounding of these and of M qdd moves qdd by |M^-1| times as much."""
+    """Of the reference's torques: rounding of these and of M qdd moves qdd by |M^-1| times as much.
+
+    A robot with ties has none of its open tree.
+    """
+    if is_tied(model):
+        return
     q, qd, qdd = reference.states.at(at).motion
     found = model.forward_dynamics(q, qd, reference.values["tau"][at].sum(-1))
     yield _flat("qdd", found, qdd, acceleration_scales(reference, at), np.ndim(at))
+
+
+def is_tied(model: Model) -> bool:
+    """Whether ties or couplings close loops of the open tree."""
+    tree = model.backend.tree
+    return tree is not None and bool(tree.ties or tree.couplings)
 
 
 def acceleration_scales(reference: Reference, at: Any) -> Array:

@@ -28,6 +28,9 @@ from .sum_calls import SumCalls
 class Dynamics(SumCalls, MotionCalls):
     """Partial torques of a robot on one back end; made by the package's `load`.
 
+    The robot is the open tree of its joints: of one with ties, which close loops, or with contacts, calls are
+    as if these were cut, and `constraints` has what they leave.
+
     q, qd, qdd: positions, velocities and accelerations of shape (..., n): rad, rad/s, rad/s^2 for a revolute
     joint, m, m/s, m/s^2 for a prismatic one. They are arrays, tensors, lists or tuples, as `load` says; the
     shapes before the last axis broadcast.
@@ -98,8 +101,7 @@ class Dynamics(SumCalls, MotionCalls):
     def constraints(self) -> Constraints[Any]:
         """What the ties and couplings of the robot's file leave of its motion, see `Constraints`.
 
-        All calls of `Dynamics` itself are of the open tree, as if its ties were cut. Raises ValueError for a
-        robot without any.
+        Raises ValueError for a robot without any, and for links of energies.
         """
         return Constraints(self.backend.constraints(self, None, (), None, None))
 
