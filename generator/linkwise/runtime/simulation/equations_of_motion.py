@@ -65,9 +65,9 @@ class EquationsOfMotion:
         return State(qd, self._accelerated(q, qd, left, False), work)
 
     def _accelerated(self, q: Any, qd: Any, given: Any, passive: bool) -> Any:
-        """Rates of v."""
+        """Rates of v; of a robot whose ties are cut, which its face does not answer, too."""
         if self.constraints is None:
-            return self.robot.forward_dynamics(q, qd, given, passive)
+            return self.robot._answers.forward_dynamics(q, qd, given, passive)
         return self.constraints.forward_dynamics(q, qd, given, passive).qdd[..., self.own]
 
     def torques(self, t: float, q: Any, qd: Any) -> Any:
