@@ -35,8 +35,8 @@ class _Sources:
         inverse = np.linalg.inv(mass)
         found = {}
         for source, (force, size) in self.forces.items():
-            columns = inverse @ _flat(force)
-            scale = np.abs(inverse) @ (_flat(size) + noise @ np.abs(columns))
+            columns = inverse @ flat(force)
+            scale = np.abs(inverse) @ (flat(size) + noise @ np.abs(columns))
             found[source] = columns.reshape(force.shape), scale.reshape(force.shape)
         return found
 
@@ -86,7 +86,7 @@ def _asked(model: Model, reference: Reference, rows: NDArray[np.intp]) -> Iterat
     states = reference.states.at(rows)
     torque, size = (a["tau"][rows].sum(-1) for a in (reference.values, reference.scales))
     sources = _sources(reference, rows, ())
-    own = _Sources(states, sources.mass, {"actuators": (_diagonal(torque), _diagonal(size))})
+    own = _Sources(states, sources.mass, {"actuators": (diagonal(torque), diagonal(size))})
     found = model.induced_accelerations(states.q, states.qd, qdd=states.qdd, constraints=False)
     yield Entries("actuators asked for", found.actuators, *own.accelerations()["actuators"])
 
@@ -113,8 +113,8 @@ def _of_a_point(
         q, qd, tau, loads=(load, [load, load]), frame=frame, point=point, constraints=False
     )
     for source, (value, scale) in sources.accelerations().items():
-        moved = jacobian @ _flat(value)
-        size = np.abs(jacobian) @ _flat(scale) + reach @ np.abs(_flat(value))
+        moved = jacobian @ flat(value)
+        size = np.abs(jacobian) @ flat(scale) + reach @ np.abs(flat(value))
         shape = len(rows), 6, *value.shape[2:]
         yield Entries(
             f"{source} of {frame}", getattr(found, source), moved.reshape(shape), size.reshape(shape)
@@ -132,9 +132,9 @@ def _sources(reference: Reference, rows: NDArray[np.intp], joints: Sequence[Pass
     rotor = passive_reference(joints, States(states.q, states.qd, np.ones_like(states.q)))[0][3]
     return _Sources(
         states,
-        (values["c2"].sum(2) + _diagonal(rotor), scales["c2"].sum(2) + _diagonal(rotor)),
+        (values["c2"].sum(2) + diagonal(rotor), scales["c2"].sum(2) + diagonal(rotor)),
         {
-            "actuators": (_diagonal(states.qdd), _diagonal(np.abs(states.qdd))),
+            "actuators": (diagonal(states.qdd), diagonal(np.abs(states.qdd))),
             "velocity": (-values["c1"] * over, scales["c1"] * np.abs(over)),
             "gravity": (-values["g"], scales["g"]),
             "passive": (_by_kind(-shares[:3]), _by_kind(sizes[:3])),
@@ -144,14 +144,15 @@ def _sources(reference: Reference, rows: NDArray[np.intp], joints: Sequence[Pass
 
 def _by_kind(shares: Array) -> Array:
     """Diagonals (samples, n, 3, n) of shares (3, samples, n)."""
-    return np.moveaxis(_diagonal(shares), 0, 2)
+    return np.moveaxis(diagonal(shares), 0, 2)
 
 
-def _diagonal(values: Array) -> Array:
-    diagonal: Array = np.eye(values.shape[-1]) * values[..., None, :]
-    return diagonal
+def diagonal(values: Array) -> Array:
+    """Matrices (..., n, n) with these (..., n) on their diagonals."""
+    matrices: Array = np.eye(values.shape[-1]) * values[..., None, :]
+    return matrices
 
 
-def _flat(values: Array) -> Array:
+def flat(values: Array) -> Array:
     """(samples, n, ...) as columns (samples, n, X)."""
     return values.reshape(*values.shape[:2], int(np.prod(values.shape[2:])))
