@@ -1,11 +1,11 @@
 """The command line: what each command prints and writes, and what it says to bad input."""
 
+import hashlib
 import json
 import os
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -75,9 +75,9 @@ def test_generate_replaces_an_earlier_package_whole(linkwise: Run, planar2: Path
 
 def test_manifest_tells_how_to_make_the_package_again(planar2: Path) -> None:
     manifest = json.loads((planar2 / "manifest.json").read_text())
-    assert manifest["schema"] == 7
+    assert manifest["schema"] == 8
     asked = {"robot": "planar2", "backends": ["numpy"], "kernel": "auto", "derivation": "rule"}
-    assert manifest["request"] == asked | asdict(Options())
+    assert manifest["request"] == asked | Options().request()
     assert manifest["kernel"] == "straight"
     assert [joint["name"] for joint in manifest["joints"]] == ["joint1", "joint2"]
     assert manifest["links"][1]["path"] == [0, 1]
@@ -494,3 +494,74 @@ def test_terms_of_a_floating_robot_are_counted(linkwise: Run, tmp_path: Path) ->
     assert done.returncode == 0, done.stderr
     (torque, *_) = json.loads(done.stdout)["torques"]
     assert torque["joint"] == 7
+
+
+LOOP = """schema = 1
+[[constraint]]
+name = "{name}"
+type = "point"
+first = {{ frame = "rod", xyz = [0.31, 0, 0] }}
+second = {{ frame = "rocker", xyz = [{at}, 0, 0] }}
+"""
+
+
+@pytest.fixture
+def bars(tmp_path: Path) -> Path:
+    """The four-bar without its pin."""
+    tree = (DATA / "fourbar.toml").read_text().partition("[[constraint]]")[0]
+    (tmp_path / "bars.toml").write_text(tree)
+    return tmp_path / "bars.toml"
+
+
+def test_a_file_beside_the_robots_closes_its_loop(bars: Path, linkwise: Run, tmp_path: Path) -> None:
+    (tmp_path / "loop.toml").write_text(LOOP.format(name="pin", at=0.24))
+    asked = ("bars.toml", "--constraints", "loop.toml", "--independent", "c")
+    done = linkwise("generate", *asked, "--out", "out", "--backend", "numpy")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[1] == "independent: c; following by constraints: a, b"
+    assert done.stderr.splitlines() == [
+        "warning: bars.toml: constraints, which robot.constraints holds, beside the torques of the open "
+        "tree: pin (point, pin_first and pin_second)",
+        "warning: bars.toml: constraints that hold something twice, so that their forces are shared by least "
+        "squares: pin",
+    ]
+    request = json.loads((tmp_path / "out/fourbar/manifest.json").read_text())["request"]
+    digest = hashlib.sha256((tmp_path / "loop.toml").read_bytes()).hexdigest()
+    assert request["constraints"] == {"file": "loop.toml", "sha256": digest}
+    assert request["independent"] == ["c"]
+    assert linkwise("check", "out/fourbar").returncode == 0
+    shown = linkwise("inspect", *asked).stdout
+    table = "\nconstraints (of `robot.constraints`; on what)\n  pin  (point: pin_first and pin_second)\n"
+    assert table + "  independent: c\n  dependent: a, b\n" in shown
+    data = json.loads(linkwise("inspect", *asked, "--json").stdout)
+    assert (data["independent"], data["dependent"]) == (["c"], ["a", "b"])
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (
+            ("--constraints", "far.toml"),
+            "bars.toml: constraint 'pin' never closes: from 24 positions that were",
+        ),
+        (("--constraints", "none.toml"), "bars.toml: none.toml: no such file"),
+        (
+            ("--constraints", "."),
+            "bars.toml: .: this is a directory; give a TOML file with [[constraint]] in it",
+        ),
+        (
+            ("--independent", "a"),
+            "bars.toml: --independent is for constraints, and here are none; leave it out",
+        ),
+        (("--independent", "a,,b"), "--independent has an empty name; give joints as A,B"),
+    ],
+)
+def test_constraints_that_cannot_be_are_one_line_and_nothing_is_written(
+    flags: tuple[str, str], message: str, bars: Path, linkwise: Run, tmp_path: Path
+) -> None:
+    (tmp_path / "far.toml").write_text(LOOP.format(name="pin", at=3))
+    done = linkwise("generate", bars.name, *flags, "--out", "out", "--backend", "numpy")
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"linkwise: error: {message}")
+    assert len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "out").exists()

@@ -43,6 +43,8 @@ def bodies(data: Any) -> Any:
     return data["tree"]["bodies"]
 
 
+TIE = {"name": "loop", "kind": "point", "first": 0, "second": 1, "length": 0.0}
+
 DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
     **{
         key: (lambda data, key=key: data.pop(key), f"the whole is not an object with {key}")  # type: ignore[misc]
@@ -135,6 +137,54 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
     "formula of a rotation": (
         lambda data: data["tree"]["formulas"].update({"bodies[0].rotation[0][0]": "m"}),
         "tree.formulas has 'bodies[0].rotation[0][0]', which is not a place",
+    ),
+    "tie of an unknown kind": (
+        lambda data: data["tree"]["ties"].append(TIE | {"kind": "weld"}),
+        "tree.ties[0].kind is not 'point' or 'hinge' or 'frame' or 'distance'",
+    ),
+    "tie of no frame": (
+        lambda data: data["tree"]["ties"].append(TIE | {"second": 9}),
+        "the tie 'loop' of the tree is not between two of its frames",
+    ),
+    "tie of one frame": (
+        lambda data: data["tree"]["ties"].append(TIE | {"second": 0}),
+        "the tie 'loop' of the tree is not between two of its frames",
+    ),
+    "length of a point": (
+        lambda data: data["tree"]["ties"].append(TIE | {"length": 0.1}),
+        "the tie 'loop' of the tree has a length that it cannot have",
+    ),
+    "distance of zero": (
+        lambda data: data["tree"]["ties"].append(TIE | {"kind": "distance"}),
+        "the tie 'loop' of the tree has a length that it cannot have",
+    ),
+    "tie twice": (
+        lambda data: data["tree"]["ties"].extend([TIE, TIE]),
+        "tree.ties and tree.couplings have 'loop' twice",
+    ),
+    "coupling of no joint": (
+        lambda data: data["tree"]["couplings"].append({"name": "gear", "terms": [[2, [0, 1]]]}),
+        "the coupling 'gear' of the tree has a joint that is not there",
+    ),
+    "coupling of a constant": (
+        lambda data: data["tree"]["couplings"].append({"name": "gear", "terms": [[0, [0, 1]], [1, [1]]]}),
+        "the coupling 'gear' of the tree does not couple joints in order",
+    ),
+    "coupling of one joint twice": (
+        lambda data: data["tree"]["couplings"].append({"name": "gear", "terms": [[0, [0, 1]], [0, [0, 1]]]}),
+        "the coupling 'gear' of the tree does not couple joints in order",
+    ),
+    "independent of nothing": (
+        lambda data: data["tree"].update(independent=[0]),
+        "tree.independent is not of some joints where there are constraints, else of none",
+    ),
+    "all independent": (
+        lambda data: data["tree"].update(ties=[TIE], independent=[0, 1]),
+        "tree.independent is not of some joints where there are constraints, else of none",
+    ),
+    "independent of no joint": (
+        lambda data: data["tree"].update(ties=[TIE], independent=[2]),
+        "tree.independent is not of joints, in ascending order",
     ),
     "link twice": (lambda data: data["links"][1].update(name="link1"), "links has 'link1' twice"),
 }

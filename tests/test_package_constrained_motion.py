@@ -14,7 +14,7 @@ from conftest import DATA, needs_compiler
 torch = pytest.importorskip("torch")
 integrate = pytest.importorskip("scipy.integrate")
 
-FOURBAR = f"{DATA / 'fourbar.toml'} loops"
+CRANK = f"{DATA / 'crank_rocker.toml'} loops"
 BACKENDS = ("numpy", "torch", pytest.param("native", marks=needs_compiler))
 LINKS = ((1.2, (0.1, 0.02), 0.02), (0.9, (0.35, 0.05), 0.04), (0.7, (0.2, -0.03), 0.03))
 """Mass, centre of mass and inertia of crank, coupler and rocker, as the file has them."""
@@ -88,7 +88,7 @@ def states(robot: Any, count: int) -> tuple[Any, Any, Any]:
 def test_each_source_moves_a_four_bar_as_multipliers_say(
     backend: str, package_of: Callable[[str], ModuleType]
 ) -> None:
-    package = package_of(FOURBAR)
+    package = package_of(CRANK)
     q, qd, tau = states(package.load("numpy"), 4)
     robot = package.load(backend)
     motion = [torch.from_numpy(a) for a in (q, qd, tau)] if robot.backend.takes_tensors else [q, qd, tau]
@@ -109,7 +109,7 @@ def test_each_source_moves_a_four_bar_as_multipliers_say(
 
 
 def test_a_four_bar_turns_closed_and_keeps_its_energy(package_of: Callable[[str], ModuleType]) -> None:
-    robot = package_of(FOURBAR).load("numpy")
+    robot = package_of(CRANK).load("numpy")
     q, qd, _ = (a[0] for a in states(robot, 4))
     time, tau = np.linspace(0.0, 0.2, 3), np.array([1.0, 0.2, -0.3])
     steps = [robot.simulate(q, qd, time, tau, step=step) for step in (0.02, 0.01)]
@@ -137,7 +137,7 @@ def test_a_four_bar_turns_closed_and_keeps_its_energy(package_of: Callable[[str]
 def test_the_open_tree_of_a_tied_robot_is_asked_for_in_words(
     package_of: Callable[[str], ModuleType],
 ) -> None:
-    robot = package_of(FOURBAR).load("numpy")
+    robot = package_of(CRANK).load("numpy")
     q, qd, tau = (a[0] for a in states(robot, 4))
     free = robot.induced_accelerations(q, qd, tau, constraints=False)
     cut = np.linalg.solve(robot.mass_matrix(q), tau - robot.inverse_dynamics(q, qd, 0 * q))

@@ -101,7 +101,7 @@ BAD = {
     ),
     "two parents": (
         chain(AB, BC, joint("ac", "a", "c")),
-        "link 'c' has 2 parents (joints 'bc', 'ac'); loops are not supported, keep one",
+        "link 'c' has 2 parents (joints 'bc', 'ac'); keep one, and close loops by constraints",
     ),
     "cycle": (
         robot(*map(link, "abc"), AB, BC, joint("ca", "c", "a")),
@@ -336,15 +336,18 @@ MJCF = """<mujoco>{option}<worldbody><body name="arm">
 </mujoco>"""
 
 
-def test_coupled_joints_of_mjcf_are_refused_unless_freed(tmp_path: Path) -> None:
+def test_coupled_joints_of_mjcf_move_together_unless_freed(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     path = tmp_path / "hand.xml"
     path.write_text(MJCF.format(option="", one="c"))
-    with pytest.raises(
-        LinkwiseError, match="joint 'c' is coupled to 'b' by an equality, which the torques would"
-    ):
-        read_robot(path)
-    assert len(read_robot(path, Options(lock={"c": 0.0})).coordinates) == 2
+    assert [(c.name, c.terms) for c in read_robot(path).couplings] == [
+        ("joint1", ((1, (0.0, -2.0, 0.0, 0.0, 0.0)), (2, (0.0, 1.0))))
+    ]
+    locked = read_robot(path, Options(lock={"c": 0.0}))
+    assert (len(locked.coordinates), locked.couplings) == (2, ())
+    assert ("freed", "c", "locked, though coupled to 'b' by an equality") in notes_of(
+        path, Options(lock={"c": 0.0})
+    )
     notes = notes_of(path, Options(free_mimic=True))
     assert ("freed", "c", "coupled to 'b' by an equality") in notes
     assert ("passive", "a", "0.1 kg·m²") in notes

@@ -140,25 +140,38 @@ def legs(folder: Path, equality: str, option: str = "") -> Path:
     return path
 
 
+SPATIAL = (
+    '<tendon><spatial name="rope"><site site="end"/><site site="tip"/></spatial></tendon>'
+    '<equality><tendon name="taut" tendon1="rope"/></equality>'
+)
+
+
 @pytest.mark.parametrize(
-    ("equality", "named"),
+    ("equality", "more", "named"),
     [
-        (CONNECT.format('name="pin" '), "the connect equality 'pin' ties link 'left' to link 'right'"),
-        (CONNECT.format(""), "an unnamed connect equality ties link 'left' to link 'right'"),
-        ('<weld name="glue" body1="hip"/>', "the weld equality 'glue' ties link 'hip' to link 'world'"),
-        ('<weld site1="tip" site2="end"/>', "an unnamed weld equality ties link 'right' to link 'left'"),
+        ("", SPATIAL, "the tendon equality 'taut' ties links together by tendon 'rope'"),
         (
-            '<tendon name="taut" tendon1="cord"/>',
-            "the tendon equality 'taut' ties links together by tendon 'cord'",
+            '<tendon name="bent" tendon1="cord" tendon2="both" polycoef="0 1 2 0 0"/>',
+            '<tendon><fixed name="both"><joint joint="l" coef="1"/><joint joint="r" coef="1"/></fixed>'
+            "</tendon>",
+            "the tendon equality 'bent' ties links together by tendon 'cord', 'both'",
         ),
     ],
-    ids=["connect", "unnamed", "weld to the world", "weld of sites", "tendon"],
+    ids=["spatial tendon", "square of a sum"],
 )
-def test_loop_closed_by_an_equality_is_refused_by_name(equality: str, named: str, tmp_path: Path) -> None:
+def test_equality_that_is_not_modelled_is_refused_by_name(
+    equality: str, more: str, named: str, tmp_path: Path
+) -> None:
     path = legs(tmp_path, equality)
+    path.write_text(path.read_text().replace("</mujoco>", f"{more}</mujoco>"))
     with pytest.raises(LinkwiseError) as caught:
         read_system(path)
-    assert f"legs.xml: {named}; loops are not modelled yet: remove it from the file" in str(caught.value)
+    assert f"legs.xml: {named}, which is not modelled: remove it from the file" in str(caught.value)
+    assert len(read_system(path, Options(lock={"l": 0.3, "r": -0.3})).links) == 1
+
+
+def robot_of(path: Path, options: Options | None = None) -> Any:
+    return getattr(read_system(path, options), "robot")  # noqa: B009 - of rigid links it has one
 
 
 @pytest.mark.parametrize(
@@ -171,27 +184,21 @@ def test_loop_closed_by_an_equality_is_refused_by_name(equality: str, named: str
     ids=["inactive", "equalities off", "constraints off"],
 )
 def test_equality_that_is_switched_off_is_not_a_loop(attributes: str, option: str, tmp_path: Path) -> None:
-    assert len(read_system(legs(tmp_path, CONNECT.format(attributes), option)).links) == 3
+    assert not robot_of(legs(tmp_path, CONNECT.format(attributes), option)).ties
 
 
-def test_equality_between_bodies_that_move_as_one_or_are_cut_away_is_not_a_loop(tmp_path: Path) -> None:
-    path = legs(tmp_path, CONNECT.format(""))
-    assert len(read_system(path, Options(tip="hip")).links) == 1
-    assert len(read_system(path, Options(lock={"l": 0.3, "r": -0.3})).links) == 1
-    with pytest.raises(LinkwiseError, match="loops are not modelled yet"):
-        read_system(path, Options(lock={"l": 0.3}))
-    with pytest.raises(LinkwiseError, match="loops are not modelled yet"):
-        read_system(path, Options(tip="left"))
-
-
-def test_tendon_and_weld_to_the_world_bind_only_what_still_moves(tmp_path: Path) -> None:
-    taut = legs(tmp_path, '<tendon name="taut" tendon1="cord"/>')
-    assert len(read_system(taut, Options(lock={"l": 0.1})).links) == 2
-    assert len(read_system(taut, Options(tip="right")).links) == 2
-    glued = legs(tmp_path, '<weld name="glue" body1="left"/>')
-    assert len(read_system(glued, Options(tip="right")).links) == 2
-    with pytest.raises(LinkwiseError, match="'glue' ties link 'left' to link 'world'"):
-        read_system(glued, Options(tip="left"))
+def test_equality_has_a_name_and_both_of_its_ends(tmp_path: Path) -> None:
+    [pin] = robot_of(legs(tmp_path, CONNECT.format('name="pin" '))).ties
+    assert pin.name == "pin"
+    robot = robot_of(legs(tmp_path, CONNECT.format("") + '<weld name="glue" body1="hip"/>'))
+    assert [(tie.name, tie.kind) for tie in robot.ties] == [("connect1", "point"), ("glue", "frame")]
+    ends = [[robot.frames[at].name for at in (tie.first, tie.second)] for tie in robot.ties]
+    assert ends == [["end", "connect1_second"], ["hip", "world"]]
+    assert not robot_of(legs(tmp_path, CONNECT.format("")), Options(lock={"l": 0.3, "r": 0.3})).ties
+    with pytest.raises(
+        LinkwiseError, match="'connect1' ties link 'left' to link 'right', which --root or --tip"
+    ):
+        read_system(legs(tmp_path, CONNECT.format("")), Options(tip="left"))
 
 
 def test_tendon_without_a_force_of_its_own_is_not_told_as_left_out(tmp_path: Path) -> None:

@@ -43,7 +43,9 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
                     f"energies in Python do not accept {', '.join(rigid)}; change the energies"
                 )
             return read_energies(Path(spec), options.parameters != "numeric")
-    return constrained_system(rigid_system(read_robot(spec, options)))
+    system = rigid_system(read_robot(spec, options))
+    with within(str(spec)):
+        return constrained_system(system)
 
 
 def generate(

@@ -18,6 +18,9 @@ from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.frame_reference import FrameReference, frame_calls, frame_reference
 from linkwise.check.induced_checks import induced_calls
+from linkwise.check.loop_checks import loop_calls
+from linkwise.check.loop_induced import induced_loop_calls
+from linkwise.check.loop_reference import LoopReference, loop_reference
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.model_calls import Named, against_reference
 from linkwise.check.newton_euler import NewtonEuler
@@ -157,6 +160,9 @@ class _Checks:
             yield Skipped(f"numbers{label}", "nothing here computes with the energies")
             return
         regressors, frames = self._regressors(values, reference), self._frames(values, reference)
+        loops = self._loops(values, reference)
+        if loops is None and self._is_tied:
+            yield Skipped(f"constraints{label}", "loops close near none of the states")
         references = References(reference, regressors, frames)
         for result in _c_results(functions, f"c{label}", references) if functions else ():
             c_passes &= result.passed
@@ -174,6 +180,9 @@ class _Checks:
                     yield from regressor_calls(f"{way.label}{label}", model, regressors)
                 if frames is not None and way.kernel != "rule":  # no kernel has a part in it
                     yield from frame_calls(f"{way.label}{label}", model, frames)
+                if loops is not None and way.kernel != "rule":
+                    yield from loop_calls(f"{way.label}{label}", model, loops)
+                    yield from induced_loop_calls(f"{way.label}{label}", model, loops)
                 joints = manifest.tree.passive if manifest.tree is not None else ()
                 yield from passive_calls(f"{way.label}{label}", model, joints, reference.states)
                 if way.kernel != "rule":  # they are composed of what every kernel was held against
@@ -223,6 +232,18 @@ class _Checks:
         if manifest.tree is None:
             return None
         return frame_reference(manifest, tree_with(manifest.tree, values), reference.states)
+
+    @property
+    def _is_tied(self) -> bool:
+        tree = self.package.manifest.tree
+        return tree is not None and bool(tree.ties or tree.couplings)
+
+    def _loops(self, values: Mapping[str, float], reference: Reference) -> LoopReference | None:
+        """What constraints are held against; a robot without ties has none."""
+        manifest = self.package.manifest
+        if manifest.tree is None or not self._is_tied:
+            return None
+        return loop_reference(manifest, tree_with(manifest.tree, values), reference.states)
 
     def _own_reference(
         self, loaded: Mapping[Way, Model], functions: CFunctions | None

@@ -84,7 +84,7 @@ class NewtonEuler:
 
     def poses(self, frames: Sequence[FrameEntry], q: Array) -> Array:
         """Homogeneous matrices from the coordinates of frames to the world's, (samples, frames, 4, 4)."""
-        found = np.zeros((len(q), len(frames), 4, 4))
+        found = np.zeros((len(q), len(frames), 4, 4), q.dtype)
         found[..., 3, 3] = 1.0
         carriers = self._carriers([frame.body for frame in frames], q, 0.0 * q, 0.0 * q)
         for f, (frame, carrier) in enumerate(zip(frames, carriers, strict=True)):

@@ -25,9 +25,11 @@ def constrained_system(system: System) -> System:
     """
     if not isinstance(system, RigidSystem) or system.robot.independent:
         return system
-    robot, tree = system.robot, rigid_tree(system)
-    if tree is None or not (robot.ties or robot.couplings):
+    robot = system.robot
+    if not (robot.ties or robot.couplings):
         return system
+    tree = rigid_tree(system)
+    assert tree is not None  # of rigid links there is one
     loops = closed_loops(tree, len(robot.coordinates))
     chosen = _independent(robot, loops.rows)
     shared = [owner for owner, is_so in zip(loops.owners, redundant_rows(loops.rows), strict=True) if is_so]
@@ -71,16 +73,18 @@ def _proposed(robot: Robot, rows: Array, rank: int) -> tuple[int, ...]:
     """Return those that pivoting leaves: columns of A are taken one by one, as of dependent ones.
 
     Of the columns that are not small beside the largest, as far as they stand across those taken, it is
-    that of a joint that nothing drives, then of the one farthest from the ground, then of the last.
+    that of a joint that nothing drives and no spring holds, then of the one farthest from the ground, then of
+    the last.
     """
     names = [coordinate.name for coordinate in robot.coordinates]
     depths = [min(_depths(robot, k), default=0) for k in range(len(names))]
+    sprung = {axis.coordinate for axis in robot.passive if axis.own.stiffness}
     left, free = scaled_rows(rows), set(range(len(names)))
     for _ in range(rank):
         sizes = np.linalg.norm(left, axis=0)
         most = max(sizes[k] for k in free)
         able = [k for k in free if sizes[k] >= SHARE * most]
-        pivot = max(able, key=lambda k: (k not in robot.driven, depths[k], k))
+        pivot = max(able, key=lambda k: (k not in robot.driven, k not in sprung, depths[k], k))
         free.remove(pivot)
         axis = left[:, pivot] / sizes[pivot]
         for _ in range(2):  # once more for what rounding leaves

@@ -13,7 +13,8 @@ from linkwise.runtime.constraints.closing_search import (
     best_closing,
     random_starts,
 )
-from linkwise.runtime.constraints.held_frames import ROWS, held_by
+from linkwise.runtime.constraints.held_frames import held_by
+from linkwise.runtime.constraints.singular_positions import open_by
 from linkwise.runtime.rule.joint_tree import (
     JointTree,
     TreeCoupling,
@@ -40,22 +41,20 @@ def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
     held = held_by(moved, [link.name for link in moved.links], ())
     starts = random_starts(joints)
     found = best_closing(TieEquations(moved, joints, held), starts)
-    rows = [(one.name, row) for one in held for row in ROWS[one.kind]]
-    owners = (*(name for name, _ in rows), *(coupling.name for coupling in tree.couplings))
+    couplings = [coupling.name for coupling in tree.couplings]
+    owners = (*(one.name for one in held for _ in one.row_names), *couplings)
     if not found.is_closed:
-        units = ["rad" if row.startswith("moment") else "m" for _, row in rows]
-        raise LinkwiseError(_told(found, owners, [*units, *("" for _ in tree.couplings)], len(starts)))
+        rows = [*(row for one in held for row in one.row_names), *couplings]
+        raise LinkwiseError(_told(found, owners, rows, len(starts)))
     return ClosedLoops(found.q, found.rows, owners)
 
 
-def _told(found: Closing, owners: tuple[str, ...], units: list[str], tries: int) -> str:
+def _told(found: Closing, owners: tuple[str, ...], rows: list[str], tries: int) -> str:
     """What stays open, by how much."""
     worst = int(np.abs(found.left).argmax())
-    size, unit = found.open_by, units[worst]
-    text = f"{1000 * size:.3g} mm" if unit == "m" else f"{size:.3g} {unit}".strip()
     return (
-        f"constraint {owners[worst]!r} never closes: from {tries} positions that were tried, {text} are left "
-        "at best; correct its places, or what it ties"
+        f"constraint {owners[worst]!r} never closes: from {tries} positions that were tried, "
+        f"{open_by(found.open_by, rows[worst])} are left at best; correct its places, or what it ties"
     )
 
 

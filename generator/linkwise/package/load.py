@@ -42,6 +42,10 @@ class Model(Protocol):
     def kinematics(self) -> Any:
         """Poses and Jacobians of frames, for rigid links."""
 
+    @property
+    def constraints(self) -> Any:
+        """What ties leave of its motion, for rigid links with ties."""
+
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """τ_ij (..., n, N)."""
 

@@ -77,7 +77,8 @@ def build(description: Description, options: Options) -> Robot:
     check_loops(description.loops, assembly.carrier)
     numbers = assembly.links if naming is None else _links(plain, options, moving.motion)
     named = {body.name for body in plain.bodies if not body.invented}
-    held = constrained(description, ends, assembly.frames, moving, options.free_mimic, options.independent)
+    freedom = options.lock, options.free_mimic, options.independent
+    held = constrained(description, ends, assembly.frames, moving, *freedom)
     singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical)
     if numbers and all(link.massless for link in numbers):
         raise LinkwiseError("no moving link has mass, so no torque is to be had; give one mass and inertia")

@@ -1,7 +1,7 @@
 """What holds beside the tree of a robot: ties of its frames, couplings of its joints, who moves them."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -48,6 +48,7 @@ def constrained(
     ends: Ends,
     frames: Sequence[Frame],
     movement: Movement,
+    lock: Collection[str],
     free_mimic: bool,
     independent: tuple[str, ...],
 ) -> Constrained:
@@ -58,7 +59,7 @@ def constrained(
     """
     values = {sp.Symbol(name, real=True): value for name, value in description.parameters}
     ties, lost = tied(description.ties, ends, frames, values)
-    couplings, uncoupled = coupled(description.couplings, movement.motion, free_mimic)
+    couplings, uncoupled = coupled(description.couplings, movement.motion, lock, free_mimic)
     wanted = independent or description.independent
     if not (ties or couplings):
         if independent:

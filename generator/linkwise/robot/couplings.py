@@ -6,31 +6,37 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot.coordinates import AxisRule
 from linkwise.robot.description import JointCoupling
 from linkwise.robot.notes import UNCOUPLED, Note
-from linkwise.robot.robot import Coupling
+from linkwise.robot.robot import Coupling, unusable
 
 CLOSE = 1e-9
 """In rad and m, by which joints that stand still may miss what a coupling asks of them."""
 
 
 def coupled(
-    couplings: Iterable[JointCoupling], motion: Mapping[str, AxisRule], free: bool
+    couplings: Iterable[JointCoupling],
+    motion: Mapping[str, AxisRule],
+    lock: Collection[str],
+    free: bool,
 ) -> tuple[tuple[Coupling, ...], list[Note]]:
     """Return the couplings of the coordinates, and notes on those that are none here.
 
-    `free` lets joints of MJCF's equalities, and those whose master was cut away, move by themselves. Raises
-    LinkwiseError for a master that was cut away, and for locked joints that break a coupling.
+    As with a mimic joint, to `lock` the first joint of a coupling lets the others move by themselves, and to
+    lock others holds the first. So does `free` with MJCF's equalities, and those whose master was cut away.
+    Raises LinkwiseError for a master that was cut away, and for joints that cannot keep a coupling.
     """
     found: list[Coupling] = []
     notes: list[Note] = []
     for coupling in couplings:
         follower, *masters = (joint for joint, _ in coupling.terms)
         lost = [joint for joint in masters if joint not in motion]
+        by = "an equality" if coupling.equality else f"constraint {coupling.name!r}"
         if follower not in motion:
             notes.append(Note("cut", coupling.name, f"joint {follower!r} of that constraint is not there"))
         elif lost and not free:
             raise LinkwiseError(_orphan(coupling, follower, lost[0]))
+        elif follower in lock:
+            notes.append(Note("freed", follower, f"locked, though {coupling.rule} by {by}", UNCOUPLED))
         elif lost or (free and coupling.equality):
-            by = "an equality" if coupling.equality else f"constraint {coupling.name!r}"
             notes.append(Note("freed", follower, f"{coupling.rule} by {by}", UNCOUPLED))
         elif terms := _terms(coupling, motion):
             found.append(Coupling(coupling.name, terms))
@@ -40,8 +46,10 @@ def coupled(
 
 
 def check_joints(couplings: Iterable[JointCoupling], axes: Collection[str]) -> None:
-    """Raise LinkwiseError for a joint that the file doesn't have."""
+    """Raise LinkwiseError for a joint that the file doesn't have, and for numbers that cannot be."""
     for coupling in couplings:
+        if fault := unusable(*(c for _, coefficients in coupling.terms for c in coefficients)):
+            raise LinkwiseError(f"constraint {coupling.name!r} has {fault} in its terms; give numbers")
         for joint, _ in coupling.terms:
             if joint not in axes:
                 raise LinkwiseError(
@@ -78,7 +86,7 @@ def _terms(
     if not kept and abs(constant) > CLOSE:
         raise LinkwiseError(
             f"constraint {coupling.name!r} cannot hold: the joints that it couples stand still or move as "
-            f"one, and miss it by {abs(constant):.3g}; correct it, or hold them elsewhere with --lock"
+            f"one, and miss it by {abs(constant):.3g}; correct it"
         )
     first = min(kept, default=None)
     return tuple((k, (constant if k == first else 0.0, *total[1:])) for k, total in kept.items())

@@ -55,7 +55,7 @@ def check_ties(ties: Iterable[AnchoredTie], bodies: Iterable[Body]) -> None:
         for anchor in (tie.first, tie.second):
             if anchor.body not in known:
                 raise LinkwiseError(
-                    f"constraint {tie.name!r} ties {anchor.body!r}, which is not a link; correct it"
+                    f"constraint {tie.name!r} ties {anchor.body!r}, which is not a link or a site; correct it"
                 )
             if fault := unusable(*anchor.translation, *(e for row in anchor.rotation for e in row)):
                 raise LinkwiseError(f"constraint {tie.name!r} has {fault} in its place; give numbers")

@@ -21,7 +21,8 @@ def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
         if count > 1:
             joints = ", ".join(repr(c.name) for c in description.connections if c.child == link)
             raise LinkwiseError(
-                f"link {link!r} has {count} parents (joints {joints}); loops are not supported, keep one"
+                f"link {link!r} has {count} parents (joints {joints}); keep one, and close loops by "
+                "constraints"
             )
     roots = [body.name for body in description.bodies if body.name not in parents]
     if not roots:
@@ -111,13 +112,13 @@ def _below(description: Description, root: str) -> set[str]:
 
 
 def check_loops(loops: tuple[Loop, ...], carrier: Mapping[str, int | None]) -> None:
-    """Refuse what ties bodies together outside the tree, unless they move as one or are cut away.
+    """Refuse what ties bodies together and is not modelled, unless they move as one or are cut away.
 
     `carrier` names the moving link of each body that is there, None for the ground.
     """
     for loop in loops:
         if not loop.pairs or any(_acts(pair, carrier, loop.of_joints) for pair in loop.pairs):
-            raise LinkwiseError(f"{loop.what}; loops are not modelled yet: {loop.remedy}")
+            raise LinkwiseError(f"{loop.what}, which is not modelled: {loop.remedy}")
 
 
 def _acts(pair: tuple[str, str], carrier: Mapping[str, int | None], of_joint: bool) -> bool:

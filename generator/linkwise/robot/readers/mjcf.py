@@ -43,7 +43,7 @@ def read_mjcf(path: Path) -> Description:
         tuple(bodies),
         tuple(connections),
         ZERO3 if weightless else (x, y, z),
-        notes=(*(Note("warned", text, "", WARNED) for text in warnings), *unused(model)),
+        notes=(*(Note("warned", text, "", WARNED) for text in warnings), *unused(model), *equal.notes),
         ties=equal.ties,
         couplings=equal.couplings,
         loops=equal.loops,

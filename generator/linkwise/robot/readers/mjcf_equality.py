@@ -16,6 +16,7 @@ from typing import Any
 from linkwise.robot import transforms
 from linkwise.robot.couplings import composed
 from linkwise.robot.description import IDENTITY, Anchor, AnchoredTie, JointCoupling, Loop
+from linkwise.robot.notes import Note
 from linkwise.robot.readers.mjcf_options import switched_off
 from linkwise.robot.readers.mjcf_tendons import joints_of, lengths_of, ties
 from linkwise.robot.robot import Rotation, TieKind
@@ -34,11 +35,12 @@ REMOVE = "remove it from the file"
 
 @dataclass(frozen=True)
 class Equalities:
-    """What the equalities are: ties, couplings, and what is not modelled."""
+    """What the equalities are: ties, couplings, and what is not modelled; `notes` are on inactive ones."""
 
     ties: tuple[AnchoredTie, ...]
     couplings: tuple[JointCoupling, ...]
     loops: tuple[Loop, ...]
+    notes: tuple[Note, ...]
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,9 @@ def equalities(mujoco: Any, model: Any, joints: list[str], bodies: list[str]) ->
             coupled.append(coupling)
         else:
             loops.append(_unmodelled(mujoco, model, equality, bodies))
-    return Equalities(tuple(tied), tuple(coupled), tuple(loops))
+    inactive = int(model.neq) - len(tied) - len(coupled) - len(loops)
+    notes = (Note("ignored", "inactive equality", f"{inactive} ×"),) if inactive else ()
+    return Equalities(tuple(tied), tuple(coupled), tuple(loops), notes)
 
 
 def _active(mujoco: Any, model: Any) -> Iterator[_Equality]:

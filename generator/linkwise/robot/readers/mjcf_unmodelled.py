@@ -26,7 +26,6 @@ COUNTS = {
     "actuator": "nu",
     "camera": "ncam",
     "contact pair": "npair",
-    "equality": "neq",
     "keyframe": "nkey",
     "light": "nlight",
     "mocap": "nmocap",

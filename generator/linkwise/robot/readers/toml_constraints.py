@@ -10,6 +10,7 @@ from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.robot import transforms
 from linkwise.robot.description import Anchor, AnchoredTie, Description, JointCoupling
+from linkwise.robot.readers.formula import MAX_POWER
 from linkwise.robot.readers.toml_table import TomlTable, as_float, named_parameters, tables, toml_data
 from linkwise.robot.robot import Rotation, TieKind, Vec3
 
@@ -120,6 +121,8 @@ def _polynomial(table: TomlTable, joint: str, terms: Mapping[str, Any]) -> tuple
     place = f"{table.place}: {joint!r} in 'terms'"
     if not all(isinstance(n, (int, float)) and not isinstance(n, bool) for n in numbers):
         raise LinkwiseError(f"{place} must be a factor, or a list of numbers")
+    if len(numbers) > MAX_POWER + 1:
+        raise LinkwiseError(f"{place} has the power {len(numbers) - 1}; {MAX_POWER} is the highest")
     found = tuple(as_float(place, n) for n in numbers)
     if not any(found[1:]):
         raise LinkwiseError(f"{place} is the same for every position; give a factor that is not 0")

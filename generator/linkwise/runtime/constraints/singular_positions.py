@@ -63,12 +63,20 @@ def _not_following(
 
 
 def check_following(rows: Any, found: Followers, names: Sequence[str], joint_names: Sequence[str]) -> None:
-    """Raise ValueError for the first sample where rows that follow from others do not agree: A G != 0."""
+    """Raise ValueError for the first sample where rows that follow from others do not agree: A G != 0.
+
+    Rows are measured by the largest of their tie's: of a loop that a joint carries as a whole, or that is
+    open within the tolerance, some are nothing but what is left of differences.
+    """
     if rows.shape[-2] == len(found.columns.dependent) or hidden(rows):
         return
     a, g = _array(rows), _array(found.map)
-    left, scale = np.abs(a @ g), np.abs(a) @ np.abs(g)
-    wrong = left > (AGREE if rows.dtype.itemsize == 8 else 10.0 * AGREE) * scale.max(-2, keepdims=True)
+    sizes, owners = np.abs(a).max(-1), np.array(names)
+    for owner in set(names):
+        own = owners == owner
+        sizes[..., own] = sizes[..., own].max(-1, keepdims=True)
+    scale = sizes[..., None] * np.abs(g).max(-2, keepdims=True)
+    wrong = np.abs(a @ g) > (AGREE if rows.dtype.itemsize == 8 else 10.0 * AGREE) * scale
     if not wrong.any():
         return
     *place, row, joint = np.argwhere(wrong)[0].tolist()

@@ -1,0 +1,102 @@
+"""phi(q) = 0 of a package's ties and couplings, from the recursion's own frames, and where it holds.
+
+Rows of A are velocities of frames at one unit velocity after the other, and their complex step is dA/dt.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
+
+from linkwise.check.body_reference import COMPLEX_STEP
+from linkwise.check.newton_euler import NewtonEuler
+from linkwise.package.load import Array
+from linkwise.package.manifest import RigidTree
+
+STEPS = 60
+LONGEST = 0.5
+"""Of a step towards closing, in rad and m."""
+CLOSED = 1e-11
+RANK = 1e-5
+"""Singular values below this part of the largest are zero: numbers of files are rounded."""
+
+
+class LoopEquations(NamedTuple):
+    """Ties and couplings of a tree."""
+
+    recursion: NewtonEuler
+    tree: RigidTree
+
+    def violation(self, q: Array) -> Array:
+        """phi, (samples, C); of small turns about axes, the sines."""
+        found: list[Array] = []
+        for tie in self.tree.ties:
+            first, second = (
+                self.recursion.poses([self.tree.frames[f]], q)[:, 0] for f in (tie.first, tie.second)
+            )
+            gap = first[:, :3, 3] - second[:, :3, 3]
+            # R1 R2^T = 1 + [turn]x, to first order
+            turn = np.cross(second[:, :3, :3], first[:, :3, :3], axis=1).sum(-1) / 2
+            x, y = first[:, :3, 0], first[:, :3, 1]
+            across = [(y * second[:, :3, 2]).sum(-1), -(x * second[:, :3, 2]).sum(-1)]
+            match tie.kind:
+                case "point":
+                    parts = [gap]
+                case "hinge":
+                    parts = [np.stack(across, -1), gap]
+                case "frame":
+                    parts = [turn, gap]
+                case "distance":
+                    parts = [np.sqrt((gap * gap).sum(-1))[:, None] - tie.length]
+            found += parts
+        for coupling in self.tree.couplings:
+            total = np.zeros(len(q), q.dtype)
+            for k, factors in coupling.terms:
+                total += polyval(q[:, k], factors)
+            found.append(total[:, None])
+        return np.concatenate(found, -1)
+
+    def rows(self, q: Array) -> Array:
+        """A, (samples, C, n)."""
+        samples, n = q.shape
+        units, many = np.tile(np.eye(n), (samples, 1)), np.repeat(q, n, 0)
+        found = []
+        for tie in self.tree.ties:
+            frames = [self.tree.frames[f] for f in (tie.first, tie.second)]
+            ends = [(frame.body, np.array(frame.translation)) for frame in frames]
+            speed = self.recursion.points(ends, many, units, 0.0 * units)[0].reshape(samples, n, 2, 6)
+            moved = np.swapaxes(speed[:, :, 0] - speed[:, :, 1], -1, -2)
+            poses = self.recursion.poses(frames, q)
+            gap = poses[:, 0, :3, 3] - poses[:, 1, :3, 3]
+            match tie.kind:
+                case "point":
+                    parts = [moved[:, 3:]]
+                case "hinge":
+                    across = np.swapaxes(poses[:, 0, :3, :2], -1, -2)
+                    parts = [across @ moved[:, :3], moved[:, 3:]]
+                case "frame":
+                    parts = [moved]
+                case "distance":
+                    way = gap / np.sqrt((gap * gap).sum(-1))[:, None]
+                    parts = [way[:, None] @ moved[:, 3:]]
+            found += parts
+        for coupling in self.tree.couplings:
+            row = np.zeros((samples, 1, n), q.dtype)
+            for k, factors in coupling.terms:
+                row[:, 0, k] += polyval(q[:, k], polyder(factors))
+            found.append(row)
+        return np.concatenate(found, 1)
+
+    def rates(self, q: Array, qd: Array) -> Array:
+        """dA/dt, (samples, C, n)."""
+        rate: Array = self.rows(q + 1j * COMPLEX_STEP * qd).imag / COMPLEX_STEP
+        return rate
+
+    def closed_near(self, q: Array) -> Array:
+        """Those of some positions from which least steps of all joints lead to where loops close."""
+        for _ in range(STEPS):
+            step = -(np.linalg.pinv(self.rows(q), rcond=RANK) @ self.violation(q)[..., None])[..., 0]
+            size = np.abs(step).max(-1, keepdims=True)
+            q = q + step * (LONGEST / np.maximum(size, LONGEST))
+        closed: Array = q[np.abs(self.violation(q)).max(-1) < CLOSED]
+        return closed

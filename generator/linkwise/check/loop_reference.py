@@ -1,0 +1,136 @@
+"""What constraints are held against: motion in the null space of A, and least squares, where loops close.
+
+With N an orthonormal basis of the null space, M qdd + h = tau + A^T lambda and A qdd = -dA/dt qd give
+(N^T M N) z = N^T (tau - h - M p) for qdd = N z + p, p = -A^+ dA/dt qd; lambda is what A^T lambda fits best.
+The package goes another way: it takes the dependent joints out, by QR.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from linkwise.check.loop_equations import LoopEquations
+from linkwise.check.newton_euler import NewtonEuler
+from linkwise.check.reference import columns
+from linkwise.check.states import States
+from linkwise.package.load import Array
+from linkwise.package.manifest import Manifest, RigidTree
+
+STATES = 12
+TRIED = 60
+FAR = 1e-2
+"""Least singular value of A_d, as part of the largest: nearer to a singular position rounding counts more."""
+
+
+@dataclass(frozen=True)
+class LoopReference:
+    """Answers to `states`, in which loops close; samples first. tau: (samples, n), on all joints."""
+
+    equations: LoopEquations
+    independent: tuple[int, ...]
+    states: States
+    tau: Array
+    rows: Array
+    rates: Array
+    map: Array
+    qdd: Array
+    forces: Array
+    """Of tau."""
+    shares: Array
+    """(samples, m, N)"""
+    link_forces: Array
+    """(samples, C, N)"""
+    coefficients: tuple[Array, Array, Array]
+
+
+def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopReference | None:
+    """The answers where loops close; None where none of the states leads there."""
+    equations = LoopEquations(NewtonEuler(manifest, tree), tree)
+    own = tree.independent
+    rest = [k for k in range(len(manifest.joints)) if k not in own]
+    q = equations.closed_near(states.q[:TRIED])
+    sizes = np.linalg.svd(equations.rows(q)[..., rest], compute_uv=False)
+    q = q[sizes[:, -1] > FAR * sizes[:, 0]][:STATES]
+    if not len(q):
+        return None
+    rows = equations.rows(q)
+    followed = _Followed(equations, own, rest, q)
+    yd, ydd = states.qd[: len(q), own], states.qdd[: len(q), own]
+    qd = followed.velocity(yd)
+    moved = States(q, qd, followed.acceleration(qd, ydd))
+    tau = np.random.default_rng(5).uniform(-1.0, 1.0, q.shape)
+    rates = equations.rates(q, qd)
+    qdd, forces = _motion(equations, moved, rows, rates, tau)
+    shares, link_forces = _shared(equations, own, rows, moved)
+    rest_yd = 0.0 * yd
+
+    def share(speed: Array, change: Array) -> Array:
+        full = followed.velocity(speed)
+        return _shared(equations, own, rows, States(q, full, followed.acceleration(full, change)))[0]
+
+    weight = share(rest_yd, rest_yd)
+    c2 = columns(lambda unit: share(rest_yd, rest_yd + unit) - weight, len(own))
+    # A quadratic form of yd, whose central difference is its derivative; the closing convention takes half.
+    c1 = columns(lambda unit: (share(yd + unit, rest_yd) - share(yd - unit, rest_yd)) / 4.0, len(own))
+    found = (rows, rates, followed.map, qdd, forces, shares, link_forces, (c2, c1, weight))
+    return LoopReference(equations, own, moved, tau, *found)
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """Motion of all joints by that of the independent ones, by least squares."""
+
+    equations: LoopEquations
+    own: Sequence[int]
+    rest: Sequence[int]
+    q: Array
+
+    @property
+    def map(self) -> Array:
+        """G, (samples, n, m)."""
+        rows = self.equations.rows(self.q)
+        found = np.zeros((*self.q.shape, len(self.own)))
+        found[:, self.own] = np.eye(len(self.own))
+        found[:, self.rest] = -np.linalg.pinv(rows[..., self.rest]) @ rows[..., self.own]
+        return found
+
+    def velocity(self, yd: Array) -> Array:
+        """qd."""
+        full: Array = (self.map @ yd[..., None])[..., 0]
+        return full
+
+    def acceleration(self, qd: Array, ydd: Array) -> Array:
+        """qdd."""
+        rows, drift = self.equations.rows(self.q), self.equations.rates(self.q, qd) @ qd[..., None]
+        full = self.velocity(ydd)
+        full[:, self.rest] -= (np.linalg.pinv(rows[..., self.rest]) @ drift)[..., 0]
+        return full
+
+
+def _motion(
+    equations: LoopEquations, states: States, rows: Array, rates: Array, tau: Array
+) -> tuple[Array, Array]:
+    """qdd and lambda of torques."""
+    torque, (q, qd, _) = equations.recursion.partial_torque, states.motion
+    rest = 0.0 * q
+    mass = columns(lambda unit: torque(q, rest, rest + unit, gravity=False).sum(-1), q.shape[1])
+    bias = torque(q, qd, rest).sum(-1)
+    free = len(equations.tree.independent)
+    null = np.swapaxes(np.linalg.svd(rows)[2][:, -free:], -1, -2)
+    back = np.swapaxes(null, -1, -2)
+    moved = -np.linalg.pinv(rows, rcond=1e-7) @ (rates @ qd[..., None])
+    driven = back @ ((tau - bias)[..., None] - mass @ moved)
+    qdd = null @ np.linalg.solve(back @ mass @ null, driven) + moved
+    left = mass @ qdd + (bias - tau)[..., None]
+    forces = np.linalg.pinv(np.swapaxes(rows, -1, -2), rcond=1e-7) @ left
+    return qdd[..., 0], forces[..., 0]
+
+
+def _shared(equations: LoopEquations, own: Sequence[int], rows: Array, states: States) -> tuple[Array, Array]:
+    """What independent joints and ties bear of each link: S tau^ + A^T lambda = tau_j."""
+    samples, _, n = rows.shape
+    driven = np.broadcast_to(np.eye(n)[:, own], (samples, n, len(own)))
+    both = np.concatenate([driven, np.swapaxes(rows, -1, -2)], -1)
+    found = np.linalg.pinv(both, rcond=1e-7) @ equations.recursion.partial_torque(*states.motion)
+    return found[:, : len(own)], found[:, len(own) :]

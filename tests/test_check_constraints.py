@@ -1,0 +1,71 @@
+"""`linkwise check` holds what constraints answer against motion that it works out in another way."""
+
+import numpy as np
+import pytest
+from linkwise import Options, generate, read_system, write_package
+from linkwise.check.loop_checks import loop_calls
+from linkwise.check.loop_reference import LoopReference, loop_reference
+from linkwise.check.states import random_states
+from linkwise.package.load import Package, load_package
+from linkwise.package.manifest import Manifest
+
+ROBOT = """schema = 1
+name = "tied"
+gravity = [0.5, -9.81, 0.3]
+parameters = {L = 0.7, m = 2.0}
+joint = [
+  {name = "crank", parent = "base", child = "a"},
+  {name = "knee", parent = "a", child = "b", xyz = [0.3, 0, 0]},
+  {name = "rocker", parent = "base", child = "c", xyz = [0.6, 0.1, 0]},
+  {name = "pinned", type = "fixed", parent = "c", child = "tip", xyz = [0.5, 0, 0]},
+  {name = "gear", parent = "base", child = "d"},
+]
+link = [
+  {name = "tip"},
+  {name = "a", mass = 1.2, com = [0.15, 0.01, 0], inertia = {xx = 0.01, yy = 0.02, zz = 0.02}},
+  {name = "b", mass = "m", com = [0.3, -0.02, 0], inertia = {xx = 0.01, yy = 0.05, zz = 0.06}},
+  {name = "c", mass = 1.5, com = [0.2, 0, 0], inertia = {xx = 0.01, yy = 0.03, zz = 0.03}},
+  {name = "d", mass = 1.5, com = [0.0, 0.1, 0], inertia = {xx = 0.01, yy = 0.03, zz = 0.03}},
+]
+constraint = [
+  {name = "pin", type = "hinge", first = {frame = "b", xyz = ["L", 0, 0]}, second = {frame = "tip"}},
+  {name = "mesh", type = "coupling", terms = {crank = [0.1, 1, 0.2], gear = 2}},
+]
+"""
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Package:
+    folder = tmp_path_factory.mktemp("tied")
+    (folder / "robot.toml").write_text(ROBOT)
+    system = read_system(folder / "robot.toml", Options("symbolic"))
+    write_package(generate(system, ["numpy"], kernel="loops"), folder / "tied")
+    return load_package(folder / "tied", Manifest.read(folder / "tied"))
+
+
+@pytest.fixture(scope="module")
+def reference(package: Package) -> LoopReference:
+    tree = package.manifest.tree
+    assert tree is not None
+    found = loop_reference(package.manifest, tree, random_states(4, 60))
+    assert found is not None
+    return found
+
+
+def test_states_are_found_in_which_loops_close(reference: LoopReference) -> None:
+    assert len(reference.states.q) >= 6
+    assert np.abs(reference.equations.violation(reference.states.q)).max() < 1e-11
+
+
+@pytest.mark.parametrize(("mass", "passes"), [(2.0, [True, True, True]), (2.001, [True, False, False])])
+def test_another_mass_is_found_in_shares_and_forces(
+    package: Package, reference: LoopReference, mass: float, passes: list[bool]
+) -> None:
+    model = package.load("numpy", {"L": 0.7, "m": mass})
+    assert [result.passed for result in loop_calls("numpy", model, reference)] == passes
+
+
+def test_another_length_is_open_where_loops_close(package: Package, reference: LoopReference) -> None:
+    model = package.load("numpy", {"L": 0.7001, "m": 2.0})
+    with pytest.raises(ValueError, match=r"^pin is open by 0\.\d+ mm at sample 0"):
+        list(loop_calls("numpy", model, reference))
