@@ -36,7 +36,19 @@ ROOMS = (
 )
 """From the top of the house to its ground: a room imports from rooms below it only."""
 
-RUNTIME = ("native", "lagrangians", "recorded", "arrays", "constraints", "kinematics", "sums", "rule", "")
+RUNTIME = (
+    "native",
+    "lagrangians",
+    "recorded",
+    "arrays",
+    "simulation",
+    "induced",
+    "constraints",
+    "kinematics",
+    "sums",
+    "rule",
+    "",
+)
 """The rooms inside runtime, by the same rule; at the ground, what every package has."""
 
 FACE = {"__init__", "__main__"}

@@ -53,6 +53,8 @@ class AnalysisResult:
     load_work: Work
     """What each joint gave against each load and took back, (n, loads) in J."""
     loads: tuple[PlacedLoad, ...]
+    induced: tuple[str, ...]
+    """Whose acceleration is told by its sources, in the columns that begin with acc."""
     closure: Closure
     ignored: tuple[str, ...]
     """Columns of the log that no joint has."""
@@ -169,6 +171,7 @@ class AnalysisResult:
             "rate_hz": self.rate,
             "samples": self.total,
             "loads": [borne.record() for borne in self.loads],
+            "induced": list(self.induced),
             "closure": asdict(self.closure),
             **({} if self.closed is None else {"constraints": self._constraints(self.closed)}),
             "work": self._work(),

@@ -36,6 +36,15 @@ Quantity = Literal[
     "power_damping",
     "power_friction",
     "power_armature",
+    "acc",
+    "acc_tau",
+    "acc_qd",
+    "acc_gravity",
+    "acc_spring",
+    "acc_damping",
+    "acc_friction",
+    "acc_load",
+    "acc_kinematic",
 ]
 MEANING: dict[Quantity, str] = {
     "time": "time",
@@ -64,7 +73,27 @@ MEANING: dict[Quantity, str] = {
     "power_damping": "power that the joint's own damping takes",
     "power_friction": "power that the joint's own Coulomb friction takes",
     "power_armature": "power that the joint sends into its own armature",
+    "acc": "acceleration of the point, or joint: all sources together",
+    "acc_tau": "acceleration by what the cause's joint gives alone",
+    "acc_qd": "acceleration by velocity forces on the link, by the cause's velocity",
+    "acc_gravity": "acceleration by the link's weight and other potentials alone",
+    "acc_spring": "acceleration by the spring of the cause's joint alone",
+    "acc_damping": "acceleration by the damping of the cause's joint alone",
+    "acc_friction": "acceleration by the Coulomb friction of the cause's joint alone",
+    "acc_load": "acceleration by the load alone",
+    "acc_kinematic": "acceleration of the point by the cause's velocity, without any of a joint",
 }
+SHARE_OF: dict[Quantity, Quantity] = {
+    "acc_tau": "tau",
+    "acc_qd": "tau_qd",
+    "acc_gravity": "tau_gravity",
+    "acc_spring": "tau_spring",
+    "acc_damping": "tau_damping",
+    "acc_friction": "tau_friction",
+    "acc_load": "tau_load",
+}
+"""The torque whose force on the coordinates a share of an acceleration comes of."""
+INDUCED: tuple[Quantity, ...] = ("acc", *SHARE_OF, "acc_kinematic")
 TERMS: tuple[Quantity, ...] = ("tau_qdd", "tau_qd", "tau_gravity")
 """The parts that sum to a partial torque."""
 PASSIVE: dict[Quantity, str] = {
@@ -101,7 +130,8 @@ Key = tuple[Quantity, int | None, int | None, int | None]
 class Column:
     """One column; `joint`, `link` and `cause` are indices, None where they mean nothing.
 
-    The cause is a coordinate; of what a load asks for the load, of what a constraint bears its row.
+    The cause is a coordinate; of what a load asks for the load, of what a constraint bears its row. An
+    induced acceleration is of a point, by its number, and has a row of that point's.
     """
 
     quantity: Quantity
@@ -110,6 +140,8 @@ class Column:
     joint: int | None = None
     link: int | None = None
     cause: int | None = None
+    point: int | None = None
+    row: int | None = None
 
     @property
     def key(self) -> Key:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples
 from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.filtering import lowpass
+from linkwise.analysis.induced_points import induced_points
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.loads.read_loads import placed_loads
@@ -44,7 +45,8 @@ class Analysis(AnalysisResult):
     """What `analyze` returns: an `AnalysisResult` that draws itself."""
 
     def figure(self, name: str = "paper") -> "Figure":
-        """A matplotlib figure: "paper", or "paper:JOINT" for another joint than the first; "shares"; "power".
+        """A matplotlib figure: "paper", or "paper:JOINT" for another joint than the first; "shares"; "power";
+        "induced", or "induced:POINT" likewise.
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """
@@ -61,6 +63,8 @@ class Wanted:
     page: bool = True
     power_terms: bool = False
     """Power by cause and order, too: as many columns again as torques have."""
+    induced: tuple[str, ...] = ()
+    """Whose acceleration is told by its sources: FRAME or FRAME,X,Y,Z, joints, centre-of-mass."""
 
 
 def analyze(
@@ -72,17 +76,20 @@ def analyze(
     payloads: Sequence[Payload] = (),
     loads: Sequence[Load | str | Path] = (),
     loads_cutoff: float | None = None,
+    induced: Sequence[str] = (),
 ) -> Analysis:
     """Analyse a motion log with a generated robot (its directory), all samples in memory.
 
     payloads: point masses that the robot carries, each a link of its own in the result
     loads: forces and moments from outside, or files of them, each a cause of its own in the result;
     loads_cutoff in Hz is of the low-pass that those of files get
+    induced: whose acceleration is to be told by its sources: FRAME or FRAME,X,Y,Z, joints, centre-of-mass
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
     loaded = carrying(robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot)), payloads)
     borne = Loads.of(loads, loads_cutoff)
-    job = _prepared(Path(log), loaded, reading or Reading(), processing or Processing(), borne, progress)
+    wanted, made = Wanted(induced=tuple(induced)), (reading or Reading(), processing or Processing())
+    job = _prepared(Path(log), loaded, *made, borne, progress, wanted)
     kept = KeptSamples(len(job.decomposer.columns), 1)
     return job.analysis(job.run(kept, progress), kept)
 
@@ -103,13 +110,13 @@ def analyze_to(
     `analyze` does, and where `out` holds something else than a former result or cannot be written.
     """
     for name in wanted.figures:
-        check_figure(name, robot)
+        check_figure(name, robot, wanted.induced)
     refuse_inside_package(out)
     for file in (log, *loads.paths):
         if os.path.realpath(file).startswith(os.path.join(os.path.realpath(out), "")):
             raise LinkwiseError(f"--out {out} is to be replaced and holds the log {file}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
-        job = _prepared(log, robot, reading, processing, loads, progress, draft, wanted.power_terms)
+        job = _prepared(log, robot, reading, processing, loads, progress, wanted, draft)
         columns = job.decomposer.columns
         shown = sum(map(on_page, columns))
         kept = KeptSamples(len(columns), stride_for(job.count, shown, NUMBERS, SAMPLES))
@@ -196,6 +203,7 @@ class Job:
             **choices(self.reading, self.processing),
             "payloads": [payload.record() for payload in robot.payloads],
             "loads": [borne.record() for borne in self.decomposer.loads],
+            "induced": [point.name for point in self.decomposer.induced.points],
         }
 
     @property
@@ -219,6 +227,7 @@ class Job:
             done.joint_work,
             done.load_work,
             self.decomposer.loads,
+            tuple(point.name for point in self.decomposer.induced.points),
             done.closure,
             self.samples.ignored,
             self.samples.warnings,
@@ -235,17 +244,18 @@ def _prepared(
     processing: Processing,
     loads: Loads,
     progress: Progress,
+    wanted: Wanted,
     buffer: Path | None = None,
-    power_terms: bool = False,
 ) -> Job:
     """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
+    points = induced_points(wanted.induced, robot)
     samples, closed = _samples(log, robot, reading, progress, buffer)
     with within(str(log)):
         span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
     borne = placed_loads(loads, robot, samples.time, reading.ignore_extra, progress, buffer)
-    decomposer = Decomposer.of(robot, processing.convention, power_terms, borne)
+    decomposer = Decomposer.of(robot, processing.convention, wanted.power_terms, borne, points)
     return Job(log.name, reading, processing, samples, decomposer, closed)
 
 

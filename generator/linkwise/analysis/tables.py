@@ -82,7 +82,7 @@ class CsvTable:
 
 
 def _metadata(column: Column) -> dict[str, str]:
-    indices = {"joint": column.joint, "link": column.link, "cause": column.cause}
+    indices = {name: getattr(column, name) for name in ("joint", "link", "cause", "point", "row")}
     return {
         "unit": column.unit,
         "meaning": MEANING[column.quantity],

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.induced_points import InducedPoint
+from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import (
@@ -48,6 +50,7 @@ class Decomposer:
     """Row of each τ_i, and the rows of its parts: τ_ij, what the joint has of its own, τ_ie."""
     powers: tuple[tuple[int, int, int], ...]
     """Row of each power, the row of its torque, and the joint whose velocity multiplies."""
+    induced: InducedShares
 
     @classmethod
     def of(
@@ -56,6 +59,7 @@ class Decomposer:
         convention: Convention,
         power_terms: bool = False,
         loads: Sequence[PlacedLoad] = (),
+        points: Sequence[InducedPoint] = (),
     ) -> "Decomposer":
         """Plan where each packed value of the robot goes."""
         columns = columns_of(robot, robot.model.layout, loads, power_terms)
@@ -76,9 +80,10 @@ class Decomposer:
             if c.quantity in TORQUE_OF and c.joint is not None
         ]
         sources = _sources(robot.model.layout, row)
-        return cls(
-            robot, tuple(loads), convention, columns, sources, tuple(parts), tuple(wholes), tuple(powers)
-        )
+        induced = InducedShares.of(robot, points, columns, [borne.name for borne in loads])
+        planned = tuple(parts), tuple(wholes), tuple(powers)
+        every = (*columns, *induced.columns)
+        return cls(robot, tuple(loads), convention, every, sources, *planned, induced)
 
     def rows(self, quantity: Quantity) -> slice:
         """Where a quantity's columns stand; they stand together."""
@@ -111,7 +116,7 @@ class Decomposer:
         for row, source, _ in self.sources["tau_gravity"]:
             out[row] = packed.gravity[..., source]
         self._fill_forces(out, time, q, qd, qdd)
-        closure = self._closure(out)
+        closure = self._closure(out) | self.induced.fill(out, packed.acceleration, q, qd, qdd)
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             for column, values in zip(self.columns, out, strict=True):

@@ -41,7 +41,8 @@ class Closure:
     Absolute in N·m (N), relative to the largest sum of magnitudes in the same block of samples. Packages
     may sum τ_i from the τ_ij, so both sums say only that nothing was lost; `recursion` is the largest
     error of τ_ij and τ_ie against an independent Newton–Euler recursion, and `energy` that of Σ_i P_ij, in
-    W, against dE_j/dt of link j's energy there; None where the energies are hand-written.
+    W, against dE_j/dt of link j's energy there; None where the energies are hand-written. `induced` is the
+    residual of induced accelerations, the sum of all shares less J q̈ + J̇ q̇; None where none were asked for.
     """
 
     terms_absolute: float = 0.0
@@ -52,6 +53,8 @@ class Closure:
     recursion_relative: float | None = None
     energy_absolute: float | None = None
     energy_relative: float | None = None
+    induced_absolute: float | None = None
+    induced_relative: float | None = None
 
     def __or__(self, other: "Closure") -> "Closure":
         """The larger of both, error by error."""
@@ -74,6 +77,11 @@ class Closure:
             raise LinkwiseError(
                 "the power that the robot's joints send into its links is not the gain of the links' energies"
                 f" (relative error {self.energy_relative:.2g}); run `linkwise check` on it"
+            )
+        if self.induced_relative is not None and not self.induced_relative <= AGAINST_RECURSION:
+            raise LinkwiseError(
+                "the induced accelerations do not sum to the acceleration (relative error"
+                f" {self.induced_relative:.2g}): the mass matrix is next to singular"
             )
 
 

@@ -17,7 +17,9 @@ from linkwise.check.derivations import derivations
 from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.frame_reference import FrameReference, frame_calls, frame_reference
+from linkwise.check.induced_checks import induced_calls
 from linkwise.check.loop_checks import loop_calls
+from linkwise.check.loop_induced import induced_loop_calls
 from linkwise.check.loop_reference import LoopReference, loop_reference
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.model_calls import Named, against_reference
@@ -180,8 +182,12 @@ class _Checks:
                     yield from frame_calls(f"{way.label}{label}", model, frames)
                 if loops is not None and way.kernel != "rule":
                     yield from loop_calls(f"{way.label}{label}", model, loops)
+                    yield from induced_loop_calls(f"{way.label}{label}", model, loops)
                 joints = manifest.tree.passive if manifest.tree is not None else ()
                 yield from passive_calls(f"{way.label}{label}", model, joints, reference.states)
+                if way.kernel != "rule":  # they are composed of what every kernel was held against
+                    record = self.package.module.AppliedLoad
+                    yield from induced_calls(f"{way.label}{label}", model, joints, reference, frames, record)
         if manifest.tree is not None:
             how = "from energies" if manifest.request.get("derivation") == "energy" else "by the rigid rule"
             ways = {way.label: model for way, model in loaded.items()}

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwise.check.body_reference import COMPLEX_STEP
 from linkwise.check.compare import Entries, Result, compare
@@ -45,7 +46,7 @@ class FrameReference:
 
 def frame_reference(manifest: Manifest, tree: RigidTree, states: States) -> FrameReference:
     """The recursion's answers at some of the states."""
-    states = states.at(np.linspace(0, len(states.q) - 1, STATES).astype(int))
+    states = states.at(chosen_rows(len(states.q)))
     count = len(tree.frames)
     chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_FRAMES)).astype(int))
     frames = [tree.frames[f] for f in chosen]
@@ -69,6 +70,11 @@ def frame_reference(manifest: Manifest, tree: RigidTree, states: States) -> Fram
         (change, changes),
         _centre(recursion, sizes, tree, states),
     )
+
+
+def chosen_rows(count: int) -> NDArray[np.intp]:
+    """Which of `count` states the reference is for."""
+    return np.linspace(0, count - 1, STATES).astype(np.intp)
 
 
 def _columns(

@@ -46,7 +46,8 @@ Terms = Annotated[
 ]
 TableFormat = Annotated[Format, typer.Option(help="Format of the table")]
 Figures = Annotated[
-    list[str] | None, typer.Option(help="paper, paper:JOINT, shares or power; may be repeated")
+    list[str] | None,
+    typer.Option(help="paper, paper:JOINT, shares, power, induced or induced:POINT; may be repeated"),
 ]
 PowerTerms = Annotated[bool, typer.Option("--power-terms", help="Write power by cause and order too")]
 Carried = Annotated[
@@ -63,6 +64,14 @@ LoadFiles = Annotated[
 ]
 LoadsCutoff = Annotated[
     float | None, typer.Option(help="Zero-phase low-pass for these loads, Hz; no filter if not given")
+]
+Induced = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="POINT",
+        help="Tell an acceleration by its sources: FRAME or FRAME,X,Y,Z in m, joints, or centre-of-mass; may "
+        "be repeated",
+    ),
 ]
 Page = Annotated[bool, typer.Option("--page/--no-page", help="Write report.html")]
 
@@ -94,6 +103,7 @@ def analyze(
     payload: Carried = None,
     loads: LoadFiles = None,
     loads_cutoff: LoadsCutoff = None,
+    induced: Induced = None,
     backend: Backend = None,
     page: Page = True,
     as_json: Json = False,
@@ -103,7 +113,7 @@ def analyze(
     processing = chosen_processing(
         derivative, window, degree, chosen_lowpass(cutoff, filter_order, padding), edges, convention
     )
-    wanted = Wanted(format, tuple(figure or ()), page, power_terms)
+    wanted = Wanted(format, tuple(figure or ()), page, power_terms, tuple(induced or ()))
     package = load_robot(robot, backend)
     package = carrying(package, carried(payload or [], package))
     borne = Loads.of(loads or [], loads_cutoff)
@@ -128,9 +138,11 @@ def _told(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         f" {closure.recursion_relative:.1e}, power with the gain of the links' energies there within"
         f" {closure.energy_relative:.1e}"
     )
+    residual = closure.induced_relative
+    shares = "" if residual is None else f"; shares sum to accelerations within {residual:.1e}"
     return [
         f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {analysis.robot.backend};"
         f" {recursion}; closure: terms sum to partial torques within {closure.terms_relative:.1e},"
-        f" these to joint torques within {closure.links_relative:.1e} (relative)",
+        f" these to joint torques within {closure.links_relative:.1e} (relative){shares}",
         *map(str, files),
     ]

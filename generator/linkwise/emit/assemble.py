@@ -33,6 +33,8 @@ SHARED_RUNTIME = (
     "dense.py",
     "dynamics.py",
     "interface.py",
+    "motion_calls.py",
+    "motion_quantities.py",
     "outputs.py",
     "parameter_values.py",
     "passive_joints.py",

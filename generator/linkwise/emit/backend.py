@@ -121,11 +121,13 @@ RULE = (
     "arrays/array_backend.py",
     "arrays/array_kernels.py",
     "constraints",
+    "induced",
     "kinematics",
     "rule",
+    "simulation",
     "sums",
 )
-"""Of linkwise/runtime: the vectorised rule, kinematics of frames, constraints, and sums over the links."""
+"""Of linkwise/runtime: the vectorised rule, and what is composed of it."""
 
 BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend

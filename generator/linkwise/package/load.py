@@ -85,6 +85,9 @@ class Model(Protocol):
     def forward_dynamics(self, q: Array, qd: Array, tau: Array, passive: bool = False) -> Array:
         """qdd (..., n)."""
 
+    def induced_accelerations(self, q: Array, qd: Array, tau: Array | None = None, **how: Any) -> Any:
+        """Shares of an acceleration by source."""
+
     def christoffel(self, q: Array, by_link: bool = False) -> Array:
         """Gamma (..., n, n, n), or by link (..., n, N, n, n)."""
 

@@ -17,6 +17,7 @@ from typing import Any, Literal, overload
 from numpy.typing import ArrayLike
 
 from .interface import Array, Backend
+from .motion_calls import MotionCalls
 from .quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
 from .robot_constraints import Constraints, Contact
 from .robot_kinematics import Kinematics
@@ -24,7 +25,7 @@ from .structure import Layout, Structure
 from .sum_calls import SumCalls
 
 
-class Dynamics(SumCalls):
+class Dynamics(SumCalls, MotionCalls):
     """Partial torques of a robot on one back end; made by the package's `load`.
 
     The robot is the open tree of its joints: of one with ties, which close loops, or with contacts, calls are

@@ -1,10 +1,11 @@
 """An analysis made visible: figures by name, drawn with matplotlib, and the page."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.induced_figure import induced
 from linkwise.analysis.show.paper_figure import paper
 from linkwise.analysis.show.power_figure import power
 from linkwise.analysis.show.shares_figure import shares
@@ -19,18 +20,21 @@ FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
     "paper": paper,
     "shares": shares,
     "power": power,
+    "induced": induced,
 }
 
 
 def draw(result: AnalysisResult, name: str) -> "Figure":
-    """Draw "paper", "shares", "power", or "paper:JOINT" for another loaded joint than the first.
+    """Draw "paper", "shares", "power" or "induced"; "paper:JOINT" or "induced:POINT" for another one.
 
     Raises LinkwiseError for another name.
     """
-    check_figure(name, result.robot)
-    kind, _, joint = name.partition(":")
+    check_figure(name, result.robot, result.induced)
+    kind, _, chosen = name.partition(":")
+    names = result.induced if kind == "induced" else result.robot.joints
     with styled():
-        return FIGURES[kind](result, result.robot.joints.index(joint) if joint else result.robot.driven[0])
+        first = 0 if kind == "induced" else result.robot.driven[0]
+        return FIGURES[kind](result, names.index(chosen) if chosen else first)
 
 
 def figure_png(result: AnalysisResult, name: str) -> bytes:
@@ -39,11 +43,15 @@ def figure_png(result: AnalysisResult, name: str) -> bytes:
         return saved(draw(result, name), "png", dpi=160)
 
 
-def check_figure(name: str, robot: LoadedRobot) -> None:
-    """Raise LinkwiseError unless `draw` knows the figure."""
+def check_figure(name: str, robot: LoadedRobot, points: Sequence[str]) -> None:
+    """Raise LinkwiseError unless `draw` knows the figure; `points` are those of induced accelerations."""
     kind, _, joint = name.partition(":")
+    if kind == "induced":
+        if not points or (joint and joint not in points):
+            raise LinkwiseError(f"--figure {name}: add --induced {joint or 'POINT'}, whose shares it draws")
+        return
     if kind not in FIGURES or (joint and (kind != "paper" or joint not in robot.driven_joints)):
         raise LinkwiseError(
             f"--figure {name}: give one of {', '.join(FIGURES)}, or paper:JOINT with a joint of"
-            f" {listed(robot.driven_joints)}"
+            f" {listed(robot.driven_joints)}, or induced:POINT"
         )

@@ -7,7 +7,7 @@ import numpy as np
 
 from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import FORCES, TORQUE_OF, Column
+from linkwise.analysis.result_columns import FORCES, INDUCED, TORQUE_OF, Column
 from linkwise.analysis.show.poses import poses
 from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
@@ -36,11 +36,11 @@ def view(result: AnalysisResult) -> dict[str, str]:
 
 
 def on_page(column: Column) -> bool:
-    """Whether a page holds a column: power it does not, being the product of two that it holds.
+    """Whether a page holds a column: not power, which is the product of two that it holds.
 
-    Nor does it hold forces of constraints.
+    Nor does it hold forces of constraints and induced accelerations.
     """
-    return column.quantity not in (*TORQUE_OF, *FORCES)
+    return column.quantity not in (*TORQUE_OF, *FORCES, *INDUCED)
 
 
 def page_data(result: AnalysisResult) -> str:

@@ -1,0 +1,158 @@
+"""Induced accelerations of a back end, source by source, against the reference's shares and an own solve."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.check.compare import Entries, Result, compare
+from linkwise.check.frame_reference import FrameReference, chosen_rows
+from linkwise.check.model_calls import FLOAT32
+from linkwise.check.passive_reference import passive_reference
+from linkwise.check.reference import Reference
+from linkwise.check.states import States
+from linkwise.check.sum_checks import regular
+from linkwise.package.entries import PassiveEntry
+from linkwise.package.load import Array, Model
+
+Quantity = tuple[Array, Array]
+"""Values (samples, n, ...) and their scales."""
+
+
+@dataclass(frozen=True)
+class _Sources:
+    """Forces by source at some of the reference's states, and what they accelerate."""
+
+    states: States
+    mass: Quantity
+    forces: dict[str, Quantity]
+
+    def accelerations(self) -> dict[str, Quantity]:
+        """M^-1 F; rounding of F and of M qdd moves qdd by |M^-1| times as much."""
+        mass, noise = self.mass
+        inverse = np.linalg.inv(mass)
+        found = {}
+        for source, (force, size) in self.forces.items():
+            columns = inverse @ flat(force)
+            scale = np.abs(inverse) @ (flat(size) + noise @ np.abs(columns))
+            found[source] = columns.reshape(force.shape), scale.reshape(force.shape)
+        return found
+
+
+def induced_calls(
+    name: str,
+    model: Model,
+    joints: Sequence[PassiveEntry],
+    reference: Reference,
+    frames: FrameReference | None,
+    load_of: Callable[..., Any],
+) -> Iterator[Result]:
+    """Shares of the coordinates, also for the torques that a motion asks for, and of a point under a load."""
+    rows = chosen_rows(len(reference.states.q))
+    rows, at = rows[regular(reference)[rows]], np.flatnonzero(regular(reference)[rows])
+    if not rows.size:
+        return
+    told = f"against {reference.name}"
+    shares = [*_given(model, joints, reference, rows), *_asked(model, reference, rows)]
+    yield compare(f"{name}: induced accelerations {told}", shares, reference.tolerance)
+    if frames is not None:
+        seen = _of_a_point(model, reference, rows, frames, at, load_of)
+        yield compare(f"{name}: induced accelerations of a point {told}", seen, reference.tolerance)
+    single = rows[reference.fits_single()[rows]]
+    if single.size:
+        shares = list(_given(model, joints, reference, single, np.float32))
+        yield compare(f"{name}: induced accelerations in single precision", shares, **FLOAT32)
+
+
+def _given(
+    model: Model,
+    joints: Sequence[PassiveEntry],
+    reference: Reference,
+    rows: NDArray[np.intp],
+    kind: type = np.float64,
+) -> Iterator[Entries]:
+    """Of torques, with what joints have of their own."""
+    sources = _sources(reference, rows, joints)
+    motion: list[Any] = [a.astype(kind) for a in sources.states.motion]
+    found: Any = model.induced_accelerations(*motion, passive=True, constraints=False)
+    for source, (value, scale) in sources.accelerations().items():
+        yield Entries(source, getattr(found, source), value, scale)
+
+
+def _asked(model: Model, reference: Reference, rows: NDArray[np.intp]) -> Iterator[Entries]:
+    """Of the actuators that give a motion."""
+    states = reference.states.at(rows)
+    torque, size = (a["tau"][rows].sum(-1) for a in (reference.values, reference.scales))
+    sources = _sources(reference, rows, ())
+    own = _Sources(states, sources.mass, {"actuators": (diagonal(torque), diagonal(size))})
+    found = model.induced_accelerations(states.q, states.qd, qdd=states.qdd, constraints=False)
+    yield Entries("actuators asked for", found.actuators, *own.accelerations()["actuators"])
+
+
+def _of_a_point(
+    model: Model,
+    reference: Reference,
+    rows: NDArray[np.intp],
+    frames: FrameReference,
+    at: NDArray[np.intp],
+    load_of: Callable[..., Any],
+) -> Iterator[Entries]:
+    """The last frame at its point, on which a load acts; the same load twice in one source too."""
+    sources = _sources(reference, rows, ())
+    f, point, frame = len(frames.chosen) - 1, frames.points[-1], frames.chosen[-1]
+    (jacobian, reach), (rate, change) = ((a[at, f] for a in q) for q in (frames.jacobian, frames.rate))
+    moment, force = np.random.default_rng(6).uniform(-1.0, 1.0, (2, 3))
+    wrench = np.concatenate([moment, force])
+    lifted, bound = wrench @ jacobian, np.abs(wrench) @ reach
+    sources.forces["loads"] = tuple(np.stack([a, 2.0 * a], -1) for a in (lifted, bound))  # type: ignore[assignment]
+    load = load_of(frame, force, moment, point)
+    q, qd, tau = sources.states.motion
+    found: Any = model.induced_accelerations(
+        q, qd, tau, loads=(load, [load, load]), frame=frame, point=point, constraints=False
+    )
+    for source, (value, scale) in sources.accelerations().items():
+        moved = jacobian @ flat(value)
+        size = np.abs(jacobian) @ flat(scale) + reach @ np.abs(flat(value))
+        shape = len(rows), 6, *value.shape[2:]
+        yield Entries(
+            f"{source} of {frame}", getattr(found, source), moved.reshape(shape), size.reshape(shape)
+        )
+    qd = sources.states.qd[:, None, :]
+    yield Entries(f"kinematic of {frame}", found.kinematic, rate * qd, change * np.abs(qd))
+
+
+def _sources(reference: Reference, rows: NDArray[np.intp], joints: Sequence[PassiveEntry]) -> _Sources:
+    """All sources but loads; the states' qdd stand for the actuators' torques."""
+    states = reference.states.at(rows)
+    values, scales = ({k: a[rows] for k, a in kept.items()} for kept in (reference.values, reference.scales))
+    over = states.qd[:, None, None, :]
+    shares, sizes = passive_reference(joints, states)
+    rotor = passive_reference(joints, States(states.q, states.qd, np.ones_like(states.q)))[0][3]
+    return _Sources(
+        states,
+        (values["c2"].sum(2) + diagonal(rotor), scales["c2"].sum(2) + diagonal(rotor)),
+        {
+            "actuators": (diagonal(states.qdd), diagonal(np.abs(states.qdd))),
+            "velocity": (-values["c1"] * over, scales["c1"] * np.abs(over)),
+            "gravity": (-values["g"], scales["g"]),
+            "passive": (_by_kind(-shares[:3]), _by_kind(sizes[:3])),
+        },
+    )
+
+
+def _by_kind(shares: Array) -> Array:
+    """Diagonals (samples, n, 3, n) of shares (3, samples, n)."""
+    return np.moveaxis(diagonal(shares), 0, 2)
+
+
+def diagonal(values: Array) -> Array:
+    """Matrices (..., n, n) with these (..., n) on their diagonals."""
+    matrices: Array = np.eye(values.shape[-1]) * values[..., None, :]
+    return matrices
+
+
+def flat(values: Array) -> Array:
+    """(samples, n, ...) as columns (samples, n, X)."""
+    return values.reshape(*values.shape[:2], int(np.prod(values.shape[2:])))
