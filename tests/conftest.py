@@ -1,6 +1,10 @@
 """Packages that tests share: each robot is generated once a session and imported from its folder."""
 
 import os
+
+# Before NumPy and torch: two files run at a time, and threads that wait for a busy core cost torch ten times.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import shutil
 import sysconfig
 from collections.abc import Callable, Iterator

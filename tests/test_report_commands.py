@@ -3,15 +3,20 @@
 import json
 import re
 import subprocess
-import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
+from command_line import run_linkwise
 
 
-def report(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "linkwise", "report", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+Report = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def report(tmp_path: Path) -> Report:
+    return partial(run_linkwise, "report", folder=tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +47,7 @@ def report(*arguments: str) -> subprocess.CompletedProcess[str]:
     ],
 )
 def test_a_users_mistake_is_one_line_and_leaves_no_file(
-    arguments: tuple[str, ...], complaint: str, tmp_path: Path
+    arguments: tuple[str, ...], complaint: str, report: Report, tmp_path: Path
 ) -> None:
     run = report(*arguments, "--out", str(tmp_path / "out"))
     assert run.returncode == 2
@@ -52,7 +57,7 @@ def test_a_users_mistake_is_one_line_and_leaves_no_file(
     assert not (tmp_path / "out").exists()
 
 
-def test_an_unwritable_directory_is_refused_before_the_work(tmp_path: Path) -> None:
+def test_an_unwritable_directory_is_refused_before_the_work(report: Report, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     run = report("reduction", "--out", str(tmp_path / "file" / "out"))
     assert run.returncode == 2
@@ -60,7 +65,7 @@ def test_an_unwritable_directory_is_refused_before_the_work(tmp_path: Path) -> N
     assert "nothing was written" in run.stderr
 
 
-def test_reports_are_the_same_bytes_from_run_to_run(tmp_path: Path) -> None:
+def test_reports_are_the_same_bytes_from_run_to_run(report: Report, tmp_path: Path) -> None:
     for run in ("a", "b"):
         assert report("reduction", "--dof", "1..4", "--out", str(tmp_path / run)).returncode == 0
         assert report("terms", "planar2", "--joint", "all", "--out", str(tmp_path / run)).returncode == 0
@@ -73,13 +78,13 @@ def test_reports_are_the_same_bytes_from_run_to_run(tmp_path: Path) -> None:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
 
 
-def test_a_held_joint_leaves_the_range_that_was_asked_for() -> None:
+def test_a_held_joint_leaves_the_range_that_was_asked_for(report: Report) -> None:
     run = report("reduction", "--dof", "1..10", "--lock", "joint1=0", "--json")
     assert run.returncode == 0, run.stderr
     assert [point["dof"] for point in json.loads(run.stdout)["points"]] == list(range(1, 11))
 
 
-def test_a_page_shows_the_pictures_that_lie_beside_it_and_no_others(tmp_path: Path) -> None:
+def test_a_page_shows_the_pictures_that_lie_beside_it_and_no_others(report: Report, tmp_path: Path) -> None:
     printed = report("reduction", "--dof", "1..3").stdout
     assert "](" not in printed
     assert "--measure" in printed
@@ -89,7 +94,7 @@ def test_a_page_shows_the_pictures_that_lie_beside_it_and_no_others(tmp_path: Pa
     assert all((tmp_path / name).is_file() for name in shown)
 
 
-def test_any_bucket_of_any_torque_can_be_asked_for() -> None:
+def test_any_bucket_of_any_torque_can_be_asked_for(report: Report) -> None:
     asked = ("--joint", "joint2", "--link", "3", "--coordinate", "3", "--order", "1", "--json")
     run = report("terms", "planar3", *asked)
     (torque,) = json.loads(run.stdout)["torques"]
@@ -97,7 +102,7 @@ def test_any_bucket_of_any_torque_can_be_asked_for() -> None:
     assert torque["kept"] == torque["velocity"][2] == 3
 
 
-def test_measured_seconds_stay_in_files_of_their_own_and_draw_again(tmp_path: Path) -> None:
+def test_measured_seconds_stay_in_files_of_their_own_and_draw_again(report: Report, tmp_path: Path) -> None:
     first, again = tmp_path / "first", tmp_path / "again"
     assert report("reduction", "--dof", "1..2", "--measure", "--out", str(first)).returncode == 0
     found = json.loads((first / "measured.json").read_text())
