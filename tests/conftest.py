@@ -31,9 +31,11 @@ needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs g
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Compiled packages go into a directory of the session, not the user's; mutants share one."""
+    session = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        session = session.parent  # so that what one process compiled is there for the other
     with pytest.MonkeyPatch.context() as patch:
-        shared = os.environ.get("LINKWISE_TEST_CACHE")
-        patch.setenv("LINKWISE_CACHE", shared or str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("LINKWISE_CACHE", os.environ.get("LINKWISE_TEST_CACHE") or str(session / "cache"))
         yield
 
 
