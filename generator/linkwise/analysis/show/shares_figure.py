@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import PASSIVE, Quantity
 from linkwise.extras import extra
-from linkwise.plotstyle import GRAVITY, colour, drawn
+from linkwise.plotstyle import GRAVITY, drawn, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,17 +28,17 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     robot = result.robot
     movement = []
     for k, joint in enumerate(robot.joints):
-        movement.append(_Cause("tau_qdd", k, f"{drawn(joint)} acceleration", colour(k)))
-        movement.append(_Cause("tau_qd", k, f"{drawn(joint)} velocity", colour(k), "////"))
+        movement.append(_Cause("tau_qdd", k, f"{drawn(joint)} acceleration", tone(k)))
+        movement.append(_Cause("tau_qd", k, f"{drawn(joint)} velocity", tone(k), "////"))
     own = dict.fromkeys(column.quantity for column in result.columns if column.quantity in PASSIVE)
     passive = [
-        _Cause(quantity, None, quantity.removeprefix("tau_"), colour(len(robot.joints) + at), "....")
+        _Cause(quantity, None, quantity.removeprefix("tau_"), tone(len(robot.joints) + at), "....")
         for at, quantity in enumerate(own)
     ]
     first = len(robot.joints) + len(passive)
     loads = [
-        _Cause("tau_load", e, drawn(borne.name), colour(first + e), "xx")
-        for e, borne in enumerate(result.loads)
+        _Cause("tau_load", e, drawn(label), tone(first + e), "xx")
+        for e, label in enumerate(result.load_labels)
     ]
     every = [_Cause("tau_gravity", None, "gravity", GRAVITY), *movement, *passive, *loads]
     rows = -(-len(every) // 3)
