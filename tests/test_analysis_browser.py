@@ -319,6 +319,10 @@ def test_loads_are_causes_and_arrows(driver, tmp_path):
         "return [...document.querySelectorAll('#stick g.load line')]"
         ".map((line) => ['x1', 'y1', 'x2', 'y2'].map((at) => Number(line.getAttribute(at))))"
     )
+    assert (
+        "Arrows are forces from outside; the longest is 9 N."
+        in driver.find_element("id", "figure-caption").text
+    )
     directions = [np.subtract(ends[2:], ends[:2]) for ends in arrows]
     for direction, force in zip(directions, (push[40, :2], (0, 9)), strict=True):
         along = direction * [1, -1] / np.hypot(*direction)
