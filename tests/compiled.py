@@ -7,6 +7,7 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,15 @@ def compile_library(directory: Path, target: Path, compiler: Sequence[str] = ("g
     assert done.returncode == 0, done.stderr
 
 
+@cache
+def _library(directory: Path) -> ctypes.CDLL:
+    """Of a package that no test changes: compiled once, however many ask."""
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / f"{name_of(directory)}.so"
+        compile_library(directory, target)
+        return ctypes.CDLL(str(target))
+
+
 class Compiled:
     """The compiled functions of a package, on arrays (samples, n) of float64 or float32."""
 
@@ -43,10 +53,7 @@ class Compiled:
         }
         totals = {"tau": "G"}
         self.sizes = {array: self.numbers.get(totals.get(array, array.upper()), 0) for array in FIELDS}
-        with tempfile.TemporaryDirectory() as folder:
-            target = Path(folder) / f"{self.name}.so"
-            compile_library(directory, target)
-            self.library = ctypes.CDLL(str(target))
+        self.library = _library(directory)
 
     def _call(self, function: str, count: int | None, motion: Sequence[Any], lengths: list[int]) -> list[Any]:
         """Arrays of the given lengths that a function fills; those of length 0 it does not have."""

@@ -1,6 +1,10 @@
 """Packages that tests share: each robot is generated once a session and imported from its folder."""
 
 import os
+
+# Before NumPy and torch: two files run at a time, and threads that wait for a busy core cost torch ten times.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import shutil
 import sysconfig
 from collections.abc import Callable, Iterator
@@ -27,9 +31,11 @@ needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs g
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Compiled packages go into a directory of the session, not the user's; mutants share one."""
+    session = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        session = session.parent  # so that what one process compiled is there for the other
     with pytest.MonkeyPatch.context() as patch:
-        shared = os.environ.get("LINKWISE_TEST_CACHE")
-        patch.setenv("LINKWISE_CACHE", shared or str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("LINKWISE_CACHE", os.environ.get("LINKWISE_TEST_CACHE") or str(session / "cache"))
         yield
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import urdf_text
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import Payload, Processing, Reading, analyze
 from linkwise.analysis.loaded_robot import load_robot
@@ -19,6 +20,7 @@ from linkwise.analysis.result import Totals
 from linkwise.analysis.result_columns import Column, columns_of
 from linkwise.analysis.run import Wanted, analyze_to
 from linkwise.analysis.show.page import report
+from linkwise.analysis.show.poses import poses
 from linkwise.analysis.work import Work
 from linkwise.progress import silent
 from motion_logs import PLANAR3, smooth, write_csv
@@ -305,6 +307,9 @@ def test_loads_are_causes_and_arrows(driver, tmp_path):
     result, _ = analyze_to(out, log, robot, Reading(), Processing(), Wanted(), silent, loads)
     driver.get((out / "report.html").as_uri())
     choose(driver, "slider", 40)
+    assert driver.execute_script("return document.getElementById('order').value") == "everything"
+    columns = driver.execute_script(TICKS, "xtick")
+    assert [text for text, *_ in columns][-3:] == ["gravity", "load hand", "load rope"]
     choose(driver, "order", "tau_load")
     _, numbers = shown_map(driver)
     for i in range(3):
@@ -313,6 +318,10 @@ def test_loads_are_causes_and_arrows(driver, tmp_path):
     arrows = driver.execute_script(
         "return [...document.querySelectorAll('#stick g.load line')]"
         ".map((line) => ['x1', 'y1', 'x2', 'y2'].map((at) => Number(line.getAttribute(at))))"
+    )
+    assert (
+        "Arrows are forces from outside; the longest is 9 N."
+        in driver.find_element("id", "figure-caption").text
     )
     directions = [np.subtract(ends[2:], ends[:2]) for ends in arrows]
     for direction, force in zip(directions, (push[40, :2], (0, 9)), strict=True):
@@ -330,6 +339,33 @@ def test_loads_are_causes_and_arrows(driver, tmp_path):
     into = [[*result.power[40, i], *(result.load_torque[40, i] * result.qd[40, i])] for i in range(3)]
     assert [[x or 0 for x in row[:6]] for row in power[:3]] == [pytest.approx(row, rel=1e-12) for row in into]
     assert driver.get_log("browser") == []
+
+
+def test_a_robot_that_moves_in_a_plane_is_seen_from_its_side(driver, tmp_path):
+    """A leg beside another, as walking is looked at; it may be turned all the same."""
+    aside = {"rpy": "0 0 0", "axis": "0 1 0"}
+    legs = [
+        urdf_text.joint(f"hip{y}", "a", leg, xyz=f"0 {y} 0", **aside) for y, leg in ((0.2, "b"), (-0.2, "c"))
+    ]
+    (tmp_path / "legs.urdf").write_text(urdf_text.robot(*map(urdf_text.link, "abc"), *legs))
+    write_package(generate(read_system(tmp_path / "legs.urdf"), ["numpy"]), tmp_path / "legs")
+    names = load_robot(tmp_path / "legs").joints
+    log = write_csv(tmp_path / "a.csv", smooth(60, 2), names)
+    analysis = analyze(log, tmp_path / "legs")
+    (tmp_path / "report.html").write_text(report(analysis), encoding="utf-8")
+    driver.get((tmp_path / "report.html").as_uri())
+    assert "Drag to turn" in driver.find_element("id", "figure-caption").text
+    origins, centres = poses(analysis.robot.bodies, analysis.q)
+    choose(driver, "slider", 30)
+    dots = driver.execute_script(
+        "return [...document.querySelectorAll('#stick circle')]"
+        ".map((dot) => ['cx', 'cy'].map((at) => Number(dot.getAttribute(at))))"
+    )
+    seen = np.array(dots) * [1, -1]
+    world = np.stack([origins[30], centres[30]], axis=1).reshape(-1, 3)[:, [0, 2]]
+    assert len(seen) == len(world) == 4
+    scale = np.ptp(seen[:, 1]) / np.ptp(world[:, 1])
+    np.testing.assert_allclose(seen - seen[0], scale * (world - world[0]), atol=0.02)
 
 
 def test_names_are_shown_and_not_obeyed(driver, tmp_path):

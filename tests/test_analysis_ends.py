@@ -1,4 +1,4 @@
-"""How `linkwise analyze` ends as a process: one line for an error, and nothing left behind."""
+"""How `linkwise analyze` ends: one line for an error, and nothing left behind."""
 
 import signal
 import subprocess
@@ -7,13 +7,12 @@ import time
 
 import numpy as np
 import pytest
+from command_line import run_linkwise
 from motion_logs import JOINTS, PLANAR3, smooth, write_csv, write_mot
 
 
-def start(log, *options):
-    command = [sys.executable, "-m", "linkwise", "analyze", str(log), "--robot", str(PLANAR3)]
-    command += ["--out", str(log.parent / "out"), *options]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def arguments(log, *options):
+    return ["analyze", str(log), "--robot", str(PLANAR3), "--out", str(log.parent / "out"), *options]
 
 
 def holed(path):
@@ -55,17 +54,17 @@ def in_degrees(path):
 )
 def test_an_error_is_one_line(tmp_path, make, options, message):
     log = make(tmp_path / "a")
-    process = start(log, *options)
-    _, stderr = process.communicate()
-    assert process.returncode == 2
-    (line,) = [line for line in stderr.splitlines() if not line.startswith("reading: ")]
+    done = run_linkwise(*arguments(log, *options), folder=tmp_path)
+    assert done.returncode == 2
+    (line,) = [line for line in done.stderr.splitlines() if not line.startswith("reading: ")]
     assert message in line
     assert [file.name for file in tmp_path.iterdir()] == [log.name]
 
 
 def test_a_termination_leaves_nothing(tmp_path):
     log = write_csv(tmp_path / "a.csv", smooth(60_000, 3))
-    process = start(log, "--resample", "9000")
+    command = [sys.executable, "-m", "linkwise", *arguments(log, "--resample", "9000")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     while len(list(tmp_path.iterdir())) < 2:
         assert process.poll() is None
         time.sleep(0.02)

@@ -4,13 +4,13 @@ import hashlib
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 import urdf_text
+from command_line import run_linkwise
 from conftest import DATA, PANDA
 from linkwise import Options
 
@@ -19,11 +19,7 @@ Run = Callable[..., subprocess.CompletedProcess[str]]
 
 @pytest.fixture
 def linkwise(tmp_path: Path) -> Run:
-    def run(*arguments: Any) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "linkwise", *map(str, arguments)]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-
-    return run
+    return partial(run_linkwise, folder=tmp_path)
 
 
 @pytest.fixture

@@ -190,7 +190,8 @@ def test_letters_that_the_terminal_lacks_are_written_as_escapes() -> None:
 
 
 WAITING = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts jobs in the background without it
 from linkwise import pipeline
 from linkwise.cli.app import main
 pipeline.read_system = lambda *_: (print("reading", flush=True), time.sleep(60))

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -288,6 +289,22 @@ RESULTS = {
 """Values of a sample of planar3 in each array of what streams."""
 
 
+@pytest.fixture(scope="module")
+def counts(
+    directory_of: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[int], ctypes.CDLL]:
+    """Library of planar3 that counts what goes past the cache, in vectors of so many bytes."""
+
+    @cache
+    def library(line: int) -> ctypes.CDLL:
+        folder = tmp_path_factory.mktemp("counting")
+        compiler = ("gcc", "-std=c99", *counting(folder, line))
+        compile_library(directory_of("planar3"), folder / "library.so", compiler)
+        return ctypes.CDLL(str(folder / "library.so"))
+
+    return library
+
+
 @pytest.mark.parametrize("behind", [0, 16], ids=["on a line", "off a line"])
 @pytest.mark.parametrize("name", RESULTS)
 @pytest.mark.parametrize(("dtype", "line"), [(np.float64, 64), (np.float32, 32)])
@@ -296,12 +313,9 @@ def test_stores_past_the_cache_are_whole_lines_and_end_with_a_fence(
     line: int,
     name: str,
     behind: int,
-    directory_of: Callable[[str], Path],
-    tmp_path: Path,
+    counts: Callable[[int], ctypes.CDLL],
 ) -> None:
-    compiler = ("gcc", "-std=c99", *counting(tmp_path, line))
-    compile_library(directory_of("planar3"), tmp_path / "library.so", compiler)
-    library = ctypes.CDLL(str(tmp_path / "library.so"))
+    library = counts(line)
     suffix, width = ("f", 16) if dtype is np.float32 else ("", 8)
     compute = getattr(library, f"planar3_{name}{suffix}")
     compute.restype = None
@@ -311,6 +325,7 @@ def test_stores_past_the_cache_are_whole_lines_and_end_with_a_fence(
     motion = np.tile(np.full(3, 0.5, dtype), count)
     pointers = [ctypes.c_void_p(a.ctypes.data) for a in (motion, motion, motion, *outputs)]
     streamed, unfenced = (ctypes.c_long.in_dll(library, name) for name in ("streamed", "unfenced"))
+    streamed.value = unfenced.value = 0
     compute(ctypes.c_size_t(width), *pointers)
     assert streamed.value == 0
     compute(ctypes.c_size_t(count // width if blocks else count), *pointers)
@@ -358,11 +373,11 @@ def test_functions_that_write_zeros_say_what_numpy_says_for_any_count(
 
 
 GUARDED = """
-#include "planar5.h"
+#include "planar4.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-enum { N = PLANAR5_JOINTS, C2 = PLANAR5_C2, C1 = PLANAR5_C1, G = PLANAR5_G };
+enum { N = PLANAR4_JOINTS, C2 = PLANAR4_C2, C1 = PLANAR4_C1, G = PLANAR4_G };
 static const int SIZES[] = { C2, C1, G, G, G, C1 };
 static real *room(size_t count)
 {
@@ -375,9 +390,9 @@ static void compute(size_t count, real *const *motion, real **out)
 {
     for (int a = 0; a < 6; ++a)
         out[a] = room(count * SIZES[a]);
-    API(planar5_decomposition)(count, motion[0], motion[1], motion[2], out[0], out[1], out[2], out[3]);
-    API(planar5_torque)(count, motion[0], motion[1], motion[2], out[4]);
-    API(planar5_position_gradient)(count, motion[0], motion[1], motion[2], out[5]);
+    API(planar4_decomposition)(count, motion[0], motion[1], motion[2], out[0], out[1], out[2], out[3]);
+    API(planar4_torque)(count, motion[0], motion[1], motion[2], out[4]);
+    API(planar4_position_gradient)(count, motion[0], motion[1], motion[2], out[5]);
 }
 int main(void)
 {
@@ -424,8 +439,8 @@ int main(void)
 def test_no_call_leaves_its_arrays_and_many_samples_are_one_by_one(
     real: str, kind: Sequence[str], directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    """Under gcc's address sanitizer. Arrays have 35, 55 and 15 entries: tiles of 8 do not fill them."""
-    folder = directory_of("planar5") / "c"
+    """Under gcc's address sanitizer. Arrays have 20, 30 and 10 entries: tiles of 8 do not fill them."""
+    folder = directory_of("planar4") / "c"
     suffix, api, near = ("", "name", "1e-12") if real == "double" else ("f", "name##f", "1e-3")
     (tmp_path / "main.c").write_text(GUARDED, encoding="utf-8")
     defined = (f"-Dreal={real}", f"-DAPI(name)={api}", f"-DNEAR={near}")
@@ -437,7 +452,7 @@ def test_no_call_leaves_its_arrays_and_many_samples_are_one_by_one(
             *kind,
             *counting(tmp_path, 64),
             "-c",
-            str(folder / f"planar5{suffix}.c"),
+            str(folder / f"planar4{suffix}.c"),
             "-o",
             "arm.o",
         ],

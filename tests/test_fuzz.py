@@ -61,7 +61,7 @@ BAD = {
 
 @pytest.fixture(scope="module")
 def hasty() -> Iterator[Client]:
-    with Client(seconds=1.0) as started:
+    with Client(seconds=1.0, modules=("linkwise.cli.inspect",)) as started:
         yield started
 
 

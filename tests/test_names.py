@@ -60,7 +60,10 @@ def chain(robot: str, names: tuple[str, ...]) -> str:
 @pytest.fixture(scope="module")
 def hostile(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     path = tmp_path_factory.mktemp("hostile") / "robot.toml"
-    path.write_text(chain(HOSTILE[1], HOSTILE[:3]), encoding="utf-8")
+    beside, *along = HOSTILE[:3]
+    text = chain(HOSTILE[1], tuple(along))
+    text += PART.format(link=quoted(beside), joint=quoted(beside), parent=quoted("base"))
+    path.write_text(text, encoding="utf-8")
     return generate(read_system(path, Options("symbolic")))
 
 

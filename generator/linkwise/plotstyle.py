@@ -50,6 +50,13 @@ def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 
 
+def tone(index: int) -> str:
+    """The same for areas, which have no dashes: darker where the colours begin again, and then paler."""
+    toward, much = ((0, 0.0), (0, 0.45), (255, 0.45))[index // len(COLOURS) % 3]
+    parts = (int(colour(index)[at : at + 2], 16) for at in (1, 3, 5))
+    return "#" + "".join(f"{round(part * (1 - much) + toward * much):02X}" for part in parts)
+
+
 def dash(index: int) -> str:
     """Line style, for the indices that share a colour."""
     return DASHES[index // len(COLOURS) % len(DASHES)]

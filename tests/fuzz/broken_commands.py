@@ -59,6 +59,7 @@ READS_LOG = """
 --convention gradient
 --format csv
 --figure paper|paper:joint2|paper:x
+--load link3=1,2,3|link2=1,2,3,4,5,6@0,0,1
 --backend numpy|native
 --json
 """

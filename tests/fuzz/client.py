@@ -5,12 +5,13 @@ import pickle
 import select
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import IO, cast
 
 from fuzz.case import Case
-from fuzz.worker import Outcome
+from fuzz.worker import MODULES, Outcome
 
 TESTS = Path(__file__).parents[1]
 PATIENCE = 90.0
@@ -18,10 +19,13 @@ PATIENCE = 90.0
 
 
 class Client:
-    """One worker, started when it is needed; a case may take so many seconds of CPU time."""
+    """One worker, started when it is needed; a case may take so many seconds of CPU time.
 
-    def __init__(self, seconds: float = 10.0) -> None:
-        self._seconds = seconds
+    The worker imports the modules before its first case.
+    """
+
+    def __init__(self, seconds: float = 10.0, modules: Sequence[str] = MODULES) -> None:
+        self._seconds, self._modules = seconds, tuple(modules)
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> "Client":
@@ -57,7 +61,7 @@ class Client:
         paths = os.pathsep.join(filter(None, (str(TESTS), os.environ.get("PYTHONPATH", ""))))
         environment = os.environ | {"PYTHONPATH": paths, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         self._process = subprocess.Popen(
-            [sys.executable, "-c", f"from fuzz.worker import serve; serve({self._seconds})"],
+            [sys.executable, "-c", f"from fuzz.worker import serve; serve({self._seconds}, {self._modules})"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=environment,

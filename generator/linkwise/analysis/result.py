@@ -13,6 +13,7 @@ from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.verify import Closure
 from linkwise.analysis.work import Work
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed, printable
 from linkwise.package.load import Array
 
 SCHEMA = 2
@@ -124,6 +125,11 @@ class AnalysisResult:
         return self._filled("tau_load", len(self.robot.joints), len(self.loads))
 
     @property
+    def load_labels(self) -> tuple[str, ...]:
+        """How pictures call the loads: one on the foot and the foot's own share are told apart."""
+        return tuple(f"load {borne.name}" for borne in self.loads)
+
+    @property
     def power(self) -> Array:
         """P_ij = τ_ij q̇_i (S, n, N) in W, what joint i sends into link j; Σ_i P_ij = d(K_j + P_j)/dt."""
         return self._dense("power_link", 2)
@@ -132,6 +138,11 @@ class AnalysisResult:
     def joint_power(self) -> Array:
         """P_i = τ_i q̇_i (S, n) in W."""
         return self._dense("power", 1)
+
+    @property
+    def load_warnings(self) -> tuple[str, ...]:
+        """What was noticed in the files of loads, each with its file."""
+        return tuple(dict.fromkeys(warning for borne in self.loads for warning in borne.warnings))
 
     @property
     def provenance(self) -> str:
@@ -147,6 +158,9 @@ class AnalysisResult:
             else "no filter"
         )
         parts += [f"{made.edges} edges", f"{made.convention} convention"]
+        for source in dict.fromkeys(borne.source for borne in self.loads):
+            names = listed([borne.name for borne in self.loads if borne.source == source])
+            parts.append(printable(f"loads {names} of {source}" if source else f"loads {names}"))
         cutoffs = sorted({borne.cutoff for borne in self.loads if borne.cutoff is not None})
         parts += [f"loads filtered at {cutoff:g} Hz" for cutoff in cutoffs]
         if self.stride > 1:
@@ -176,7 +190,7 @@ class AnalysisResult:
             **({} if self.closed is None else {"constraints": self._constraints(self.closed)}),
             "work": self._work(),
             "ignored_columns": list(self.ignored),
-            "warnings": list(self.warnings),
+            "warnings": [*self.warnings, *self.load_warnings],
             "columns": [
                 {
                     "name": column.name,

@@ -64,7 +64,7 @@ def read_samples(
     samples = collected(in_si(), 1 + len(joints), buffer)
     with within(str(path)):
         rate = even_rate(samples[:, 0], log.first_row, strict=reading.resample is None)
-        warnings = (*log.warnings, *_slowness(rate))
+        warnings = (*log.warnings, *slowness(rate))
         if reading.resample is not None:
             rate = reading.resample
             samples = collected(resampled(samples, rate, progress=progress), 1 + len(joints), buffer)
@@ -89,7 +89,8 @@ def finite_blocks(log: Log, path: Path, columns: Sequence[int], progress: Progre
         progress("reading", done, log.size)
 
 
-def _slowness(rate: float) -> tuple[str, ...]:
+def slowness(rate: float) -> tuple[str, ...]:
+    """A warning where so many samples a second, Hz, are hardly those of a movement."""
     if rate >= SLOW:
         return ()
     return (f"{rate:.4g} samples a second are few: if time is in ms, divide it by 1000",)

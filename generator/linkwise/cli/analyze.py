@@ -35,6 +35,7 @@ from linkwise.cli.log_options import (
     carried,
     chosen_lowpass,
     chosen_processing,
+    constant_loads,
     pairs,
 )
 from linkwise.escape import json_text, listed
@@ -56,6 +57,15 @@ Carried = Annotated[
         "--payload",
         metavar="BODY=KG,X,Y,Z",
         help="Point mass on a body, at a point in its axes, m; NAME:BODY=… names it; may be repeated",
+    ),
+]
+ConstantLoads = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--load",
+        metavar="BODY=FX,FY,FZ@X,Y,Z",
+        help="Constant force, N, in the world's axes, at a point in the body's, m; ,MX,MY,MZ behind FZ adds a"
+        " moment, N·m; NAME:BODY=… names it; may be repeated",
     ),
 ]
 LoadFiles = Annotated[
@@ -101,6 +111,7 @@ def analyze(
     figure: Figures = None,
     power_terms: PowerTerms = False,
     payload: Carried = None,
+    load: ConstantLoads = None,
     loads: LoadFiles = None,
     loads_cutoff: LoadsCutoff = None,
     induced: Induced = None,
@@ -116,11 +127,13 @@ def analyze(
     wanted = Wanted(format, tuple(figure or ()), page, power_terms, tuple(induced or ()))
     package = load_robot(robot, backend)
     package = carrying(package, carried(payload or [], package))
-    borne = Loads.of(loads or [], loads_cutoff)
+    borne = Loads.of([*constant_loads(load or [], package), *(loads or [])], loads_cutoff)
     with shown_progress(UNITS) as progress:
         analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress, borne)
     for warning in analysis.warnings:
         tell(f"warning: {log}: {warning}", err=True)
+    for warning in analysis.load_warnings:
+        tell(f"warning: {warning}", err=True)
     if analysis.ignored:
         tell(f"left out: {listed(analysis.ignored)}", err=True)
     if as_json:

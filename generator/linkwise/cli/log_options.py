@@ -8,6 +8,7 @@ import typer
 
 from linkwise.analysis.body_names import named_body
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads import Load
 from linkwise.analysis.settings import (
     Convention,
     Derivative,
@@ -114,4 +115,26 @@ def carried(given: Sequence[str], robot: LoadedRobot) -> tuple[Payload, ...]:
         name, body = named_body(where, robot)
         x, y, z = point or (0.0, 0.0, 0.0)
         found.append(Payload(body, mass, (x, y, z), name))
+    return tuple(found)
+
+
+def constant_loads(given: Sequence[str], robot: LoadedRobot) -> tuple[Load, ...]:
+    """Loads of [NAME:]BODY=FX,FY,FZ[,MX,MY,MZ][@X,Y,Z]; raises LinkwiseError for another text."""
+    found = []
+    for text in given:
+        where, sign, numbers = text.rpartition("=")
+        wrench, at, place = numbers.partition("@")
+        try:
+            force_and_moment = list(map(float, wrench.split(",")))
+            point = list(map(float, place.split(","))) if at else [0.0, 0.0, 0.0]
+        except ValueError:
+            sign = ""
+        if not (sign and where) or len(force_and_moment) not in (3, 6) or len(point) != 3:
+            raise LinkwiseError(
+                f"--load {text}: write it as BODY=FX,FY,FZ, or with moments behind them and with the point as"
+                " BODY=FX,FY,FZ,MX,MY,MZ@X,Y,Z, in N, N·m and m"
+            )
+        name, body = named_body(where, robot)
+        moment = force_and_moment[3:] or (0.0, 0.0, 0.0)
+        found.append(Load(name or body, body, force_and_moment[:3], moment, point))
     return tuple(found)

@@ -58,6 +58,8 @@ class PlacedLoad:
     """The file that it is from, "" for none."""
     cutoff: float | None = None
     """Of the low-pass that it got, in Hz."""
+    warnings: tuple[str, ...] = ()
+    """What was noticed in the file, which each names."""
 
     def wrench(self, time: Array, q: Array, pose: Pose) -> Wrench:
         """What acts at instants (S,) with the robot at q (S, n)."""

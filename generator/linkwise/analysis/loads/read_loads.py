@@ -14,7 +14,7 @@ from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WIDTH, Loa
 from linkwise.analysis.loads.load_columns import PARTS, LoadColumns, load_columns
 from linkwise.analysis.loads.placed_load import PlacedLoad, Seat, seat_of
 from linkwise.analysis.logs import open_log
-from linkwise.analysis.samples import collected, finite_blocks
+from linkwise.analysis.samples import collected, finite_blocks, slowness
 from linkwise.analysis.settings import Lowpass
 from linkwise.errors import LinkwiseError, within
 from linkwise.package.load import Array
@@ -89,7 +89,9 @@ def _read(
             mend = "for --loads-cutoff bring it to an even rate, in Hz such as"
             rate = even_rate(table[:, 0], log.first_row, strict=True, mend=mend)
             lowpass(table[:, 1:7], rate, Lowpass(cutoff), flag="--loads-cutoff")
-    return PlacedLoad(load.name, seat, table, load.log.name, cutoff)
+    noticed = (*log.warnings, *slowness(1 / usual_step(table[:, 0], log.first_row)))
+    warnings = tuple(f"{load.log.name}: {warning}" for warning in noticed)
+    return PlacedLoad(load.name, seat, table, load.log.name, cutoff, warnings)
 
 
 def _about_origin(seat: Seat, rows: Array) -> None:

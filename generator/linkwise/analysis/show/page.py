@@ -117,8 +117,8 @@ def _loads(result: AnalysisResult) -> list[dict[str, str]]:
     pose = model_pose(result.robot.model)
     wrenches = [borne.wrench(result.time, result.q, pose) for borne in result.loads]
     return [
-        {"name": printable(borne.name), "places": _encode(at.place), "forces": _encode(at.force)}
-        for borne, at in zip(result.loads, wrenches, strict=True)
+        {"name": printable(label), "places": _encode(at.place), "forces": _encode(at.force)}
+        for label, at in zip(result.load_labels, wrenches, strict=True)
     ]
 
 

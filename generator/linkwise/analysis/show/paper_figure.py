@@ -29,7 +29,7 @@ class _Panel:
 def paper(result: AnalysisResult, i: int) -> "Figure":
     """Coordinates, τ_i, and for joint i: τ_ij, τp_ij(q̇_j), τp_ij(q̈_j), j's own coordinate."""
     robot, panels = result.robot, _panels(result, i)
-    carried = (*robot.links, *(borne.name for borne in result.loads))
+    carried = (*robot.links, *result.load_labels)
     named = (("Joints", robot.joints), ("Links and loads" if result.loads else "Links", carried))
     legends = [_legend_rows(names) for _, names in named]
     heights = [PANEL] * len(panels) + [LINE * (rows + 1) for rows in legends]
@@ -47,7 +47,7 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
     for row, (title, names) in enumerate(named, len(panels)):
         _legend(figure.add_subplot(grid[row]), title, names)
     figure.suptitle(f"{drawn(robot.name, 60)} · {drawn(result.source, 60)}", x=0.01, ha="left", fontsize=11)
-    foot = "\n".join([*textwrap.wrap(_left_out(result), 125), result.provenance])
+    foot = "\n".join(textwrap.wrap(_left_out(result), 125) + textwrap.wrap(result.provenance, 125))
     figure.supxlabel(foot, x=0.01, ha="left", fontsize=7, color="#5A6270")
     return figure  # type: ignore[no-any-return]
 

@@ -1,5 +1,6 @@
 """Power of each joint over time, and below it the work that joints gave to each link and took back."""
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +22,7 @@ LEGEND = 12
 
 
 def power(result: AnalysisResult, _: int) -> "Figure":
-    """Curves of P_i = τ_i q̇_i in W; for each joint bars of work in J, into links and out of them."""
+    """Curves of P_i = τ_i q̇_i in W; for each joint bars of work in J, into links, and against loads."""
     robot = result.robot
     joints, driven = [drawn(name) for name in robot.driven_joints], list(robot.driven)
     height = 0.9 + 0.34 * len(joints)
@@ -35,25 +36,34 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     curves.set_xlabel("time (s)")
     curves.set_xlim(result.time[0], result.time[-1])
     _legend(curves, "joint", len(joints))
-    work = Work(result.work.given[driven], result.work.taken[driven])
-    _bars(bars, work, [drawn(name) for name in robot.links])
-    bars.set_title("Work: taken back out of links, and given to them")
+    targets = [drawn(name) for name in (*robot.links, *result.load_labels)]
+    work = _with_loads(result)
+    _bars(bars, Work(work.given[driven], work.taken[driven]), targets)
+    into = "links and loads" if result.loads else "links"
+    bars.set_title(f"Work: taken back out of {into}, and given to them")
     bars.set_yticks(range(len(joints)), joints)
     bars.invert_yaxis()
     bars.set_xlabel("J")
     bars.grid(axis="y", visible=False)
-    _legend(bars, "link", len(robot.links) + 1)
+    _legend(bars, "link or load" if result.loads else "link", len(targets) + 1)
     figure.suptitle(f"{drawn(robot.name, 40)} · {drawn(result.source, 50)}", x=0.01, ha="left", fontsize=11)
-    figure.supxlabel(result.provenance, x=0.01, ha="left", fontsize=7, color="#5A6270")
+    made = textwrap.fill(result.provenance, 140)
+    figure.supxlabel(made, x=0.01, ha="left", fontsize=7, color="#5A6270")
     return figure  # type: ignore[no-any-return]
 
 
-def _bars(axis: Any, work: Work, links: list[str]) -> None:
-    """Stacked from zero outwards, by link; a mark stands at the net of each joint."""
+def _with_loads(result: AnalysisResult) -> Work:
+    """What each joint gave to each link, and behind them against each load, and took back, (n, N + loads)."""
+    parts = ((getattr(work, side) for work in (result.work, result.load_work)) for side in ("given", "taken"))
+    return Work(*(np.concatenate(list(part), axis=1) for part in parts))
+
+
+def _bars(axis: Any, work: Work, targets: list[str]) -> None:
+    """Stacked from zero outwards, by link and load; a mark stands at the net of each joint."""
     at = range(len(work.given))
     for side in (work.given, -work.taken):
         starts: Array = np.zeros(len(work.given))
-        for j, name in enumerate(links):
+        for j, name in enumerate(targets):
             label = name if side is work.given else None
             fill = {
                 "color": colour(j),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import PASSIVE, Quantity
 from linkwise.extras import extra
-from linkwise.plotstyle import GRAVITY, colour, drawn
+from linkwise.plotstyle import GRAVITY, drawn, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,17 +29,17 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     movement = []
     for at, k in enumerate(robot.driven):
         joint = drawn(robot.joints[k])
-        movement.append(_Cause("tau_qdd", k, f"{joint} acceleration", colour(at)))
-        movement.append(_Cause("tau_qd", k, f"{joint} velocity", colour(at), "////"))
+        movement.append(_Cause("tau_qdd", k, f"{joint} acceleration", tone(at)))
+        movement.append(_Cause("tau_qd", k, f"{joint} velocity", tone(at), "////"))
     own = dict.fromkeys(column.quantity for column in result.columns if column.quantity in PASSIVE)
     passive = [
-        _Cause(quantity, None, quantity.removeprefix("tau_"), colour(len(robot.driven) + at), "....")
+        _Cause(quantity, None, quantity.removeprefix("tau_"), tone(len(robot.driven) + at), "....")
         for at, quantity in enumerate(own)
     ]
     first = len(robot.driven) + len(passive)
     loads = [
-        _Cause("tau_load", e, drawn(borne.name), colour(first + e), "xx")
-        for e, borne in enumerate(result.loads)
+        _Cause("tau_load", e, drawn(label), tone(first + e), "xx")
+        for e, label in enumerate(result.load_labels)
     ]
     every = [_Cause("tau_gravity", None, "gravity", GRAVITY), *movement, *passive, *loads]
     rows = -(-len(every) // 3)
