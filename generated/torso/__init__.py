@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from .names import ROBOT
 from .runtime.dynamics import Dynamics
 from .runtime.interface import Backend
+from .runtime.motion_quantities import AppliedLoad, InducedAccelerations, Trajectory
 from .runtime.rule.joint_tree import Bodies
 from .runtime.quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
+from .runtime.robot_constraints import Contact
 from .runtime.rule.regressors import inertial_parameters
 from .runtime.structure import Layout
 
@@ -171,16 +173,20 @@ FASTEST_FIRST: tuple[str, ...] = (
 """The same, the fastest for large batches first."""
 
 __all__ = [
+    "AppliedLoad",
     "BACKENDS",
     "FASTEST_FIRST",
     "Bodies",
     "Coefficients",
+    "Contact",
     "Dynamics",
     "GradientPropagation",
+    "InducedAccelerations",
     "Layout",
     "Packed",
     "PassiveTorque",
     "Propagation",
+    "Trajectory",
     "bodies",
     "inertial_parameters",
     "joint_names",

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from .interface import Array
+from .interface import Array, Backend
 from .quantities import Energy, Power
 from .structure import Structure
 
@@ -15,6 +15,7 @@ class SumCalls:
     """
 
     structure: Structure
+    backend: Backend[Any]
     _answers: Any
 
     def joint_index(self, joint: int | str) -> int:
@@ -56,9 +57,16 @@ class SumCalls:
         friction and armature too, as `passive_torque` has them; else it is for the links alone, the inverse
         of `inverse_dynamics`
 
-        Raises ValueError for a singular mass matrix, with the sample and the joints that can move without
-        moving any mass; inside torch.func and torch.compile, qdd is then not finite.
+        Raises ValueError for a robot with ties, whose joints move as `constraints.forward_dynamics` says, and
+        for a singular mass matrix, with the sample and the joints that can move without moving any mass;
+        inside torch.func and torch.compile, qdd is then not finite.
         """
+        tree = self.backend.tree
+        if tree is not None and (tree.ties or tree.couplings):
+            raise ValueError(
+                f"the joints of {self.structure.name} are tied, which its open tree does not know; call "
+                "constraints.forward_dynamics(q, qd, tau)"
+            )
         qdd: Array = self._answers.forward_dynamics(q, qd, tau, passive, out)
         return qdd
 

@@ -17,14 +17,19 @@ from typing import Any, Literal, overload
 from numpy.typing import ArrayLike
 
 from .interface import Array, Backend
+from .motion_calls import MotionCalls
 from .quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
+from .robot_constraints import Constraints, Contact
 from .robot_kinematics import Kinematics
 from .structure import Layout, Structure
 from .sum_calls import SumCalls
 
 
-class Dynamics(SumCalls):
+class Dynamics(SumCalls, MotionCalls):
     """Partial torques of a robot on one back end; made by the package's `load`.
+
+    The robot is the open tree of its joints: of one with ties, which close loops, or with contacts, calls are
+    as if these were cut, and `constraints` has what they leave.
 
     q, qd, qdd: positions, velocities and accelerations of shape (..., n): rad, rad/s, rad/s^2 for a revolute
     joint, m, m/s, m/s^2 for a prismatic one. They are arrays, tensors, lists or tuples, as `load` says; the
@@ -91,6 +96,34 @@ class Dynamics(SumCalls):
     def kinematics(self) -> Kinematics[Any]:
         """Poses, Jacobians and their rates of the robot's frames; raises ValueError for links of energies."""
         return Kinematics(self.backend.kinematics(self.check_finite, self._answers.read_beside_motion))
+
+    @cached_property
+    def constraints(self) -> Constraints[Any]:
+        """What the ties and couplings of the robot's file leave of its motion, see `Constraints`.
+
+        Raises ValueError for a robot without any, and for links of energies.
+        """
+        return Constraints(self.backend.constraints(self, None, (), None, None))
+
+    def constrained(
+        self,
+        independent: Sequence[int | str] | None = None,
+        contacts: Sequence[Contact] = (),
+        at: Array | None = None,
+        tolerance: float | None = None,
+    ) -> Constraints[Any]:
+        """`constraints` with contacts besides, or other independent joints; of a robot without ties too.
+
+        independent: joints by number or by name; unless given, the file's where there are no contacts, and
+        else those that pivoting leaves, of a floating base as few as can be
+        at: positions (n,) in which loops close, where joints are chosen; unless given, some that were found
+        tolerance: largest violation of a tie, in m or rad, that calls take; unless given, 1e-4, as the right
+        angles of 1.5708 in files leave some micrometres that nothing closes
+
+        Raises ValueError for what is not there, for joints on which the others do not hang at `at`, and
+        where nothing is left to move.
+        """
+        return Constraints(self.backend.constraints(self, independent, contacts, at, tolerance))
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}

@@ -91,6 +91,15 @@ class Backend(Protocol[Kind]):
     def kinematics(self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]) -> Any:
         """The calls of `Kinematics`, a `KinematicAnswers`; raises ValueError without a tree."""
 
+    def induced(self, robot: Any) -> Any:
+        """The calls for induced accelerations of a robot on this back end, an `InducedAnswers`."""
+
+    def constraints(self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any) -> Any:
+        """The calls of `Constraints` on a robot with this back end; raises as `Dynamics.constrained` does."""
+
+    def simulated(self, robot: Any, *given: Any) -> Any:
+        """The motion of a robot on this back end over time, a `Trajectory`."""
+
     def constant(self, values: NDArray[Any], like: Kind) -> Kind:
         """A table of numbers, to compute with `like`."""
 

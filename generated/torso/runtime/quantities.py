@@ -111,6 +111,15 @@ class PassiveTorque(NamedTuple, Generic[Array]):
         return total
 
 
+class ConstrainedMotion(NamedTuple, Generic[Array]):
+    """How a robot with constraints moves, and what these bear."""
+
+    qdd: Array
+    """Of all joints, (..., n), in rad/s^2 or m/s^2."""
+    forces: Array
+    """lambda, (..., C), a number for each row of the constraints."""
+
+
 class Packed(NamedTuple, Generic[Array]):
     """Full decomposition without its zeros: values (..., count) whose indices are the robot's `layout`."""
 

@@ -39,13 +39,13 @@ def carried(
     joints = tables.from_world if from_world else tables.joints
     placed = poses(xp, joints, taken(numbers.translations, tables.chosen), taken(q, joints.coordinates))
     axes = taken(placed.axes, tables.carriers)
-    places = taken(placed.places, tables.carriers) + _turned(axes, taken(offsets, tables.frames))
+    places = taken(placed.places, tables.carriers) + turned(axes, taken(offsets, tables.frames))
     return Carried(placed, product(axes, tables.rotations), places)
 
 
 def point_at(found: Carried, point: Any) -> Any:
     """Where points (3, frames, samples) are, which are given in the axes of the frames."""
-    return found.places if point is None else found.places + _turned(found.axes, point)
+    return found.places if point is None else found.places + turned(found.axes, point)
 
 
 def homogeneous(xp: Any, found: Carried) -> Any:
@@ -59,7 +59,7 @@ def jacobian(xp: Any, tables: FrameTables, found: Carried, x: Any) -> Any:
     """Of a point at x (3, 1, samples) of one frame, (6, n, samples)."""
     screws = joint_screws(xp, tables.joints, found.joints)
     z, s = screws[:, 0], screws[:, 1]
-    return _by_coordinate(tables, xp.concat([z[:3], s[:3] + cross(z, around(xp, x))], 0))
+    return by_coordinate(tables, xp.concat([z[:3], s[:3] + cross(z, around(xp, x))], 0))
 
 
 def load_torque(xp: Any, tables: FrameTables, found: Carried, x: Any, force: Any, moment: Any) -> Any:
@@ -72,36 +72,43 @@ def load_torque(xp: Any, tables: FrameTables, found: Carried, x: Any, force: Any
     work = ((s[:3] + cross(z, around(xp, x))) * force).sum(0)
     if moment is not None:
         work = work + (z[:3] * moment).sum(0)
-    return -_by_coordinate(tables, work)
+    return -by_coordinate(tables, work)
 
 
 def moving(
-    xp: Any, tables: FrameTables, numbers: TreeArrays, found: Carried, qd: Any, qdd: Any = None
+    xp: Any,
+    tables: FrameTables,
+    numbers: TreeArrays,
+    found: Carried,
+    qd: Any,
+    qdd: Any = None,
+    from_world: bool = False,
 ) -> Twists:
     """Screws and motion of the joints, without gravity; qd, qdd: (n, samples), no qdd for none."""
+    joints = tables.from_world if from_world else tables.joints
     velocity = taken(qd, tables.joints.coordinates)
     acceleration = 0.0 * velocity if qdd is None else taken(qdd, tables.joints.coordinates)
-    return twists(xp, tables.joints, found.joints, 0.0 * numbers.gravity, velocity, acceleration)
+    return twists(xp, joints, found.joints, 0.0 * numbers.gravity, velocity, acceleration)
 
 
 def jacobian_rate(xp: Any, tables: FrameTables, moved: Twists, x: Any) -> Any:
     """Rate of `jacobian`, (6, n, samples)."""
     zd, sd = moved.rates[:, 0], moved.rates[:, 1]
-    xd = _velocity(xp, _of_frames(tables, moved.twists), x)
+    xd = point_velocity(xp, of_frames(tables, moved.twists), x)
     linear = sd[:3] + cross(zd, around(xp, x)) + cross(moved.screws[:, 0], around(xp, xd))
-    return _by_coordinate(tables, xp.concat([zd[:3], linear], 0))
+    return by_coordinate(tables, xp.concat([zd[:3], linear], 0))
 
 
 def velocity_of(xp: Any, tables: FrameTables, moved: Twists, x: Any) -> Any:
     """(omega, xd) of points, (6, frames, samples)."""
-    twist = _of_frames(tables, moved.twists)
-    return xp.concat([twist[:3, 0], _velocity(xp, twist, x)], 0)
+    twist = of_frames(tables, moved.twists)
+    return xp.concat([twist[:3, 0], point_velocity(xp, twist, x)], 0)
 
 
 def acceleration_of(xp: Any, tables: FrameTables, moved: Twists, x: Any) -> Any:
     """(alpha, xdd) of points, (6, frames, samples): xdd = a + alpha x x + omega x xd."""
-    twist, change = (_of_frames(tables, a) for a in (moved.twists, moved.accelerations))
-    xd = around(xp, _velocity(xp, twist, x))
+    twist, change = (of_frames(tables, a) for a in (moved.twists, moved.accelerations))
+    xd = around(xp, point_velocity(xp, twist, x))
     linear = change[:3, 1] + cross(change[:, 0], around(xp, x)) + cross(twist[:, 0], xd)
     return xp.concat([change[:3, 0], linear], 0)
 
@@ -115,17 +122,17 @@ def centre_jacobian(xp: Any, tables: FrameTables, masses: Any, found: Carried) -
     """Jacobian of the centre of mass, (3, n, samples)."""
     screws = joint_screws(xp, tables.joints, found.joints)
     mass, moment = _behind(tables, masses, found.places)
-    return _by_coordinate(tables, mass * screws[:3, 1] + cross(screws[:, 0], around(xp, moment)))
+    return by_coordinate(tables, mass * screws[:3, 1] + cross(screws[:, 0], around(xp, moment)))
 
 
 def centre_jacobian_rate(xp: Any, tables: FrameTables, masses: Any, found: Carried, moved: Twists) -> Any:
     """Its rate, (3, n, samples)."""
-    speeds = _velocity(xp, _of_frames(tables, moved.twists), found.places)
+    speeds = point_velocity(xp, of_frames(tables, moved.twists), found.places)
     mass, moment = _behind(tables, masses, found.places)
     change = around(xp, _behind(tables, masses, speeds)[1])
     zd, sd = moved.rates[:, 0], moved.rates[:, 1]
     linear = mass * sd[:3] + cross(zd, around(xp, moment)) + cross(moved.screws[:, 0], change)
-    return _by_coordinate(tables, linear)
+    return by_coordinate(tables, linear)
 
 
 def _shares(masses: Any) -> Any:
@@ -139,21 +146,22 @@ def _behind(tables: FrameTables, masses: Any, vectors: Any) -> tuple[Any, Any]:
     return tables.carried @ shares, tables.carried @ (shares * vectors)
 
 
-def _of_frames(tables: FrameTables, twists: Any) -> Any:
+def of_frames(tables: FrameTables, twists: Any) -> Any:
+    """Those of the joints that carry the frames."""
     return taken(twists, tables.carriers)
 
 
-def _velocity(xp: Any, twist: Any, x: Any) -> Any:
+def point_velocity(xp: Any, twist: Any, x: Any) -> Any:
     """v + omega x x."""
     return twist[:3, 1] + cross(twist[:, 0], around(xp, x))
 
 
-def _turned(axes: Any, vector: Any) -> Any:
+def turned(axes: Any, vector: Any) -> Any:
     """Matrices (3, 3, ...) times vectors (3, ...)."""
     return axes[:, 0] * vector[0] + axes[:, 1] * vector[1] + axes[:, 2] * vector[2]
 
 
-def _by_coordinate(tables: FrameTables, columns: Any) -> Any:
+def by_coordinate(tables: FrameTables, columns: Any) -> Any:
     """Columns (..., joints, samples) summed over the joints of each coordinate, (..., n, samples)."""
     first, *others = tables.columns
     total = taken(columns, first)

@@ -3,9 +3,12 @@
 from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 
+from ..constraints.constraint_answers import ConstraintAnswers, constraint_answers
+from ..induced.induced_answers import InducedAnswers
 from ..kinematics.kinematic_answers import KinematicAnswers
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays, given_numbers
+from ..simulation.simulation_answers import simulated
 from ..structure import Structure
 from ..sums.sum_answers import SumAnswers
 
@@ -28,6 +31,20 @@ class ArrayBackend:
     ) -> KinematicAnswers:
         """The calls of `Kinematics`."""
         return KinematicAnswers(self.structure, self, check_finite, read_beside_motion)
+
+    def induced(self, robot: Any) -> InducedAnswers:
+        """The calls for induced accelerations of a robot on this back end."""
+        return InducedAnswers(robot)
+
+    def constraints(
+        self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any
+    ) -> ConstraintAnswers:
+        """The calls of `Constraints` on a robot with this back end."""
+        return constraint_answers(robot, independent, contacts, at, tolerance)
+
+    def simulated(self, robot: Any, *given: Any) -> Any:
+        """The motion of a robot on this back end over time; see `MotionCalls.simulate`."""
+        return simulated(robot, *given)
 
     def side(self, like: Any) -> Any:
         """What computes with `like`, an array or a tensor."""

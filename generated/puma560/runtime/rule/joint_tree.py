@@ -57,6 +57,36 @@ class TreeFrame(NamedTuple):
     """Of its origin there, in m."""
 
 
+class TreeTie(NamedTuple):
+    """Two frames that are held together beside the tree, which closes a loop of joints.
+
+    A qd = 0 with rows of J_first - J_second, J the Jacobian of a frame, whose moment rows stand first.
+    """
+
+    name: str
+    kind: str
+    """What is held, and how many rows that has:
+
+    point     the origins coincide: 3, along the world's axes
+    hinge     the z axes coincide too: 5, two turns about x and y of the first frame, then those 3
+    frame     all axes coincide too: 6, three turns about the world's axes, then those 3
+    distance  the origins are `length` apart: 1
+    """
+    first: int
+    """Index of the tree's frame; forces of the tie are those on this one, and minus those on the second."""
+    second: int
+    length: float = 0.0
+    """In m, above 0; of a distance only."""
+
+
+class TreeCoupling(NamedTuple):
+    """Coordinates that hang on each other: the sum over the terms of c_0 + c_1 q + c_2 q^2 + ... is 0."""
+
+    name: str
+    terms: tuple[tuple[int, tuple[float, ...]], ...]
+    """Of each coordinate, by its index, c_0, c_1, ...; the sum is in the unit that these give it."""
+
+
 @dataclass(frozen=True)
 class JointTree:
     """Joints, parents first, links in the order of j, and gravity in m/s^2 in the axes of the base.
@@ -70,6 +100,11 @@ class JointTree:
     links: tuple[TreeLink, ...]
     frames: tuple[TreeFrame, ...] = ()
     formulas: Mapping[str, Formula] = field(default_factory=dict)
+    ties: tuple[TreeTie, ...] = ()
+    """What closes loops, which the joints leave open."""
+    couplings: tuple[TreeCoupling, ...] = ()
+    independent: tuple[int, ...] = ()
+    """Coordinates that the others follow by the ties and couplings, in order; none where none was chosen."""
 
     def chain(self, joint: int | None) -> tuple[int, ...]:
         """Indices of the joints from the ground to `joint`, itself included."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..chosen_names import MOST_NAMES, plain
-from .namespace import namespace
+from .namespace import hidden, namespace
 
 CLEAR = 1e5
 """Roundings; a matrix with ones on its diagonal whose least pivot is as large is far from singular."""
@@ -19,7 +19,12 @@ SHARE = 1e-3
 
 
 def solved(mass: Any, force: Any, joint_names: Sequence[str]) -> Any:
-    """M^-1 f (..., n), of matrices (..., n, n) and forces (..., n).
+    """M^-1 f (..., n), of matrices (..., n, n) and forces (..., n); raises as `solved_columns` does."""
+    return solved_columns(mass, force[..., None], joint_names)[..., 0]
+
+
+def solved_columns(mass: Any, forces: Any, joint_names: Sequence[str]) -> Any:
+    """M^-1 F (..., n, X), of matrices (..., n, n) and columns of forces (..., n, X).
 
     Rows and columns are scaled to ones on the diagonal first: a hand's inertia is not lost beside a body's.
     Raises ValueError for a singular matrix, with the sample and the joints; where nobody may look at
@@ -31,17 +36,17 @@ def solved(mass: Any, force: Any, joint_names: Sequence[str]) -> Any:
     scaled = mass / (size[..., :, None] * size[..., None, :])
     if xp is np:
         _check(scaled, joint_names)
-        moved = np.linalg.solve(scaled, (force / size)[..., None])
+        moved = np.linalg.solve(scaled, forces / size[..., None])
     else:
         _check_tensor(scaled, joint_names)
-        moved = xp.linalg.solve_ex(scaled, (force / size)[..., None])[0]
-    return moved[..., 0] / size
+        moved = xp.linalg.solve_ex(scaled, forces / size[..., None])[0]
+    return moved / size[..., None]
 
 
 def _check_tensor(scaled: Any, joint_names: Sequence[str]) -> None:
-    torch: Any = sys.modules["torch"]
-    if torch.compiler.is_compiling() or torch._C._are_functorch_transforms_active() or scaled.is_meta:
+    if hidden(scaled):
         return
+    torch: Any = sys.modules["torch"]
     factors, faults = torch.linalg.cholesky_ex(scaled.detach())
     least = factors.diagonal(0, -2, -1).amin(-1) if scaled.numel() else faults + 1.0
     clear = (faults == 0) & (least**2 > CLEAR * torch.finfo(scaled.dtype).eps)

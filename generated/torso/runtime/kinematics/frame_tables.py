@@ -29,6 +29,11 @@ class FrameTables(NamedTuple):
     carried: Any
     """(joints, frames): ones where a joint moves a frame."""
 
+    @property
+    def moved(self) -> int:
+        """Number of joints and frames, by which the memory of a call grows."""
+        return len(self.joints.parents) + len(self.carriers)
+
 
 def frame_tables(tree: JointTree, n: int, frames: Sequence[int]) -> FrameTables:
     """Tables of some of a tree's frames, in float64."""

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..answers import MOTION
 from ..arguments import check_numbers
 from ..outputs import accepted
 from ..rule.joint_tree import JointTree
@@ -27,7 +28,7 @@ from .frame_arrays import (
     point_at,
     velocity_of,
 )
-from .frame_tables import FrameTables, frame_tables, link_tables
+from .frame_tables import frame_tables, link_tables
 from .named_frames import frame_index
 
 CACHE = 1 << 21
@@ -48,7 +49,8 @@ class Asked(NamedTuple):
     """What a call computes with: array namespace, constants, the tree's numbers, motion (n, samples) each."""
 
     xp: Any
-    tables: FrameTables
+    tables: Any
+    """`FrameTables`, or others that tell how much they move."""
     numbers: TreeArrays
     motion: list[Any]
     vectors: dict[str, Any]
@@ -229,24 +231,25 @@ class KinematicAnswers:
         answer: Callable[[Asked], Any],
         shape: tuple[int, ...],
         out: Any,
+        names: Sequence[str] = MOTION,
     ) -> Any:
         """Answer (..., *shape) to a motion; `answer` gives it with the samples last.
 
-        beside: some of `VECTORS`, None for those that were not given
+        beside: some of `VECTORS`, None for those that were not given; names: those of the motion
         """
-        named = dict(zip(("q", "qd", "qdd"), given, strict=False))
+        named = dict(zip(names, given, strict=False))
         motion = list(self._backend.arrays(named, self._structure.n))
         if self._check_finite:
             check_numbers(named, self._structure.joint_names)
         own = self._backend.side(motion[0])
         motion, vectors = _with_vectors(own, motion, beside)
         if out is not None:
-            read = dict(zip(("q", "qd", "qdd"), motion, strict=False)) | vectors
+            read = dict(zip(names, motion, strict=False)) | vectors
             accepted(out, (), (shape,), read, self._read_beside_motion(), False)
         value = self._at_once(call, motion, part, vectors.get("point"))
         if value is None:
             at, count = self._asked(own, part, motion, vectors), math.prod(shape)
-            value = _in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
+            value = in_pieces(own, motion, at, answer, count).reshape(*motion[0].shape[:-1], *shape)
         if out is None:  # its numbers side by side
             return np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value.contiguous()
         out[...] = value
@@ -266,18 +269,17 @@ class KinematicAnswers:
         placed = {name: xp.swapaxes(a.reshape(-1, 3), 0, 1)[:, None] for name, a in vectors.items()}
         return Asked(xp, self._tables[part, key], numbers, flat, placed)
 
-    def _tables_of(self, part: Any) -> FrameTables:
+    def _tables_of(self, part: Any) -> Any:
         if part == LINKS:
             return link_tables(self._tree, self._structure.n)
         frames = range(len(self.frames)) if part == ALL else [part]
         return frame_tables(self._tree, self._structure.n, frames)
 
 
-def _in_pieces(own: Any, motion: Sequence[Any], at: Asked, answer: Callable[[Asked], Any], count: int) -> Any:
+def in_pieces(own: Any, motion: Sequence[Any], at: Asked, answer: Callable[[Asked], Any], count: int) -> Any:
     """Answers (samples, count), as many samples at once as the back end wants."""
     xp, samples = at.xp, at.motion[0].shape[1]
-    moved = len(at.tables.joints.parents) + len(at.tables.carriers)
-    size = own.chunk(motion, max(16, CACHE // (motion[0].itemsize * (NUMBERS * moved + count))))
+    size = own.chunk(motion, max(16, CACHE // (motion[0].itemsize * (NUMBERS * at.tables.moved + count))))
     if size is None or samples <= size:
         return xp.swapaxes(answer(at).reshape(count, samples), 0, 1)
     whole = xp.empty((samples, count), dtype=motion[0].dtype)

@@ -15,7 +15,7 @@ from .link_modules import LinkModules, links_and_values
 from .partial_lagrangian import PartialLagrangian
 from .run_time_values import RunTimeValues
 
-MADE_ANEW = ("structure", "backend", "layout", "_load", "_asked", "_answers", "kinematics")
+MADE_ANEW = ("structure", "backend", "layout", "_load", "_asked", "_answers", "kinematics", "constraints")
 """What a copy does not take over: it has its own."""
 
 

@@ -1,0 +1,82 @@
+"""Which joints may be independent: rank and pivoting of A at one position, on NumPy arrays.
+
+Rows are comparable, as `closing_search` has them: not each by its own largest entry, for a row that a planar
+loop leaves at zero holds nothing but rounding. Columns are compared by what is left of them across those
+taken before.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rule.joint_tree import JointTree
+
+RANK = 1e-5
+"""Singular values below this part of the largest, or of 1, are zero; what is left of columns likewise.
+
+A file's right angle of 1.5708 tilts by 4e-6 what is meant to be parallel.
+"""
+SHARE = 1e-3
+"""Rows that have less than this part in a sum of rows that is zero are not among those that it ties."""
+
+
+def rank_of(rows: NDArray[np.float64], tolerance: float = RANK) -> int:
+    """Rank of A (C, n)."""
+    values = np.linalg.svd(rows, compute_uv=False)
+    return int((values > tolerance * max(1.0, values.max(initial=0.0))).sum())
+
+
+def chosen_independent(
+    rows: NDArray[np.float64], rather_dependent: Sequence[int] = (), tolerance: float = RANK
+) -> tuple[int, ...]:
+    """Coordinates that are left when columns of A (C, n) are taken by pivoting, largest first.
+
+    rather_dependent: those that are taken before any other, as far as they can be, since nothing drives them
+    """
+    left = rows.copy()
+    largest = np.linalg.norm(left, axis=0).max(initial=1.0)
+    rest = [k for k in range(rows.shape[1]) if k not in rather_dependent]
+    taken: list[int] = []
+    for group in (list(rather_dependent), rest):
+        open_ones = list(group)
+        while open_ones:
+            sizes = np.linalg.norm(left[:, open_ones], axis=0)
+            at = int(sizes.argmax())
+            if not sizes[at] > tolerance * largest:
+                break
+            pivot = open_ones.pop(at)
+            taken.append(pivot)
+            axis = left[:, pivot] / sizes[at]
+            for _ in range(2):  # once more for what rounding leaves
+                left -= np.outer(axis, axis @ left)
+    return tuple(k for k in range(rows.shape[1]) if k not in taken)
+
+
+def redundant_rows(rows: NDArray[np.float64], tolerance: float = RANK) -> NDArray[np.bool_]:
+    """Which rows of A (C, n) follow from others, so that forces on them are not unique.
+
+    Rows of nothing but rounding do not count: no joint moves that way, and no force is asked for there.
+    """
+    least = tolerance * max(1.0, np.linalg.svd(rows, compute_uv=False).max(initial=0.0))
+    there = np.abs(rows).max(-1, initial=0.0) > least
+    u, values, _ = np.linalg.svd(rows[there])
+    found = np.zeros(len(rows), dtype=np.bool_)
+    found[there] = np.abs(u[:, int((values > least).sum()) :]).max(-1, initial=0.0) > SHARE
+    return found
+
+
+def loose_base(tree: JointTree) -> tuple[int, ...]:
+    """Coordinates of a base that slides and turns in one place, which nobody drives; none of another."""
+    carried = {link.joint for link in tree.links}
+    run: list[int] = []
+    parent = None
+    while True:
+        children = [f for f, joint in enumerate(tree.joints) if joint.parent == parent]
+        together = len(children) == 1 and (not run or not any(tree.joints[children[0]].translation))
+        if not together or (parent is not None and parent in carried):
+            break
+        parent = children[0]
+        run.append(parent)
+    kinds = {tree.joints[f].kind for f in run}
+    return tuple(tree.joints[f].coordinate for f in run) if len(kinds) > 1 else ()

@@ -1,0 +1,109 @@
+"""Where loops of a robot close, at its own numbers, when no such position is known: on NumPy arrays.
+
+Newton's method with least steps of all joints, q <- q - A^+ phi, from a few starts about q = 0, where itself
+loops are often stretched and A loses rank.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rule.joint_tree import JointTree
+from ..rule.tree_arrays import own_numbers
+from .held_frames import ROWS, TURNS, Held
+from .independent_joints import RANK, rank_of
+from .singular_positions import OPEN
+from .tie_arrays import pairs, tie_jacobian, violation
+from .tie_tables import tie_tables
+
+WIDTHS = (0.1, 0.3, 1.0, 2.0)
+"""How far around zero starts are, in rad and m."""
+TRIES = 6
+"""Starts of each width."""
+ENOUGH = 4
+"""Closed positions to choose among: one of them may be singular."""
+STEPS = 60
+LONGEST = 0.5
+"""Of a step, in rad and m."""
+SHORTEST = 1e-10
+Numbers = NDArray[np.float64]
+
+
+class Closing(NamedTuple):
+    """Where the steps from a start ended."""
+
+    q: Numbers
+    """(n,)"""
+    left: Numbers
+    """phi, (C,)."""
+    rows: Numbers
+    """A, (C, n)."""
+    comparable: Numbers
+    """A with rows that may stand beside each other: in m by the robot's size, couplings by their largest."""
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether nothing is left open."""
+        return self.open_by <= OPEN
+
+    @property
+    def open_by(self) -> float:
+        """What is left of the row that is open most."""
+        return float(np.abs(self.left).max(initial=0.0))
+
+
+class TieEquations:
+    """phi(q) = 0 of what is held in a tree, its couplings too."""
+
+    def __init__(self, tree: JointTree, n: int, held: Sequence[Held]) -> None:
+        self._tables, self._numbers = tie_tables(tree, n, held), own_numbers(tree)
+        numbers = (self._numbers.translations, self._numbers.offsets)
+        size = max(np.abs(a).max(initial=0.0) for a in numbers) or 1.0
+        turns = [row in TURNS for one in held for row in ROWS[one.kind]]
+        self._sizes = np.where(turns, 1.0, size)[:, None]
+
+    def at(self, q: Numbers) -> Closing:
+        """phi, without what contacts have, and A at q (n,)."""
+        column = q[:, None]
+        placed = pairs(np, self._tables, self._numbers, column)
+        phi, rows = (made(np, self._tables, column, placed) for made in (violation, tie_jacobian))
+        return Closing(q, phi[:, 0], rows[..., 0], self._comparable(rows[..., 0]))
+
+    def _comparable(self, rows: Numbers) -> Numbers:
+        ties, couplings = np.split(rows, [len(self._sizes)])
+        most = np.abs(couplings).max(-1, keepdims=True)
+        return np.concatenate([ties / self._sizes, couplings / np.where(most > 0.0, most, 1.0)])
+
+    def closed_from(self, start: Numbers) -> Closing:
+        """Where the steps from q (n,) end."""
+        at = self.at(start)
+        for _ in range(STEPS):
+            step = np.linalg.lstsq(at.rows, -at.left, rcond=RANK)[0]
+            size = np.abs(step).max()
+            if size < SHORTEST:
+                break
+            at = self.at(at.q + step * min(1.0, LONGEST / size))
+        return at
+
+
+def random_starts(n: int) -> list[Numbers]:
+    """Positions (n,), the same at every call."""
+    random = np.random.default_rng(0)
+    return [width * random.uniform(-1.0, 1.0, n) for width in WIDTHS for _ in range(TRIES)]
+
+
+def best_closing(equations: TieEquations, starts: Iterable[Numbers]) -> Closing:
+    """A closed position where A has its largest rank; if none was found, what is open least."""
+    ended = []
+    for start in starts:
+        ended.append(equations.closed_from(start))
+        closed = [at for at in ended if at.is_closed]
+        if len(closed) == ENOUGH:
+            break
+    return (
+        max(closed, key=lambda at: rank_of(at.comparable))
+        if closed
+        else min(ended, key=lambda at: at.open_by)
+    )

@@ -1,0 +1,106 @@
+"""Which constraints a robot has, and which of its joints are independent: chosen once, where loops close."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import as_array
+from ..chosen_names import short
+from ..rule.joint_tree import JointTree
+from ..structure import Structure
+from .closing_search import TieEquations, best_closing, random_starts
+from .held_frames import Held, all_names, held_by
+from .independent_joints import chosen_independent, loose_base, rank_of, redundant_rows
+from .singular_positions import listed
+from .tie_tables import tie_tables
+
+
+class ChosenConstraints:
+    """Ties, couplings and contacts, and the independent joints."""
+
+    def __init__(
+        self, structure: Structure, tree: JointTree, independent: Any, contacts: Any, at: Any
+    ) -> None:
+        """Raises as `Dynamics.constrained` does."""
+        self._structure, self._tree = structure, tree
+        self.held: Sequence[Held] = held_by(tree, structure.link_names, contacts)
+        if not self.held and not tree.couplings:
+            raise ValueError(
+                f"{structure.name} has no ties; robot.constrained(contacts=[Contact(frame)]) makes some that "
+                "hold frames of it where they are"
+            )
+        self.tables = tie_tables(tree, structure.n, self.held)
+        self.names = all_names(self.held, tree)
+        self.rows = (
+            *(row for one in self.held for row in one.row_names),
+            *(coupling.name for coupling in tree.couplings),
+        )
+        self.row_names = tuple(
+            [one.name for one in self.held for _ in one.row_names] + [c.name for c in tree.couplings]
+        )
+        self._at = None if at is None else self._position(at)
+        self.independent = self._independent(independent, bool(contacts))
+
+    @cached_property
+    def redundant(self) -> tuple[str, ...]:
+        """Names of those among whose rows some follow from others."""
+        shared = {
+            name for name, is_so in zip(self.row_names, redundant_rows(self._matrix), strict=True) if is_so
+        }
+        return tuple(name for name in self.names if name in shared)
+
+    @cached_property
+    def _matrix(self) -> NDArray[np.float64]:
+        """A where loops close beside `at`, or anywhere, of the tree's own numbers, its rows comparable."""
+        tree, n = self._tree, self._structure.n
+        starts = random_starts(n) if self._at is None else [self._at]
+        q = starts[0]
+        if tree.ties or tree.couplings:
+            ties = TieEquations(tree, n, [one for one in self.held if one.second is not None])
+            found = best_closing(ties, starts)
+            if not found.is_closed:
+                told = "from any position that was tried; give `at`" if self._at is None else "beside `at`"
+                raise ValueError(f"{listed(self.names)} did not close {told}")
+            q = found.q
+        return TieEquations(tree, n, self.held).at(q).comparable
+
+    def _independent(self, given: Any, has_contacts: bool) -> tuple[int, ...]:
+        if given is None and not has_contacts and self._tree.independent:
+            return self._tree.independent
+        n, names = self._structure.n, self._structure.joint_names
+        free = n - rank_of(self._matrix)
+        if not free:
+            raise ValueError(f"{listed(self.names)} leave nothing to move: the robot is over-constrained")
+        proposed = chosen_independent(self._matrix, loose_base(self._tree) if has_contacts else ())
+        if given is None:
+            return proposed
+        chosen = self._listed(given)
+        told = f"such as {[names[k] for k in proposed]}"
+        if len(chosen) != free:
+            count = f"{len(chosen)} joint{'s' if len(chosen) != 1 else ''}"
+            raise ValueError(f"independent has {count}, but the constraints leave {free} to choose, {told}")
+        rest = [k for k in range(n) if k not in chosen]
+        if rank_of(self._matrix[:, rest]) < n - free:
+            mine = listed([names[k] for k in chosen])
+            raise ValueError(
+                f"the other joints do not follow {mine}, of which some follow others; choose others, {told}"
+            )
+        return chosen
+
+    def _listed(self, given: Any) -> tuple[int, ...]:
+        if isinstance(given, str) or not isinstance(given, list | tuple):
+            raise TypeError(f"independent is {short(given)}; give a list of joints by number or by name")
+        chosen = sorted(self._structure.joint_index(joint, "independent") for joint in given)
+        if len(set(chosen)) < len(chosen):
+            raise ValueError(f"independent is {short(given)}, which names a joint twice")
+        return tuple(chosen)
+
+    def _position(self, at: Any) -> NDArray[np.float64]:
+        found = as_array("at", at)
+        if found.shape != (self._structure.n,) or found.dtype.kind not in "fiu":
+            raise ValueError(f"at has shape {found.shape}; give one position of shape ({self._structure.n},)")
+        position: NDArray[np.float64] = found.astype(float)
+        return position

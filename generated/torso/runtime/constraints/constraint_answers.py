@@ -1,0 +1,203 @@
+"""The calls of `Constraints` behind its face, composed of the rows of ties and the calls of the open tree."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..quantities import Coefficients, ConstrainedMotion, Propagation
+from ..sums.inertia_solve import solved
+from ..sums.namespace import namespace, side_by_side
+from .chosen_constraints import ChosenConstraints
+from .closed_places import ClosedPlace, RowNames, closed_place
+from .followers import Followers, borne, joint_columns, projected, times
+from .newton_closing import closed
+from .tie_rows import TieRows
+
+
+class ConstraintAnswers:
+    """The calls on a robot; arguments as `Constraints` says."""
+
+    def __init__(self, robot: Any, chosen: ChosenConstraints, rows: TieRows, tolerance: float | None) -> None:
+        """`robot` answers for the open tree."""
+        self._robot, self._chosen, self._tie_rows, self._tolerance = robot, chosen, rows, tolerance
+        self._columns = joint_columns(chosen.independent, robot.n)
+        self.names, self.rows = chosen.names, chosen.rows
+        self.independent = tuple(robot.joint_names[k] for k in self._columns.independent)
+        self.dependent = tuple(robot.joint_names[k] for k in self._columns.dependent)
+        self._told = RowNames(chosen.rows, chosen.row_names, robot.joint_names)
+        self._listed: dict[Any, Any] = {}
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """See `Constraints.redundant`."""
+        return self._chosen.redundant
+
+    def violation(self, q: Any, held_at: Any) -> Any:
+        """See `Constraints.violation`."""
+        return self._tie_rows.violation(q, q if held_at is None else held_at)
+
+    def jacobian(self, q: Any) -> Any:
+        """See `Constraints.jacobian`."""
+        (q,) = self._read(q=q)
+        return side_by_side(self._tie_rows.at(q).positions()[..., 1:])
+
+    def jacobian_rate(self, q: Any, qd: Any) -> Any:
+        """See `Constraints.jacobian_rate`."""
+        return self._tie_rows.rates(q, qd)
+
+    def closed(self, q: Any, held_at: Any) -> Any:
+        """See `Constraints.closed`."""
+        (q,) = self._read(q=q)
+        return closed(self._tie_rows, self._own_columns(q), q, held_at, self._tolerance, self._told)
+
+    def velocity_map(self, q: Any) -> Any:
+        """See `Constraints.velocity_map`."""
+        (q,) = self._read(q=q)
+        return side_by_side(self._place(q).found.map)
+
+    def velocity(self, q: Any, yd: Any) -> Any:
+        """See `Constraints.velocity`."""
+        (q,) = self._read(q=q)
+        return self._place(q).velocity(self._own("yd", yd, q))
+
+    def acceleration(self, q: Any, qd: Any, ydd: Any) -> Any:
+        """See `Constraints.acceleration`."""
+        place, q, qd = self._moving(q, qd)
+        return place.velocity(self._own("ydd", ydd, q)) + place.bias(qd)
+
+    def velocity_accelerations(self, q: Any, qd: Any) -> Any:
+        """See `Constraints.velocity_accelerations`."""
+        place, _, qd = self._moving(q, qd)
+        return place.bias_by_cause(qd)
+
+    def projected(self, q: Any, torque: Any, by_link: bool) -> Any:
+        """See `Constraints.projected`."""
+        (q,) = self._read(q=q)
+        answer = projected(self._place(q).found, self._torque(torque, q, by_link))
+        return answer if by_link else answer[..., 0]
+
+    def inverse_dynamics(self, q: Any, qd: Any, qdd: Any) -> Any:
+        """See `Constraints.inverse_dynamics`."""
+        found, *motion = self._accelerated(q, qd, qdd)
+        return projected(found, self._robot.inverse_dynamics(*motion)[..., None])[..., 0]
+
+    def partial_torque(self, q: Any, qd: Any, qdd: Any) -> Any:
+        """See `Constraints.partial_torque`."""
+        found, *motion = self._accelerated(q, qd, qdd)
+        return projected(found, self._robot.partial_torque(*motion))
+
+    def coefficients(self, q: Any, qd: Any) -> Any:
+        """See `Constraints.coefficients`."""
+        return self._coefficients(*self._moving(q, qd))
+
+    def propagation(self, q: Any, qd: Any, qdd: Any) -> Any:
+        """See `Constraints.propagation`."""
+        q, qd, qdd = self._read(q=q, qd=qd, qdd=qdd)
+        place, q, qd = self._moving(q, qd)
+        c2, c1, g = self._coefficients(place, q, qd)
+        yd, ydd = (place.own(a)[..., None, None, :] for a in (qd, qdd))
+        return Propagation(c2 * ydd, c1 * yd, g)
+
+    def forces(self, q: Any, qd: Any, qdd: Any) -> Any:
+        """See `Constraints.forces`."""
+        found, *motion = self._accelerated(q, qd, qdd)
+        return borne(found, self._robot.partial_torque(*motion))
+
+    def forces_of(self, q: Any, torque: Any, by_link: bool) -> Any:
+        """See `Constraints.forces_of`."""
+        (q,) = self._read(q=q)
+        answer = borne(self._place(q).found, self._torque(torque, q, by_link))
+        return answer if by_link else answer[..., 0]
+
+    def forward_dynamics(self, q: Any, qd: Any, tau: Any, passive: bool) -> Any:
+        """Solve (G^T M G) ydd = G^T (tau - h - g - M bias), then A^T lambda = M qdd + h + g - tau."""
+        q, qd, tau = self._read(q=q, qd=qd, tau=tau)
+        place, q, qd = self._moving(q, qd)
+        robot, found, rest = self._robot, place.found, 0.0 * qd
+        mass, force = robot.mass_matrix(q), tau - robot.inverse_dynamics(q, qd, rest)
+        if passive:
+            armature = robot.backend.constant(robot.structure.passive_sums.armature, q)
+            mass = mass + namespace(q).diag(armature)
+            force = force - robot.passive_torque(q, qd, rest).total
+        bias = place.bias(qd)
+        driven = projected(found, (force - times(mass, bias))[..., None])[..., 0]
+        qdd = place.velocity(solved(projected(found, mass @ found.map), driven, self.independent)) + bias
+        forces = borne(found, (times(mass, qdd) - force)[..., None])[..., 0]
+        return ConstrainedMotion(qdd, forces)
+
+    def _coefficients(self, place: ClosedPlace, q: Any, qd: Any) -> Any:
+        """c2^ = G^T c2 G, c1^ = G^T (c2 dG/dt + c1 G), g^ = G^T g, for each link."""
+        c2, c1, g = self._robot.coefficients(q, qd)
+        found, rate = place.found, place.map_rate(qd)[..., None, :, :]
+        mapped = found.map[..., None, :, :]
+        acceleration, velocity = c2 @ mapped, c2 @ rate + c1 @ mapped
+        return Coefficients(
+            _projected_cubes(found, acceleration), _projected_cubes(found, velocity), projected(found, g)
+        )
+
+    def _read(self, **named: Any) -> Sequence[Any]:
+        read: Sequence[Any] = self._robot.backend.arrays(named, self._robot.n)
+        return read
+
+    def _own(self, name: str, given: Any, q: Any) -> Any:
+        """What is given of the independent joints, (..., m)."""
+        values, m = self._robot.backend.weights(name, given, q), len(self.independent)
+        if values.ndim == 0 or values.shape[-1] != m:
+            told = f"its last axis must be {m}, one for each of {', '.join(self.independent)}"
+            raise ValueError(f"{name} has shape {tuple(values.shape)}; {told}")
+        return values
+
+    def _torque(self, given: Any, q: Any, by_link: bool) -> Any:
+        """Torques (..., n, X)."""
+        values, axis = self._robot.backend.weights("torque", given, q), -2 if by_link else -1
+        if values.ndim < -axis or values.shape[axis] != self._robot.n:
+            shape = "(..., n, X)" if by_link else "(..., n), or with by_link=True (..., n, X)"
+            raise ValueError(f"torque has shape {tuple(values.shape)}; give {shape}, n = {self._robot.n}")
+        return values if by_link else values[..., None]
+
+    def _own_columns(self, q: Any) -> Any:
+        key = type(q), getattr(q, "device", None)
+        if key not in self._listed:
+            backend = self._robot.backend
+            self._listed[key] = type(self._columns)(*(backend.index(a, q) for a in self._columns))
+        return self._listed[key]
+
+    def _place(self, q: Any) -> ClosedPlace:
+        """How joints follow at q (..., n), in which all ties close."""
+        return closed_place(self._tie_rows, self._own_columns(q), q, self._tolerance, self._told)
+
+    def _moving(self, q: Any, qd: Any) -> tuple[ClosedPlace, Any, Any]:
+        """The same, q, and qd in which all joints follow."""
+        q, qd = self._read(q=q, qd=qd)
+        place = self._place(q)
+        return place, q, place.velocity(place.own(qd))
+
+    def _accelerated(self, q: Any, qd: Any, qdd: Any) -> tuple[Followers, Any, Any, Any]:
+        """How joints follow, and a motion in which they do."""
+        q, qd, qdd = self._read(q=q, qd=qd, qdd=qdd)
+        place, q, qd = self._moving(q, qd)
+        return place.found, q, qd, place.velocity(place.own(qdd)) + place.bias(qd)
+
+
+def _projected_cubes(found: Followers, parts: Any) -> Any:
+    """G^T over i of (..., n, N, m)."""
+    *batch, n, links, m = parts.shape
+    flat = projected(found, parts.reshape(*batch, n, links * m))
+    return flat.reshape(*batch, m, links, m)
+
+
+def constraint_answers(
+    robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any
+) -> ConstraintAnswers:
+    """The calls on a robot; raises as `Dynamics.constrained` does."""
+    backend, structure = robot.backend, robot.structure
+    if backend.tree is None:
+        raise ValueError(
+            f"the links of {structure.name} are energies, which do not say where anything is; constraints "
+            "are there for rigid links"
+        )
+    if tolerance is not None and not (isinstance(tolerance, float | int) and tolerance >= 0.0):
+        raise ValueError(f"tolerance is {tolerance!r}; give a number of m and rad, 0 or more")
+    chosen = ChosenConstraints(structure, backend.tree, independent, contacts, at)
+    beside = robot._answers.read_beside_motion
+    rows = TieRows(structure, backend, robot.check_finite, beside, chosen.tables, len(chosen.rows))
+    return ConstraintAnswers(robot, chosen, rows, tolerance)

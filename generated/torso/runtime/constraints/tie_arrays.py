@@ -1,0 +1,196 @@
+"""How far ties, couplings and contacts are from closing, their Jacobian A and its rate, samples innermost.
+
+Of a pair of frames, with S_f = (z, s) the screws of the joints and m = 1 where a joint moves a frame,
+
+    J = ((m1 - m2) z, (m1 - m2) s + z x X)    X = m1 x1 - m2 x2
+
+is how it turns and shifts, J_first - J_second at once. A row is w . J of its pair: w is an axis of the
+world, one of the first frame, whose rate is omega x w, or u = d / |d|, from the second frame to the first.
+"""
+
+from typing import Any, NamedTuple
+
+from ..kinematics.frame_arrays import (
+    Carried,
+    by_coordinate,
+    carried,
+    moving,
+    of_frames,
+    point_at,
+    point_velocity,
+    turned,
+)
+from ..rule.kinematics import around, cross, joint_screws, taken
+from ..rule.tree_arrays import TreeArrays
+from .tie_tables import TieTables
+
+TINY = 1e-12
+"""Below it cos(t/2)^2 is that of a frame upside down, whose axis of turning is not known."""
+
+
+class Ends(NamedTuple):
+    """The frames of all pairs where they are."""
+
+    carried: Carried
+    places: Any
+    """Of their points, (3, frames, samples)."""
+
+
+class Pairs(NamedTuple):
+    """The same pair by pair, and what their rows take from it."""
+
+    ends: Ends
+    shift: Any
+    """d, (3, P, samples)."""
+    moves: Any
+    """J, (6, P, n, samples)."""
+    weights: Any
+    """w, (6, C, samples)."""
+
+
+def ends(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Ends | None:
+    """Where frames are at q (n, samples); None without ties and contacts."""
+    if tables.frames is None:
+        return None
+    found = carried(xp, tables.frames, numbers, numbers.offsets, q, from_world=True)
+    return Ends(found, point_at(found, tables.points))
+
+
+def pairs(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Pairs | None:
+    """Where pairs are at q (n, samples); None without ties and contacts."""
+    at = ends(xp, tables, numbers, q)
+    if at is None or tables.frames is None:
+        return None
+    shift = at.places[:, : tables.pairs] - _seconds(xp, tables, at.places)
+    screws = joint_screws(xp, tables.frames.from_world, at.carried.joints)[:, :, None]
+    one, z = tables.moved_apart, screws[:, 0]
+    linear = one * screws[:3, 1] + cross(z, _arms(xp, tables, at.places))
+    moves = by_coordinate(tables.frames, xp.concat([one * z[:3], linear], 0))
+    return Pairs(at, shift, moves, _weights(xp, tables, at, shift))
+
+
+def violation(xp: Any, tables: TieTables, q: Any, at: Pairs | None, held: Ends | None = None) -> Any:
+    """phi, (C, samples); held: where contacts took hold, where they are unless given."""
+    parts = []
+    if at is not None:
+        axes, places = at.ends.carried.axes, at.ends.places
+        shift, weights = at.shift, at.weights
+        if held is not None:
+            shift = places[:, : tables.pairs] - _seconds(xp, tables, places, held.places)
+        along = (weights[3:] * taken(shift, tables.row_pairs)).sum(0)
+        if tables.all_axes is not None:
+            second = _seconds(xp, tables, axes, held and held.carried.axes)
+            turn = _turn(xp, tables.all_axes, axes[:, :, : tables.pairs], second)
+            along = along + (weights[:3] * taken(turn, tables.row_pairs)).sum(0)
+        parts.append(along * tables.placed - tables.apart)
+    if tables.polynomials:
+        parts.append(_polynomial(tables.polynomials[0], q).sum(1))
+    return _joined(xp, parts)
+
+
+def tie_jacobian(xp: Any, tables: TieTables, q: Any, at: Pairs | None) -> Any:
+    """A, (C, n, samples)."""
+    parts = []
+    if at is not None:
+        parts.append((at.weights[:, :, None] * taken(at.moves, tables.row_pairs, -3)).sum(0))
+    if tables.polynomials:
+        parts.append(_polynomial(tables.polynomials[1], q))
+    return _joined(xp, parts)
+
+
+def tie_jacobian_rate(
+    xp: Any, tables: TieTables, numbers: TreeArrays, q: Any, qd: Any, at: Pairs | None
+) -> Any:
+    """dA/dt, (C, n, samples)."""
+    parts = []
+    if at is not None and tables.frames is not None:
+        places = at.ends.places
+        moved = moving(xp, tables.frames, numbers, at.ends.carried, qd, from_world=True)
+        twist = of_frames(tables.frames, moved.twists)
+        speeds = point_velocity(xp, twist, places)
+        # z x X becomes zd x X + z x dX/dt
+        z, zd, sd = moved.screws[:, 0, None], moved.rates[:, 0, None], moved.rates[:3, 1, None]
+        linear = cross(zd, _arms(xp, tables, places)) + cross(z, _arms(xp, tables, speeds))
+        one = tables.moved_apart
+        changes = by_coordinate(tables.frames, xp.concat([one * zd[:3], one * sd + linear], 0))
+        total = at.weights[:, :, None] * taken(changes, tables.row_pairs, -3)
+        rates = _weight_rates(xp, tables, at, twist[:, 0, : tables.pairs], speeds)
+        if rates is not None:
+            total = total + rates[:, :, None] * taken(at.moves, tables.row_pairs, -3)
+        parts.append(total.sum(0))
+    if tables.polynomials:
+        parts.append(_polynomial(tables.polynomials[2], q) * qd)
+    return _joined(xp, parts)
+
+
+def _seconds(xp: Any, tables: TieTables, a: Any, held: Any = None) -> Any:
+    """What the second frames of the pairs have, (..., P, samples): that of a contact is its own, held."""
+    own = a[..., tables.pairs :, :]
+    if tables.ties == tables.pairs:
+        return own
+    kept = (a if held is None else held)[..., tables.ties : tables.pairs, :]
+    return xp.concat([own, kept], -2)
+
+
+def _turn(xp: Any, every: Any, first: Any, second: Any) -> Any:
+    """2 sin(t/2) times the axis about which, by t, the first frames are turned from the second ones.
+
+    Of all axes a, or of z alone: sin t times it is half the sum of a2 x a1, or z2 x z1.
+    """
+    sines = cross(around(xp, second), around(xp, first))
+    cosines = (second * first).sum(0)
+    sine = every * 0.5 * sines.sum(1) + (1.0 - every) * sines[:, 2]
+    cosine = every * 0.5 * (cosines.sum(0) - 1.0) + (1.0 - every) * cosines[2]
+    half = 0.5 * (1.0 + cosine)  # cos(t/2)^2
+    return sine / xp.where(half > TINY, half, 0.0 * half + TINY) ** 0.5
+
+
+def _weights(xp: Any, tables: TieTables, at: Ends, shift: Any) -> Any:
+    """w, (6, C, samples); one for all samples where they stay as they are."""
+    weights = tables.fixed
+    if tables.turning is not None:
+        turning = turned(taken(at.carried.axes, tables.row_pairs), tables.turning)
+        weights = weights + xp.concat([turning, 0.0 * turning], 0)
+    if tables.along is not None:
+        along = tables.along * taken(shift / _size(tables, shift), tables.row_pairs)
+        weights = weights + xp.concat([0.0 * along, along], 0)
+    return weights
+
+
+def _weight_rates(xp: Any, tables: TieTables, at: Pairs, spin: Any, speeds: Any) -> Any:
+    """dw/dt; None where they stay as they are."""
+    if tables.turning is None and tables.along is None:
+        return None
+    turning, along = 0.0 * at.weights[:3], 0.0 * at.weights[3:]
+    if tables.turning is not None:
+        own = at.weights[:3] - tables.fixed[:3]
+        turning = cross(taken(spin, tables.row_pairs), around(xp, own))
+    if tables.along is not None:
+        # the rate of d, as far as it stands across d, by |d|
+        size = _size(tables, at.shift)
+        u, slip = at.shift / size, speeds[:, : tables.pairs] - _seconds(xp, tables, speeds)
+        along = tables.along * taken((slip - u * (u * slip).sum(0)) / size, tables.row_pairs)
+    return xp.concat([turning, along], 0)
+
+
+def _size(tables: TieTables, shift: Any) -> Any:
+    """|d| of pairs whose length is held, 1 of others, (P, samples)."""
+    return ((shift * shift).sum(0) * tables.is_apart + (1.0 - tables.is_apart)) ** 0.5
+
+
+def _arms(xp: Any, tables: TieTables, places: Any) -> Any:
+    """X, (5, P, joints, samples)."""
+    first, second = places[:, : tables.pairs], _seconds(xp, tables, places)
+    return around(xp, tables.first * first[:, :, None] - tables.second * second[:, :, None])
+
+
+def _polynomial(factors: tuple[Any, ...], q: Any) -> Any:
+    """c_0 + c_1 q + ..., (K, n, samples), by Horner's rule."""
+    value = factors[-1] + 0.0 * q
+    for factor in factors[-2::-1]:
+        value = value * q + factor
+    return value
+
+
+def _joined(xp: Any, parts: list[Any]) -> Any:
+    return parts[0] if len(parts) == 1 else xp.concat(parts, 0)

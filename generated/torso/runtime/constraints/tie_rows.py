@@ -1,0 +1,100 @@
+"""Rows of ties, couplings and contacts for positions as a user gives them."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from ..kinematics.kinematic_answers import Asked, KinematicAnswers, in_pieces
+from ..structure import Structure
+from .tie_arrays import Pairs, ends, pairs, tie_jacobian, tie_jacobian_rate, violation
+from .tie_tables import TieTables
+
+ROWS_OF = "rows"
+
+
+class TieRows(KinematicAnswers):
+    """phi, A and dA/dt; arguments as `Constraints` says."""
+
+    def __init__(
+        self,
+        structure: Structure,
+        backend: Any,
+        check_finite: bool,
+        read_beside_motion: Callable[[], Iterable[Any]],
+        tables: TieTables,
+        count: int,
+    ) -> None:
+        super().__init__(structure, backend, check_finite, read_beside_motion)
+        self._constants, self._count = tables, count
+
+    def at(self, q: Any) -> "RowsAt":
+        """Rows at positions that have been read, (..., n)."""
+        own = self._backend.side(q)
+        return RowsAt(own, self._asked(own, ROWS_OF, [q], {}), tuple(q.shape), self._count)
+
+    def violation(self, q: Any, held_at: Any) -> Any:
+        """phi, (..., C), from where contacts took hold."""
+
+        def answer(at: Asked) -> Any:
+            held = ends(at.xp, at.tables, at.numbers, at.motion[1])
+            return violation(at.xp, at.tables, at.motion[0], _pairs(at), held)
+
+        return self._rows("violation", (q, held_at), answer, (self._count,), ("q", "held_at"))
+
+    def rates(self, q: Any, qd: Any) -> Any:
+        """dA/dt, (..., C, n)."""
+
+        def answer(at: Asked) -> Any:
+            q, qd = at.motion
+            return tie_jacobian_rate(at.xp, at.tables, at.numbers, q, qd, _pairs(at))
+
+        return self._rows("rates", (q, qd), answer, (self._count, self._structure.n))
+
+    def _rows(self, call: str, given: Any, answer: Any, shape: Any, names: Any = ("q", "qd")) -> Any:
+        return self._answer(call, given, ROWS_OF, {}, answer, shape, None, names)
+
+    def _tables_of(self, part: Any) -> TieTables:
+        return self._constants
+
+
+class RowsAt:
+    """Rows at some positions; of few samples, what they are made of is kept for their rates."""
+
+    def __init__(self, own: Any, asked: Asked, shape: tuple[int, ...], count: int) -> None:
+        self._own, self._asked, self._shape, self._count = own, asked, shape, count
+        self._kept: Pairs | None = None
+
+    def positions(self) -> Any:
+        """phi, without what contacts have, and A beside it: (..., C, 1 + n)."""
+
+        def answer(at: Asked) -> Any:
+            placed = _pairs(at)
+            if at is self._asked:
+                self._kept = placed
+            phi = violation(at.xp, at.tables, at.motion[0], placed)
+            return at.xp.concat([phi[:, None], tie_jacobian(at.xp, at.tables, at.motion[0], placed)], 1)
+
+        return self._made(answer, self._asked, 1 + self._shape[-1])
+
+    def rates(self, qd: Any) -> Any:
+        """dA/dt, (..., C, n), for velocities (..., n) of the same samples."""
+        first = self._asked
+        flat = first.xp.swapaxes(qd.reshape(-1, qd.shape[-1]), 0, 1)
+        asked = first._replace(motion=[*first.motion, flat])
+
+        def answer(at: Asked) -> Any:
+            placed = self._kept if at is asked and self._kept is not None else _pairs(at)
+            q, qd = at.motion
+            return tie_jacobian_rate(at.xp, at.tables, at.numbers, q, qd, placed)
+
+        return self._made(answer, asked, self._shape[-1])
+
+    def _made(self, answer: Callable[[Asked], Any], asked: Asked, width: int) -> Any:
+        flat = in_pieces(self._own, asked.motion, asked, answer, self._count * width)
+        values = flat.reshape(*self._shape[:-1], self._count, width)
+        return np.ascontiguousarray(values) if isinstance(values, np.ndarray) else values.contiguous()
+
+
+def _pairs(at: Asked) -> Any:
+    return pairs(at.xp, at.tables, at.numbers, at.motion[0])

@@ -1,0 +1,1 @@
+"""What each source accelerates: actuators, velocities, weights, loads and constraints."""

@@ -1,0 +1,93 @@
+"""Forces on the coordinates by source, side by side as columns.
+
+    M qdd = u - sum_js c1_ijs qd_s - sum_j g_ij - spring - damping - friction + sum_e J_e^T w_e
+
+with armature on the diagonal of M where the joints' own torques count.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..motion_quantities import AppliedLoad
+from ..sums.namespace import namespace
+
+
+class SourceForces(NamedTuple):
+    """Columns of generalised forces (..., n, X): those of actuators first, once they are known."""
+
+    mass: Any
+    """M (..., n, n)."""
+    columns: Any
+    tails: tuple[tuple[int, ...], ...]
+    """Shape of the sources of each kind, which follow each other in the columns."""
+
+    def split(self, columns: Any) -> list[Any]:
+        """What belongs to each kind of source, (..., r, *tail), of columns (..., r, X)."""
+        parts, start = [], 0
+        for tail in self.tails:
+            end = start + math.prod(tail)
+            parts.append(columns[..., start:end].reshape(*columns.shape[:-1], *tail))
+            start = end
+        return parts
+
+
+def source_forces(robot: Any, q: Any, qd: Any, loads: Sequence[Any], passive: bool) -> SourceForces:
+    """All sources but actuators: velocity (N, n), gravity (N), passive (3, n), loads (L)."""
+    n, links = robot.n, robot.N
+    side, own = robot.backend.side(q), robot.structure.passive_sums
+    c2, c1, gravity = robot.coefficients(q, qd)
+    kinds = [-(c1 * qd[..., None, None, :]).reshape(*q.shape, links * n), -gravity]
+    mass, rest = c2.sum(-2), 0.0 * q
+    identity = side.constant(np.eye(n), q)
+    if passive:
+        shares = robot.passive_torque(q, qd, rest)[:3]
+        mass = mass + side.constant(np.diag(own.armature), q)
+    else:
+        shares = (rest,) * 3
+    kinds += [-identity * share[..., None, :] for share in shares]
+    kinds += [-torque[..., None] for torque in load_torques(robot, q, loads)]
+    columns = beside(kinds)
+    return SourceForces(mass, columns, ((links, n), (links,), (3, n), (len(loads),)))
+
+
+def with_actuators(forces: SourceForces, tau: Any, identity: Any) -> SourceForces:
+    """The same with torques (..., n) of actuators before them."""
+    columns = beside([identity * tau[..., None, :], forces.columns])
+    return SourceForces(forces.mass, columns, ((tau.shape[-1],), *forces.tails))
+
+
+def beside(parts: Sequence[Any]) -> Any:
+    """Columns (..., n, X) side by side, of samples in one shape."""
+    xp = namespace(parts[0])
+    batch = np.broadcast_shapes(*(tuple(part.shape[:-2]) for part in parts))
+    return xp.concat([xp.broadcast_to(part, (*batch, *part.shape[-2:])) for part in parts], -1)
+
+
+def listed(loads: Any) -> list[Any]:
+    """Loads as a list, of which one alone may be given; raises TypeError for what is neither."""
+    if isinstance(loads, AppliedLoad):
+        return [loads]
+    if not isinstance(loads, list | tuple):
+        raise TypeError(f"loads is a {type(loads).__name__}; give a list of AppliedLoad(frame, force, ...)")
+    return list(loads)
+
+
+def load_torques(robot: Any, q: Any, loads: Sequence[Any]) -> list[Any]:
+    """What each load adds to the torques that joints need, (..., n); errors tell which load is meant."""
+    found = []
+    for e, load in enumerate(loads):
+        several = [load] if isinstance(load, AppliedLoad) else load
+        if not isinstance(several, list | tuple) or not all(isinstance(a, AppliedLoad) for a in several):
+            raise TypeError(
+                f"loads[{e}] is a {type(load).__name__}; give AppliedLoad(frame, force, ...), or a list of "
+                "them that counts as one load"
+            )
+        try:
+            torques = [robot.kinematics.load_torque(q, **each._asdict()) for each in several]
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"loads[{e}]: {error}") from None
+        found.append(sum(torques, 0.0 * q))
+    return found

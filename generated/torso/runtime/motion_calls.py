@@ -1,0 +1,100 @@
+"""The calls of `Dynamics` on what moves a robot, and how it then moves."""
+
+from typing import Any
+
+from .interface import Array
+from .motion_quantities import InducedAccelerations, Trajectory
+
+
+class MotionCalls:
+    """Accelerations by their sources, and motion over time.
+
+    Arguments, batches and errors are those of `Dynamics`.
+    """
+
+    backend: Any
+
+    def induced_accelerations(
+        self,
+        q: Array,
+        qd: Array,
+        tau: Array | None = None,
+        qdd: Array | None = None,
+        loads: Any = (),
+        passive: bool = False,
+        frame: str | int | None = None,
+        point: Array | None = None,
+        constraints: Any = None,
+    ) -> InducedAccelerations[Array]:
+        """What each source accelerates, the others away: shares that sum to the acceleration.
+
+        tau: what the actuators give, (..., n); or in its place
+        qdd: a motion's acceleration: the actuators then give what it asks of them, less what loads do
+        loads: what acts from outside, each an `AppliedLoad`, or a list of them for one source, such as a
+        muscle's two ends
+        passive: whether springs, damping, friction and armature of the joints count, as in forward_dynamics
+        frame: what accelerates: the coordinates unless given, or a frame, with its `point`, as
+        `robot.kinematics` takes them, or "centre of mass"
+        constraints: what the motion keeps, the file's ties unless given, else what `robot.constrained`
+        makes, or False for the open tree; q, qd are then as `Constraints` has them, and the actuators that a
+        qdd asks for are those of the independent joints
+
+        The frame's own dJ/dt qd is the share `kinematic`. Sources of acceleration are forces: what gravity
+        accelerates at rest is there even where it is held, and an actuator's share cancels it.
+
+        Raises as forward_dynamics does, and names the load that is wrong.
+        """
+        answers, given = self.backend.induced(self), (q, qd, tau, qdd, loads, passive)
+        shares: InducedAccelerations[Array] = answers.accelerations(*given, frame, point, constraints)
+        return shares
+
+    def simulate(
+        self,
+        q: Array,
+        qd: Array,
+        time: Any,
+        tau: Any = None,
+        loads: Any = (),
+        passive: bool = True,
+        step: float | None = None,
+        method: str = "RK4",
+        rtol: float = 1e-9,
+        atol: float = 1e-12,
+        constraints: Any = None,
+    ) -> Trajectory[Array]:
+        """How the robot moves from q and qd on, (..., n), at the instants `time`, (T,), in s.
+
+        tau: what the actuators give: nothing unless given; (..., n), or a function of (t, q, qd) that is
+        called wherever the method evaluates, also between steps
+        loads: as in `induced_accelerations`, or a function of (t, q, qd) that gives them
+        passive: whether springs, damping, friction and armature of the joints count
+        step: of RK4 the longest, in s; from instant to instant unless given; of the others a bound
+        method: "RK4", of fixed steps, order 4, through which gradients flow; or one of SciPy's solve_ivp,
+        RK45, DOP853, Radau, ..., whose steps keep rtol and atol, and with which all starts step together
+        constraints: as in `induced_accelerations`; q is closed first. Independent joints are integrated; the
+        others are closed by Newton's method at each evaluation and after each step, and follow with G yd
+
+        The answer's energy_drift is the energy that the integration made or lost. Raises ValueError where the
+        motion ceases to be finite, and as forward_dynamics and `Constraints` do; ImportError without SciPy.
+        """
+        given = q, qd, time, tau, loads, passive, step, method, (rtol, atol), constraints
+        trajectory: Trajectory[Array] = self.backend.simulated(self, *given)
+        return trajectory
+
+    def induced_reactions(
+        self,
+        q: Array,
+        qd: Array,
+        tau: Array | None = None,
+        qdd: Array | None = None,
+        loads: Any = (),
+        passive: bool = False,
+        constraints: Any = None,
+    ) -> InducedAccelerations[Array]:
+        """What each source puts on the constraints: shares of lambda, (..., C, ...), by their rows.
+
+        Arguments are those of `induced_accelerations`. Raises ValueError without constraints.
+        """
+        answers, given = self.backend.induced(self), (q, qd, tau, qdd, loads, passive)
+        shares: InducedAccelerations[Array] = answers.reactions(*given, constraints)
+        return shares
