@@ -21,9 +21,10 @@ SHARE = 1e-3
 
 
 def scaled_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows by their largest entries; of zeros they stay."""
+    """Rows by their largest entries; those that are but what rounding leaves stay as small as they are."""
     most = np.abs(rows).max(-1, keepdims=True, initial=0.0)
-    scaled: NDArray[np.float64] = rows / np.where(most > 0.0, most, 1.0)
+    largest = most.max(initial=0.0)
+    scaled: NDArray[np.float64] = rows / np.where(most > RANK * largest, most, largest or 1.0)
     return scaled
 
 
