@@ -10,7 +10,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note
 from linkwise.robot.robot import Coupling, Robot, Tie
-from linkwise.runtime.constraints.independent_joints import rank_of, redundant_rows
+from linkwise.runtime.constraints.independent_joints import rank_of, redundant_names
 from linkwise.symbolic.system import RigidSystem, System
 
 SHARE = 0.05
@@ -32,10 +32,9 @@ def constrained_system(system: System) -> System:
     assert tree is not None  # of rigid links there is one
     loops = closed_loops(tree, len(robot.coordinates))
     chosen = _independent(robot, loops.rows)
-    shared = [owner for owner, is_so in zip(loops.owners, redundant_rows(loops.rows), strict=True) if is_so]
     notes = [Note("constraint", tie.name, _about_tie(tie, robot), BESIDE) for tie in robot.ties]
     notes += [Note("constraint", c.name, _about_coupling(c, robot), BESIDE) for c in robot.couplings]
-    notes += [Note("redundant", name, "", LEAST) for name in dict.fromkeys(shared)]
+    notes += [Note("redundant", name, "", LEAST) for name in redundant_names(loops.rows, loops.owners)]
     return replace(system, robot=replace(robot, independent=chosen, notes=(*robot.notes, *notes)))
 
 
