@@ -17,8 +17,8 @@ from linkwise.check.frame_reference import FrameReference
 from linkwise.check.model_calls import FLOAT32
 from linkwise.check.packed_layout import IndexRows, Rows
 from linkwise.check.reference import Reference, dense_quantities
-from linkwise.emit.c.header import frame_constants
 from linkwise.errors import LinkwiseError
+from linkwise.escape import identifiers
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
@@ -237,7 +237,8 @@ def _wrong_number(manifest: Manifest, compiled: CompiledPackage, rows: IndexRows
     expected |= {"PARAMETERS": len(manifest.parameters)} if manifest.parameters else {}
     if manifest.tree is not None:
         names = [frame.name for frame in manifest.tree.frames]
-        expected |= {"FRAMES": len(names)} | {key: f for f, key in enumerate(frame_constants(names))}
+        numbers = {key: f for f, key in enumerate(identifiers(names, "FRAME_"))}
+        expected |= {"FRAMES": len(names)} | numbers
     wrong = sorted(set(expected.items()) ^ set(compiled.constants.items()))
     return f"{wrong[0][0]} is wrong" if wrong else ""
 

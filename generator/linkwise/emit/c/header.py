@@ -61,15 +61,11 @@ def joint_lines(system: System) -> Iterator[str]:
     return aligned([["joint", "unit", "name"], *rows])
 
 
-def frame_constants(names: Sequence[str]) -> list[str]:
-    """What frames of these names are called in C, behind the robot's own name."""
-    return identifiers(names, "FRAME_")
-
-
 def frame_lines(system: RigidSystem) -> Iterator[tuple[str, str]]:
-    """Return each frame's constant, and its name and what carries it."""
+    """Return each frame's constant, behind the robot's own name, and its name and what carries it."""
     frames = system.robot.named_frames
-    for constant, frame in zip(frame_constants([frame.name for frame in frames]), frames, strict=True):
+    constants = identifiers([frame.name for frame in frames], "FRAME_")
+    for constant, frame in zip(constants, frames, strict=True):
         link = None if frame.link is None else system.robot.links[frame.link]
         moved = "on the ground" if link is None else f"behind {c_comment(link.joint.name)}"
         yield constant, f"{c_comment(frame.name)}, {moved}"
