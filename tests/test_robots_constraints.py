@@ -427,3 +427,46 @@ def test_a_joint_that_carries_a_whole_loop_moves_none_of_it(tmp_path: Path) -> N
     assert constraints.independent == ("t", "a")
     q = constraints.closed(np.random.default_rng(0).uniform(-1.0, 1.0, (50, 4)))
     assert np.abs(constraints.velocity_map(q)[:, 2:, 0]).max() < 1e-12
+
+
+def test_ends_are_placed_as_joints_are(tmp_path: Path) -> None:
+    """A hinge where a joint is lets it turn, and nothing else; beside it, it holds nothing."""
+    place = "xyz = ['2*L', 0.1, -0.3], rpy = [0.3, 'pi/3', -1]"
+    axis = "axis = [1, 2, -2]"
+    robot = f"""schema = 1
+name = "arm"
+parameters = {{ L = 0.2 }}
+joint = [
+  {{ name = "j", parent = "base", child = "p", {place}, {axis} }},
+  {{ name = "k", parent = "p", child = "q", xyz = [0, 0.2, 0], axis = [0, 1, 0] }},
+]
+link = [
+  {{ name = "p", mass = 1, inertia = {{ xx = 1, yy = 1, zz = 1 }} }},
+  {{ name = "q", mass = 1, inertia = {{ xx = 1, yy = 1, zz = 1 }} }},
+]
+[[constraint]]
+name = "again"
+type = "hinge"
+first = {{ frame = "base", {place}, {axis} }}
+second = {{ frame = "p", {axis} }}
+"""
+    with pytest.raises(LinkwiseError, match="the constraints 'again' hold however the joints move"):
+        robot_of(written(tmp_path, "again.toml", robot))
+    geared = robot + COUPLED.removeprefix("schema = 1\n") + "terms = { j = 2, k = -1 }\n"
+    constraints = loaded(
+        written(tmp_path, "geared.toml", geared), tmp_path, parameters="symbolic"
+    ).constraints
+    violation = constraints.violation(np.random.default_rng(0).uniform(-3, 3, (20, 2)))
+    assert np.abs(violation[:, :5]).max() < 1e-14
+    assert np.abs(violation[:, 5]).min() > 1e-3
+    assert constraints.redundant == ("again",)
+
+
+def test_a_loop_is_planar_within_the_digits_of_its_file(tmp_path: Path) -> None:
+    upright = FOURBAR.read_text().replace("gravity = [0, -9.81, 0]", "gravity = [0, 0, -9.81]")
+    for joint, roll in (("a", "1.570796"), ("c", "1.5707963")):
+        upright = upright.replace(f'name = "{joint}",', f'name = "{joint}", rpy = [{roll}, 0, 0],')
+    constraints = loaded(written(tmp_path, "upright.toml", upright), tmp_path).constraints
+    assert (constraints.independent, constraints.redundant) == (("a",), ("pin",))
+    q = constraints.closed(np.random.default_rng(0).uniform(-0.3, 0.3, (20, 3)))
+    assert constraints.velocity_map(q).shape == (20, 3, 1)

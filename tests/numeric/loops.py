@@ -4,7 +4,7 @@ Pinocchio has the open tree: its Jacobians, accelerations, mass matrix and torqu
 written down here anew, and M qdd + h = tau + A^T lambda with A qdd + gamma = 0 is solved as one system.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
@@ -171,7 +171,21 @@ def held_arm() -> Mechanism:
     return Mechanism("held_arm", robot, (tie,), q, 2)
 
 
-MECHANISMS = {made.name: made for made in (fourbar(), fivebar(), bennett(), delta(), held_arm())}
+def upright() -> Mechanism:
+    """The five-bar in a plane upright: turned by a right angle, rows held twice are no more than rounding."""
+    flat, turn = fivebar(), (pi / 2, 0.0, 0.0)
+
+    def stood(joint: JointData) -> JointData:
+        x, y, z = (rotation(*turn) @ np.array(joint.xyz)).tolist()
+        return replace(joint, xyz=(x, y, z), rpy=turn) if joint.parent == "base" else joint
+
+    joints = tuple(stood(joint) for joint in flat.robot.joints)
+    robot = replace(flat.robot, joints=joints, gravity=(0.0, 0.0, -9.81))
+    return replace(flat, name="upright", robot=robot)
+
+
+MADE = (fourbar(), fivebar(), upright(), bennett(), delta(), held_arm())
+MECHANISMS = {made.name: made for made in MADE}
 
 
 class LoopOracle:

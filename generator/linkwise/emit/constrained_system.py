@@ -10,7 +10,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note
 from linkwise.robot.robot import Coupling, Robot, Tie
-from linkwise.runtime.constraints.independent_joints import rank_of, redundant_rows, scaled_rows
+from linkwise.runtime.constraints.independent_joints import rank_of, redundant_rows
 from linkwise.symbolic.system import RigidSystem, System
 
 SHARE = 0.05
@@ -20,8 +20,8 @@ SHARE = 0.05
 def constrained_system(system: System) -> System:
     """Return the system with its independent coordinates found, if it has constraints; else as it is.
 
-    Raises LinkwiseError for constraints that never close, that leave nothing to move, and for coordinates
-    asked for that others do not follow.
+    Raises LinkwiseError for constraints that never close, that hold nothing or all that moves, and for
+    coordinates asked for that others do not follow.
     """
     if not isinstance(system, RigidSystem) or system.robot.independent:
         return system
@@ -45,6 +45,11 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
     rank = rank_of(rows)
     free = len(names) - rank
     constraints = listed([*(repr(tie.name) for tie in robot.ties), *(repr(c.name) for c in robot.couplings)])
+    if not rank:
+        raise LinkwiseError(
+            f"the constraints {constraints} hold however the joints move, so nothing follows from them; "
+            "remove them"
+        )
     if not free:
         raise LinkwiseError(
             f"the constraints {constraints} leave nothing to move, so the robot stands still; remove one, or "
@@ -79,7 +84,7 @@ def _proposed(robot: Robot, rows: Array, rank: int) -> tuple[int, ...]:
     names = [coordinate.name for coordinate in robot.coordinates]
     depths = [min(_depths(robot, k), default=0) for k in range(len(names))]
     sprung = {axis.coordinate for axis in robot.passive if axis.own.stiffness}
-    left, free = scaled_rows(rows), set(range(len(names)))
+    left, free = rows, set(range(len(names)))
     for _ in range(rank):
         sizes = np.linalg.norm(left, axis=0)
         most = max(sizes[k] for k in free)

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 class ClosedLoops(NamedTuple):
-    """A position q (n,) in which constraints hold, their Jacobian A (C, n), and the name of each row's."""
+    """A position q (n,) in which constraints hold, A (C, n) with comparable rows, and whose each row is."""
 
     q: Array
     rows: Array
@@ -46,7 +46,7 @@ def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
     if not found.is_closed:
         rows = [*(row for one in held for row in one.row_names), *couplings]
         raise LinkwiseError(_told(found, owners, rows, len(starts)))
-    return ClosedLoops(found.q, found.rows, owners)
+    return ClosedLoops(found.q, found.comparable, owners)
 
 
 def _told(found: Closing, owners: tuple[str, ...], rows: list[str], tries: int) -> str:

@@ -54,7 +54,7 @@ class ChosenConstraints:
 
     @cached_property
     def _matrix(self) -> NDArray[np.float64]:
-        """A where loops close beside `at`, or anywhere, of the tree's own numbers."""
+        """A where loops close beside `at`, or anywhere, of the tree's own numbers, its rows comparable."""
         tree, n = self._tree, self._structure.n
         starts = random_starts(n) if self._at is None else [self._at]
         q = starts[0]
@@ -65,7 +65,7 @@ class ChosenConstraints:
                 told = "from any position that was tried; give `at`" if self._at is None else "beside `at`"
                 raise ValueError(f"{listed(self.names)} did not close {told}")
             q = found.q
-        return TieEquations(tree, n, self.held).at(q).rows
+        return TieEquations(tree, n, self.held).at(q).comparable
 
     def _independent(self, given: Any, has_contacts: bool) -> tuple[int, ...]:
         if given is None and not has_contacts and self._tree.independent:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import own_numbers
-from .held_frames import Held
+from .held_frames import ROWS, TURNS, Held
 from .independent_joints import RANK, rank_of
 from .tie_arrays import pairs, tie_jacobian, violation
 from .tie_tables import tie_tables
@@ -42,6 +42,8 @@ class Closing(NamedTuple):
     """phi, (C,)."""
     rows: Numbers
     """A, (C, n)."""
+    comparable: Numbers
+    """A with rows that may stand beside each other: in m by the robot's size, couplings by their largest."""
 
     @property
     def is_closed(self) -> bool:
@@ -59,13 +61,22 @@ class TieEquations:
 
     def __init__(self, tree: JointTree, n: int, held: Sequence[Held]) -> None:
         self._tables, self._numbers = tie_tables(tree, n, held), own_numbers(tree)
+        numbers = (self._numbers.translations, self._numbers.offsets)
+        size = max(np.abs(a).max(initial=0.0) for a in numbers) or 1.0
+        turns = [row in TURNS for one in held for row in ROWS[one.kind]]
+        self._sizes = np.where(turns, 1.0, size)[:, None]
 
     def at(self, q: Numbers) -> Closing:
         """phi, without what contacts have, and A at q (n,)."""
         column = q[:, None]
         placed = pairs(np, self._tables, self._numbers, column)
         phi, rows = (made(np, self._tables, column, placed) for made in (violation, tie_jacobian))
-        return Closing(q, phi[:, 0], rows[..., 0])
+        return Closing(q, phi[:, 0], rows[..., 0], self._comparable(rows[..., 0]))
+
+    def _comparable(self, rows: Numbers) -> Numbers:
+        ties, couplings = np.split(rows, [len(self._sizes)])
+        most = np.abs(couplings).max(-1, keepdims=True)
+        return np.concatenate([ties / self._sizes, couplings / np.where(most > 0.0, most, 1.0)])
 
     def closed_from(self, start: Numbers) -> Closing:
         """Where the steps from q (n,) end."""
@@ -93,4 +104,8 @@ def best_closing(equations: TieEquations, starts: Iterable[Numbers]) -> Closing:
         closed = [at for at in ended if at.is_closed]
         if len(closed) == ENOUGH:
             break
-    return max(closed, key=lambda at: rank_of(at.rows)) if closed else min(ended, key=lambda at: at.open_by)
+    return (
+        max(closed, key=lambda at: rank_of(at.comparable))
+        if closed
+        else min(ended, key=lambda at: at.open_by)
+    )

@@ -1,7 +1,8 @@
 """Which joints may be independent: rank and pivoting of A at one position, on NumPy arrays.
 
-Metres and radians stand beside each other: rows are scaled to their largest entry, and columns are compared
-by what is left of them across those taken before.
+Rows are comparable, as `closing_search` has them: not each by its own largest entry, for a row that a planar
+loop leaves at zero holds nothing but rounding. Columns are compared by what is left of them across those
+taken before.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from ..rule.joint_tree import JointTree
 
 RANK = 1e-5
-"""Singular values below this part of the largest are zero, and what is left of columns likewise.
+"""Singular values below this part of the largest, or of 1, are zero; what is left of columns likewise.
 
 A file's right angle of 1.5708 tilts by 4e-6 what is meant to be parallel.
 """
@@ -20,17 +21,10 @@ SHARE = 1e-3
 """Rows that have less than this part in a sum of rows that is zero are not among those that it ties."""
 
 
-def scaled_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows by their largest entries; of zeros they stay."""
-    most = np.abs(rows).max(-1, keepdims=True, initial=0.0)
-    scaled: NDArray[np.float64] = rows / np.where(most > 0.0, most, 1.0)
-    return scaled
-
-
 def rank_of(rows: NDArray[np.float64], tolerance: float = RANK) -> int:
     """Rank of A (C, n)."""
-    values = np.linalg.svd(scaled_rows(rows), compute_uv=False)
-    return int((values > tolerance * max(values.max(initial=0.0), 1e-300)).sum())
+    values = np.linalg.svd(rows, compute_uv=False)
+    return int((values > tolerance * max(1.0, values.max(initial=0.0))).sum())
 
 
 def chosen_independent(
@@ -40,8 +34,8 @@ def chosen_independent(
 
     rather_dependent: those that are taken before any other, as far as they can be, since nothing drives them
     """
-    left = scaled_rows(rows).copy()
-    largest = np.linalg.norm(left, axis=0).max(initial=0.0)
+    left = rows.copy()
+    largest = np.linalg.norm(left, axis=0).max(initial=1.0)
     rest = [k for k in range(rows.shape[1]) if k not in rather_dependent]
     taken: list[int] = []
     for group in (list(rather_dependent), rest):
@@ -61,8 +55,8 @@ def chosen_independent(
 
 def redundant_rows(rows: NDArray[np.float64], tolerance: float = RANK) -> NDArray[np.bool_]:
     """Which rows of A (C, n) follow from others, so that forces on them are not unique."""
-    u, values, _ = np.linalg.svd(scaled_rows(rows))
-    rank = int((values > tolerance * values.max(initial=0.0)).sum())
+    u, values, _ = np.linalg.svd(rows)
+    rank = int((values > tolerance * max(1.0, values.max(initial=0.0))).sum())
     shared: NDArray[np.bool_] = np.abs(u[:, rank:]).max(-1, initial=0.0) > SHARE
     return shared
 
