@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from ..arguments import has_tensors
 from ..arrays.numpy_backend import NumpyBackend
+from ..constraints.chosen_constraints import ChosenConstraints
 from ..interface import ClosedForms
 from ..rule.rule_calls import RigidRule
 from ..structure import Structure
 from .native_answers import NativeAnswers
 from .native_calls import NativeCalls, checked_threads
 from .native_control import ControlCalls, NativeKinematics
+from .native_ties import NativeTieRows
 
 if TYPE_CHECKING:
     from .native_torch import TorchSide
@@ -77,6 +79,15 @@ class NativeBackend(NumpyBackend):
     ) -> NativeKinematics:
         """The calls of `Kinematics`: C answers for one sample, arrays and tensors else."""
         return NativeKinematics(self.structure, self, check_finite, read_beside_motion, self.control)
+
+    def tie_rows(
+        self,
+        chosen: ChosenConstraints,
+        check_finite: bool,
+        read_beside_motion: Callable[[], Iterable[Any]],
+    ) -> NativeTieRows:
+        """Rows of ties and contacts: C answers for their frames of one sample."""
+        return NativeTieRows(self.structure, self, check_finite, read_beside_motion, chosen, self.control)
 
     def side(self, like: Any) -> Any:
         """What computes with `like`, an array or a tensor."""

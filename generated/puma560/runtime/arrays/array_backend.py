@@ -3,7 +3,9 @@
 from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 
+from ..constraints.chosen_constraints import ChosenConstraints
 from ..constraints.constraint_answers import ConstraintAnswers, constraint_answers
+from ..constraints.tie_rows import TieRows
 from ..induced.induced_answers import InducedAnswers
 from ..kinematics.kinematic_answers import KinematicAnswers
 from ..rule.joint_tree import JointTree
@@ -40,7 +42,20 @@ class ArrayBackend:
         self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any
     ) -> ConstraintAnswers:
         """The calls of `Constraints` on a robot with this back end."""
-        return constraint_answers(robot, independent, contacts, at, tolerance)
+
+        def rows(chosen: ChosenConstraints) -> TieRows:
+            return self.tie_rows(chosen, robot.check_finite, robot._answers.read_beside_motion)
+
+        return constraint_answers(robot, independent, contacts, at, tolerance, rows)
+
+    def tie_rows(
+        self,
+        chosen: ChosenConstraints,
+        check_finite: bool,
+        read_beside_motion: Callable[[], Iterable[Any]],
+    ) -> TieRows:
+        """Rows of ties and contacts."""
+        return TieRows(self.structure, self, check_finite, read_beside_motion, chosen)
 
     def simulated(self, robot: Any, *given: Any) -> Any:
         """The motion of a robot on this back end over time; see `MotionCalls.simulate`."""

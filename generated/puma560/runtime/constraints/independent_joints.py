@@ -53,17 +53,19 @@ def chosen_independent(
     return tuple(k for k in range(rows.shape[1]) if k not in taken)
 
 
-def redundant_rows(rows: NDArray[np.float64], tolerance: float = RANK) -> NDArray[np.bool_]:
-    """Which rows of A (C, n) follow from others, so that forces on them are not unique.
+def redundant_names(rows: NDArray[np.float64], owners: Sequence[str]) -> tuple[str, ...]:
+    """Whose rows of A (C, n) follow from others, so that forces on them are not unique; each once, in order.
 
-    Rows of nothing but rounding do not count: no joint moves that way, and no force is asked for there.
+    Rows of nothing but rounding count where their owner has no others: it holds nothing that could move. A
+    planar loop's pin has such across its plane, where no force is asked for.
     """
-    least = tolerance * max(1.0, np.linalg.svd(rows, compute_uv=False).max(initial=0.0))
+    least = RANK * max(1.0, np.linalg.svd(rows, compute_uv=False).max(initial=0.0))
     there = np.abs(rows).max(-1, initial=0.0) > least
     u, values, _ = np.linalg.svd(rows[there])
-    found = np.zeros(len(rows), dtype=np.bool_)
-    found[there] = np.abs(u[:, int((values > least).sum()) :]).max(-1, initial=0.0) > SHARE
-    return found
+    shared = np.abs(u[:, int((values > least).sum()) :]).max(-1, initial=0.0) > SHARE
+    moving = [owner for owner, moves in zip(owners, there, strict=True) if moves]
+    found = {owner for owner, is_so in zip(moving, shared, strict=True) if is_so} | set(owners) - set(moving)
+    return tuple(owner for owner in dict.fromkeys(owners) if owner in found)
 
 
 def loose_base(tree: JointTree) -> tuple[int, ...]:

@@ -7,7 +7,8 @@ import numpy as np
 
 from ..kinematics.kinematic_answers import Asked, KinematicAnswers, in_pieces
 from ..structure import Structure
-from .tie_arrays import Pairs, ends, pairs, tie_jacobian, tie_jacobian_rate, violation
+from .chosen_constraints import ChosenConstraints
+from .tie_arrays import Changes, Pairs, ends, pair_changes, pairs, tie_jacobian, tie_jacobian_rate, violation
 from .tie_tables import TieTables
 
 ROWS_OF = "rows"
@@ -22,11 +23,10 @@ class TieRows(KinematicAnswers):
         backend: Any,
         check_finite: bool,
         read_beside_motion: Callable[[], Iterable[Any]],
-        tables: TieTables,
-        count: int,
+        chosen: ChosenConstraints,
     ) -> None:
         super().__init__(structure, backend, check_finite, read_beside_motion)
-        self._constants, self._count = tables, count
+        self._constants, self._count = chosen.tables, len(chosen.rows)
 
     def at(self, q: Any) -> "RowsAt":
         """Rows at positions that have been read, (..., n)."""
@@ -46,8 +46,7 @@ class TieRows(KinematicAnswers):
         """dA/dt, (..., C, n)."""
 
         def answer(at: Asked) -> Any:
-            q, qd = at.motion
-            return tie_jacobian_rate(at.xp, at.tables, at.numbers, q, qd, _pairs(at))
+            return _rates(at, placed := _pairs(at), _changes(at, placed))
 
         return self._rows("rates", (q, qd), answer, (self._count, self._structure.n))
 
@@ -69,7 +68,7 @@ class RowsAt:
         """phi, without what contacts have, and A beside it: (..., C, 1 + n)."""
 
         def answer(at: Asked) -> Any:
-            placed = _pairs(at)
+            placed = self._pairs(at)
             if at is self._asked:
                 self._kept = placed
             phi = violation(at.xp, at.tables, at.motion[0], placed)
@@ -84,11 +83,18 @@ class RowsAt:
         asked = first._replace(motion=[*first.motion, flat])
 
         def answer(at: Asked) -> Any:
-            placed = self._kept if at is asked and self._kept is not None else _pairs(at)
-            q, qd = at.motion
-            return tie_jacobian_rate(at.xp, at.tables, at.numbers, q, qd, placed)
+            placed = self._kept if at is asked and self._kept is not None else self._pairs(at)
+            return _rates(at, placed, self._changes(at, placed))
 
         return self._made(answer, asked, self._shape[-1])
+
+    def _pairs(self, at: Asked) -> Pairs | None:
+        """Where pairs are."""
+        return _pairs(at)
+
+    def _changes(self, at: Asked, placed: Pairs | None) -> Changes | None:
+        """How pairs change."""
+        return _changes(at, placed)
 
     def _made(self, answer: Callable[[Asked], Any], asked: Asked, width: int) -> Any:
         flat = in_pieces(self._own, asked.motion, asked, answer, self._count * width)
@@ -96,5 +102,14 @@ class RowsAt:
         return np.ascontiguousarray(values) if isinstance(values, np.ndarray) else values.contiguous()
 
 
-def _pairs(at: Asked) -> Any:
+def _pairs(at: Asked) -> Pairs | None:
     return pairs(at.xp, at.tables, at.numbers, at.motion[0])
+
+
+def _changes(at: Asked, placed: Pairs | None) -> Changes | None:
+    return pair_changes(at.xp, at.tables, at.numbers, at.motion[1], placed)
+
+
+def _rates(at: Asked, placed: Pairs | None, changes: Changes | None) -> Any:
+    q, qd = at.motion
+    return tie_jacobian_rate(at.xp, at.tables, q, qd, placed, changes)

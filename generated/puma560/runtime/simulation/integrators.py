@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
@@ -45,7 +46,7 @@ def by_scipy(
     Raises ImportError without SciPy, ValueError where the solver gives up.
     """
     try:
-        from scipy.integrate import solve_ivp
+        solve_ivp = import_module("scipy.integrate").solve_ivp
     except ImportError:
         raise ImportError(
             f"method {method!r} is SciPy's, which is not installed here: pip install scipy, or take method "

@@ -13,7 +13,7 @@ from ..rule.joint_tree import JointTree
 from ..structure import Structure
 from .closing_search import TieEquations, best_closing, random_starts
 from .held_frames import Held, all_names, held_by
-from .independent_joints import chosen_independent, loose_base, rank_of, redundant_rows
+from .independent_joints import chosen_independent, loose_base, rank_of, redundant_names
 from .singular_positions import listed
 from .tie_tables import tie_tables
 
@@ -47,10 +47,7 @@ class ChosenConstraints:
     @cached_property
     def redundant(self) -> tuple[str, ...]:
         """Names of those among whose rows some follow from others."""
-        shared = {
-            name for name, is_so in zip(self.row_names, redundant_rows(self._matrix), strict=True) if is_so
-        }
-        return tuple(name for name in self.names if name in shared)
+        return redundant_names(self._matrix, self.row_names)
 
     @cached_property
     def _matrix(self) -> NDArray[np.float64]:

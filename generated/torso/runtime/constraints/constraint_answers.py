@@ -1,6 +1,6 @@
 """The calls of `Constraints` behind its face, composed of the rows of ties and the calls of the open tree."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..quantities import Coefficients, ConstrainedMotion, Propagation
@@ -186,9 +186,17 @@ def _projected_cubes(found: Followers, parts: Any) -> Any:
 
 
 def constraint_answers(
-    robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any
+    robot: Any,
+    independent: Any,
+    contacts: Any,
+    at: Any,
+    tolerance: Any,
+    made: Callable[[ChosenConstraints], TieRows],
 ) -> ConstraintAnswers:
-    """The calls on a robot; raises as `Dynamics.constrained` does."""
+    """The calls on a robot, with the rows that are made of what was chosen.
+
+    Raises as `Dynamics.constrained` does.
+    """
     backend, structure = robot.backend, robot.structure
     if backend.tree is None:
         raise ValueError(
@@ -198,6 +206,4 @@ def constraint_answers(
     if tolerance is not None and not (isinstance(tolerance, float | int) and tolerance >= 0.0):
         raise ValueError(f"tolerance is {tolerance!r}; give a number of m and rad, 0 or more")
     chosen = ChosenConstraints(structure, backend.tree, independent, contacts, at)
-    beside = robot._answers.read_beside_motion
-    rows = TieRows(structure, backend, robot.check_finite, beside, chosen.tables, len(chosen.rows))
-    return ConstraintAnswers(robot, chosen, rows, tolerance)
+    return ConstraintAnswers(robot, chosen, made(chosen), tolerance)

@@ -48,6 +48,17 @@ class Pairs(NamedTuple):
     """w, (6, C, samples)."""
 
 
+class Changes(NamedTuple):
+    """How pairs change."""
+
+    moves: Any
+    """dJ/dt, (6, P, n, samples)."""
+    spin: Any
+    """omega of the first frames, (3, P, samples)."""
+    speeds: Any
+    """Of the points of all frames, (3, frames, samples)."""
+
+
 def ends(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Ends | None:
     """Where frames are at q (n, samples); None without ties and contacts."""
     if tables.frames is None:
@@ -61,12 +72,33 @@ def pairs(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Pairs | No
     at = ends(xp, tables, numbers, q)
     if at is None or tables.frames is None:
         return None
-    shift = at.places[:, : tables.pairs] - _seconds(xp, tables, at.places)
     screws = joint_screws(xp, tables.frames.from_world, at.carried.joints)[:, :, None]
     one, z = tables.moved_apart, screws[:, 0]
     linear = one * screws[:3, 1] + cross(z, _arms(xp, tables, at.places))
-    moves = by_coordinate(tables.frames, xp.concat([one * z[:3], linear], 0))
+    return paired(xp, tables, at, by_coordinate(tables.frames, xp.concat([one * z[:3], linear], 0)))
+
+
+def paired(xp: Any, tables: TieTables, at: Ends, moves: Any) -> Pairs:
+    """The pairs of frames that move so, (6, P, n, samples)."""
+    shift = at.places[:, : tables.pairs] - _seconds(xp, tables, at.places)
     return Pairs(at, shift, moves, _weights(xp, tables, at, shift))
+
+
+def pair_changes(
+    xp: Any, tables: TieTables, numbers: TreeArrays, qd: Any, at: Pairs | None
+) -> Changes | None:
+    """How that changes at qd (n, samples): z x X becomes zd x X + z x dX/dt."""
+    if at is None or tables.frames is None:
+        return None
+    places = at.ends.places
+    moved = moving(xp, tables.frames, numbers, at.ends.carried, qd, from_world=True)
+    twist = of_frames(tables.frames, moved.twists)
+    speeds = point_velocity(xp, twist, places)
+    z, zd, sd = moved.screws[:, 0, None], moved.rates[:, 0, None], moved.rates[:3, 1, None]
+    linear = cross(zd, _arms(xp, tables, places)) + cross(z, _arms(xp, tables, speeds))
+    one = tables.moved_apart
+    moves = by_coordinate(tables.frames, xp.concat([one * zd[:3], one * sd + linear], 0))
+    return Changes(moves, twist[:3, 0, : tables.pairs], speeds)
 
 
 def violation(xp: Any, tables: TieTables, q: Any, at: Pairs | None, held: Ends | None = None) -> Any:
@@ -99,22 +131,13 @@ def tie_jacobian(xp: Any, tables: TieTables, q: Any, at: Pairs | None) -> Any:
 
 
 def tie_jacobian_rate(
-    xp: Any, tables: TieTables, numbers: TreeArrays, q: Any, qd: Any, at: Pairs | None
+    xp: Any, tables: TieTables, q: Any, qd: Any, at: Pairs | None, changes: Changes | None
 ) -> Any:
     """dA/dt, (C, n, samples)."""
     parts = []
-    if at is not None and tables.frames is not None:
-        places = at.ends.places
-        moved = moving(xp, tables.frames, numbers, at.ends.carried, qd, from_world=True)
-        twist = of_frames(tables.frames, moved.twists)
-        speeds = point_velocity(xp, twist, places)
-        # z x X becomes zd x X + z x dX/dt
-        z, zd, sd = moved.screws[:, 0, None], moved.rates[:, 0, None], moved.rates[:3, 1, None]
-        linear = cross(zd, _arms(xp, tables, places)) + cross(z, _arms(xp, tables, speeds))
-        one = tables.moved_apart
-        changes = by_coordinate(tables.frames, xp.concat([one * zd[:3], one * sd + linear], 0))
-        total = at.weights[:, :, None] * taken(changes, tables.row_pairs, -3)
-        rates = _weight_rates(xp, tables, at, twist[:, 0, : tables.pairs], speeds)
+    if at is not None and changes is not None:
+        total = at.weights[:, :, None] * taken(changes.moves, tables.row_pairs, -3)
+        rates = _weight_rates(xp, tables, at, changes)
         if rates is not None:
             total = total + rates[:, :, None] * taken(at.moves, tables.row_pairs, -3)
         parts.append(total.sum(0))
@@ -157,17 +180,19 @@ def _weights(xp: Any, tables: TieTables, at: Ends, shift: Any) -> Any:
     return weights
 
 
-def _weight_rates(xp: Any, tables: TieTables, at: Pairs, spin: Any, speeds: Any) -> Any:
+def _weight_rates(xp: Any, tables: TieTables, at: Pairs, changes: Changes) -> Any:
     """dw/dt; None where they stay as they are."""
     if tables.turning is None and tables.along is None:
         return None
     turning, along = 0.0 * at.weights[:3], 0.0 * at.weights[3:]
     if tables.turning is not None:
         own = at.weights[:3] - tables.fixed[:3]
+        spin = around(xp, changes.spin)
         turning = cross(taken(spin, tables.row_pairs), around(xp, own))
     if tables.along is not None:
         # the rate of d, as far as it stands across d, by |d|
         size = _size(tables, at.shift)
+        speeds = changes.speeds
         u, slip = at.shift / size, speeds[:, : tables.pairs] - _seconds(xp, tables, speeds)
         along = tables.along * taken((slip - u * (u * slip).sum(0)) / size, tables.row_pairs)
     return xp.concat([turning, along], 0)
