@@ -80,15 +80,18 @@ def test_aligning_turns_z_to_the_axis_and_permutes_for_an_axis_of_the_frame(axis
         assert set(np.abs(rotation).reshape(-1)) == {0.0, 1.0}
 
 
-def test_entries_within_1e_12_of_a_whole_number_become_it_and_no_others() -> None:
-    row = (1 - 0.9e-12, -1 + 0.9e-12, 0.9e-12)
-    assert snap([row])[0] == (1.0, -1.0, 0.0)
-    assert math.copysign(1.0, snap([(-0.9e-12, 1.0, 1.0)])[0][0]) == 1.0
+def test_entries_within_1e_12_of_a_whole_number_become_it_where_rows_stay_orthonormal() -> None:
+    e = 0.9e-12
+    rows = [(-e, -1 + e, e), (1 - e, e, -e), (e, -e, 1 - e)]
+    whole = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    assert snapped(rows) == (whole, True)
+    assert snapped(whole) == (whole, False)
+    assert math.copysign(1.0, snap(rows)[0][0]) == 1.0
+    tilted = [(1 - e, 0.0, 1.3e-6), (0.0, 1.0, 6e-17), (-1.3e-6, 0.0, 1 - e)]
+    assert snap(tilted) == ((1 - e, 0.0, 1.3e-6), (0.0, 1.0, 0.0), (-1.3e-6, 0.0, 1 - e))
     for left in (1 - 1.1e-12, -1 + 1.1e-12, 1.1e-12, -1.1e-12, 0.5):
         assert snap([(left, left, left)])[0] == (left, left, left)
     assert snap([(math.nan, math.inf, 0.25)])[0][1:] == (math.inf, 0.25)
-    assert snapped([row]) == (((1.0, -1.0, 0.0),), True)
-    assert snapped([(1.0, 0.5, 0.0)]) == (((1.0, 0.5, 0.0),), False)
 
 
 def test_right_angles_cost_no_more_than_the_permutations_they_are(tmp_path: Path) -> None:
@@ -103,3 +106,10 @@ def test_right_angles_cost_no_more_than_the_permutations_they_are(tmp_path: Path
         notes.append({note.subject for note in system.notes if note.kind == "snapped"})
     assert costs[0] < costs[1]
     assert notes == [{"ab", "bc"}, set()]
+
+
+@pytest.mark.parametrize("angle", [1.570796, 1.5707963, 1e-6, 3.14159])
+def test_a_rounded_angle_stays_a_rotation(angle: float) -> None:
+    for rpy in ((angle, 0.0, 0.0), (0.0, angle, 0.0), (0.3, 0.0, angle)):
+        rows = np.array(compose(snap(from_rpy(*rpy)), about_z(angle)))
+        np.testing.assert_allclose(rows @ rows.T, np.eye(3), rtol=0, atol=4e-15)

@@ -62,7 +62,7 @@ class SumCalls:
         inside torch.func and torch.compile, qdd is then not finite.
         """
         tree = self.backend.tree
-        if tree is not None and (tree.ties or tree.couplings):
+        if tree is not None and tree.tied:
             raise ValueError(
                 f"the joints of {self.structure.name} are tied, which its open tree does not know; call "
                 "constraints.forward_dynamics(q, qd, tau)"

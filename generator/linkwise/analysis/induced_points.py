@@ -50,7 +50,7 @@ def induced_points(texts: Sequence[str], robot: LoadedRobot) -> tuple[InducedPoi
     twice, and for a robot with constraints.
     """
     tree = robot.package.manifest.tree
-    if texts and tree is not None and (tree.ties or tree.couplings):
+    if texts and tree is not None and tree.tied:
         raise LinkwiseError(
             f"--induced {texts[0]}: {robot.name} has constraints, of which an analysis does not know yet; ask"
             " the package's induced_accelerations"

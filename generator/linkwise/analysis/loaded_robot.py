@@ -67,7 +67,7 @@ def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
     manifest = package.manifest
     chosen, model = _load(package, package.fastest_first if backend is None else (backend,))
     tree = manifest.tree
-    tied = ConstrainedModel.of(model, tree) if tree is not None and tree.independent else None
+    tied = ConstrainedModel.of(model, tree) if tree is not None and tree.tied else None
     return LoadedRobot(
         manifest.name,
         tuple(model.joint_names),

@@ -87,7 +87,7 @@ def _models(package: Package, tree: RigidTree, placed: Sequence[_Placed]) -> lis
         masses[at.link], centres[at.link] = at.payload.mass, at.place
         bodies = own._replace(masses=masses, centres=centres, inertias=np.zeros(own.inertias.shape))
         model = package.load(backend, bodies=bodies)
-        if tree.independent:
+        if tree.tied:
             model = cast(Model, ConstrainedModel.of(model, tree))
         models.append((at.link, model))
     return models

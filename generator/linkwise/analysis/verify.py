@@ -10,7 +10,7 @@ import numpy as np
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import Column, Quantity
-from linkwise.check.following import following_map
+from linkwise.check.loop_equations import LoopEquations
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
@@ -128,7 +128,7 @@ def against_recursion(
     expected = np.concatenate([partial, *(torque[:, :, None] for torque in asked)], axis=2)
     tree = robot.package.manifest.tree
     if robot.constrained is not None and tree is not None:
-        mapped = following_map(robot.recursion, tree, q)
+        mapped = LoopEquations(robot.recursion, tree).velocity_map(q)
         projected = np.einsum("snm,snj->smj", mapped, expected)
         expected = np.zeros_like(expected)
         expected[:, list(robot.driven)] = projected

@@ -236,7 +236,7 @@ class _Checks:
     @property
     def _is_tied(self) -> bool:
         tree = self.package.manifest.tree
-        return tree is not None and bool(tree.ties or tree.couplings)
+        return tree is not None and tree.tied
 
     def _loops(self, values: Mapping[str, float], reference: Reference) -> LoopReference | None:
         """What constraints are held against; a robot without ties has none."""

@@ -87,6 +87,15 @@ class LoopEquations(NamedTuple):
             found.append(row)
         return np.concatenate(found, 1)
 
+    def velocity_map(self, q: Array) -> Array:
+        """G (samples, n, m) of qd = G yd, y the tree's independent joints, by least squares."""
+        rows, own = self.rows(q), list(self.tree.independent)
+        rest = [k for k in range(q.shape[1]) if k not in own]
+        found = np.zeros((*q.shape, len(own)))
+        found[:, own] = np.eye(len(own))
+        found[:, rest] = -np.linalg.pinv(rows[..., rest]) @ rows[..., own]
+        return found
+
     def rates(self, q: Array, qd: Array) -> Array:
         """dA/dt, (samples, C, n)."""
         rate: Array = self.rows(q + 1j * COMPLEX_STEP * qd).imag / COMPLEX_STEP

@@ -89,11 +89,7 @@ class _Followed:
     @property
     def map(self) -> Array:
         """G, (samples, n, m)."""
-        rows = self.equations.rows(self.q)
-        found = np.zeros((*self.q.shape, len(self.own)))
-        found[:, self.own] = np.eye(len(self.own))
-        found[:, self.rest] = -np.linalg.pinv(rows[..., self.rest]) @ rows[..., self.own]
-        return found
+        return self.equations.velocity_map(self.q)
 
     def velocity(self, yd: Array) -> Array:
         """qd."""

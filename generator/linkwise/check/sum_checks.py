@@ -114,7 +114,7 @@ def _accelerations(model: Model, reference: Reference, at: Any) -> Iterator[Entr
 def is_tied(model: Model) -> bool:
     """Whether ties or couplings close loops of the open tree."""
     tree = model.backend.tree
-    return tree is not None and bool(tree.ties or tree.couplings)
+    return tree is not None and tree.tied
 
 
 def acceleration_scales(reference: Reference, at: Any) -> Array:

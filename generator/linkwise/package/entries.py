@@ -133,6 +133,11 @@ class RigidTree:
     independent: tuple[int, ...]
     formulas: Mapping[str, str]
 
+    @property
+    def tied(self) -> bool:
+        """Whether anything holds beside the joints."""
+        return bool(self.ties or self.couplings)
+
 
 @dataclass(frozen=True)
 class EnergyEntry:

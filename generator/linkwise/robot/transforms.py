@@ -6,7 +6,8 @@ from operator import mul
 
 from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3
 
-SNAP = 1e-12
+SNAP, ROUNDING = 1e-12, 1e-15
+"""What files round away, and what computing does."""
 
 
 def times(number: float, value: Scalar) -> Scalar:
@@ -107,8 +108,12 @@ def align_z(axis: Sequence[float]) -> Rotation:
 
 
 def snap(rows: Sequence[Sequence[float]]) -> Rotation:
-    """Round entries within 1e-12 of −1, 0 or 1; ±90° turns then leave no 6e-17 behind."""
-    return tuple(_row(row) for row in rows)
+    """Round entries within 1e-12 of −1, 0 or 1, as far as rows stay orthonormal.
+
+    ±90° turns then leave no 6e-17 behind; what a rounded angle, 1.570796 say, leaves is a turn of its own.
+    """
+    near = _rounded(rows, SNAP)
+    return near if _is_orthonormal(near) else _rounded(rows, ROUNDING)
 
 
 def snapped(rows: Sequence[Sequence[float]]) -> tuple[Rotation, bool]:
@@ -117,15 +122,17 @@ def snapped(rows: Sequence[Sequence[float]]) -> tuple[Rotation, bool]:
     return rotation, rotation != tuple(map(tuple, rows))
 
 
-def _row(row: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = (_near_whole(e) for e in row)
-    return x, y, z
+def _rounded(rows: Sequence[Sequence[float]], reach: float) -> Rotation:
+    def near(e: float) -> float:
+        whole = float(round(e)) + 0.0 if math.isfinite(e) else e
+        return whole if abs(e - whole) < reach else float(e)
+
+    return tuple((near(x), near(y), near(z)) for x, y, z in rows)
 
 
-def _near_whole(e: float) -> float:
-    if not math.isfinite(e):
-        return e
-    return float(round(e)) + 0.0 if abs(e - round(e)) < SNAP else float(e)
+def _is_orthonormal(rows: Rotation) -> bool:
+    products = ((i == k, sum(map(mul, rows[i], rows[k]))) for i in range(len(rows)) for k in range(i + 1))
+    return all(abs(product - own) < ROUNDING for own, product in products)
 
 
 def total(terms: Iterable[Scalar]) -> Scalar:

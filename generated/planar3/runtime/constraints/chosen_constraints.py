@@ -55,7 +55,7 @@ class ChosenConstraints:
         tree, n = self._tree, self._structure.n
         starts = random_starts(n) if self._at is None else [self._at]
         q = starts[0]
-        if tree.ties or tree.couplings:
+        if tree.tied:
             ties = TieEquations(tree, n, [one for one in self.held if one.second is not None])
             found = best_closing(ties, starts)
             if not found.is_closed:

@@ -87,7 +87,7 @@ def constraints_of(robot: Any, given: Any) -> Any:
     if given is not None:
         return given or None
     tree = robot.backend.tree
-    return robot.constraints if tree is not None and (tree.ties or tree.couplings) else None
+    return robot.constraints if tree is not None and tree.tied else None
 
 
 def following(robot: Any, constraints: Any, q: Any, qd: Any) -> Any:

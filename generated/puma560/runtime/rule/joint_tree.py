@@ -106,6 +106,11 @@ class JointTree:
     independent: tuple[int, ...] = ()
     """Coordinates that the others follow by the ties and couplings, in order; none where none was chosen."""
 
+    @property
+    def tied(self) -> bool:
+        """Whether anything holds beside the joints."""
+        return bool(self.ties or self.couplings)
+
     def chain(self, joint: int | None) -> tuple[int, ...]:
         """Indices of the joints from the ground to `joint`, itself included."""
         chain: list[int] = []
