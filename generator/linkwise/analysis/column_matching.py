@@ -68,7 +68,10 @@ def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> S
 def with_columns(
     columns: Sequence[str], joints: Sequence[str], optional: Collection[str], reading: Reading
 ) -> tuple[int, ...]:
-    """Which joints are to be read: those `optional` only where the log has a column for them."""
+    """Which joints are to be read: those `optional` only where the log has a column for them.
+
+    Raises LinkwiseError for a mapping of what is not there.
+    """
     source = _mapped(columns, joints, reading)
     return tuple(k for k, joint in enumerate(joints) if joint not in optional or source[joint] in columns)
 

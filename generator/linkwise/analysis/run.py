@@ -266,7 +266,9 @@ def _samples(
     if robot.constrained is None:
         return read_samples(log, robot.joints, robot.units, reading, progress, buffer), None
     followers = set(robot.constrained.constraints.dependent)
-    there = with_columns(open_log(log).columns, robot.joints, followers, reading)
+    columns = open_log(log).columns
+    with within(str(log)):
+        there = with_columns(columns, robot.joints, followers, reading)
     names, units = (tuple(given[k] for k in there) for given in (robot.joints, robot.units))
     samples = read_samples(log, names, units, reading, progress, buffer)
     with within(str(log)):
