@@ -225,3 +225,15 @@ def test_page_table_and_record_have_the_joints_that_are_driven(folder: Path, tmp
 def test_identification_of_a_closed_loop_is_refused(folder: Path) -> None:
     with pytest.raises(LinkwiseError, match=r"four_bar has constraints \(pin\), which identify"):
         identify(folder / "joints.csv", folder / "robot")
+
+
+def test_joints_that_follow_are_found_from_the_logs_own_first_sample(folder: Path, tmp_path: Path) -> None:
+    """With all joints at zero these bars lie on one line, where the loop is singular."""
+    flat = FOUR_BAR.replace("xyz = [0.5, 0, 0], rpy = [0, 0, 1.5707963267948966]", "xyz = [0.3, 0, 0]")
+    (tmp_path / "flat.toml").write_text(flat)
+    write_package(generate(read_system(tmp_path / "flat.toml"), ["numpy"]), tmp_path / "flat")
+    time = np.arange(100) / 100
+    log = write_csv(tmp_path / "log.csv", np.column_stack([time, 0.8 + 0.2 * np.sin(3 * time)]), ["turn"])
+    result = analyze(log, tmp_path / "flat")
+    tip = 0.2 * np.exp(1j * result.q[:, 0]) + 0.5 * np.exp(1j * (result.q[:, 0] + result.q[:, 1]))
+    np.testing.assert_allclose(tip, 0.3 + 0.4 * np.exp(1j * result.q[:, 2]), rtol=0, atol=1e-12)

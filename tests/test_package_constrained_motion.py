@@ -106,6 +106,10 @@ def test_each_source_moves_a_four_bar_as_multipliers_say(
     asked = robot.induced_accelerations(*motion[:2], qdd=motion_of_all.qdd)
     assert relative_error(asked.total, np.asarray(motion_of_all.qdd)) <= 1e-10
     assert np.abs(np.asarray(asked.actuators)[..., 1:]).max() == 0.0, "the crank alone is driven"
+    of_crank = 0.0 * motion_of_all.qdd
+    of_crank[..., 0] = motion_of_all.qdd[..., 0]
+    followed = robot.induced_accelerations(*motion[:2], qdd=of_crank)
+    assert relative_error(followed.total, np.asarray(motion_of_all.qdd)) <= 1e-10, "the others follow"
 
 
 def test_a_four_bar_turns_closed_and_keeps_its_energy(package_of: Callable[[str], ModuleType]) -> None:
@@ -146,3 +150,15 @@ def test_the_open_tree_of_a_tied_robot_is_asked_for_in_words(
     assert np.abs(robot.constraints.violation(falling.q[-1])).max() > 1e-3
     with pytest.raises(ValueError, match=r"^pin is open by \d+.* mm; give positions in which ties close"):
         robot.induced_accelerations(np.add(q, [0.1, 0.0, 0.0]), qd, tau)
+
+
+def test_constraints_that_are_not_the_robots_are_refused(package_of: Callable[[str], ModuleType]) -> None:
+    robot = package_of(CRANK).load("numpy")
+    q, qd, tau = (a[0] for a in states(robot, 4))
+    other = package_of(CRANK).load("torch").constraints
+    with pytest.raises(
+        ValueError, match=r"^constraints are of another robot than this crank_rocker on numpy"
+    ):
+        robot.induced_accelerations(q, qd, tau, constraints=other)
+    with pytest.raises(TypeError, match=r"^constraints is True; give what robot.constrained\(...\) makes"):
+        robot.simulate(q, qd, [0.0, 0.1], constraints=True)

@@ -296,6 +296,10 @@ BAD: dict[str, tuple[dict[str, str], str]] = {
         {"text": 'schema = 1\nindependent = ["b", "b"]'},
         "the independent joint 'b' is given 2 times; give it once",
     ),
+    "itself": (
+        {"first": 'first = { frame = "rocker", xyz = [0.1, 0, 0] }'},
+        "constraint 'own' ties link 'rocker' to itself; name two links",
+    ),
     "no schema": ({"text": ""}, "the schema is None; write schema = 1 at the top"),
     "robot": ({"text": FOURBAR.read_text()}, "the file has the unknown key 'name'"),
 }
@@ -319,6 +323,13 @@ def test_joints_that_others_do_not_follow_cannot_be_independent(tmp_path: Path) 
         robot_of(written(tmp_path, "geared.toml", geared), independent=("b", "c"))
     with pytest.raises(LinkwiseError, match="--independent is for constraints, and here are none; leave it"):
         robot_of(written(tmp_path, "tree.toml", tree), independent=("b",))
+
+
+def test_a_file_without_constraints_for_a_robot_without_is_refused(tmp_path: Path) -> None:
+    tree = written(tmp_path, "tree.toml", FOURBAR.read_text().partition("[[constraint]]")[0])
+    lone = written(tmp_path, "lone.toml", 'schema = 1\nindependent = ["b"]\n')
+    with pytest.raises(LinkwiseError, match=r"lone.toml: there is no \[\[constraint\]\] in it, nor any in"):
+        robot_of(tree, constraints=str(lone))
 
 
 def notes_of(robot: Robot) -> set[tuple[str, str, str]]:

@@ -1,8 +1,8 @@
 """Positions of a log in which ties close: joints that follow are where the independent ones leave them.
 
 Columns of the log for joints that follow say where to look for them, within a tolerance. Where some are
-missing, these joints start from zero, and go on from sample to sample: ties that can close in several ways
-stay in the one that leads from there.
+missing, these joints start from zero at the first sample, and go on from sample to sample: ties that can
+close in several ways stay in the one that leads from there.
 """
 
 from collections.abc import Iterator, Sequence
@@ -123,7 +123,7 @@ def _continued(
 ) -> Array:
     """Guesses (S, n) of the joints that are missing."""
     q, marks = q.copy(), np.unique([*range(0, len(q), apart), len(q) - 1])
-    at = _start(model) if last is None else last
+    at = _start(model, q[0], float(time[0])) if last is None else last
     led = np.empty((len(marks), q.shape[1]))
     for row, mark in enumerate(marks):
         at = led[row] = _led(model, at, q[mark], float(time[mark]))
@@ -132,15 +132,19 @@ def _continued(
     return q
 
 
-def _start(model: ConstrainedModel) -> Array:
+def _start(model: ConstrainedModel, first: Array, time: float) -> Array:
+    """A closed position for the first sample, in which what is missing is zero; or one for all zeros."""
     try:
-        return np.asarray(model.constraints.closed(np.zeros(len(model.joint_names))))
+        return np.asarray(model.constraints.closed(first))
     except ValueError as error:
-        missing = ", ".join(model.constraints.dependent)
-        raise LinkwiseError(
-            f"ties do not close from all joints at zero ({error}); give the log columns of the joints that"
-            f" follow, {missing}, from which they are closed"
-        ) from None
+        try:
+            return np.asarray(model.constraints.closed(0.0 * first))
+        except ValueError:
+            missing = ", ".join(model.constraints.dependent)
+            raise LinkwiseError(
+                f"time {time:.6g} s: joints that follow cannot be found from zero ({error}); give the log"
+                f" columns for them, {missing}"
+            ) from None
 
 
 def _led(model: ConstrainedModel, start: Array, wanted: Array, time: float) -> Array:

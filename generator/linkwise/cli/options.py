@@ -45,7 +45,7 @@ def robot_options(
     ] = False,
     constraints: Annotated[
         Path | None,
-        _flag(help="TOML file with [[constraint]]: loops and couplings beside those of the robot's own file"),
+        _flag(help="TOML file of constraints: loops and couplings beside those of the robot's own file"),
     ] = None,
     independent: Annotated[
         list[str] | None,

@@ -59,6 +59,10 @@ def check_ties(ties: Iterable[AnchoredTie], bodies: Iterable[Body]) -> None:
                 )
             if fault := unusable(*anchor.translation, *(e for row in anchor.rotation for e in row)):
                 raise LinkwiseError(f"constraint {tie.name!r} has {fault} in its place; give numbers")
+        if tie.first.body == tie.second.body:
+            raise LinkwiseError(
+                f"constraint {tie.name!r} ties link {tie.first.body!r} to itself; name two links"
+            )
         if fault := unusable(tie.length):
             raise LinkwiseError(f"constraint {tie.name!r} has {fault} for its length; give m")
         if tie.kind == "distance" and tie.length <= 0:

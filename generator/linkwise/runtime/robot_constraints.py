@@ -62,6 +62,10 @@ class Constraints(Generic[Array]):
     def __init__(self, answers: Any) -> None:
         self._answers = answers
 
+    def are_of(self, robot: Any) -> bool:
+        """Whether they were made by this robot, on this back end."""
+        return bool(self._answers.robot is robot)
+
     def __repr__(self) -> str:
         return f"<constraints of {len(self.rows)} rows, independent {', '.join(self.independent)}>"
 

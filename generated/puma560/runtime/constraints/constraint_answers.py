@@ -18,7 +18,8 @@ class ConstraintAnswers:
 
     def __init__(self, robot: Any, chosen: ChosenConstraints, rows: TieRows, tolerance: float | None) -> None:
         """`robot` answers for the open tree."""
-        self._robot, self._chosen, self._tie_rows, self._tolerance = robot, chosen, rows, tolerance
+        self.robot = robot
+        self._chosen, self._tie_rows, self._tolerance = chosen, rows, tolerance
         self._columns = joint_columns(chosen.independent, robot.n)
         self.names, self.rows = chosen.names, chosen.rows
         self.independent = tuple(robot.joint_names[k] for k in self._columns.independent)
@@ -78,12 +79,12 @@ class ConstraintAnswers:
     def inverse_dynamics(self, q: Any, qd: Any, qdd: Any) -> Any:
         """See `Constraints.inverse_dynamics`."""
         found, *motion = self._accelerated(q, qd, qdd)
-        return projected(found, self._robot.inverse_dynamics(*motion)[..., None])[..., 0]
+        return projected(found, self.robot.inverse_dynamics(*motion)[..., None])[..., 0]
 
     def partial_torque(self, q: Any, qd: Any, qdd: Any) -> Any:
         """See `Constraints.partial_torque`."""
         found, *motion = self._accelerated(q, qd, qdd)
-        return projected(found, self._robot.partial_torque(*motion))
+        return projected(found, self.robot.partial_torque(*motion))
 
     def coefficients(self, q: Any, qd: Any) -> Any:
         """See `Constraints.coefficients`."""
@@ -100,7 +101,7 @@ class ConstraintAnswers:
     def forces(self, q: Any, qd: Any, qdd: Any) -> Any:
         """See `Constraints.forces`."""
         found, *motion = self._accelerated(q, qd, qdd)
-        return borne(found, self._robot.partial_torque(*motion))
+        return borne(found, self.robot.partial_torque(*motion))
 
     def forces_of(self, q: Any, torque: Any, by_link: bool) -> Any:
         """See `Constraints.forces_of`."""
@@ -112,7 +113,7 @@ class ConstraintAnswers:
         """Solve (G^T M G) ydd = G^T (tau - h - g - M bias), then A^T lambda = M qdd + h + g - tau."""
         q, qd, tau = self._read(q=q, qd=qd, tau=tau)
         place, q, qd = self._moving(q, qd)
-        robot, found, rest = self._robot, place.found, 0.0 * qd
+        robot, found, rest = self.robot, place.found, 0.0 * qd
         mass, force = robot.mass_matrix(q), tau - robot.inverse_dynamics(q, qd, rest)
         if passive:
             armature = robot.backend.constant(robot.structure.passive_sums.armature, q)
@@ -126,7 +127,7 @@ class ConstraintAnswers:
 
     def _coefficients(self, place: ClosedPlace, q: Any, qd: Any) -> Any:
         """c2^ = G^T c2 G, c1^ = G^T (c2 dG/dt + c1 G), g^ = G^T g, for each link."""
-        c2, c1, g = self._robot.coefficients(q, qd)
+        c2, c1, g = self.robot.coefficients(q, qd)
         found, rate = place.found, place.map_rate(qd)[..., None, :, :]
         mapped = found.map[..., None, :, :]
         acceleration, velocity = c2 @ mapped, c2 @ rate + c1 @ mapped
@@ -135,12 +136,12 @@ class ConstraintAnswers:
         )
 
     def _read(self, **named: Any) -> Sequence[Any]:
-        read: Sequence[Any] = self._robot.backend.arrays(named, self._robot.n)
+        read: Sequence[Any] = self.robot.backend.arrays(named, self.robot.n)
         return read
 
     def _own(self, name: str, given: Any, q: Any) -> Any:
         """What is given of the independent joints, (..., m)."""
-        values, m = self._robot.backend.weights(name, given, q), len(self.independent)
+        values, m = self.robot.backend.weights(name, given, q), len(self.independent)
         if values.ndim == 0 or values.shape[-1] != m:
             told = f"its last axis must be {m}, one for each of {', '.join(self.independent)}"
             raise ValueError(f"{name} has shape {tuple(values.shape)}; {told}")
@@ -148,16 +149,16 @@ class ConstraintAnswers:
 
     def _torque(self, given: Any, q: Any, by_link: bool) -> Any:
         """Torques (..., n, X)."""
-        values, axis = self._robot.backend.weights("torque", given, q), -2 if by_link else -1
-        if values.ndim < -axis or values.shape[axis] != self._robot.n:
+        values, axis = self.robot.backend.weights("torque", given, q), -2 if by_link else -1
+        if values.ndim < -axis or values.shape[axis] != self.robot.n:
             shape = "(..., n, X)" if by_link else "(..., n), or with by_link=True (..., n, X)"
-            raise ValueError(f"torque has shape {tuple(values.shape)}; give {shape}, n = {self._robot.n}")
+            raise ValueError(f"torque has shape {tuple(values.shape)}; give {shape}, n = {self.robot.n}")
         return values if by_link else values[..., None]
 
     def _own_columns(self, q: Any) -> Any:
         key = type(q), getattr(q, "device", None)
         if key not in self._listed:
-            backend = self._robot.backend
+            backend = self.robot.backend
             self._listed[key] = type(self._columns)(*(backend.index(a, q) for a in self._columns))
         return self._listed[key]
 

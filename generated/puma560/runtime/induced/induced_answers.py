@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arguments import check_numbers
 from ..motion_quantities import InducedAccelerations
-from .responses import Response, constraints_of, following, response_of
+from .responses import Response, accelerating, constraints_of, following, response_of
 from .source_forces import SourceForces, listed, source_forces, with_actuators
 
 CENTRE_OF_MASS = "centre of mass"
@@ -70,6 +70,7 @@ class InducedAnswers:
         others = source_forces(self._robot, q, qd, listed(loads), passive)
         response = response_of(self._robot, constraints, q, qd, others.mass)
         if tau is None:
+            last = accelerating(self._robot, constraints, q, qd, last)
             asked = (others.mass @ last[..., None])[..., 0] - others.columns.sum(-1)
             last = response.needed(asked[..., None])[..., 0]
         return q, qd, with_actuators(others, last, self._diagonal(q)), response

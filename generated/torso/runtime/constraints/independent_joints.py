@@ -60,6 +60,10 @@ def redundant_names(rows: NDArray[np.float64], owners: Sequence[str]) -> tuple[s
     planar loop's pin has such across its plane, where no force is asked for.
     """
     least = RANK * max(1.0, np.linalg.svd(rows, compute_uv=False).max(initial=0.0))
+    rows = rows.copy()
+    for owner in set(owners):  # along and across what moves, however the robot stands in the world
+        own = [at for at, name in enumerate(owners) if name == owner]
+        rows[own] = np.linalg.svd(rows[own])[0].T @ rows[own]
     there = np.abs(rows).max(-1, initial=0.0) > least
     u, values, _ = np.linalg.svd(rows[there])
     shared = np.abs(u[:, int((values > least).sum()) :]).max(-1, initial=0.0) > SHARE

@@ -79,6 +79,6 @@ def _check(violation: Any, tolerance: float | None, names: RowNames) -> None:
     if found is not None:
         place, row, size = found
         raise ValueError(
-            f"{plain(names.owners[row])} does not close{sample_of(place)}, however the dependent joints "
-            f"move: {open_by(size, names.rows[row])} remain"
+            f"{plain(names.owners[row])} does not close{sample_of(place)}: from here the dependent joints "
+            f"leave {open_by(size, names.rows[row])}; start them elsewhere, if it can close at all"
         )

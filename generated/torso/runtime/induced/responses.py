@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from ..chosen_names import short
+from ..robot_constraints import Constraints
 from ..sums.inertia_solve import solved_columns
 
 
@@ -83,19 +85,42 @@ Response = FreeResponse | TiedResponse
 
 
 def constraints_of(robot: Any, given: Any) -> Any:
-    """What a motion keeps: that which is given, or the robot's own; None where it keeps nothing."""
+    """What a motion keeps: that which is given, or the robot's own; None where it keeps nothing.
+
+    Raises TypeError for what is no constraints, and ValueError for those of another robot.
+    """
+    if given is False:
+        return None
     if given is not None:
-        return given or None
+        if not isinstance(given, Constraints):
+            raise TypeError(
+                f"constraints is {short(given)}; give what robot.constrained(...) makes, or False"
+            )
+        if not given.are_of(robot):
+            raise ValueError(
+                f"constraints are of another robot than this {robot.name} on {robot.backend.name}; make them "
+                "by its own constrained(...)"
+            )
+        return given
     tree = robot.backend.tree
     return robot.constraints if tree is not None and tree.tied else None
 
 
 def following(robot: Any, constraints: Any, q: Any, qd: Any) -> Any:
     """Velocities that keep the constraints, of which those of the independent joints are taken."""
+    return qd if constraints is None else constraints.velocity(q, qd[..., _own(robot, constraints, q)])
+
+
+def accelerating(robot: Any, constraints: Any, q: Any, qd: Any, qdd: Any) -> Any:
+    """Accelerations that keep them, likewise."""
     if constraints is None:
-        return qd
-    own = robot.backend.index(np.array([robot.joint_index(name) for name in constraints.independent]), q)
-    return constraints.velocity(q, qd[..., own])
+        return qdd
+    return constraints.acceleration(q, qd, qdd[..., _own(robot, constraints, q)])
+
+
+def _own(robot: Any, constraints: Any, q: Any) -> Any:
+    """Positions of the independent joints."""
+    return robot.backend.index(np.array([robot.joint_index(name) for name in constraints.independent]), q)
 
 
 def response_of(robot: Any, constraints: Any, q: Any, qd: Any, mass: Any) -> Response:

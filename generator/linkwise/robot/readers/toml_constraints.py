@@ -31,7 +31,12 @@ def with_constraint_file(description: Description, path: Path) -> Description:
         if name in parameters:
             raise LinkwiseError(f"parameter {name!r} is one of the robot's file already; rename it")
     described = replace(description, parameters=(*description.parameters, *parameters.items()))
-    return with_constraints(described, data)
+    found = with_constraints(described, data)
+    if not (found.ties or found.couplings or found.loops):
+        raise LinkwiseError(
+            "there is no [[constraint]] in it, nor any in the robot's file; add one, or leave the file out"
+        )
+    return found
 
 
 def with_constraints(description: Description, data: dict[str, Any]) -> Description:
