@@ -117,8 +117,9 @@ class Dynamics(SumCalls, MotionCalls):
         independent: joints by number or by name; unless given, the file's where there are no contacts, and
         else those that pivoting leaves, of a floating base as few as can be
         at: positions (n,) in which loops close, where joints are chosen; unless given, some that were found
-        tolerance: largest violation of a tie, in m or rad, that calls take; unless given, 1e-4, as the right
-        angles of 1.5708 in files leave some micrometres that nothing closes
+        tolerance: largest violation of a tie, in m or rad, that calls take; unless given, 1e-6, in float32
+        1e-4, of what joints could close, and 1e-4 of the rest: right angles of 1.5708 in files leave some
+        micrometres that nothing closes
 
         Raises ValueError for what is not there, for joints on which the others do not hang at `at`, and
         where nothing is left to move.

@@ -153,9 +153,9 @@ def _led(model: ConstrainedModel, start: Array, wanted: Array, time: float) -> A
     way = wanted[own] - start[own]
     while done < 1.0:
         step = min(step, 1.0 - done)
-        guess = at + np.asarray(model.constraints.velocity(at, step * way))
-        guess[own] = start[own] + (done + step) * way
         try:
+            guess = at + np.asarray(model.constraints.velocity(at, step * way))
+            guess[own] = start[own] + (done + step) * way
             found = np.asarray(model.constraints.closed(guess))
         except ValueError as error:
             found, told = None, str(error)

@@ -66,6 +66,11 @@ def dependent_shares(found: Followers, changes: Any) -> Any:
     return taken(xp.concat([still, moved], -2), found.columns.order, -2)
 
 
+def closable(factors: tuple[Any, Any], violation: Any) -> Any:
+    """The part of phi (..., C) that dependent joints could close, Q Q^T phi."""
+    return times(factors[0], times(_transposed(factors[0]), violation))
+
+
 def borne(found: Followers, torque: Any) -> Any:
     """lambda (..., C, X) of torques (..., n, X) that dependent joints need."""
     own = taken(torque, found.columns.dependent, -2)

@@ -15,8 +15,8 @@ from ..chosen_names import plain
 from ..rule.kinematics import taken
 from ..sums.namespace import hidden, namespace
 from .closed_places import RowNames
-from .followers import JointColumns, dependent_shares, factored, followers
-from .singular_positions import check_factors, open_by, sample_of, worst_open
+from .followers import JointColumns, closable, dependent_shares, factored, followers
+from .singular_positions import check_factors, closable_tolerance, open_by, sample_of, worst_open
 from .tie_rows import TieRows
 
 STEPS = 50
@@ -45,7 +45,11 @@ def closed(
             found = _found(ties, columns, q, start, names.joints)
         found = _with_independent_of(q, found.detach(), columns)
         found = found + _step(ties, columns, found, start, names.joints)
-    _check(ties.violation(found, start), tolerance, names)
+    violation = ties.violation(found, start)
+    _check(violation, tolerance, names)
+    if tolerance is None:
+        factors = factored(ties.at(found).positions()[..., 1:], columns)
+        _check(closable(factors, violation), closable_tolerance(q), names)
     return found
 
 

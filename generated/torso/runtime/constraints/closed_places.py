@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..rule.kinematics import taken
-from .followers import Followers, JointColumns, dependent_shares, factored, followers, times
-from .singular_positions import check_closed, check_factors, check_following
+from .followers import Followers, JointColumns, closable, dependent_shares, factored, followers, times
+from .singular_positions import check_closed, check_factors, check_following, closable_tolerance
 from .tie_rows import RowsAt, TieRows
 
 
@@ -56,6 +56,9 @@ def closed_place(
     rows = positions[..., 1:]
     factors = factored(rows, columns)
     check_factors(rows, factors[1], columns, names.joints)
+    if tolerance is None:  # what joints could close is held more strictly than what nothing closes
+        left = closable(factors, positions[..., 0])
+        check_closed(left, closable_tolerance(q), names.rows, names.owners)
     found = followers(rows, columns, factors)
     check_following(rows, found, names.owners, names.joints)
     return ClosedPlace(found, rows_at)

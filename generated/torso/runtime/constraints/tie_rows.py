@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ..kinematics.kinematic_answers import Asked, KinematicAnswers, in_pieces
+from ..kinematics.asked_samples import Asked, in_pieces
+from ..kinematics.kinematic_answers import KinematicAnswers
 from ..structure import Structure
 from .chosen_constraints import ChosenConstraints
 from .tie_arrays import Changes, Pairs, ends, pair_changes, pairs, tie_jacobian, tie_jacobian_rate, violation

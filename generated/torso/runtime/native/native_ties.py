@@ -8,8 +8,8 @@ import numpy as np
 from ..constraints.chosen_constraints import ChosenConstraints
 from ..constraints.tie_arrays import Changes, Ends, Pairs, paired
 from ..constraints.tie_rows import RowsAt, TieRows
+from ..kinematics.asked_samples import Asked
 from ..kinematics.frame_arrays import Carried
-from ..kinematics.kinematic_answers import Asked
 from ..rule.kinematics import Poses
 from ..structure import Structure
 from .native_control import ControlCalls

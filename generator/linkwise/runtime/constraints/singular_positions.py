@@ -13,7 +13,7 @@ from .followers import Followers, JointColumns
 from .independent_joints import chosen_independent, rank_of
 
 OPEN = 1e-4
-"""In m, rad and units of couplings, what may be left open: files round their numbers."""
+"""In m, rad and units of couplings, what may be left open that nothing closes: files round their numbers."""
 AGREE = 1e-4
 """Rows that follow from others may differ from these by this part of their size: files round numbers."""
 
@@ -98,6 +98,11 @@ def check_closed(violation: Any, tolerance: float | None, rows: Sequence[str], n
             f"{plain(names[row])} is open by {open_by(size, rows[row])}{sample_of(place)}; give positions "
             "in which ties close, as closed(q) answers"
         )
+
+
+def closable_tolerance(like: Any) -> float:
+    """How far joints may be from where they would close ties, in m and rad."""
+    return 1e-6 if like.dtype.itemsize == 8 else 1e-4
 
 
 def worst_open(violation: Any, tolerance: float | None) -> tuple[list[int], int, float] | None:
