@@ -31,8 +31,12 @@ class Selection:
         return (self.time, *self.joints)
 
 
-def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> Selection:
+def select(
+    columns: Sequence[str], joints: Sequence[str], reading: Reading, beside: Collection[str] = ()
+) -> Selection:
     """Match columns to joints by `reading.mapping`, else by name, also as OpenSim's states name them.
+
+    beside: columns that are of no joint, and asked for elsewhere
 
     Raises LinkwiseError for a joint without a column, a column used twice, and a column without a joint
     where that was not allowed.
@@ -45,7 +49,7 @@ def select(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> S
     at_column = {column: at for at, column in enumerate(columns)}
     missing = [joint for joint, column in source.items() if column not in at_column]
     used = {*source.values(), columns[time]}
-    free = [column for column in columns if column not in used]
+    free = [column for column in columns if column not in used and column not in beside]
     speeds = {f"{column.removesuffix(STATE)}/speed" for column in used if column.endswith(STATE)}
     if missing:
         raise LinkwiseError(

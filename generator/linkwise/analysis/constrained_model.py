@@ -103,8 +103,8 @@ class ConstrainedModel:
         return _array(self.constraints.forces(q, qd, qdd))
 
     def forces_of(self, q: Array, torque: Array) -> Array:
-        """What constraints bear of torques (S, n) on all joints, (S, C)."""
-        return _array(self.constraints.forces_of(q, torque))
+        """What constraints bear of torques (S, n, X) on all joints, (S, C, X)."""
+        return _array(self.constraints.forces_of(q, torque, by_link=True))
 
     def _projected(self, q: Array, torque: Array) -> Array:
         """G^T torque in the places of the independent joints, (S, n)."""

@@ -12,7 +12,8 @@ import numpy as np
 
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.result_columns import SHARE_OF, Column, Quantity, mirrored
+from linkwise.analysis.result_columns import SHARE_OF, Column, Quantity
+from linkwise.analysis.term_rows import mirrored
 from linkwise.analysis.verify import Closure, worst_of
 from linkwise.errors import LinkwiseError
 from linkwise.escape import column_part

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import cast
 
 from linkwise.analysis.constrained_model import ConstrainedModel
+from linkwise.analysis.contacts.ground_contacts import GroundContacts
 from linkwise.analysis.settings import Payload
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
@@ -40,6 +41,9 @@ class LoadedRobot:
     constrained: ConstrainedModel | None = None
     """The robot's own links where joints are tied; `model` then asks for independent joints alone."""
 
+    contacts: GroundContacts | None = None
+    """Where the robot stands on the ground."""
+
     @property
     def driven(self) -> tuple[int, ...]:
         """Joints that have torques: all, or the independent ones."""
@@ -53,9 +57,18 @@ class LoadedRobot:
 
     def borne_by(self, joints: Iterable[int]) -> tuple[int, ...]:
         """Joints with torques that bear what these joints are loaded with."""
-        if self.constrained is None:
-            return tuple(sorted(joints))
-        return tuple(sorted({y for k in joints for y in self.constrained.following.movers[k]}))
+        found = set(joints)
+        if self.constrained is not None:
+            found = {y for k in joints for y in self.constrained.following.movers[k]}
+        if self.contacts is not None and found & set(self.contacts.unactuated):
+            found |= set(self.contacts.joints)
+        return tuple(sorted(found))
+
+    @property
+    def constraint_rows(self) -> tuple[str, ...]:
+        """What each row of ties, couplings and contacts bears, in the order of a result's forces."""
+        tied = () if self.constrained is None else self.constrained.constraints.rows
+        return (*tied, *(() if self.contacts is None else self.contacts.rows))
 
 
 def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:

@@ -162,6 +162,8 @@ class AnalysisResult:
             names = listed([borne.name for borne in self.loads if borne.source == source])
             parts.append(printable(f"loads {names} of {source}" if source else f"loads {names}"))
         cutoffs = sorted({borne.cutoff for borne in self.loads if borne.cutoff is not None})
+        if self.robot.contacts is not None:
+            parts.append(printable(f"contacts {listed(self.robot.contacts.names)}"))
         parts += [f"loads filtered at {cutoff:g} Hz" for cutoff in cutoffs]
         if self.stride > 1:
             parts.append(f"one sample in {self.stride} shown")
@@ -188,6 +190,7 @@ class AnalysisResult:
             "induced": list(self.induced),
             "closure": asdict(self.closure),
             **({} if self.closed is None else {"constraints": self._constraints(self.closed)}),
+            **({} if robot.contacts is None else {"contacts": robot.contacts.record(robot.joints)}),
             "work": self._work(),
             "ignored_columns": list(self.ignored),
             "warnings": [*self.warnings, *self.load_warnings],
@@ -214,9 +217,24 @@ class AnalysisResult:
         return self._filled("force_link", len(self.robot.links), self._rows)
 
     @property
+    def contact_wrench(self) -> Array:
+        """What the ground puts on each contact, (S, contacts, 6): moment about its point, force; world axes.
+
+        In N m and N. Moments of a hinge, along its own axes, are not in it.
+        """
+        ground = self.robot.contacts
+        out = np.zeros((len(self.time), 0 if ground is None else len(ground.names), 6))
+        if ground is None:
+            return out
+        forces = self.constraint_force[:, self._rows - len(ground.rows) :]
+        for row, (contact, place) in enumerate(zip(ground.owners, ground.wrench_rows, strict=True)):
+            if place is not None:
+                out[:, contact, place] = forces[:, row]
+        return out
+
+    @property
     def _rows(self) -> int:
-        tied = self.robot.constrained
-        return 0 if tied is None else len(tied.constraints.rows)
+        return len(self.robot.constraint_rows)
 
     def _constraints(self, closed: ClosedLog) -> dict[str, Any]:
         tied = self.robot.constrained

@@ -6,8 +6,8 @@ from typing import Literal
 
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
+from linkwise.analysis.term_rows import TermRows
 from linkwise.escape import column_part
-from linkwise.package.load import PackedLayout
 
 Quantity = Literal[
     "time",
@@ -26,6 +26,15 @@ Quantity = Literal[
     "tau_load",
     "force",
     "force_link",
+    "force_spring",
+    "force_damping",
+    "force_friction",
+    "force_armature",
+    "force_load",
+    "force_measured",
+    "tau_as_loads",
+    "contact",
+    "slip",
     "power",
     "power_link",
     "power_load",
@@ -63,6 +72,15 @@ MEANING: dict[Quantity, str] = {
     "tau_load": "what the joint takes to bear the load",
     "force": "what the constraint bears: all links together, what joints have of their own, and loads",
     "force_link": "what the constraint bears of the link",
+    "force_spring": "what the constraint bears of joints' own springs",
+    "force_damping": "what the constraint bears of joints' own damping",
+    "force_friction": "what the constraint bears of joints' own Coulomb friction",
+    "force_armature": "what the constraint bears of joints' own armatures",
+    "force_load": "what the constraint bears of the load",
+    "force_measured": "what was measured of the contact",
+    "tau_as_loads": "joint torque with what was measured in place of what contacts bear",
+    "contact": "share of the contact in what several could bear; 0 while it is off",
+    "slip": "velocity of what the contact holds, while it is on",
     "power": "power of the joint: what it sends into all links together, what it has of its own, and loads",
     "power_link": "power that the joint sends into the link",
     "power_load": "power that the joint sends out against the load",
@@ -120,7 +138,17 @@ TORQUE_OF: dict[Quantity, Quantity] = dict(
 )
 """The torque that a power is made of: P = τ q̇_i, term by term."""
 
-FORCES: tuple[Quantity, ...] = ("force", "force_link")
+FORCE_OF: dict[Quantity, Quantity] = {
+    "tau_spring": "force_spring",
+    "tau_damping": "force_damping",
+    "tau_friction": "force_friction",
+    "tau_armature": "force_armature",
+    "tau_load": "force_load",
+}
+"""What constraints bear of what stands beside the links' torques."""
+FORCES: tuple[Quantity, ...] = ("force", "force_link", *FORCE_OF.values())
+GROUND: tuple[Quantity, ...] = ("contact", "slip", "force_measured", "tau_as_loads")
+"""What is known of contacts beside the forces that they bear."""
 
 Key = tuple[Quantity, int | None, int | None, int | None]
 """What identifies a column, without names: quantity, joint, link, cause."""
@@ -130,8 +158,9 @@ Key = tuple[Quantity, int | None, int | None, int | None]
 class Column:
     """One column; `joint`, `link` and `cause` are indices, None where they mean nothing.
 
-    The cause is a coordinate; of what a load asks for the load, of what a constraint bears its row. An
-    induced acceleration is of a point, by its number, and has a row of that point's.
+    The cause is a coordinate; of what a load asks for the load, of what a constraint bears its row, with the
+    load that it bears where it is of one. An induced acceleration is of a point, by its number, and has a row
+    of that point's.
     """
 
     quantity: Quantity
@@ -142,6 +171,7 @@ class Column:
     cause: int | None = None
     point: int | None = None
     row: int | None = None
+    load: int | None = None
 
     @property
     def key(self) -> Key:
@@ -160,9 +190,16 @@ def force_unit(row: str) -> str:
 
 
 def columns_of(
-    robot: LoadedRobot, layout: PackedLayout, loads: Sequence[PlacedLoad] = (), power_terms: bool = False
+    robot: LoadedRobot,
+    terms: TermRows,
+    loads: Sequence[PlacedLoad] = (),
+    power_terms: bool = False,
+    measured: Sequence[int] = (),
 ) -> tuple[Column, ...]:
-    """Columns in order: time, motion, τ_i, τ_ij, terms, the joints' own, loads, power; none for what is 0."""
+    """Columns in order: time, motion, τ_i, τ_ij, terms, the joints' own, loads, forces, power.
+
+    None for what is 0. measured: contacts of which loads were measured.
+    """
     out = [Column("time", "time", "s")]
     motions: tuple[tuple[Quantity, str], ...] = (("q", ""), ("qd", "/s"), ("qdd", "/s²"))
     for quantity, suffix in motions:
@@ -176,13 +213,13 @@ def columns_of(
         name = "/".join([prefix, *map(column_part, parts)])
         out.append(Column(quantity, name, load_unit(robot.units[i]), i, j, k))
 
-    for i, j in sorted(map(tuple, layout.torque.tolist())):
+    for i, j, _ in terms.torque:
         load("tau_link", "tau", i, j)
-    for i, j, k, _ in mirrored(layout):
+    for i, j, k, _ in terms.acceleration:
         load("tau_qdd", "tau_qdd", i, j, k)
-    for i, j, k in sorted(map(tuple, layout.velocity.tolist())):
+    for i, j, k, _ in terms.velocity:
         load("tau_qd", "tau_qd", i, j, k)
-    for i, j in sorted(map(tuple, layout.gravity.tolist())):
+    for i, j, _ in terms.gravity:
         load("tau_gravity", "tau_gravity", i, j)
     for share, number in PASSIVE.items():
         for i in robot.borne_by({own.coordinate for own in robot.passive if getattr(own, number)}):
@@ -191,18 +228,49 @@ def columns_of(
         for i in robot.borne_by(borne.seat.joints):
             name = "/".join(["tau_load", *map(column_part, (robot.joints[i], borne.name))])
             out.append(Column("tau_load", name, load_unit(robot.units[i]), i, cause=e))
-    return *out, *_forces(robot), *_powers(out, (*POWER, *POWER_TERMS) if power_terms else POWER)
+    powers = _powers(out, (*POWER, *POWER_TERMS) if power_terms else POWER)
+    return *out, *_forces(robot, loads), *_ground(robot, measured), *powers
 
 
-def _forces(robot: LoadedRobot) -> Iterator[Column]:
-    """What each row of the constraints bears, of all and of each link."""
-    if robot.constrained is None:
-        return
-    for row, name in enumerate(robot.constrained.constraints.rows):
+def _forces(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> Iterator[Column]:
+    """What each row of the constraints bears, of all, of each link, of joints' own and of each load."""
+    own = [share for share, number in PASSIVE.items() if any(getattr(one, number) for one in robot.passive)]
+    for row, name in enumerate(robot.constraint_rows):
         part, unit = column_part(name), force_unit(name)
         yield Column("force", f"force/{part}", unit, cause=row)
         for j, link in enumerate(robot.links):
             yield Column("force_link", f"force/{part}/{column_part(link)}", unit, link=j, cause=row)
+        for share in own:
+            yield Column(FORCE_OF[share], f"{FORCE_OF[share]}/{part}", unit, cause=row)
+        for e, borne in enumerate(loads):
+            yield Column(
+                "force_load", f"force_load/{part}/{column_part(borne.name)}", unit, cause=row, load=e
+            )
+
+
+def _ground(robot: LoadedRobot, measured: Sequence[int]) -> Iterator[Column]:
+    """When each contact is on, how what it holds moves, and what was measured there."""
+    ground = robot.contacts
+    if ground is None:
+        return
+    for number, name in enumerate(ground.names):
+        yield Column("contact", f"contact/{column_part(name)}", "1", cause=number)
+    first = len(robot.constraint_rows) - len(ground.rows)
+    for row, name in enumerate(ground.rows, first):
+        unit = "rad/s" if force_unit(name) == "N·m" else "m/s"
+        yield Column("slip", f"slip/{column_part(slip_name(name))}", unit, cause=row)
+    for row, name in enumerate(ground.rows, first):
+        if ground.owners[row - first] in measured and ground.wrench_rows[row - first] is not None:
+            yield Column("force_measured", f"force_measured/{column_part(name)}", force_unit(name), cause=row)
+    for i in robot.driven if measured else ():
+        joint = column_part(robot.joints[i])
+        yield Column("tau_as_loads", f"tau_as_loads/{joint}", load_unit(robot.units[i]), i)
+
+
+def slip_name(row: str) -> str:
+    """What moves where a row bears: "foot angular_x" for "foot moment_x", "foot x" for "foot force_x"."""
+    name, _, force = row.rpartition(" ")
+    return f"{name} {force.replace('moment_', 'angular_').replace('force_', '')}"
 
 
 def _powers(columns: Sequence[Column], quantities: Sequence[Quantity]) -> Iterator[Column]:
@@ -212,11 +280,3 @@ def _powers(columns: Sequence[Column], quantities: Sequence[Quantity]) -> Iterat
             if c.quantity == TORQUE_OF[quantity]:
                 name = c.name.replace("tau", "power", 1)
                 yield Column(quantity, name, "W", c.joint, c.link, c.cause)
-
-
-def mirrored(layout: PackedLayout) -> list[tuple[int, int, int, int]]:
-    """All (i, j, k, source) of c2, sorted: only i ≤ k is stored, and c2 is symmetric in i and k."""
-    rows = set()
-    for source, (i, j, k) in enumerate(layout.acceleration.tolist()):
-        rows |= {(i, j, k, source), (k, j, i, source)}
-    return sorted(rows)

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples
 from linkwise.analysis.column_matching import with_columns
+from linkwise.analysis.contacts import Contacts
+from linkwise.analysis.contacts.contact_times import contact_times
+from linkwise.analysis.contacts.standing_robot import standing_on
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.induced_points import induced_points
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
@@ -31,11 +34,13 @@ from linkwise.output import whole_directory
 from linkwise.package.load import Array
 from linkwise.package.write import refuse_inside_package
 from linkwise.progress import Progress, silent
+from linkwise.runtime.robot_constraints import Contact
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NO_LOADS = Loads()
+NO_CONTACTS = Contacts()
 RECORD = "analysis.json"
 """The record, and the mark by which a directory is known to hold a former result."""
 
@@ -46,7 +51,7 @@ class Analysis(AnalysisResult):
 
     def figure(self, name: str = "paper") -> "Figure":
         """A matplotlib figure: "paper", or "paper:JOINT" for another joint than the first; "shares"; "power";
-        "induced", or "induced:POINT" likewise.
+        "induced", or "induced:POINT" likewise; "contacts".
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """
@@ -77,6 +82,7 @@ def analyze(
     loads: Sequence[Load | str | Path] = (),
     loads_cutoff: float | None = None,
     induced: Sequence[str] = (),
+    contacts: Contacts | Sequence[Contact] = (),
 ) -> Analysis:
     """Analyse a motion log with a generated robot (its directory), all samples in memory.
 
@@ -84,12 +90,14 @@ def analyze(
     loads: forces and moments from outside, or files of them, each a cause of its own in the result;
     loads_cutoff in Hz is of the low-pass that those of files get
     induced: whose acceleration is to be told by its sources: FRAME or FRAME,X,Y,Z, joints, centre-of-mass
+    contacts: frames that the ground holds, whose reactions are found from the motion; `Contacts` says when
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
+    held = Contacts.of(contacts)
     loaded = carrying(robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot)), payloads)
-    borne = Loads.of(loads, loads_cutoff)
+    loaded, borne = standing_on(loaded, held), Loads.of(loads, loads_cutoff)
     wanted, made = Wanted(induced=tuple(induced)), (reading or Reading(), processing or Processing())
-    job = _prepared(Path(log), loaded, *made, borne, progress, wanted)
+    job = _prepared(Path(log), loaded, *made, borne, held, progress, wanted)
     kept = KeptSamples(len(job.decomposer.columns), 1)
     return job.analysis(job.run(kept, progress), kept)
 
@@ -103,20 +111,22 @@ def analyze_to(
     wanted: Wanted,
     progress: Progress,
     loads: Loads = NO_LOADS,
+    contacts: Contacts = NO_CONTACTS,
 ) -> tuple[Analysis, Sequence[Path]]:
     """Analyse a log of any length with flat memory; `out` appears when everything is done.
 
     Returns the analysis thinned to what a page shows, and the files written. Raises LinkwiseError, as
     `analyze` does, and where `out` holds something else than a former result or cannot be written.
     """
+    robot = standing_on(robot, contacts)
     for name in wanted.figures:
         check_figure(name, robot, wanted.induced)
     refuse_inside_package(out)
-    for file in (log, *loads.paths):
+    for file in (log, *loads.paths, *contacts.loads):
         if os.path.realpath(file).startswith(os.path.join(os.path.realpath(out), "")):
             raise LinkwiseError(f"--out {out} is to be replaced and holds the log {file}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
-        job = _prepared(log, robot, reading, processing, loads, progress, wanted, draft)
+        job = _prepared(log, robot, reading, processing, loads, contacts, progress, wanted, draft)
         columns = job.decomposer.columns
         shown = sum(map(on_page, columns))
         kept = KeptSamples(len(columns), stride_for(job.count, shown, NUMBERS, SAMPLES))
@@ -243,33 +253,44 @@ def _prepared(
     reading: Reading,
     processing: Processing,
     loads: Loads,
+    contacts: Contacts,
     progress: Progress,
     wanted: Wanted,
     buffer: Path | None = None,
 ) -> Job:
     """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
     points = induced_points(wanted.induced, robot)
-    samples, closed = _samples(log, robot, reading, progress, buffer)
+    switches = [one.column for one in contacts.columns.values()]
+    samples, closed = _samples(log, robot, reading, switches, progress, buffer)
     with within(str(log)):
         span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
     borne = placed_loads(loads, robot, samples.time, reading.ignore_extra, progress, buffer)
-    decomposer = Decomposer.of(robot, processing.convention, wanted.power_terms, borne, points)
+    times = contact_times(contacts, log, robot, reading, samples.time, progress, buffer)
+    decomposer = Decomposer.of(robot, processing.convention, wanted.power_terms, borne, points, times)
     return Job(log.name, reading, processing, samples, decomposer, closed)
 
 
 def _samples(
-    log: Path, robot: LoadedRobot, reading: Reading, progress: Progress, buffer: Path | None
+    log: Path,
+    robot: LoadedRobot,
+    reading: Reading,
+    switches: Sequence[str],
+    progress: Progress,
+    buffer: Path | None,
 ) -> tuple[Samples, ClosedLog | None]:
-    """Samples of all joints; where joints are tied, those that follow closed, and how far the log was off."""
+    """Samples of all joints; where joints are tied, those that follow closed, and how far the log was off.
+
+    switches: columns of the log that say when contacts are on
+    """
     if robot.constrained is None:
-        return read_samples(log, robot.joints, robot.units, reading, progress, buffer), None
+        return read_samples(log, robot.joints, robot.units, reading, progress, buffer, switches), None
     followers = set(robot.constrained.constraints.dependent)
     columns = open_log(log).columns
     with within(str(log)):
         there = with_columns(columns, robot.joints, followers, reading)
     names, units = (tuple(given[k] for k in there) for given in (robot.joints, robot.units))
-    samples = read_samples(log, names, units, reading, progress, buffer)
+    samples = read_samples(log, names, units, reading, progress, buffer, switches)
     with within(str(log)):
         return closed_samples(samples, there, robot.constrained, reading.loop_tolerance, progress, buffer)

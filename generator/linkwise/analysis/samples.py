@@ -41,16 +41,18 @@ def read_samples(
     reading: Reading,
     progress: Progress,
     buffer: Path | None = None,
+    beside: Sequence[str] = (),
 ) -> Samples:
     """Read, convert to SI and check a log.
 
     joint_units: one for each joint, "rad" or "m"
     buffer: a directory in which a disk buffer keeps the samples; None keeps them in memory
+    beside: columns that something else reads
     Raises LinkwiseError that names file, row and column for what cannot be analysed.
     """
     log = open_log(path)
     with within(str(path)):
-        selection = select(log.columns, joints, reading)
+        selection = select(log.columns, joints, reading, beside)
     angles = [at for at, unit in enumerate(joint_units, 1) if unit == "rad"]
     factor = radians_per_unit(log, reading)
     peaks = np.zeros(1 + len(joints))

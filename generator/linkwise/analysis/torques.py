@@ -2,10 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.borne_forces import BorneForces
+from linkwise.analysis.contacts.contact_terms import ContactTerms
+from linkwise.analysis.contacts.contact_times import ContactTimes
+from linkwise.analysis.contacts.ground_contacts import Standing
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loaded_robot import LoadedRobot
@@ -18,12 +21,13 @@ from linkwise.analysis.result_columns import (
     Key,
     Quantity,
     columns_of,
-    mirrored,
+    load_unit,
 )
 from linkwise.analysis.settings import Convention
+from linkwise.analysis.term_rows import TermRows, term_rows
 from linkwise.analysis.verify import Closure, residual, worst_of
 from linkwise.errors import LinkwiseError
-from linkwise.package.load import Array, PackedLayout
+from linkwise.package.load import Array
 
 Source = tuple[int, int, int]
 """Row of the result, column of the packed values, the coordinate that multiplies (-1: none)."""
@@ -37,6 +41,8 @@ class Decomposer:
     τ_i = Σ_j τ_ij + what the joint has of its own + Σ_e τ_ie, with τ_ie = −J_iᵀ (n, f) of load e
     τ_ij = Σ_k c2_ijk q̈_k + Σ_k c1_ijk q̇_k + g_ij
     P_ij = τ_ij q̇_i, what joint i sends into link j
+
+    Where the robot stands on contacts, all of these torques are what the contacts leave.
     """
 
     robot: LoadedRobot
@@ -51,6 +57,10 @@ class Decomposer:
     powers: tuple[tuple[int, int, int], ...]
     """Row of each power, the row of its torque, and the joint whose velocity multiplies."""
     induced: InducedShares
+    forces: BorneForces
+    times: ContactTimes | None
+    terms: ContactTerms | None
+    """None where nothing stands on contacts."""
 
     @classmethod
     def of(
@@ -60,9 +70,15 @@ class Decomposer:
         power_terms: bool = False,
         loads: Sequence[PlacedLoad] = (),
         points: Sequence[InducedPoint] = (),
+        times: ContactTimes | None = None,
     ) -> "Decomposer":
         """Plan where each packed value of the robot goes."""
-        columns = columns_of(robot, robot.model.layout, loads, power_terms)
+        rows, terms = term_rows(robot.model.layout), None
+        if robot.contacts is not None:
+            terms = ContactTerms.of(rows, robot.contacts)
+            rows = terms.rows
+        measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
+        columns = columns_of(robot, rows, loads, power_terms, measured)
         row = {column.key: at for at, column in enumerate(columns)}
         parts = [
             (at, _rows(columns, TERMS, joint=c.joint, link=c.link))
@@ -79,11 +95,12 @@ class Decomposer:
             for at, c in enumerate(columns)
             if c.quantity in TORQUE_OF and c.joint is not None
         ]
-        sources = _sources(robot.model.layout, row)
+        sources = _sources(rows, row)
         induced = InducedShares.of(robot, points, columns, [borne.name for borne in loads])
         planned = tuple(parts), tuple(wholes), tuple(powers)
         every = (*columns, *induced.columns)
-        return cls(robot, tuple(loads), convention, every, sources, *planned, induced)
+        forces = BorneForces(robot, tuple(loads), times)
+        return cls(robot, tuple(loads), convention, every, sources, *planned, induced, forces, times, terms)
 
     def rows(self, quantity: Quantity) -> slice:
         """Where a quantity's columns stand; they stand together."""
@@ -101,12 +118,16 @@ class Decomposer:
                 q, qd, qdd = self.robot.constrained.consistent(q, qd, qdd)
             except ValueError as error:
                 raise LinkwiseError(f"between {time[0]:.6g} and {time[-1]:.6g} s: {error}") from None
-        packed = self.robot.model.packed(q, qd, qdd)
+        packed, standing = self.robot.model.packed(q, qd, qdd), self._standing(time, q)
+        mass, free = packed.acceleration, self.robot.model.inverse_dynamics(q, qd, qdd)
+        partial = self._dense(packed.torque, q.shape[1])
+        if standing is not None and self.terms is not None:
+            packed = self.terms.left(packed, standing, q.shape[1])
         out[0] = time
         out[self.rows("q")], out[self.rows("qd")], out[self.rows("qdd")] = q.T, qd.T, qdd.T
-        out[self.rows("tau")] = self.robot.model.inverse_dynamics(q, qd, qdd).T[list(self.robot.driven)]
-        self._add_passive(out, q, qd, qdd)
-        self._add_loads(out, time, q)
+        out[self.rows("tau")] = _left(standing, free).T[list(self.robot.driven)]
+        self._add_passive(out, standing, q, qd, qdd)
+        self._add_loads(out, standing, time, q)
         for row, source, _ in self.sources["tau_link"]:
             out[row] = packed.torque[..., source]
         for row, source, k in self.sources["tau_qdd"]:
@@ -115,10 +136,11 @@ class Decomposer:
             np.multiply(packed.velocity[..., source], qd[:, k], out=out[row])
         for row, source, _ in self.sources["tau_gravity"]:
             out[row] = packed.gravity[..., source]
-        self._fill_forces(out, time, q, qd, qdd)
-        closure = self._closure(out) | self.induced.fill(out, packed.acceleration, q, qd, qdd)
+        self.forces.fill(out, self.columns, standing, time, (q, qd, qdd), partial)
+        closure = self._closure(out, partial) | self.induced.fill(out, mass, q, qd, qdd)
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
+            velocity = _left(standing, velocity)
             for column, values in zip(self.columns, out, strict=True):
                 if column.quantity == "tau_qd":
                     values[:] = velocity[:, column.joint, column.link, column.cause]
@@ -126,20 +148,36 @@ class Decomposer:
             np.multiply(out[torque], qd[:, i], out=out[power])
         return closure
 
-    def _add_passive(self, out: Array, q: Array, qd: Array, qdd: Array) -> None:
+    def _dense(self, torque: Array, n: int) -> Array:
+        """tau_ij (S, n, N) of packed ones, before contacts bear any; empty where none do."""
+        if self.terms is None:
+            return np.zeros((0, n, 0))
+        out = np.zeros((len(torque), n, len(self.robot.links)))
+        for i, j, source in term_rows(self.robot.model.layout).torque:
+            out[:, i, j] = torque[:, source]
+        return out
+
+    def _standing(self, time: Array, q: Array) -> Standing | None:
+        """How the ground holds the robot; None where nothing does."""
+        if self.times is None or self.robot.contacts is None:
+            return None
+        return self.robot.contacts.standing(q, self.times.shares(self.robot.model, time, q))
+
+    def _add_passive(self, out: Array, standing: Standing | None, q: Array, qd: Array, qdd: Array) -> None:
         """Fill what joints have of their own, and add it to their torques."""
         if not self.robot.passive:
             return
-        found = dict(zip(PASSIVE, self.robot.model.passive_torque(q, qd, qdd), strict=True))
+        every = self.robot.model.passive_torque(q, qd, qdd)
+        found = {share: _left(standing, torque) for share, torque in zip(PASSIVE, every, strict=True)}
         whole = self._wholes()
         for column, values in zip(self.columns, out, strict=True):
             if column.quantity in PASSIVE and column.joint is not None:
                 values[:] = found[column.quantity][:, column.joint]
                 out[whole[column.joint]] += values
 
-    def _add_loads(self, out: Array, time: Array, q: Array) -> None:
+    def _add_loads(self, out: Array, standing: Standing | None, time: Array, q: Array) -> None:
         """Fill what joints take to bear loads, and add it to their torques."""
-        asked = [borne.torque(self.robot.model, time, q) for borne in self.loads]
+        asked = [_left(standing, borne.torque(self.robot.model, time, q)) for borne in self.loads]
         whole = self._wholes()
         for column, values in zip(self.columns, out, strict=True):
             if column.quantity == "tau_load" and column.joint is not None and column.cause is not None:
@@ -152,35 +190,21 @@ class Decomposer:
             c.joint: at for at, c in enumerate(self.columns) if c.quantity == "tau" and c.joint is not None
         }
 
-    def _fill_forces(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> None:
-        """Fill what constraints bear of the links, and with what joints have of their own and loads."""
-        tied = self.robot.constrained
-        if tied is None:
-            return
-        model: Any = self.robot.model
-        by_link = model.forces(q, qd, qdd)
-        beside = sum(
-            [
-                *(np.asarray(a) for a in tied.open.passive_torque(q, qd, qdd)),
-                *(borne.torque(tied.open, time, q) for borne in self.loads),
-            ]
-        )
-        whole = by_link.sum(-1) + tied.forces_of(q, beside + 0.0 * q)
-        for column, values in zip(self.columns, out, strict=True):
-            if column.quantity == "force":
-                values[:] = whole[:, column.cause]
-            elif column.quantity == "force_link":
-                values[:] = by_link[:, column.cause, column.link]
+    def _closure(self, out: Array, partial: Array) -> Closure:
+        """Check the closing sums, by unit: a joint that carries but rounding is measured by its peers.
 
-    def _closure(self, out: Array) -> Closure:
-        """Check the closing sums, by unit: a joint that carries but rounding is measured by its peers."""
-        worst = Closure()
+        partial: tau_ij (S, n, N) before contacts bear any: what they leave may be but its rounding
+        """
+        worst, units = Closure(), self.robot.units
+        before = np.abs(partial).sum(axis=-1).max(axis=0, initial=0.0)
         for unit in dict.fromkeys(self.columns[whole].unit for whole, _ in self.wholes):
             alike = [(whole, links) for whole, links in self.wholes if self.columns[whole].unit == unit]
             parts = [(link, rows) for link, rows in self.parts if self.columns[link].unit == unit]
+            size = max(size for size, other in zip(before, units, strict=True) if load_unit(other) == unit)
             terms = [residual([out[row] for row in rows], out[link]) for link, rows in parts]
             sums = [residual([out[row] for row in links], out[whole]) for whole, links in alike]
-            worst |= Closure(*worst_of(terms), *worst_of(sums))
+            least = (0.0, float(size))
+            worst |= Closure(*worst_of([*terms, least]), *worst_of([*sums, least]))
         return worst
 
 
@@ -197,15 +221,21 @@ def _rows(
     )
 
 
-def _sources(layout: PackedLayout, row: dict[Key, int]) -> dict[Quantity, tuple[Source, ...]]:
-    def plain(quantity: Quantity, pairs: list[list[int]]) -> tuple[Source, ...]:
-        return tuple((row[quantity, i, j, None], at, -1) for at, (i, j) in enumerate(pairs))
+def _left(standing: Standing | None, torque: Array) -> Array:
+    """What contacts leave of torques (S, n, ...)."""
+    return np.asarray(torque) if standing is None else standing.left(np.asarray(torque))
+
+
+def _sources(terms: TermRows, row: dict[Key, int]) -> dict[Quantity, tuple[Source, ...]]:
+    def plain(quantity: Quantity, rows: Sequence[tuple[int, ...]]) -> tuple[Source, ...]:
+        return tuple((row[quantity, i, j, None], at, -1) for i, j, at in rows)
+
+    def moved(quantity: Quantity, rows: Sequence[tuple[int, ...]]) -> tuple[Source, ...]:
+        return tuple((row[quantity, i, j, k], at, k) for i, j, k, at in rows)
 
     return {
-        "tau_link": plain("tau_link", layout.torque.tolist()),
-        "tau_gravity": plain("tau_gravity", layout.gravity.tolist()),
-        "tau_qdd": tuple((row["tau_qdd", i, j, k], at, k) for i, j, k, at in mirrored(layout)),
-        "tau_qd": tuple(
-            (row["tau_qd", i, j, k], at, k) for at, (i, j, k) in enumerate(layout.velocity.tolist())
-        ),
+        "tau_link": plain("tau_link", terms.torque),
+        "tau_gravity": plain("tau_gravity", terms.gravity),
+        "tau_qdd": moved("tau_qdd", terms.acceleration),
+        "tau_qd": moved("tau_qd", terms.velocity),
     }

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.contacts.contact_reference import ContactReference
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import Column, Quantity
@@ -111,6 +112,8 @@ def against_recursion(
 ) -> Closure:
     """τ_ij, P_ij, τ_ie of some samples of a block (columns, S) against Newton–Euler; none for energies.
 
+    Of what a motion slips at contacts, these feed energy to links, beside the joints.
+
     Relative errors are by unit: a joint that carries nothing but rounding is measured by its peers.
     """
     if robot.recursion is None:
@@ -126,12 +129,17 @@ def against_recursion(
     partial = robot.recursion.partial_torque(q, qd, qdd)
     asked = [load_torque(robot.recursion, borne, block[0, at], q) for borne in loads]
     expected = np.concatenate([partial, *(torque[:, :, None] for torque in asked)], axis=2)
-    tree = robot.package.manifest.tree
+    tree, mapped = robot.package.manifest.tree, None
     if robot.constrained is not None and tree is not None:
         mapped = LoopEquations(robot.recursion, tree).velocity_map(q)
         projected = np.einsum("snm,snj->smj", mapped, expected)
         expected = np.zeros_like(expected)
         expected[:, list(robot.driven)] = projected
+    fed, free = np.zeros((len(q), len(robot.links))), expected
+    if robot.contacts is not None and tree is not None:
+        reference = ContactReference(robot.recursion, tree, robot.contacts)
+        expected, given = reference.left(expected, q, qd, dense("contact"), mapped)
+        fed = given[:, : len(robot.links)]
     ours, power = np.zeros_like(expected), np.zeros_like(partial)
     for row, column in enumerate(columns):
         if column.quantity == "tau_link":
@@ -144,13 +152,14 @@ def against_recursion(
     for unit in set(robot.units):
         alike = [i for i, other in enumerate(robot.units) if other == unit]
         error = float(np.abs(ours - expected)[:, alike].max(initial=0.0))
-        scale = float(np.abs(expected).sum(axis=2)[:, alike].max(initial=0.0))
+        # What contacts leave may be but the rounding of what they bear.
+        scale = float(max(np.abs(a).sum(axis=2)[:, alike].max(initial=0.0) for a in (expected, free)))
         absolute = max(absolute, error)
         relative = max(relative, error / scale if scale else error)
         # Power that is but rounding is measured by the torques and speeds that it is the rounding of.
         carried = float(np.abs(partial).sum(axis=2)[:, alike].max(initial=0.0))
         watts += carried * float(np.abs(qd[:, alike]).max(initial=0.0))
-    apart = float(np.abs(power.sum(axis=1) - _gain(robot.recursion, q, qd, qdd)).max(initial=0.0))
+    apart = float(np.abs(power.sum(axis=1) + fed - _gain(robot.recursion, q, qd, qdd)).max(initial=0.0))
     return Closure(
         recursion_absolute=absolute,
         recursion_relative=relative,

@@ -14,6 +14,7 @@ from linkwise.analysis.run import Wanted, analyze_to
 from linkwise.analysis.settings import Convention, Reading
 from linkwise.analysis.tables import Format
 from linkwise.cli import Json, tell
+from linkwise.cli.contact_options import Held, Measured, Threshold, Unactuated, While, chosen_contacts
 from linkwise.cli.log_options import (
     UNITS,
     AngleUnits,
@@ -48,7 +49,9 @@ Terms = Annotated[
 TableFormat = Annotated[Format, typer.Option(help="Format of the table")]
 Figures = Annotated[
     list[str] | None,
-    typer.Option(help="paper, paper:JOINT, shares, power, induced or induced:POINT; may be repeated"),
+    typer.Option(
+        help="paper, paper:JOINT, shares, power, induced, induced:POINT or contacts; may be repeated"
+    ),
 ]
 PowerTerms = Annotated[bool, typer.Option("--power-terms", help="Write power by cause and order too")]
 Carried = Annotated[
@@ -114,6 +117,11 @@ def analyze(
     load: ConstantLoads = None,
     loads: LoadFiles = None,
     loads_cutoff: LoadsCutoff = None,
+    contact: Held = None,
+    contact_while: While = None,
+    contact_loads: Measured = None,
+    contact_threshold: Threshold = None,
+    unactuated: Unactuated = None,
     induced: Induced = None,
     backend: Backend = None,
     page: Page = True,
@@ -127,9 +135,19 @@ def analyze(
     wanted = Wanted(format, tuple(figure or ()), page, power_terms, tuple(induced or ()))
     package = load_robot(robot, backend)
     package = carrying(package, carried(payload or [], package))
-    borne = Loads.of([*constant_loads(load or [], package), *(loads or [])], loads_cutoff)
+    held = chosen_contacts(
+        contact or [],
+        contact_while or [],
+        contact_loads or [],
+        contact_threshold,
+        loads_cutoff,
+        unactuated or [],
+        package,
+    )
+    of_loads = None if contact_loads and not loads else loads_cutoff
+    borne = Loads.of([*constant_loads(load or [], package), *(loads or [])], of_loads)
     with shown_progress(UNITS) as progress:
-        analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress, borne)
+        analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress, borne, held)
     for warning in analysis.warnings:
         tell(f"warning: {log}: {warning}", err=True)
     for warning in analysis.load_warnings:

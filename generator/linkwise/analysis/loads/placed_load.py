@@ -114,7 +114,7 @@ def seat_of(load: str, body: str, axes: str, point_in: str | None, robot: Loaded
     if frame.body is None:
         raise LinkwiseError(f"{what} on {body!r}: that stands on the ground, so that no joint bears it")
     seen = frame if point_in is None else _seen_in(what, point_in, robot, tree)
-    return Seat(frame, _seen_in(what, axes, robot, tree), seen, _path(tree, frame.body))
+    return Seat(frame, _seen_in(what, axes, robot, tree), seen, moving_joints(tree, frame.body))
 
 
 def _seen_in(what: str, name: str, robot: LoadedRobot, tree: RigidTree) -> FrameEntry | None:
@@ -125,7 +125,8 @@ def _seen_in(what: str, name: str, robot: LoadedRobot, tree: RigidTree) -> Frame
     return own or body_frame(f"{what}, given in the axes of", name, robot)
 
 
-def _path(tree: RigidTree, body: int | None) -> tuple[int, ...]:
+def moving_joints(tree: RigidTree, body: int | None) -> tuple[int, ...]:
+    """Coordinates that move a body of the tree; none move the ground."""
     found = set()
     while body is not None:
         found.add(tree.bodies[body].coordinate)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.contacts_figure import contacts
 from linkwise.analysis.show.induced_figure import induced
 from linkwise.analysis.show.paper_figure import paper
 from linkwise.analysis.show.power_figure import power
@@ -21,11 +22,12 @@ FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
     "shares": shares,
     "power": power,
     "induced": induced,
+    "contacts": contacts,
 }
 
 
 def draw(result: AnalysisResult, name: str) -> "Figure":
-    """Draw "paper", "shares", "power" or "induced"; "paper:JOINT" or "induced:POINT" for another one.
+    """Draw one of FIGURES by its name; "paper:JOINT" or "induced:POINT" for another joint or point.
 
     Raises LinkwiseError for another name.
     """
@@ -50,6 +52,8 @@ def check_figure(name: str, robot: LoadedRobot, points: Sequence[str]) -> None:
         if not points or (joint and joint not in points):
             raise LinkwiseError(f"--figure {name}: add --induced {joint or 'POINT'}, whose shares it draws")
         return
+    if kind == "contacts" and robot.contacts is None and not joint:
+        raise LinkwiseError(f"--figure {name}: add --contact, whose forces it draws")
     if kind not in FIGURES or (joint and (kind != "paper" or joint not in robot.driven_joints)):
         raise LinkwiseError(
             f"--figure {name}: give one of {', '.join(FIGURES)}, or paper:JOINT with a joint of"

@@ -7,7 +7,7 @@ import numpy as np
 
 from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import FORCES, INDUCED, TORQUE_OF, Column
+from linkwise.analysis.result_columns import FORCES, GROUND, INDUCED, TORQUE_OF, Column
 from linkwise.analysis.show.poses import poses
 from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
@@ -18,6 +18,8 @@ from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
 NUMBERS, SAMPLES = 500_000, 1500
 """What a page holds at most; longer logs are thinned out, and the page says so."""
 
+FIRM = 0.05
+"""Of the largest upright force, below which a centre of pressure means nothing."""
 TEMPLATE = "analysis/report.html.j2"
 
 
@@ -38,9 +40,9 @@ def view(result: AnalysisResult) -> dict[str, str]:
 def on_page(column: Column) -> bool:
     """Whether a page holds a column: not power, which is the product of two that it holds.
 
-    Nor does it hold forces of constraints and induced accelerations.
+    Nor does it hold forces of constraints, what else is known of contacts, and induced accelerations.
     """
-    return column.quantity not in (*TORQUE_OF, *FORCES, *INDUCED)
+    return column.quantity not in (*TORQUE_OF, *FORCES, *GROUND, *INDUCED)
 
 
 def page_data(result: AnalysisResult) -> str:
@@ -87,6 +89,7 @@ def page_data(result: AnalysisResult) -> str:
         "gravityColour": GRAVITY,
         "bodies": _bodies(result),
         "loads": _loads(result),
+        "reactions": _reactions(result),
     }
     return script_data(data)
 
@@ -120,6 +123,23 @@ def _loads(result: AnalysisResult) -> list[dict[str, str]]:
         {"name": printable(label), "places": _encode(at.place), "forces": _encode(at.force)}
         for label, at in zip(result.load_labels, wrenches, strict=True)
     ]
+
+
+def _reactions(result: AnalysisResult) -> list[dict[str, str]]:
+    """The same of contacts; a frame that is held bears where the moment has no share along the ground."""
+    ground = result.robot.contacts
+    if ground is None:
+        return []
+    up = np.array(result.robot.up) / np.linalg.norm(result.robot.up)
+    out = []
+    for c, place in enumerate(ground.places(result.robot.model, result.q)):
+        moment, force = result.contact_wrench[:, c, :3], result.contact_wrench[:, c, 3:]
+        pressed = force @ up
+        firm = np.abs(pressed) > FIRM * np.abs(pressed).max(initial=0.0)
+        centre = place + np.cross(up, moment) / np.where(firm, pressed, np.inf)[:, None]
+        label = printable(f"ground at {ground.names[c]}")
+        out.append({"name": label, "places": _encode(centre), "forces": _encode(force)})
+    return out
 
 
 def _work(result: AnalysisResult) -> list[dict[str, float]]:

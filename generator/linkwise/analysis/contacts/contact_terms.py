@@ -1,0 +1,92 @@
+"""Torque terms of a robot that stands on contacts: each link's weight and motion reach joints by the ground.
+
+With T of `Standing.transfer`, of every term c_ijk of the free robot
+
+    c^_ijk = c_ijk - sum_b T_ib c_bjk
+
+is left with joint i. It is of the link and the cause that c_bjk is of, and no longer symmetric in i and k.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.analysis.contacts.ground_contacts import GroundContacts, Standing
+from linkwise.analysis.model_side import NAMES, Side
+from linkwise.analysis.term_rows import TermRows
+from linkwise.package.load import Array
+
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class _Kind:
+    """Values of one kind: a block (joints, pairs) of joints that contacts load, then those of the others."""
+
+    rows: tuple[tuple[int, ...], ...]
+    block: tuple[int, int]
+    places: tuple[Index, Index]
+    """In the block, of the packed values of its joints."""
+    sources: Index
+    """Those packed values."""
+    others: Index
+    """Packed values of the other joints."""
+
+    @classmethod
+    def of(cls, rows: Sequence[tuple[int, ...]], joints: Sequence[int]) -> "_Kind":
+        """Of rows (i, j[, k], source) of the free robot."""
+        mine = [row for row in rows if row[0] in joints]
+        rest = [row for row in rows if row[0] not in joints]
+        pairs = sorted({row[1:-1] for row in mine})
+        place = {pair: at for at, pair in enumerate(pairs)}
+        size = len(joints) * len(pairs)
+        made = [(i, *pair, a * len(pairs) + b) for a, i in enumerate(joints) for b, pair in enumerate(pairs)]
+        made += [(*row[:-1], size + at) for at, row in enumerate(rest)]
+        return cls(
+            tuple(sorted(made)),
+            (len(joints), len(pairs)),
+            (_index(joints.index(row[0]) for row in mine), _index(place[row[1:-1]] for row in mine)),
+            _index(row[-1] for row in mine),
+            _index(row[-1] for row in rest),
+        )
+
+    def left(self, packed: Array, standing: Standing, joints: Sequence[int], n: int) -> Array:
+        """Values (S, count) in the order of the sources of `rows`."""
+        samples = len(packed)
+        whole = np.zeros((samples, n, self.block[1]))
+        whole[:, np.asarray(joints)[self.places[0]], self.places[1]] = packed[:, self.sources]
+        block = standing.left(whole)[:, list(joints)].reshape(samples, -1)
+        return np.concatenate([block, packed[:, self.others]], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTerms:
+    """All kinds of terms."""
+
+    kinds: tuple[_Kind, ...]
+    joints: tuple[int, ...]
+
+    @classmethod
+    def of(cls, free: TermRows, contacts: GroundContacts) -> "ContactTerms":
+        """Of the terms that the free robot has."""
+        kinds = tuple(_Kind.of(getattr(free, name), contacts.joints) for name in NAMES)
+        return cls(kinds, contacts.joints)
+
+    @property
+    def rows(self) -> TermRows:
+        """Rows (i, j[, k], source), in which `left` has values."""
+        return TermRows(**{name: kind.rows for name, kind in zip(NAMES, self.kinds, strict=True)})
+
+    def left(self, packed: Side, standing: Standing, n: int) -> Side:
+        """Values of packed ones of the free robot with n joints."""
+        found = (
+            kind.left(np.asarray(getattr(packed, name)), standing, self.joints, n)
+            for name, kind in zip(NAMES, self.kinds, strict=True)
+        )
+        return Side(*found)
+
+
+def _index(numbers: object) -> Index:
+    return np.fromiter(numbers, dtype=np.intp)  # type: ignore[call-overload,no-any-return]

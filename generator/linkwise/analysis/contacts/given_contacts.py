@@ -1,0 +1,70 @@
+"""Contacts as a user gives them: frames that the ground holds in a movement, and when it does."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from linkwise.errors import LinkwiseError
+from linkwise.runtime.robot_constraints import Contact
+
+THRESHOLD = 20.0
+"""N; of a force plate's reading below it nothing stands there."""
+
+
+@dataclass(frozen=True)
+class WhileColumn:
+    """A contact is on while a column of the motion's log is above a value."""
+
+    column: str
+    above: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.above):
+            raise LinkwiseError(f"--contact-while: {self.column!r} above {self.above}; give a finite number")
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Frames that the ground holds while the robot moves, and what they bear is asked of the motion.
+
+    A contact is on all the time; or by name in `columns` while a column of the motion's log is above a value;
+    or, where `loads` are given, while the measured loads on its body come to more than `threshold` in N.
+    These loads load nothing: what contacts bear is held against them, and what several contacts could bear is
+    theirs in proportion to them. `unactuated` are the joints that nothing drives, by whose equations
+    reactions are found: those of the floating base unless given.
+
+    Raises LinkwiseError for values that do not go together.
+    """
+
+    given: tuple[Contact, ...] = ()
+    columns: Mapping[str, WhileColumn] = field(default_factory=dict)
+    loads: tuple[Path, ...] = ()
+    threshold: float | None = None
+    cutoff: float | None = None
+    """Of the low-pass that these loads get, in Hz; none unless given."""
+    unactuated: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.given:
+            for flag, there in (
+                ("--contact-while", self.columns),
+                ("--contact-loads", self.loads),
+                ("--unactuated", self.unactuated),
+            ):
+                if there:
+                    raise LinkwiseError(f"{flag} goes with --contact; add it")
+        if self.threshold is not None and not self.loads:
+            raise LinkwiseError("--contact-threshold goes with --contact-loads; add it")
+        if self.threshold is not None and not 0.0 <= self.threshold < math.inf:
+            raise LinkwiseError(f"--contact-threshold {self.threshold:g}: give a force in N, 0 or more")
+
+    @classmethod
+    def of(cls, given: "Contacts | Sequence[Contact]") -> "Contacts":
+        """Themselves, or contacts that are on all the time."""
+        return given if isinstance(given, Contacts) else cls(tuple(given))
+
+    @property
+    def least_force(self) -> float:
+        """Of the loads, in N, above which a contact is on."""
+        return THRESHOLD if self.threshold is None else self.threshold

@@ -1,0 +1,87 @@
+"""A robot that stands on contacts: which joints nothing drives, and which ones contacts load."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from linkwise.analysis.body_names import body_frame
+from linkwise.analysis.contacts.given_contacts import Contacts
+from linkwise.analysis.contacts.ground_contacts import GroundContacts
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads.placed_load import moving_joints
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+from linkwise.runtime.constraints.independent_joints import loose_base
+from linkwise.runtime.robot_constraints import Contact
+
+
+def standing_on(robot: LoadedRobot, contacts: Contacts) -> LoadedRobot:
+    """The robot with contacts.
+
+    Raises LinkwiseError for frames that are not there or stand on the ground, contacts that leave nothing to
+    move, two of one name, and a robot of which every joint is driven.
+    """
+    if not contacts.given:
+        return robot
+    tree = robot.package.manifest.tree
+    first = contacts.given[0]
+    if tree is None:
+        raise LinkwiseError(
+            f"contact on {first.frame!r}: the links of {robot.name} are energies, which do not say where"
+            " anything is; contacts are for rigid links"
+        )
+    frames = [body_frame("contact on", str(contact.frame), robot) for contact in contacts.given]
+    names = [contact.name or f"{contact.frame} {contact.kind}" for contact in contacts.given]
+    _check_names(names, contacts)
+    unactuated = _unactuated(robot, contacts.unactuated)
+    made = tuple(_constraints(robot, contact) for contact in contacts.given)
+    loaded = robot.borne_by({i for frame in frames for i in moving_joints(tree, frame.body)})
+    ground = GroundContacts(
+        tuple(names),
+        contacts.given,
+        made,
+        unactuated,
+        tuple(sorted({*loaded, *unactuated})),
+        robot.constrained,
+    )
+    return replace(robot, contacts=ground)
+
+
+def _unactuated(robot: LoadedRobot, given: Sequence[str]) -> tuple[int, ...]:
+    """Joints that nothing drives, as told, or of the floating base."""
+    for name in given:
+        if name not in robot.driven_joints:
+            raise LinkwiseError(
+                f"--unactuated {name}: {robot.name} has no such joint that moves by itself; they are"
+                f" {listed(robot.driven_joints)}"
+            )
+    model: Any = robot.model
+    base = [robot.joints.index(name) for name in given] or list(loose_base(model.backend.tree))
+    found = tuple(sorted({i for i in base if i in robot.driven}))
+    if not found:
+        raise LinkwiseError(
+            f"{robot.name} has no floating base, and every joint is driven: its motion does not tell what a"
+            " contact bears; measure that and give it with --loads, or name the joints that nothing drives"
+            " with --unactuated"
+        )
+    return found
+
+
+def _constraints(robot: LoadedRobot, contact: Contact) -> Any:
+    model: Any = robot.model
+    try:
+        return model.constrained(contacts=[contact])
+    except (TypeError, ValueError) as error:
+        told = str(error).replace("contacts[0]", f"contact {contact.name or contact.frame!r}")
+        raise LinkwiseError(f"--contact: {told}") from None
+
+
+def _check_names(names: Sequence[str], contacts: Contacts) -> None:
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise LinkwiseError(f"contact {twice[0]!r} stands twice; tell them apart as NAME:FRAME")
+    strange = [name for name in contacts.columns if name not in names]
+    if strange:
+        raise LinkwiseError(
+            f"--contact-while {strange[0]}=…: there is no such contact; they are {listed(names)}"
+        )

@@ -1,0 +1,179 @@
+"""What the ground bears at each contact, link by link, and the torques of the joints that stand on it."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.result_columns import load_unit
+from linkwise.extras import extra
+from linkwise.package.load import Array
+from linkwise.plotstyle import GRAVITY, INK, drawn, tone
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST = 5
+"""Links with areas of their own; of others the sum has one."""
+JOINTS = 3
+"""Joints drawn, those nearest to the contact."""
+LITTLE = 0.03
+"""Of the largest force, below which a component is not drawn."""
+SHADE, SHARED = "#F1F3F6", "#DADFE6"
+WIDTH, HEIGHT = 4.4, 1.75
+PARTS = ("x", "y", "z")
+
+
+def contacts(result: AnalysisResult, _: int) -> "Figure":
+    """A column of panels for each contact: forces, what links ask of it as areas, then joints' torques."""
+    ground = result.robot.contacts
+    assert ground is not None
+    force = _forces(result)
+    shown = _components(result, force)
+    alone = _largest(force)
+    joints = [_joints(result, c) for c in range(len(ground.names))]
+    count = len(shown) + max(map(len, joints))
+    figure = extra("matplotlib.figure").Figure(
+        figsize=(WIDTH * len(ground.names) + 1.4, HEIGHT * count + 1.3), layout="constrained"
+    )
+    panels = figure.subplots(count, len(ground.names), sharex=True, sharey="row", squeeze=False)
+    for c, name in enumerate(ground.names):
+        panels[0, c].set_title(drawn(name))
+        for panel, axis in zip(panels[:, c], shown, strict=False):
+            _draw_force(panel, result, force[c], (c, axis), alone)
+        for panel, i in zip(panels[len(shown) :, c], joints[c], strict=False):
+            _draw_torque(panel, result, c, i)
+        panels[-1, c].set_xlabel("time (s)")
+        panels[-1, c].set_xlim(result.time[0], result.time[-1])
+    for panel, axis in zip(panels[:, 0], shown, strict=False):
+        panel.set_ylabel(f"force {PARTS[axis]} (N)")
+    handles: dict[str, Any] = {}
+    for panel in panels.flat:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    figure.legend(
+        handles.values(), handles.keys(), loc="outside lower center", ncols=4, handlelength=2, fontsize=8
+    )
+    figure.suptitle(
+        f"What the ground bears · {drawn(result.robot.name, 40)} · {drawn(result.source, 50)}",
+        x=0.01,
+        ha="left",
+        fontsize=11,
+    )
+    return figure  # type: ignore[no-any-return]
+
+
+def _forces(result: AnalysisResult) -> list[Array]:
+    """Of each contact what each link asks of the ground, and last what else does, (3, N + 1, S)."""
+    robot, ground = result.robot, result.robot.contacts
+    assert ground is not None
+    first = len(robot.constraint_rows) - len(ground.rows)
+    out = [np.zeros((3, len(robot.links) + 1, len(result.time))) for _ in ground.names]
+    for column, values in zip(result.columns, result.values, strict=True):
+        row = (column.cause or 0) - first
+        if column.quantity not in ("force", "force_link") or row < 0:
+            continue
+        part = ground.rows[row].rpartition("force_")[2]
+        if part in PARTS:
+            cube = out[int(ground.owners[row])]
+            if column.link is not None:
+                cube[PARTS.index(part), column.link] += values
+                cube[PARTS.index(part), -1] -= values
+            else:
+                cube[PARTS.index(part), -1] += values
+    return out
+
+
+def _components(result: AnalysisResult, force: list[Array]) -> list[int]:
+    """Axes along which the ground bears anything, the upright one first."""
+    sizes = np.max([np.abs(cube.sum(axis=1)).max(axis=-1) for cube in force], axis=0)
+    up = int(np.abs(result.robot.up).argmax())
+    order = [up, *(axis for axis in range(3) if axis != up)]
+    return [axis for axis in order if sizes[axis] > LITTLE * sizes.max()] or [up]
+
+
+def _joints(result: AnalysisResult, contact: int) -> list[int]:
+    """Driven joints between the base and a contact, the nearest first."""
+    robot, ground = result.robot, result.robot.contacts
+    assert ground is not None
+    tree = robot.package.manifest.tree
+    assert tree is not None
+    frame = str(ground.contacts[contact].frame)
+    body = next(one.body for one in tree.frames if one.name == frame)
+    found: list[int] = []
+    while body is not None:
+        own = tree.bodies[body].coordinate
+        if own in robot.driven and own not in (*ground.unactuated, *found):
+            found.append(own)
+        body = tree.bodies[body].parent
+    return found[:JOINTS]
+
+
+def _largest(force: list[Array]) -> list[int]:
+    """Links that ask most of the ground."""
+    means = np.sum([np.abs(cube).sum(axis=(0, 2)) for cube in force], axis=0)[:-1]
+    return sorted(sorted(range(len(means)), key=lambda j: -float(means[j]))[:MOST])
+
+
+def _draw_force(
+    panel: Any, result: AnalysisResult, force: Array, place: tuple[int, int], alone: list[int]
+) -> None:
+    """place: contact and axis; alone: links with areas of their own."""
+    contact, axis = place
+    _shade(panel, result, contact)
+    parts = force[axis]
+    areas = [(drawn(result.robot.links[j]), tone(at), parts[j]) for at, j in enumerate(alone)]
+    rest = [j for j in range(len(parts)) if j not in alone]
+    if rest and np.abs(parts[rest]).max() > LITTLE * np.abs(parts.sum(axis=0)).max():
+        areas.append(("all else", GRAVITY, parts[rest].sum(axis=0)))
+    for sign in (1.0, -1.0):
+        base = np.zeros(len(result.time))
+        for label, ink, values in areas:
+            top = base + sign * np.maximum(sign * values, 0.0)
+            panel.fill_between(result.time, base, top, color=ink, alpha=0.55, linewidth=0, label=label)
+            base = top
+    panel.plot(result.time, parts.sum(axis=0), color=INK, linewidth=1.6, label="found from the motion")
+    _draw_measured(panel, result, contact, axis)
+    panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+
+
+def _draw_measured(panel: Any, result: AnalysisResult, contact: int, axis: int) -> None:
+    ground = result.robot.contacts
+    assert ground is not None
+    first = len(result.robot.constraint_rows) - len(ground.rows)
+    for column, values in zip(result.columns, result.values, strict=True):
+        row = (column.cause or 0) - first
+        mine = column.quantity == "force_measured" and ground.owners[row] == contact
+        if mine and ground.rows[row].endswith(f" force_{PARTS[axis]}"):
+            panel.plot(result.time, values, color="#C21E56", linestyle="dashed", label="measured")
+
+
+def _draw_torque(panel: Any, result: AnalysisResult, contact: int, i: int) -> None:
+    _shade(panel, result, contact)
+    name, unit = drawn(result.robot.joints[i]), load_unit(result.robot.units[i])
+    for column, values in zip(result.columns, result.values, strict=True):
+        if column.joint == i and column.quantity == "tau":
+            panel.plot(result.time, values, color=INK, linewidth=1.6, label="found from the motion")
+        if column.joint == i and column.quantity == "tau_as_loads":
+            panel.plot(result.time, values, color="#C21E56", linestyle="dashed", label="measured")
+    panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+    panel.set_title(f"torque of {name} ({unit})", fontsize=9)
+
+
+def _shade(panel: Any, result: AnalysisResult, contact: int) -> None:
+    """Shade when a contact is on, darker where another is too, so that who bears what is a choice."""
+    on = np.array([v for c, v in zip(result.columns, result.values, strict=True) if c.quantity == "contact"])
+    mine = on[contact] > 0
+    several = mine & ((on > 0).sum(axis=0) > 1)
+    for where, ink, label in ((mine, SHADE, "stands"), (several, SHARED, "others stand too")):
+        panel.fill_between(
+            result.time,
+            0,
+            1,
+            where=where,
+            color=ink,
+            linewidth=0,
+            transform=panel.get_xaxis_transform(),
+            zorder=-1,
+            label=label if where.any() else None,
+        )

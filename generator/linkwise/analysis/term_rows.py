@@ -1,0 +1,39 @@
+"""Which torque terms a model has values of, and where among its packed values."""
+
+from typing import NamedTuple
+
+from linkwise.package.load import PackedLayout
+
+
+class TermRows(NamedTuple):
+    """Of each kind of term its rows (i, j, source), or (i, j, k, source), sorted.
+
+    The source is where packed values have it.
+    """
+
+    acceleration: tuple[tuple[int, ...], ...]
+    velocity: tuple[tuple[int, ...], ...]
+    gravity: tuple[tuple[int, ...], ...]
+    torque: tuple[tuple[int, ...], ...]
+
+
+def term_rows(layout: PackedLayout) -> TermRows:
+    """All terms of a layout."""
+
+    def numbered(rows: list[list[int]]) -> tuple[tuple[int, ...], ...]:
+        return tuple(sorted((*row, at) for at, row in enumerate(rows)))
+
+    return TermRows(
+        tuple(mirrored(layout)),
+        numbered(layout.velocity.tolist()),
+        numbered(layout.gravity.tolist()),
+        numbered(layout.torque.tolist()),
+    )
+
+
+def mirrored(layout: PackedLayout) -> list[tuple[int, int, int, int]]:
+    """All (i, j, k, source) of c2, sorted: only i ≤ k is stored, and c2 is symmetric in i and k."""
+    rows = set()
+    for source, (i, j, k) in enumerate(layout.acceleration.tolist()):
+        rows |= {(i, j, k, source), (k, j, i, source)}
+    return sorted(rows)

@@ -1,0 +1,108 @@
+"""The flags of contacts: which frames the ground holds, how, and when."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from linkwise.analysis.body_names import named_body
+from linkwise.analysis.contacts import Contacts, WhileColumn
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.errors import LinkwiseError
+from linkwise.runtime.robot_constraints import Contact
+
+Held = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--contact",
+        metavar="FRAME=KIND@X,Y,Z",
+        help="Frame that the ground holds, at a point in its axes, m; KIND is held, point, hinged,AX,AY,AZ"
+        " about an axis, or rolling,RADIUS; NAME:FRAME=… names it; may be repeated",
+    ),
+]
+While = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--contact-while",
+        metavar="NAME=COLUMN>VALUE",
+        help="The contact is on while a column of the log is above a value, 0.5 if not given; may be"
+        " repeated",
+    ),
+]
+Measured = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--contact-loads",
+        help="Loads measured at the contacts, read as --loads are: each contact is on while they come to"
+        " more than --contact-threshold, and they load nothing; may be repeated",
+    ),
+]
+Threshold = Annotated[float | None, typer.Option("--contact-threshold", help="Force in N; 20 if not given")]
+Unactuated = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--unactuated",
+        metavar="JOINT",
+        help="Joint that nothing drives, by whose equation reactions are found; the floating base's if not"
+        " given; may be repeated",
+    ),
+]
+NUMBERS = {"held": (), "point": (), "hinged": ("AX", "AY", "AZ"), "rolling": ("RADIUS",)}
+"""What stands behind a kind."""
+
+
+def chosen_contacts(
+    contact: Sequence[str],
+    while_above: Sequence[str],
+    loads: Sequence[Path],
+    threshold: float | None,
+    cutoff: float | None,
+    unactuated: Sequence[str],
+    robot: LoadedRobot,
+) -> Contacts:
+    """Contacts as the flags say; raises LinkwiseError for what is written otherwise.
+
+    cutoff: of the low-pass that loads get, in Hz
+    """
+    given = tuple(_contact(text, robot) for text in contact)
+    columns = dict(_while(text) for text in while_above)
+    low = cutoff if loads else None
+    return Contacts(given, columns, tuple(loads), threshold, low, tuple(unactuated))
+
+
+def _contact(text: str, robot: LoadedRobot) -> Contact:
+    """Of [NAME:]FRAME=KIND[,NUMBERS][@X,Y,Z]."""
+    where, sign, rest = text.rpartition("=")
+    what, at, place = rest.partition("@")
+    kind, *numbers = what.split(",")
+    if not (sign and where and kind in NUMBERS):
+        raise LinkwiseError(
+            f"--contact {text}: write it as FRAME=KIND@X,Y,Z, the kind one of {', '.join(NUMBERS)}"
+        )
+    named = ",".join((kind, *NUMBERS[kind]))
+    try:
+        more = [float(number) for number in numbers]
+        x, y, z = (float(number) for number in place.split(",")) if at else (0.0, 0.0, 0.0)
+    except ValueError:
+        raise LinkwiseError(f"--contact {text}: write it as FRAME={named}@X,Y,Z, in m") from None
+    if len(more) != len(NUMBERS[kind]):
+        raise LinkwiseError(f"--contact {text}: write it as FRAME={named}@X,Y,Z, in m")
+    name, frame = named_body(where, robot)
+    made = Contact(frame, kind, (x, y, z), normal=robot.up, name=name or frame)
+    if kind == "hinged":
+        return made._replace(axis=(more[0], more[1], more[2]))
+    return made._replace(radius=more[0]) if more else made
+
+
+def _while(text: str) -> tuple[str, WhileColumn]:
+    """Of NAME=COLUMN[>VALUE]."""
+    name, sign, rest = text.partition("=")
+    column, above, value = rest.rpartition(">")
+    try:
+        found = WhileColumn(column, float(value)) if above else WhileColumn(rest)
+    except ValueError:
+        found = WhileColumn(rest)
+    if not (sign and name and rest):
+        raise LinkwiseError(f"--contact-while {text}: write it as NAME=COLUMN>VALUE")
+    return name, found
