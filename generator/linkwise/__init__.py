@@ -11,7 +11,18 @@ from linkwise.errors import LinkwiseError
 from linkwise.version import VERSION as __version__
 
 if TYPE_CHECKING:
-    from linkwise.analysis import Analysis, Lowpass, Processing, Reading, analyze
+    from linkwise.analysis import (
+        Analysis,
+        Contact,
+        Contacts,
+        Load,
+        Lowpass,
+        Payload,
+        Processing,
+        Reading,
+        WhileColumn,
+        analyze,
+    )
     from linkwise.check import check_package
     from linkwise.identification import Fitting, Identification, identify
     from linkwise.package.write import write_package
@@ -22,6 +33,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Analysis",
+    "Contact",
+    "Contacts",
     "Coordinate",
     "Fitting",
     "Identification",
@@ -34,6 +47,7 @@ __all__ = [
     "Processing",
     "Reading",
     "System",
+    "WhileColumn",
     "__version__",
     "analyze",
     "check_package",
@@ -47,6 +61,8 @@ __all__ = [
 
 _ROOM_OF = {
     "Analysis": "analysis",
+    "Contact": "analysis",
+    "Contacts": "analysis",
     "Coordinate": "robot",
     "Fitting": "identification",
     "Identification": "identification",
@@ -58,6 +74,7 @@ _ROOM_OF = {
     "Processing": "analysis",
     "Reading": "analysis",
     "System": "symbolic.system",
+    "WhileColumn": "analysis",
     "analyze": "analysis",
     "check_package": "check",
     "energy_system": "symbolic.user_energies",

@@ -1,7 +1,20 @@
 """From a recorded movement to who loads whom: torque analysis of motion logs."""
 
+from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.loads import Load
 from linkwise.analysis.run import Analysis, analyze
 from linkwise.analysis.settings import Lowpass, Payload, Processing, Reading
+from linkwise.runtime.robot_constraints import Contact
 
-__all__ = ["Analysis", "Load", "Lowpass", "Payload", "Processing", "Reading", "analyze"]
+__all__ = [
+    "Analysis",
+    "Contact",
+    "Contacts",
+    "Load",
+    "Lowpass",
+    "Payload",
+    "Processing",
+    "Reading",
+    "WhileColumn",
+    "analyze",
+]

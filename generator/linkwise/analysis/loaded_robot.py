@@ -55,6 +55,12 @@ class LoadedRobot:
         """Their names."""
         return tuple(self.joints[i] for i in self.driven)
 
+    @property
+    def moving_itself(self) -> tuple[int, ...]:
+        """Those of them that something drives, where contacts say that nothing drives some."""
+        still = () if self.contacts is None else self.contacts.unactuated
+        return tuple(i for i in self.driven if i not in still) or self.driven
+
     def borne_by(self, joints: Iterable[int]) -> tuple[int, ...]:
         """Joints with torques that bear what these joints are loaded with."""
         found = set(joints)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples
 from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.contacts import Contacts
-from linkwise.analysis.contacts.contact_times import contact_times
+from linkwise.analysis.contacts.contact_times import contact_times, switch_columns
 from linkwise.analysis.contacts.standing_robot import standing_on
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.induced_points import induced_points
@@ -122,7 +122,7 @@ def analyze_to(
     for name in wanted.figures:
         check_figure(name, robot, wanted.induced)
     refuse_inside_package(out)
-    for file in (log, *loads.paths, *contacts.loads):
+    for file in (log, *loads.paths, *contacts.measured.paths):
         if os.path.realpath(file).startswith(os.path.join(os.path.realpath(out), "")):
             raise LinkwiseError(f"--out {out} is to be replaced and holds the log {file}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
@@ -260,7 +260,7 @@ def _prepared(
 ) -> Job:
     """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
     points = induced_points(wanted.induced, robot)
-    switches = [one.column for one in contacts.columns.values()]
+    switches = switch_columns(contacts, log)
     samples, closed = _samples(log, robot, reading, switches, progress, buffer)
     with within(str(log)):
         span_of(samples, processing)

@@ -9,7 +9,6 @@ import numpy as np
 from linkwise.analysis.column_matching import time_column
 from linkwise.analysis.contacts.given_contacts import Contacts, WhileColumn
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.given_loads import Loads
 from linkwise.analysis.loads.placed_load import PlacedLoad, Wrench, model_pose
 from linkwise.analysis.loads.read_loads import placed_loads
 from linkwise.analysis.logs import open_log
@@ -48,7 +47,8 @@ class ContactTimes:
         """
         out = np.ones((len(time), len(self.series)))
         for number, (series, loads) in enumerate(zip(self.series, self.measured, strict=True)):
-            force = np.linalg.norm(sum(wrench.force for wrench in _wrenches(loads, model, time, q)), axis=-1)
+            pushes = [wrench.force for wrench in _wrenches(loads, model, time, q)]
+            force = np.linalg.norm(sum(pushes, np.zeros((len(time), 3))), axis=1)
             if series is not None:
                 is_on = np.interp(time, series[:, 0], series[:, 1]) > series[0, 2]
             else:
@@ -89,19 +89,33 @@ def contact_times(
     """
     if robot.contacts is None:
         return None
-    loads = placed_loads(
-        Loads((), contacts.loads, contacts.cutoff), robot, motion, reading.ignore_extra, progress, buffer
-    )
+    loads = placed_loads(contacts.measured, robot, motion, reading.ignore_extra, progress, buffer)
     names = robot.contacts.names
     series = tuple(_series(contacts.columns.get(name), log, reading, progress) for name in names)
     found = _by_contact(robot, loads)
     for name, column, some in zip(names, series, found, strict=True):
         if contacts.loads and column is None and not some:
             raise LinkwiseError(
-                f"contact {name!r}: no load of {listed([str(path) for path in contacts.loads])} acts on its"
-                f" body; say when it is on with --contact-while {name}=COLUMN"
+                f"contact {name!r}: no load of --contact-loads acts on its body ({_told(loads)}); say when"
+                f" it is on with --contact-while {name}=COLUMN"
             )
     return ContactTimes(series, found, contacts.least_force)
+
+
+def _told(loads: Sequence[PlacedLoad]) -> str:
+    return listed([f"{load.name} is on {load.seat.frame.name}" for load in loads])
+
+
+def switch_columns(contacts: Contacts, log: Path) -> tuple[str, ...]:
+    """Columns of the motion's log that say when contacts are on; raises LinkwiseError for one not there."""
+    there = open_log(log).columns if contacts.columns else ()
+    for name, given in contacts.columns.items():
+        if given.column not in there:
+            raise LinkwiseError(
+                f"{log}: --contact-while {name}={given.column}: no column {given.column!r}; the log has"
+                f" {listed(map(repr, there))}"
+            )
+    return tuple(given.column for given in contacts.columns.values())
 
 
 def _series(given: WhileColumn | None, log: Path, reading: Reading, progress: Progress) -> Array | None:
@@ -109,11 +123,6 @@ def _series(given: WhileColumn | None, log: Path, reading: Reading, progress: Pr
         return None
     opened = open_log(log)
     with within(str(log)):
-        if given.column not in opened.columns:
-            raise LinkwiseError(
-                f"--contact-while: no column {given.column!r}; the log has"
-                f" {listed(map(repr, opened.columns))}"
-            )
         columns = time_column(opened.columns, reading), list(opened.columns).index(given.column)
     rows = collected(finite_blocks(opened, log, columns, progress), 2, None)
     return np.column_stack([rows, np.full(len(rows), given.above)])

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from linkwise.analysis.loads import Load, Loads
 from linkwise.errors import LinkwiseError
 from linkwise.runtime.robot_constraints import Contact
 
@@ -39,7 +40,7 @@ class Contacts:
 
     given: tuple[Contact, ...] = ()
     columns: Mapping[str, WhileColumn] = field(default_factory=dict)
-    loads: tuple[Path, ...] = ()
+    loads: tuple[Load | str | Path, ...] = ()
     threshold: float | None = None
     cutoff: float | None = None
     """Of the low-pass that these loads get, in Hz; none unless given."""
@@ -63,6 +64,11 @@ class Contacts:
     def of(cls, given: "Contacts | Sequence[Contact]") -> "Contacts":
         """Themselves, or contacts that are on all the time."""
         return given if isinstance(given, Contacts) else cls(tuple(given))
+
+    @property
+    def measured(self) -> Loads:
+        """Its loads, and the files that they are in."""
+        return Loads.of(self.loads, self.cutoff)
 
     @property
     def least_force(self) -> float:

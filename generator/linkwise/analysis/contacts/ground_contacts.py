@@ -10,8 +10,8 @@ chains, by the joints b in place of the dependent ones.
 
 Where contacts could bear it in several ways, as two feet can, that is taken for which the sum of
 lambda^2 / w is least, in N and N m, with a share w of each contact: two that bear alike bear in proportion
-to their shares. Where they cannot bear it, as a foot that only touches at a point cannot, what is left over stays
-with the joints b: a residual.
+to their shares. Where they cannot bear it, as a foot that only touches at a point cannot, what is left over
+stays with the joints b: a residual.
 """
 
 from collections.abc import Iterator, Sequence

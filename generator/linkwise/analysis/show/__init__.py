@@ -35,7 +35,7 @@ def draw(result: AnalysisResult, name: str) -> "Figure":
     kind, _, chosen = name.partition(":")
     names = result.induced if kind == "induced" else result.robot.joints
     with styled():
-        first = 0 if kind == "induced" else result.robot.driven[0]
+        first = 0 if kind == "induced" else result.robot.moving_itself[0]
         return FIGURES[kind](result, names.index(chosen) if chosen else first)
 
 

@@ -1,0 +1,183 @@
+"""A leg that stands: what the ground bears, found from the motion, when it does, and what is refused."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import run_linkwise
+from linkwise import LinkwiseError, Load, generate, read_system, write_package
+from linkwise.analysis import Contact, Contacts, WhileColumn, analyze
+from motion_logs import LEG, smooth, write_csv
+
+JOINTS = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
+MASSES = {"pelvis": 50.85, "thigh": 7.5, "shank": 3.49, "foot": 1.09}
+GRAVITY = 9.80665
+FOOT = Contact("foot", "held", (0.1, -0.06, 0.0), name="sole")
+COUPLED = """
+[[constraint]]
+name = "gear"
+type = "coupling"
+terms = { ankle_angle_r = 1, knee_angle_r = [0.1, 0.5, 0.2] }
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A leg, one whose ankle follows the knee, and logs in which it stands still and moves."""
+    made: Path = tmp_path_factory.mktemp("stance")
+    write_package(generate(read_system(LEG), ["numpy"]), made / "leg")
+    (made / "coupled.toml").write_text(LEG.read_text() + COUPLED)
+    write_package(generate(read_system(made / "coupled.toml"), ["numpy"]), made / "coupled")
+    moving = smooth(80, 6)
+    moving[:, 1:] *= 0.4
+    write_csv(made / "moving.csv", moving, JOINTS)
+    still = moving.copy()
+    still[:, 1:] = [0.0, 0.9, 0.05, 0.3, -0.4, 0.1]
+    stands = (moving[:, 0] > 0.395).astype(float)
+    write_csv(made / "still.csv", np.column_stack([still, stands]), [*JOINTS, "stands"])
+    return made
+
+
+def test_ground_bears_the_weight_of_each_link_where_all_rests(folder: Path) -> None:
+    result = analyze(
+        folder / "still.csv", folder / "leg", contacts=Contacts((FOOT,), {"sole": WhileColumn("stands")})
+    )
+    on = result.time > 0.395
+    for link, mass in MASSES.items():
+        bears = result[f"force/sole force_y/{link}"]
+        assert np.abs(bears[on] - mass * GRAVITY).max() < 1e-9
+        assert not bears[~on].any()
+    # The base's joints bear the weight while nothing else does, and nothing while the ground does.
+    weight = sum(MASSES.values()) * GRAVITY
+    assert np.abs(result["tau/pelvis_ty"][~on] - weight).max() < 1e-9
+    assert not result["tau/pelvis_ty"][on].any()
+
+
+def test_a_foot_that_touches_at_a_point_leaves_a_moment_to_the_base(folder: Path) -> None:
+    result = analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT._replace(kind="point")])
+    assert not result["force/sole force_z"].any()
+    free = analyze(folder / "moving.csv", folder / "leg")
+    wrench = result.contact_wrench[:, 0]
+    rows = result.robot.model.kinematics.jacobian(result.q, "foot", FOOT.point)
+    left = free.torque - np.einsum("srn,sr->sn", rows, wrench)
+    assert np.abs(result.torque - left).max() < 1e-9 * np.abs(free.torque).max()
+    assert np.abs(result.torque[:, 2]).max() > 1.0
+
+
+def test_forces_of_links_and_loads_sum_to_what_the_ground_bears(folder: Path) -> None:
+    push = Load("push", "pelvis", (20.0, -30.0, 0.0))
+    result = analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT], loads=[push])
+    parts = [result[f"force/sole force_x/{link}"] for link in MASSES] + [
+        result["force_load/sole force_x/push"]
+    ]
+    assert np.abs(sum(parts) - result["force/sole force_x"]).max() < 1e-9
+    assert np.abs(result["force_load/sole force_x/push"] + 20.0).max() < 1e-9
+    assert np.abs(result["tau_load/ankle_angle_r/push"]).max() > 1.0  # by way of the ground
+
+
+def test_measured_loads_say_when_a_foot_stands_and_load_nothing(folder: Path) -> None:
+    time = np.arange(81) / 100
+    force = np.stack([10.0 + 0.0 * time, 1000.0 * (time > 0.405), 0.0 * time], 1)
+    plate = Load("plate", "foot", force, time=time)
+    contacts = Contacts((FOOT,), loads=(plate,), threshold=50.0)
+    result = analyze(folder / "moving.csv", folder / "leg", contacts=contacts)
+    on = result["contact/sole"] > 0
+    assert on.tolist() == (result.time > 0.40).tolist()
+    assert (
+        np.abs(result["force_measured/sole force_y"] - np.interp(result.time, time, force[:, 1])).max() < 1e-9
+    )
+    loaded = analyze(folder / "moving.csv", folder / "leg", loads=[plate])
+    for joint in JOINTS:
+        assert np.abs(result[f"tau_as_loads/{joint}"] - loaded[f"tau/{joint}"]).max() < 1e-9
+    free = analyze(folder / "moving.csv", folder / "leg")
+    assert np.abs(result.torque[~on] - free.torque[~on]).max() == 0.0
+
+
+def test_a_tie_bears_what_the_ground_gives_to_a_joint_that_follows(folder: Path) -> None:
+    log = write_csv(folder / "coupled.csv", smooth(80, 5) * [1, 0.3, 0.3, 0.3, 0.3, 0.3], JOINTS[:-1])
+    result = analyze(log, folder / "coupled", contacts=[FOOT])
+    assert result.robot.constrained is not None
+    model: Any = result.robot.constrained.open
+    needed = model.inverse_dynamics(result.q, result.qd, result.qdd)
+    rows = model.kinematics.jacobian(result.q, "foot", FOOT.point)
+    needed = needed - np.einsum("srn,sr->sn", rows, result.contact_wrench[:, 0])
+    knee = result.q[:, 4]
+    needed[:, 5] -= result["force/gear"]
+    needed[:, 4] -= result["force/gear"] * (0.5 + 0.4 * knee)
+    scale = np.abs(result.torque).max()
+    assert np.abs(result.torque - needed).max() < 1e-9 * scale
+    assert np.abs(needed[:, [0, 1, 2, 5]]).max() < 1e-9 * scale
+    by_link = sum(result[f"force/gear/{link}"] for link in MASSES)
+    assert np.abs(by_link - result["force/gear"]).max() < 1e-9 * scale
+
+
+def test_power_of_joints_and_of_slip_is_the_gain_of_energy(folder: Path) -> None:
+    result = analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT])
+    slip = np.stack([result[f"slip/sole {part}"] for part in ("angular_z", "x", "y")], 1)
+    fed = (slip * result.contact_wrench[:, 0, [2, 3, 4]]).sum(1)
+    free = analyze(folder / "moving.csv", folder / "leg")
+    assert np.abs(result.joint_power.sum(1) + fed - free.joint_power.sum(1)).max() < 1e-9 * np.abs(fed).max()
+    assert result.closure.energy_relative is not None
+    assert result.closure.energy_relative < 1e-9
+
+
+def test_the_command_writes_forces_and_draws_them(folder: Path, tmp_path: Path) -> None:
+    arguments = ["analyze", "still.csv", "--robot", "leg", "--out", tmp_path / "out"]
+    contact = ["--contact", "sole:foot=held@0.1,-0.06,0", "--contact-while", "sole=stands>0.5"]
+    done = run_linkwise(*arguments, *contact, "--figure", "contacts", "--format", "csv", folder=folder)
+    assert done.returncode == 0, done.stderr
+    record = json.loads((tmp_path / "out" / "analysis.json").read_text())
+    assert record["contacts"]["unactuated"] == JOINTS[:3]
+    assert record["contacts"]["held"][0]["point"] == [0.1, -0.06, 0.0]
+    assert (tmp_path / "out" / "contacts.png").stat().st_size > 10_000
+    header = (tmp_path / "out" / "analysis.csv").read_text().splitlines()
+    assert any("force/sole force_y/pelvis" in line for line in header[:3])
+
+
+BAD = {
+    "foot=glued": "write it as FRAME=KIND@X,Y,Z, the kind one of held, point, hinged, rolling",
+    "foot=rolling": "--contact foot=rolling: write it as FRAME=rolling,RADIUS@X,Y,Z, in m",
+    "foot=rolling,-1": "contact 'foot'.radius is -1.0; what rolls has one above 0, in m",
+    "toes=held": "contact on 'toes': leg has no such body; its bodies are",
+    "base=held": "which stands on the ground anyway",
+    "foot=held@1,2": "--contact foot=held@1,2: write it as FRAME=held@X,Y,Z, in m",
+}
+
+
+@pytest.mark.parametrize("contact", BAD)
+def test_contacts_that_cannot_be_are_refused_in_a_line(folder: Path, contact: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = "analyze", "moving.csv", "--robot", "leg", "--out", out, "--contact", contact
+    done = run_linkwise(*words, folder=folder)
+    assert done.returncode == 2
+    assert BAD[contact] in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not out.exists()
+
+
+def test_what_does_not_go_with_contacts_is_refused(folder: Path) -> None:
+    log, leg = folder / "still.csv", folder / "leg"
+    shank = (Load("p", "shank", (0, 9, 0)),)
+    for contacts, told in (
+        (Contacts((FOOT, FOOT)), "contact 'sole' stands twice"),
+        (Contacts((FOOT,), {"toe": WhileColumn("stands")}), "no such contact; they are sole"),
+        (Contacts((FOOT,), {"sole": WhileColumn("on")}), "no column 'on'; the log has"),
+        (Contacts((FOOT,), unactuated=("hip",)), "--unactuated hip: leg has no such joint"),
+        (Contacts((FOOT,), {"sole": WhileColumn("stands")}, shank), "where no contact is"),
+    ):
+        with pytest.raises(LinkwiseError, match=told):
+            analyze(log, leg, contacts=contacts)
+    knee = Contact("shank", "point", name="knee")
+    with pytest.raises(LinkwiseError, match="contact 'sole': no load of --contact-loads acts on its body"):
+        analyze(folder / "moving.csv", leg, contacts=Contacts((FOOT, knee), loads=shank))
+    with pytest.raises(LinkwiseError, match="goes with --contact; add it"):
+        Contacts(unactuated=("pelvis_tx",))
+
+
+def test_contacts_of_an_arm_that_is_driven_throughout_are_refused(folder: Path, tmp_path: Path) -> None:
+    write_package(generate(read_system("planar3"), ["numpy"]), tmp_path / "arm")
+    log = write_csv(tmp_path / "log.csv", smooth(20, 3))
+    with pytest.raises(LinkwiseError, match="does not tell what a contact bears; measure that"):
+        analyze(log, tmp_path / "arm", contacts=[Contact("link3", "point")])
