@@ -190,7 +190,7 @@ class AnalysisResult:
             "induced": list(self.induced),
             "closure": asdict(self.closure),
             **({} if self.closed is None else {"constraints": self._constraints(self.closed)}),
-            **({} if robot.contacts is None else {"contacts": robot.contacts.record(robot.joints)}),
+            **({} if robot.contacts is None else {"contacts": self._contacts()}),
             "work": self._work(),
             "ignored_columns": list(self.ignored),
             "warnings": [*self.warnings, *self.load_warnings],
@@ -240,6 +240,25 @@ class AnalysisResult:
         tied = self.robot.constrained
         names = () if tied is None else tied.constraints.independent
         return {"independent": list(names), **closed.record()}
+
+    def largest_slip(self, contact: int) -> tuple[float, float]:
+        """How fast what a contact holds moves at most while it is on, in m/s and rad/s, over all samples."""
+        ground = self.robot.contacts
+        found = {"m/s": 0.0, "rad/s": 0.0}
+        for column, peak in zip(self.columns, self.totals.peak, strict=True):
+            if ground is None or column.quantity != "slip" or column.cause is None:
+                continue
+            if ground.owners[column.cause - self._rows + len(ground.rows)] == contact:
+                found[column.unit] = max(found[column.unit], float(peak))
+        return found["m/s"], found["rad/s"]
+
+    def _contacts(self) -> dict[str, Any]:
+        ground = self.robot.contacts
+        assert ground is not None
+        record = ground.record(self.robot.joints)
+        for number, one in enumerate(record["held"]):
+            one["largest_slip"] = dict(zip(("m/s", "rad/s"), self.largest_slip(number), strict=True))
+        return record
 
     def _work(self) -> dict[str, Any]:
         """Work in J of each joint, all links together, and of each joint into each link that it moves."""

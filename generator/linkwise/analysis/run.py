@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -240,11 +240,26 @@ class Job:
             tuple(point.name for point in self.decomposer.induced.points),
             done.closure,
             self.samples.ignored,
-            self.samples.warnings,
+            (*self.samples.warnings, *self._twice_borne()),
             done.samples,
             kept.stride,
             self.closed,
         )
+
+    def _twice_borne(self) -> Iterator[str]:
+        """Warnings of contacts on bodies that bear loads too, which may be what was measured there."""
+        robot = self.decomposer.robot
+        tree, ground = robot.package.manifest.tree, robot.contacts
+        if tree is None or ground is None:
+            return
+        body = {frame.name: frame.body for frame in tree.frames}
+        for name, contact in zip(ground.names, ground.contacts, strict=True):
+            for load in self.decomposer.loads:
+                if load.seat.frame.body == body[str(contact.frame)]:
+                    yield (
+                        f"load {load.name!r} and contact {name!r} act on one body; what was measured at the"
+                        " contact is given with --contact-loads"
+                    )
 
 
 def _prepared(

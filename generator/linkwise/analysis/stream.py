@@ -20,8 +20,8 @@ from linkwise.progress import Progress
 Sink = Callable[[Array], None]
 """Takes one block (columns, samples) after the other; the block is the sink's own."""
 
-INNER = 4096
-"""Samples computed at once, so that the intermediate values stay in the cache."""
+INNER, LEAST = 4096, 1024
+"""Samples computed at once, so that the intermediate values stay in the cache; of wide results fewer."""
 
 BLOCK_BYTES = 48 << 20
 """Size of a block handed on, about: some three of them are in memory at any time."""
@@ -88,12 +88,13 @@ def stream(
     peak = np.zeros(len(decomposer.columns))
     work = WorkSum(decomposer.columns)
     closure = Closure()
+    inner = _at_once(len(decomposer.columns))
     with ThreadPoolExecutor(1) as writer, np.errstate(over="ignore", invalid="ignore"):
         pending: Future[None] | None = None
         for first, last in _blocks(start, stop, len(decomposer.columns)):
             block = np.empty((len(decomposer.columns), last - first))
-            for at in range(first, last, INNER):
-                end = min(at + INNER, last)
+            for at in range(first, last, inner):
+                end = min(at + inner, last)
                 q, qd, qdd = derivatives(samples.q, samples.rate, at, end, processing)
                 out = block[:, at - first : end - first]
                 closure |= decomposer.fill(out, samples.time[at:end], q, qd, qdd)
@@ -141,7 +142,12 @@ def _largest(samples: Samples, decomposer: Decomposer, at: int) -> str:
     return f": {decomposer.robot.joints[joint]!r} comes to {near[row, joint]:.3g} in {where}"
 
 
+def _at_once(columns: int) -> int:
+    return min(INNER, max(LEAST, BLOCK_BYTES // (8 * columns)))
+
+
 def _blocks(start: int, stop: int, columns: int) -> Iterator[tuple[int, int]]:
-    rows = max(INNER, BLOCK_BYTES // (8 * columns) // INNER * INNER)
+    inner = _at_once(columns)
+    rows = max(inner, BLOCK_BYTES // (8 * columns) // inner * inner)
     for at in range(start, stop, rows):
         yield at, min(at + rows, stop)

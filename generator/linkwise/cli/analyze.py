@@ -175,5 +175,16 @@ def _told(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {analysis.robot.backend};"
         f" {recursion}; closure: terms sum to partial torques within {closure.terms_relative:.1e},"
         f" these to joint torques within {closure.links_relative:.1e} (relative){shares}",
+        *_of_contacts(analysis),
         *map(str, files),
+    ]
+
+
+def _of_contacts(analysis: Analysis) -> list[str]:
+    """How far a motion is from keeping its contacts."""
+    ground = analysis.robot.contacts
+    slips = [] if ground is None else [analysis.largest_slip(c) for c in range(len(ground.names))]
+    return [
+        f"contact {name} moves by up to {metres:.3g} m/s and {turns:.3g} rad/s while it is on"
+        for name, (metres, turns) in zip(() if ground is None else ground.names, slips, strict=True)
     ]
