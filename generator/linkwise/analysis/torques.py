@@ -116,7 +116,7 @@ class Decomposer:
         for row, source, _ in self.sources["tau_gravity"]:
             out[row] = packed.gravity[..., source]
         self._fill_forces(out, time, q, qd, qdd)
-        closure = self._closure(out) | self.induced.fill(out, packed.acceleration, q, qd, qdd)
+        closure = self._closure(out) | self.induced.fill(out, packed, q, qd, qdd)
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             for column, values in zip(self.columns, out, strict=True):
