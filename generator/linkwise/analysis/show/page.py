@@ -1,6 +1,7 @@
 """`report.html`: the analysis as one file that needs no network."""
 
 import base64
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,9 @@ import numpy as np
 from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import FORCES, INDUCED, TORQUE_OF, Column
+from linkwise.analysis.show.induced_figure import TITLES
 from linkwise.analysis.show.poses import poses
+from linkwise.analysis.show.source_curves import components, numbers_of_curves, source_curves
 from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
 from linkwise.extras import extra
@@ -38,9 +41,14 @@ def view(result: AnalysisResult) -> dict[str, str]:
 def on_page(column: Column) -> bool:
     """Whether a page holds a column: not power, which is the product of two that it holds.
 
-    Nor does it hold forces of constraints and induced accelerations.
+    Nor does it hold forces of constraints; of induced accelerations it holds sums.
     """
     return column.quantity not in (*TORQUE_OF, *FORCES, *INDUCED)
+
+
+def numbers_on_page(columns: Sequence[Column]) -> int:
+    """Of each sample, at most."""
+    return sum(map(on_page, columns)) + numbers_of_curves(columns)
 
 
 def page_data(result: AnalysisResult) -> str:
@@ -87,6 +95,7 @@ def page_data(result: AnalysisResult) -> str:
         "gravityColour": GRAVITY,
         "bodies": _bodies(result),
         "loads": _loads(result),
+        "induced": [_induced(result, point) for point in range(len(result.induced))],
     }
     return script_data(data)
 
@@ -120,6 +129,24 @@ def _loads(result: AnalysisResult) -> list[dict[str, str]]:
         {"name": printable(label), "places": _encode(at.place), "forces": _encode(at.force)}
         for label, at in zip(result.load_labels, wrenches, strict=True)
     ]
+
+
+def _induced(result: AnalysisResult, point: int) -> dict[str, Any]:
+    """Components of what accelerates, and the curves of its sources, (rows, samples) each."""
+    name, rows = result.induced[point], components(result, point)
+    return {
+        "name": printable(TITLES.get(name, name)),
+        "rows": [{"name": printable(row), "unit": unit} for row, unit in rows.values()],
+        "curves": [
+            {
+                "kind": curve.kind,
+                "label": printable(curve.label),
+                "at": curve.number,
+                "values": _encode(curve.values),
+            }
+            for curve in source_curves(result, point, list(rows))
+        ],
+    }
 
 
 def _work(result: AnalysisResult) -> list[dict[str, float]]:
