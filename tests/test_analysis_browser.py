@@ -123,6 +123,35 @@ def test_numbers_in_the_table_are_the_files(page, result):
     assert sum(value for _, value, _ in cells[:-1]) == pytest.approx(cells[-1][1], rel=1e-12)
 
 
+def test_what_accelerates_a_point_is_shown_by_source_and_adds_up(driver, tmp_path):
+    log, robot = write_csv(tmp_path / "log.csv", smooth(300, 3)), load_robot(PLANAR3)
+    wanted = Wanted("csv", induced=("joints", "link3,0.25,0,0"))
+    loads = Loads.of([Load("pull", "link3", force=(0.0, -5.0, 0.0))], None)
+    result, _ = analyze_to(tmp_path / "out", log, robot, Reading(), Processing(), wanted, silent, loads)
+    driver.get((tmp_path / "out" / "report.html").as_uri())
+    curves = "return [...document.getElementById('induced').data].map((c) => [c.name, Array.from(c.y)])"
+    choose(driver, "component", 1)
+    (name, whole), *parts = driver.execute_script(curves)
+    assert name == "all together"
+    np.testing.assert_array_equal(whole, result["acc/joints/joint2"])
+    choose(driver, "point", 1)
+    options = driver.execute_script(
+        "return [...document.getElementById('component').options].map((o) => o.textContent)"
+    )
+    assert options == ["turning about z", "x", "y"]
+    (_, whole), *parts = driver.execute_script(curves)
+    np.testing.assert_array_equal(whole, result["acc/link3,0.25,0,0/x"])
+    assert [part for part, _ in parts] == [
+        *(f"torque of joint{i}" for i in (1, 2, 3)), "gravity", "velocities", "load pull"
+    ]  # fmt: skip
+    np.testing.assert_allclose(np.sum([y for _, y in parts], axis=0), whole, atol=1e-10 * np.abs(whole).max())
+    cursor = "return document.getElementById('induced-cursor').style.left"
+    before = driver.execute_script(cursor)
+    choose(driver, "slider", 10)
+    assert driver.execute_script(cursor) != before
+    assert driver.get_log("browser") == []
+
+
 POWER = "return document.getElementById('power').data[0]"
 
 
@@ -164,7 +193,7 @@ def test_curves_are_linked_to_the_slider(page):
     choose(page, "slider", 700)
     share = page.execute_script(
         "const area = document.querySelector('#curves .nsewdrag').getBoundingClientRect();"
-        "const line = document.getElementById('cursor').getBoundingClientRect();"
+        "const line = document.getElementById('curves-cursor').getBoundingClientRect();"
         "return (line.left + line.width / 2 - area.left) / area.width"
     )
     assert share == pytest.approx(700 / 999, abs=2e-3)

@@ -156,6 +156,53 @@ def test_the_pin_bears_what_the_rocker_needs_to_swing(folder: Path) -> None:
     np.testing.assert_allclose(by_link[:, 0], 0.0, atol=1e-12)  # the crank turns about its own pin
 
 
+def test_each_source_alone_accelerates_crank_and_rocker_by_the_one_equation_of_motion(
+    folder: Path, tmp_path: Path
+) -> None:
+    geared = FOUR_BAR.replace('name = "swing",', 'name = "swing", armature = 0.05,')
+    (tmp_path / "geared.toml").write_text(geared)
+    write_package(generate(read_system(tmp_path / "geared.toml"), ["numpy"]), tmp_path / "geared")
+    pull = Load("pull", "rocker", force=(3.0, -2.0, 0.0), point=(0.1, 0.0, 0.0))
+    bag = Payload("coupler", 0.7, (0.4, 0.0, 0.0), "bag")
+    result = analyze(
+        folder / "crank.csv",
+        tmp_path / "geared",
+        processing=ALL,
+        loads=[pull],
+        payloads=[bag],
+        induced=["joints", "rocker,0.4,0,0"],
+    )
+    x, xd, _ = motion(result)
+    every = [(name, None) for name in MASSES] + [("coupler", (0.7, 0.4))]
+    follows = slope(lambda at: angles(at)[2], x)
+    further = slope(lambda at: slope(lambda y: angles(y)[2], at), x)
+    inertia = sum(share_of(name, x, xd, 1.0, mass)[0] for name, mass in every) + 0.05 * follows**2
+    own = {"tau": result.torque[:, 0]}
+    for title, (name, mass) in zip((*MASSES, "bag"), every, strict=True):
+        own[f"gravity/{title}"] = -share_of(name, x, xd, 1.0, mass)[2]
+    bend = slope(lambda at: angles(at)[1] - at, x)
+    own |= {"spring/turn": -2.0 * (x - 0.2), "damping/bend": -0.3 * bend**2 * xd}
+    at = [slope(lambda y, f=f: 0.1 * f(angles(y)[2]), x) for f in (np.cos, np.sin)]
+    own["load/pull"] = 3.0 * at[0] - 2.0 * at[1]
+    motions = sum(share_of(name, x, xd, 1.0, mass)[1] for name, mass in every)
+    motions = -(motions + 0.05 * follows * further * xd**2) / inertia
+    by_velocities = {"turn": motions, "swing": follows * motions + further * xd**2}
+    for joint, factor in (("turn", 1.0), ("swing", follows)):
+        for source, force in own.items():
+            kind, _, cause = source.partition("/")
+            found = result[f"acc_{kind}/joints/{joint}/{cause or 'turn'}"]
+            np.testing.assert_allclose(found, factor * force / inertia, rtol=0, atol=1e-8, err_msg=source)
+        prefixes = tuple(f"acc_{kind}/joints/{joint}/" for kind in ("qd", "constraint", "kinematic"))
+        there = sum(result[c.name] for c in result.columns if c.name.startswith(prefixes))
+        np.testing.assert_allclose(there, by_velocities[joint], rtol=0, atol=1e-6)
+    tip = [slope(lambda y, f=f: 0.4 * f(angles(y)[2]), x) for f in (np.cos, np.sin)]
+    for component, moved in zip("xy", tip, strict=True):
+        found = result[f"acc_gravity/rocker,0.4,0,0/{component}/bag"]
+        np.testing.assert_allclose(found, moved * own["gravity/bag"] / inertia, rtol=0, atol=1e-8)
+    assert result.closure.induced_relative is not None
+    assert result.closure.induced_relative <= 1e-12
+
+
 def test_a_log_of_all_joints_is_closed_and_says_how_far_off_it_was(folder: Path, tmp_path: Path) -> None:
     table = np.loadtxt(folder / "joints.csv", delimiter=",", skiprows=1)
     exact = analyze(folder / "joints.csv", folder / "robot")

@@ -96,3 +96,48 @@ def test_contacts_bear_what_the_base_asks_by_the_least_forces(
                 assert relative_error(result.contact_wrench[s, c], found) <= LIMIT
         assert not result.torque[s, :6].any()  # the base gives nothing, to the last digit
         assert len(feet) == 4 or not result.contact_wrench[s, 0].any()
+
+
+def test_each_source_moves_a_robot_that_stands_as_one_system_of_equations_says(
+    solo: tuple[Path, PinocchioModel],
+) -> None:
+    """[M −Aᵀ; A 0] [q̈_x; λ_x] = [F_x; b_x], b that of contacts alone; shares sum to a measured motion."""
+    folder, own = solo
+    feet = FEET[:2]
+    push = Load("push", "base_link", (3.0, -2.0, 5.0))
+    contacts = Contacts(feet, {"front": WhileColumn("stands")})
+    result = analyze(
+        folder / "log.csv", folder / "robot", contacts=contacts, loads=[push], induced=["joints"]
+    )
+    for s in (0, 30, 59):
+        q, qd, qdd = result.q[s], result.qd[s], result.qdd[s]
+        on = feet[int(result.time[s] < 0.2) :]
+        rows = np.concatenate([rows_of(own, contact, q) for contact in on])
+        mass, n = own.mass(q), len(q)
+        whole = np.block([[mass, -rows.T], [rows, np.zeros((len(rows), len(rows)))]])
+
+        def moved(force: Any, bend: Any, whole: Any = whole, n: int = n) -> Any:
+            return np.linalg.lstsq(whole, np.concatenate([force, bend]), rcond=None)[0][:n]
+
+        rest, still = np.zeros(n), np.zeros(len(rows))
+        gravity = moved(-own.gravity(q), still)
+        velocity = moved(own.gravity(q) - own.torque(q, qd, rest), still)
+        slip = moved(rest, rows @ qdd)
+        motors = qdd - gravity - velocity - slip
+        names, found = result.robot.joints, {}
+        for kind in ("acc", "acc_gravity", "acc_qd", "acc_contact", "acc_tau", "acc_load"):
+            found[kind] = np.array(
+                [
+                    sum(
+                        values[s]
+                        for column, values in zip(result.columns, result.values, strict=True)
+                        if column.quantity == kind and column.row == i
+                    )
+                    for i in range(len(names))
+                ]
+            )
+        scale = max(np.abs(a).max() for a in found.values())
+        expected = {"acc": qdd, "acc_gravity": gravity, "acc_qd": velocity, "acc_contact": slip}
+        for kind, value in expected.items():
+            assert np.abs(found[kind] - value).max() <= LIMIT * scale, kind
+        assert np.abs(found["acc_tau"] + found["acc_load"] - motors).max() <= LIMIT * scale

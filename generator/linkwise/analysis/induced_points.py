@@ -46,15 +46,9 @@ class InducedPoint:
 def induced_points(texts: Sequence[str], robot: LoadedRobot) -> tuple[InducedPoint, ...]:
     """Points of FRAME, FRAME,X,Y,Z, joints and centre-of-mass.
 
-    Raises LinkwiseError for a frame that is not there, a point that is not three numbers, one that stands
-    twice, and for a robot with constraints.
+    Raises LinkwiseError for a frame that is not there, a point that is not three numbers, and one that
+    stands twice.
     """
-    tree = robot.package.manifest.tree
-    if texts and tree is not None and tree.tied:
-        raise LinkwiseError(
-            f"--induced {texts[0]}: {robot.name} has constraints, of which an analysis does not know yet; ask"
-            " the package's induced_accelerations"
-        )
     twice = [text for text, count in Counter(texts).items() if count > 1]
     if twice:
         raise LinkwiseError(f"--induced {twice[0]} is given twice; leave one of them out")

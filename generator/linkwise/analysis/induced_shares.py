@@ -1,38 +1,39 @@
-"""Shares of accelerations by source, from the torques that a result has: q̈_x = M⁻¹ F_x, point by point.
+"""Shares of accelerations by source, from the torques that a result has: M q̈_x = F_x, point by point.
 
-    M q̈ = Σ_i u_i − Σ_js c1_ijs q̇_s − Σ_j g_ij − spring, damping, friction − Σ_e τ_ie
+Where joints are tied, A q̇ = 0, each source x solves
 
-with u_i = τ_i what the joint gives, and armature in M. A point accelerates by J q̈_x, and by J̇ q̇ itself.
+    [M −Aᵀ; A 0] [q̈_x; λ_x] = [F_x; b_x]      b = −Ȧ q̇ for the constraints' own source, else 0
+
+as `induced_accelerations` of the package does. So velocities are those of all joints, and a link's share of
+them is c1_ijs q̇_s of the open tree: what c1^ of the independent joints has besides, c2 Ġ, answers to the
+constraints that turn, and counts in their own source by the joint whose velocity turns them.
+
+Where the robot stands on contacts, `StandingResponse` says how it answers, and contacts are sources too.
+
+A point accelerates by J q̈_x, and by J̇ q̇ itself.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.contacts.ground_contacts import Standing
+from linkwise.analysis.contacts.standing_response import StandingResponse
 from linkwise.analysis.induced_points import InducedPoint
+from linkwise.analysis.induced_sources import InducedSources, opened
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.result_columns import SHARE_OF, Column, Quantity
-from linkwise.analysis.term_rows import mirrored
+from linkwise.analysis.model_side import NAMES, Side
+from linkwise.analysis.result_columns import Column, Quantity
 from linkwise.analysis.verify import Closure, worst_of
 from linkwise.errors import LinkwiseError
 from linkwise.escape import column_part
 from linkwise.package.load import Array
-from linkwise.runtime.sums.inertia_solve import solved_columns
+from linkwise.runtime.induced.responses import FreeResponse, Response, TiedResponse
 
 AT_ONCE = 1 << 21
 """Numbers of the sources' forces computed at once."""
-
-
-@dataclass(frozen=True)
-class ForceSource:
-    """A source: which of the result's torques are its force on the coordinates."""
-
-    quantity: Quantity
-    link: int | None
-    cause: int | None
-    torques: tuple[tuple[int, int, float], ...]
-    """Coordinate, row of the result, and the sign with which the torque drives it."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class InducedShares:
 
     robot: LoadedRobot
     points: tuple[InducedPoint, ...]
-    sources: tuple[ForceSource, ...]
+    sources: InducedSources
     columns: tuple[Column, ...]
     first: int
     """Row of the result at which they begin."""
@@ -55,32 +56,33 @@ class InducedShares:
         loads: Sequence[str],
     ) -> "InducedShares":
         """others: all columns of torques and motion; loads: their names."""
-        sources = _sources(others) if points else ()
+        sources = InducedSources.of(robot, others if points else ())
         columns = tuple(
             column
             for number, point in enumerate(points)
             for row in range(len(point.rows))
-            for column in _columns(robot, loads, sources, point, number, row)
+            for column in _columns(sources, loads, point, number, row)
         )
         return cls(robot, tuple(points), sources, columns, len(others))
 
-    def fill(self, out: Array, mass: Array, q: Array, qd: Array, qdd: Array) -> Closure:
-        """Fill columns of `out` (columns, S), whose torques are there; mass: c2 in the layout's order."""
+    def fill(
+        self, out: Array, packed: Any, standing: Standing | None, q: Array, qd: Array, qdd: Array
+    ) -> Closure:
+        """Fill columns of `out` (columns, S), whose torques are there; packed: of the robot's model."""
         worst = Closure()
-        numbers = max(1, len(self.sources) * q.shape[1])
+        numbers = max(1, len(self.sources.every) * q.shape[1])
         step = max(1, AT_ONCE // numbers)
         for at in range(0, len(q), step) if self.points else ():
             some = slice(at, at + step)
-            worst |= self._fill(out[:, some], mass[some], q[some], qd[some], qdd[some])
+            part = Side(*(getattr(packed, name)[some] for name in NAMES))
+            rows = None if standing is None else standing.every[some]
+            worst |= self._fill(out[:, some], part, rows, q[some], qd[some], qdd[some])
         return worst
 
-    def _fill(self, out: Array, mass: Array, q: Array, qd: Array, qdd: Array) -> Closure:
-        forces = np.zeros((*q.shape, len(self.sources)))
-        for x, source in enumerate(self.sources):
-            for i, row, sign in source.torques:
-                forces[:, i, x] += sign * out[row]
+    def _fill(self, out: Array, packed: Side, rows: Array | None, q: Array, qd: Array, qdd: Array) -> Closure:
+        mass, forces = self.sources.mass_and_forces(out, packed, q, qd, qdd)
         try:
-            moved = solved_columns(self._mass(mass, q.shape[1]), forces, self.robot.joints)
+            moved = self._moved(self._response(mass, q, qd), forces, rows, qdd)
         except ValueError as error:
             raise LinkwiseError(f"--induced: {error}") from error
         row, worst = self.first, Closure()
@@ -100,49 +102,45 @@ class InducedShares:
                 worst |= Closure(induced_absolute=absolute, induced_relative=relative)
         return worst
 
-    def _mass(self, packed: Array, n: int) -> Array:
-        """M (S, n, n) of links, payloads and what turns behind gears."""
-        mass = np.zeros((len(packed), n, n))
-        for i, _, k, source in mirrored(self.robot.model.layout):
-            mass[:, i, k] += packed[:, source]
-        for own in self.robot.passive:
-            mass[:, own.coordinate, own.coordinate] += own.ratio**2 * own.armature
-        return mass
+    def _moved(self, free: Response, forces: Array, rows: Array | None, qdd: Array) -> Array:
+        """q̈_x (S, n, X) of forces, then of ties, then of contacts with rows A (S, C, n)."""
+        ground = self.robot.contacts
+        response = free if rows is None else StandingResponse(free, rows)
+        moved = [response.accelerations(forces)]
+        if self.robot.constrained is not None:
+            moved.append(response.of_velocities())
+        if isinstance(response, StandingResponse) and ground is not None:
+            moved.append(response.of_contacts(qdd, ground.owners, len(ground.names)))
+        return np.concatenate(moved, axis=2)
 
-
-def _sources(columns: Sequence[Column]) -> tuple[ForceSource, ...]:
-    """What drives the coordinates: joints' torques forwards, all that these are needed for backwards."""
-    found: dict[tuple[Quantity, int | None, int | None], list[tuple[int, int, float]]] = {}
-    for quantity, torque in SHARE_OF.items():
-        for row, c in enumerate(columns):
-            if c.quantity != torque or c.joint is None:
-                continue
-            of_links = torque in ("tau_qd", "tau_gravity", "tau_load")
-            key = quantity, c.link, c.cause if of_links else c.joint
-            found.setdefault(key, []).append((c.joint, row, 1.0 if torque == "tau" else -1.0))
-    return tuple(ForceSource(*key, tuple(torques)) for key, torques in found.items())
+    def _response(self, mass: Array, q: Array, qd: Array) -> Response:
+        model = opened(self.robot)
+        if self.robot.constrained is None:
+            return FreeResponse(model, q, mass)
+        ties = self.robot.constrained.constraints
+        mapped, bias = (np.asarray(a) for a in (ties.velocity_map(q), ties.velocity_accelerations(q, qd)))
+        return TiedResponse(model, q, mass, ties, mapped, bias)
 
 
 def _columns(
-    robot: LoadedRobot,
-    loads: Sequence[str],
-    sources: Sequence[ForceSource],
-    point: InducedPoint,
-    number: int,
-    row: int,
+    sources: InducedSources, loads: Sequence[str], point: InducedPoint, number: int, row: int
 ) -> list[Column]:
     """Of one component of a point: its acceleration, the shares of the sources, and J̇ q̇ by its causes."""
-    unit = point.units[row]
+    unit, robot = point.units[row], sources.robot
 
     def column(quantity: Quantity, link: int | None, cause: int | None, names: Sequence[str]) -> Column:
         name = "/".join([quantity, *map(column_part, (point.name, point.rows[row], *names))])
         return Column(quantity, name, unit, None, link, cause, number, row)
 
     made = [column("acc", None, None, ())]
-    for source in sources:
+    for source in sources.every:
         causes = loads if source.quantity == "acc_load" else robot.joints
         names = [] if source.link is None else [robot.links[source.link]]
         names += [] if source.cause is None else [causes[source.cause]]
         made.append(column(source.quantity, source.link, source.cause, names))
+    if robot.constrained is not None:
+        made += [column("acc_constraint", None, s, [joint]) for s, joint in enumerate(robot.joints)]
+    if robot.contacts is not None:
+        made += [column("acc_contact", None, c, [name]) for c, name in enumerate(robot.contacts.names)]
     made += [column("acc_kinematic", None, s, [joint]) for s, joint in enumerate(robot.joints)]
     return made

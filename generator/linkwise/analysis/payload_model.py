@@ -49,6 +49,13 @@ class PayloadModel:
         """What payloads do not change: names, kinematics, what joints have of their own."""
         return getattr(self.own, name)
 
+    @property
+    def open(self) -> "PayloadModel":
+        """The same without ties, where joints are tied."""
+        own: Any = self.own
+        payloads: Any = [(part.link, part.model) for part in self.parts]
+        return PayloadModel.of(own.open, [(link, model.open) for link, model in payloads])
+
     def packed(self, q: Array, qd: Array, qdd: Array) -> Side:
         """All coefficients and τ_ij on the paths."""
         values = [self.own.packed(q, qd, qdd), *(part.model.packed(q, qd, qdd) for part in self.parts)]

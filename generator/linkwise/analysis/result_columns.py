@@ -53,6 +53,8 @@ Quantity = Literal[
     "acc_damping",
     "acc_friction",
     "acc_load",
+    "acc_constraint",
+    "acc_contact",
     "acc_kinematic",
 ]
 MEANING: dict[Quantity, str] = {
@@ -99,19 +101,24 @@ MEANING: dict[Quantity, str] = {
     "acc_damping": "acceleration by the damping of the cause's joint alone",
     "acc_friction": "acceleration by the Coulomb friction of the cause's joint alone",
     "acc_load": "acceleration by the load alone",
+    "acc_constraint": "acceleration by constraints that turn with the cause's velocity",
+    "acc_contact": "acceleration by what the contact itself does, as what it holds turns and slips",
     "acc_kinematic": "acceleration of the point by the cause's velocity, without any of a joint",
 }
-SHARE_OF: dict[Quantity, Quantity] = {
-    "acc_tau": "tau",
-    "acc_qd": "tau_qd",
-    "acc_gravity": "tau_gravity",
-    "acc_spring": "tau_spring",
-    "acc_damping": "tau_damping",
-    "acc_friction": "tau_friction",
-    "acc_load": "tau_load",
-}
-"""The torque whose force on the coordinates a share of an acceleration comes of."""
-INDUCED: tuple[Quantity, ...] = ("acc", *SHARE_OF, "acc_kinematic")
+INDUCED: tuple[Quantity, ...] = (
+    "acc",
+    "acc_tau",
+    "acc_qd",
+    "acc_gravity",
+    "acc_spring",
+    "acc_damping",
+    "acc_friction",
+    "acc_load",
+    "acc_constraint",
+    "acc_contact",
+    "acc_kinematic",
+)
+"""An acceleration, and its shares by source."""
 TERMS: tuple[Quantity, ...] = ("tau_qdd", "tau_qd", "tau_gravity")
 """The parts that sum to a partial torque."""
 PASSIVE: dict[Quantity, str] = {

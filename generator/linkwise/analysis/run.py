@@ -23,7 +23,7 @@ from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Payload, Processing, Reading, choices
 from linkwise.analysis.show import check_figure, draw, figure_png
-from linkwise.analysis.show.page import NUMBERS, SAMPLES, on_page, report
+from linkwise.analysis.show.page import NUMBERS, SAMPLES, numbers_on_page, report
 from linkwise.analysis.stream import KeptSamples, Sink, Streamed, span_of, stream, stride_for
 from linkwise.analysis.tables import Format, open_table
 from linkwise.analysis.torques import Decomposer
@@ -128,8 +128,8 @@ def analyze_to(
     with whole_directory(out, _refuse_unless_result) as draft:
         job = _prepared(log, robot, reading, processing, loads, contacts, progress, wanted, draft)
         columns = job.decomposer.columns
-        shown = sum(map(on_page, columns))
-        kept = KeptSamples(len(columns), stride_for(job.count, shown, NUMBERS, SAMPLES))
+        stride = stride_for(job.count, numbers_on_page(columns), NUMBERS, SAMPLES)
+        kept = KeptSamples(len(columns), stride)
         note = json_text(job.note())
         with open_table(draft / f"analysis.{wanted.table}", columns, note) as table:
 

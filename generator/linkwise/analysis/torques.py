@@ -119,7 +119,7 @@ class Decomposer:
             except ValueError as error:
                 raise LinkwiseError(f"between {time[0]:.6g} and {time[-1]:.6g} s: {error}") from None
         packed, standing = self.robot.model.packed(q, qd, qdd), self._standing(time, q)
-        mass, free = packed.acceleration, self.robot.model.inverse_dynamics(q, qd, qdd)
+        unborne, free = packed, self.robot.model.inverse_dynamics(q, qd, qdd)
         partial = self._dense(packed.torque, q.shape[1])
         if standing is not None and self.terms is not None:
             packed = self.terms.left(packed, standing, q.shape[1])
@@ -137,7 +137,7 @@ class Decomposer:
         for row, source, _ in self.sources["tau_gravity"]:
             out[row] = packed.gravity[..., source]
         self.forces.fill(out, self.columns, standing, time, (q, qd, qdd), partial)
-        closure = self._closure(out, partial) | self.induced.fill(out, mass, q, qd, qdd)
+        closure = self._closure(out, partial) | self.induced.fill(out, unborne, standing, q, qd, qdd)
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             velocity = _left(standing, velocity)

@@ -1,6 +1,7 @@
 """`report.html`: the analysis as one file that needs no network."""
 
 import base64
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,9 @@ import numpy as np
 from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import FORCES, GROUND, INDUCED, TORQUE_OF, Column
+from linkwise.analysis.show.induced_figure import TITLES
 from linkwise.analysis.show.poses import poses
+from linkwise.analysis.show.source_curves import components, numbers_of_curves, source_curves
 from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
 from linkwise.extras import extra
@@ -40,9 +43,15 @@ def view(result: AnalysisResult) -> dict[str, str]:
 def on_page(column: Column) -> bool:
     """Whether a page holds a column: not power, which is the product of two that it holds.
 
-    Nor does it hold forces of constraints, what else is known of contacts, and induced accelerations.
+    Nor does it hold forces of constraints and what else is known of contacts; of induced accelerations it
+    holds sums.
     """
     return column.quantity not in (*TORQUE_OF, *FORCES, *GROUND, *INDUCED)
+
+
+def numbers_on_page(columns: Sequence[Column]) -> int:
+    """Of each sample, at most."""
+    return sum(map(on_page, columns)) + numbers_of_curves(columns)
 
 
 def page_data(result: AnalysisResult) -> str:
@@ -90,6 +99,7 @@ def page_data(result: AnalysisResult) -> str:
         "bodies": _bodies(result),
         "loads": _loads(result),
         "reactions": _reactions(result),
+        "induced": [_induced(result, point) for point in range(len(result.induced))],
     }
     return script_data(data)
 
@@ -140,6 +150,24 @@ def _reactions(result: AnalysisResult) -> list[dict[str, str]]:
         label = printable(f"ground at {ground.names[c]}")
         out.append({"name": label, "places": _encode(centre), "forces": _encode(force)})
     return out
+
+
+def _induced(result: AnalysisResult, point: int) -> dict[str, Any]:
+    """Components of what accelerates, and the curves of its sources, (rows, samples) each."""
+    name, rows = result.induced[point], components(result, point)
+    return {
+        "name": printable(TITLES.get(name, name)),
+        "rows": [{"name": printable(row), "unit": unit} for row, unit in rows.values()],
+        "curves": [
+            {
+                "kind": curve.kind,
+                "label": printable(curve.label),
+                "at": curve.number,
+                "values": _encode(curve.values),
+            }
+            for curve in source_curves(result, point, list(rows))
+        ],
+    }
 
 
 def _work(result: AnalysisResult) -> list[dict[str, float]]:
