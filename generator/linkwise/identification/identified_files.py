@@ -1,4 +1,4 @@
-"""The files of an identification: a record, a page, and the robot as a URDF file."""
+"""The files of an identification: a record, a page, and the robot as a URDF file, its loops beside it."""
 
 from collections.abc import Iterator
 from typing import Any
