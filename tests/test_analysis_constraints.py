@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linkwise import LinkwiseError, Load, Payload, generate, identify, read_system, write_package
+from linkwise import LinkwiseError, Load, Payload, generate, read_system, write_package
 from linkwise.analysis import Processing, Reading, analyze
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.run import Wanted, analyze_to
@@ -267,11 +267,6 @@ def test_page_table_and_record_have_the_joints_that_are_driven(folder: Path, tmp
     assert sorted(data["bodies"]["coordinates"]) == [0, 1, 2]
     with pytest.raises(LinkwiseError, match="paper:JOINT with a joint of turn"):
         result.figure("paper:bend")
-
-
-def test_identification_of_a_closed_loop_is_refused(folder: Path) -> None:
-    with pytest.raises(LinkwiseError, match=r"four_bar has constraints \(pin\), which identify"):
-        identify(folder / "joints.csv", folder / "robot")
 
 
 def test_joints_that_follow_are_found_from_the_logs_own_first_sample(folder: Path, tmp_path: Path) -> None:

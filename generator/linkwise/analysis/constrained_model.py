@@ -98,6 +98,17 @@ class ConstrainedModel:
         """What the independent joints take for springs, losses and armatures of all joints, (S, n) each."""
         return tuple(self._projected(q, _array(a)) for a in self.open.passive_torque(q, qd, qdd))
 
+    def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Y^ of tau^_aj = Y^_aj pi_j, (S, n, N, 10), zero for joints that follow."""
+        own = _array(self.open.regressor(q, qd, qdd))
+        flat = own.reshape(*own.shape[:2], -1)
+        projected = _array(self.constraints.projected(q, flat, by_link=True))
+        return self._spread(projected.reshape(*projected.shape[:2], *own.shape[2:]), 1)
+
+    def velocity_map(self, q: Array) -> Array:
+        """G with columns in the places of the independent joints, (S, n, n)."""
+        return self._spread(_array(self.constraints.velocity_map(q)))
+
     def forces(self, q: Array, qd: Array, qdd: Array) -> Array:
         """What constraints bear of each link, (S, C, N)."""
         return _array(self.constraints.forces(q, qd, qdd))

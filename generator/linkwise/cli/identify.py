@@ -20,6 +20,7 @@ from linkwise.cli.log_options import (
     How,
     IgnoreExtra,
     Log,
+    LoopTolerance,
     Map,
     Package,
     Pad,
@@ -77,11 +78,12 @@ def identify(
     padding: Pad = None,
     friction: Friction = True,
     unseen: Unseen = 0.2,
+    loop_tolerance: LoopTolerance = 0.01,
     backend: Backend = None,
     as_json: Json = False,
 ) -> None:
     """What a log of motion and torques says of the links: masses, centres, inertias, friction."""
-    reading = Reading(units, time, pairs("--map", mapping or []), ignore_extra, resample)
+    reading = Reading(units, time, pairs("--map", mapping or []), ignore_extra, resample, loop_tolerance)
     lowpass = chosen_lowpass(cutoff, filter_order, padding)
     processing = chosen_processing(derivative, window, degree, lowpass, "trim")
     without = tuple(unmeasured or [])
@@ -119,6 +121,10 @@ def _told(found: Identification, files: Sequence[Path]) -> Iterator[str]:
         yield f"no torque of {listed(found.unmeasured)}{hidden}"
     if found.floating:
         yield f"no friction of {listed(found.floating)}: what floats has no bearings"
+    if found.followers:
+        shared = listed(found.shared_friction)
+        counted = f"; the friction of {shared} counts in that of the others" if found.shared_friction else ""
+        yield f"no torque of {listed(found.followers)}, which follow{counted}"
     for i, joint in enumerate(found.joints):
         yield (
             f"{joint}: torque {sizes[i]:.3g}, error {errors['fit'][i]:.3g} {what}, by the bodies "

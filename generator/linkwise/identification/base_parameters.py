@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwise.identification.random_motions import Motion, random_motion
 from linkwise.package.load import Array, Model
 
 NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
@@ -32,8 +33,6 @@ TIE = 1e-6
 """Of the larger: what of columns differs by less is equally large."""
 NOTHING = 1e-9
 """Of a column's size: a smaller part of another column is rounding too."""
-SPEED = 3.0
-"""rad/s and rad/s^2, m/s and m/s^2."""
 ROWS = 4
 """Rows of random motion for each column."""
 
@@ -70,16 +69,22 @@ class BaseParameters:
         return [combination_text(self.links, row, own) for row, own in rows]
 
 
-def base_parameters(model: Model, measured: Sequence[int] | None = None) -> BaseParameters:
+def samples_needed(model: Model, torques: int) -> int:
+    """How long random motions of a robot must be that has so many torques."""
+    return -(-ROWS * len(NAMES) * len(model.link_names) // torques) + ROWS
+
+
+def base_parameters(
+    model: Model, measured: Sequence[int] | None = None, motion: Motion | None = None
+) -> BaseParameters:
     """Base parameters of a robot, by random motions of up to SPEED; raises as its `regressor` does.
 
     measured: joints, counted from 0, whose torques there are, in any order; all if not given
+    motion: random motions of joints that are tied; those of free joints if not given
     """
     links, n = tuple(model.link_names), len(model.joint_names)
     columns = len(NAMES) * len(links)
-    generator = np.random.default_rng(0)
-    q = generator.uniform(-np.pi, np.pi, (-(-ROWS * columns // n) + ROWS, n))
-    qd, qdd = generator.uniform(-SPEED, SPEED, (2, *q.shape))
+    q, qd, qdd = random_motion(model, samples_needed(model, n)) if motion is None else motion
     rows = model.regressor(q, qd, qdd).reshape(len(q), n, columns)
     picked, combinations = _combinations(rows.reshape(-1, columns), np.arange(columns))
     hidden: tuple[str, ...] = ()

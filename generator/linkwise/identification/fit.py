@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwise.identification.base_parameters import SPEED, BaseParameters
+from linkwise.identification.base_parameters import BaseParameters
+from linkwise.identification.bearings import Bearings
 from linkwise.identification.normal_factors import JointEquations
 from linkwise.package.load import Array
 
@@ -24,10 +25,10 @@ POOR, WORST = 30.0, 1000.0
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What a log says of base parameters (base,) and friction (n, 2), viscous and Coulomb.
+    """What a log says of base parameters (base,) and friction (B, 2), viscous and Coulomb.
 
-    Friction is zero where a joint has none. n are the joints whose torques are measured, in the robot's
-    order.
+    Friction is zero where a joint has none. B are the joints of `Bearings`, first the n whose torques are
+    measured, in the robot's order: all, where joints are free.
     """
 
     beta: Array
@@ -52,10 +53,11 @@ class Excitation:
     worst: str
 
 
-def weighted_fit(equations: JointEquations, base: BaseParameters, rubs: NDArray[np.bool_]) -> Fit:
-    """Fit all joints together; `rubs` (n,) says which of them have friction."""
-    n, noise = len(equations.triangles), np.ones(len(equations.triangles))
-    condition = excitation(equations, base, rubs).condition
+def weighted_fit(equations: JointEquations, base: BaseParameters, bearings: Bearings) -> Fit:
+    """Fit all joints together."""
+    rubs, n = bearings.rubs, len(equations.triangles)
+    noise = np.ones(n)
+    condition = excitation(equations, base, bearings).condition
     for _ in range(ROUNDS):
         triangle = stacked(equations, noise, rubs)
         beta, friction = _solved(triangle, base, rubs)
@@ -63,7 +65,7 @@ def weighted_fit(equations: JointEquations, base: BaseParameters, rubs: NDArray[
     triangle = stacked(equations, noise, rubs)
     beta, friction = _solved(triangle, base, rubs)
     errors = np.linalg.norm(np.linalg.inv(triangle[:-1, :-1]), axis=1)
-    own = np.zeros((n, 2))
+    own = np.zeros((len(rubs), 2))
     own[rubs] = errors[base.count :].reshape(-1, 2)
     return Fit(beta, friction, errors[: base.count], own, noise, condition, triangle)
 
@@ -82,29 +84,25 @@ def _noise(equations: JointEquations, beta: Array, friction: Array, free: float)
 def stacked(equations: JointEquations, noise: Array, rubs: NDArray[np.bool_]) -> Array:
     """Triangle of all joints' equations, each divided by its noise."""
     n, size = equations.triangles.shape[:2]
-    base = size - 3
-    rows = np.zeros((n, size, base + 2 * int(rubs.sum()) + 1))
-    rows[:, :, :base] = equations.triangles[:, :, :base]
-    rows[:, :, -1] = equations.triangles[:, :, -1]
-    for at, i in enumerate(np.flatnonzero(rubs)):
-        rows[i, :, base + 2 * at : base + 2 * at + 2] = equations.triangles[i, :, base : base + 2]
-    weighted = rows / noise[:, None, None]
+    base = size - 2 * len(rubs) - 1
+    kept = np.concatenate([np.ones(base, np.bool_), np.repeat(rubs, 2), [True]])
+    weighted = equations.triangles[:, :, kept] / noise[:, None, None]
     triangle = np.linalg.qr(weighted.reshape(n * size, -1), mode="r")
     return np.asarray(triangle)
 
 
 def _solved(triangle: Array, base: BaseParameters, rubs: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """beta and friction (n, 2)."""
+    """beta and friction (B, 2)."""
     x = np.linalg.solve(triangle[:-1, :-1], triangle[:-1, -1]).astype(float)
     friction = np.zeros((len(rubs), 2))
     friction[rubs] = x[base.count :].reshape(-1, 2)
     return x[: base.count], friction
 
 
-def excitation(equations: JointEquations, base: BaseParameters, rubs: NDArray[np.bool_]) -> Excitation:
+def excitation(equations: JointEquations, base: BaseParameters, bearings: Bearings) -> Excitation:
     """How well a log's motion tells the unknowns apart, all joints weighing the same."""
-    triangle = stacked(equations, np.ones(len(rubs)), rubs)
-    sizes = np.concatenate([base.sizes, np.tile([SPEED / np.sqrt(3.0), 1.0], int(rubs.sum()))])
+    triangle = stacked(equations, np.ones(len(equations.triangles)), bearings.rubs)
+    sizes = np.concatenate([base.sizes, bearings.sizes[bearings.rubs].reshape(-1)])
     _, values, directions = np.linalg.svd(triangle[:-1, :-1] / sizes)
     worst = int(np.abs(directions[-1]).argmax())
     return Excitation(

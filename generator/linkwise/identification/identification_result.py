@@ -6,6 +6,7 @@ import numpy as np
 
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.identification.base_parameters import BaseParameters
+from linkwise.identification.bearings import Bearings, floating_coordinates
 from linkwise.identification.fit import Fit
 from linkwise.identification.normal_factors import JointEquations
 from linkwise.identification.physical_fit import PhysicalFit
@@ -20,6 +21,7 @@ class Identification:
     robot: LoadedRobot
     log: TorqueLog
     base: BaseParameters
+    bearings: Bearings
     fit: Fit
     """Base parameters and friction, by weighted least squares."""
     physical: PhysicalFit
@@ -30,18 +32,35 @@ class Identification:
     unseen: JointEquations
     """Equations of the part of the log that was fitted, and of the rest."""
     warnings: tuple[str, ...]
-    floating: tuple[str, ...]
-    """Those coordinates of floating joints whose torques are measured: without bearings, and friction."""
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Joints whose torques are measured, in the robot's order: those of fit, friction and errors."""
+        """Joints whose torques are measured, in the robot's order: those of noise and errors."""
         return tuple(self.robot.joints[i] for i in self.log.measured)
 
     @property
+    def followers(self) -> tuple[str, ...]:
+        """Joints that follow these, whose friction stands behind theirs."""
+        return tuple(self.robot.joints[i] for i in self.bearings.joints[len(self.log.measured) :])
+
+    @property
     def unmeasured(self) -> tuple[str, ...]:
-        """The other joints."""
-        return tuple(joint for joint in self.robot.joints if joint not in self.joints)
+        """Joints whose torques are not measured, without those that follow."""
+        return tuple(joint for joint in self.robot.driven_joints if joint not in self.joints)
+
+    @property
+    def floating(self) -> tuple[str, ...]:
+        """Coordinates of a base that floats whose torques are measured: without bearings, and friction."""
+        floats = floating_coordinates(self.robot)
+        return tuple(self.robot.joints[i] for i in self.log.measured if i in floats)
+
+    @property
+    def shared_friction(self) -> tuple[str, ...]:
+        """Followers whose friction counts in that of the others: no motion tells it from theirs."""
+        if not self.bearings.rubs.any():
+            return ()
+        rubs = self.bearings.rubs[len(self.log.measured) :]
+        return tuple(joint for joint, own in zip(self.followers, rubs, strict=True) if not own)
 
     def errors(self, equations: JointEquations) -> dict[str, Array]:
         """Root mean square error of each joint's torque: of the fit, of its bodies, and of the package."""

@@ -1,4 +1,4 @@
-"""The files of an identification: a record, a page, and the robot as a URDF file."""
+"""The files of an identification: a record, a page, and the robot as a URDF file, its loops beside it."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,6 +7,7 @@ import numpy as np
 
 from linkwise.escape import json_text, markdown
 from linkwise.identification.base_parameters import NAMES, UNITS
+from linkwise.identification.constraint_file import constraint_text
 from linkwise.identification.identification_result import Identification
 from linkwise.identification.pseudo_inertia import central
 from linkwise.identification.urdf_file import lost_gravity, urdf_text
@@ -20,7 +21,7 @@ def identified_files(found: Identification, manifest: Manifest, choices: dict[st
     """The files, by name; `choices` are recorded."""
     assert manifest.tree is not None
     pi = dict(zip(found.robot.links, found.physical.pi, strict=True))
-    every = zip(found.joints, found.physical.friction, strict=True)
+    every = zip((*found.joints, *found.followers), found.physical.friction, strict=True)
     friction = {joint: own for joint, own in every if joint not in found.floating}
     urdf = urdf_text(manifest.name, manifest.tree, manifest.joints, pi, friction)
     about = record(found) | {"gravity": list(manifest.tree.gravity), "choices": choices}
@@ -29,18 +30,26 @@ def identified_files(found: Identification, manifest: Manifest, choices: dict[st
         "identified.md": page(found, lost_gravity(manifest.tree)),
         f"{manifest.name}.urdf": urdf,
     }
+    if manifest.tree.tied:
+        texts[f"{manifest.name}.toml"] = constraint_text(manifest.tree, manifest.joints)
     return {name: text.encode() for name, text in texts.items()}
 
 
 def record(found: Identification) -> dict[str, Any]:
     """Everything found, as plain data."""
     fit, robot = found.fit, found.robot
-    joints = {
+    friction = {
         name: {
             "viscous": fit.friction[i, 0],
             "viscous_error": fit.friction_errors[i, 0],
             "coulomb": fit.friction[i, 1],
             "coulomb_error": fit.friction_errors[i, 1],
+        }
+        for i, name in enumerate((*found.joints, *found.followers))
+    }
+    joints = {
+        name: {
+            **friction[name],
             "noise": fit.noise[i],
             **{f"unseen_error_{what}": e[i] for what, e in found.errors(found.unseen).items()},
             **{f"seen_error_{what}": e[i] for what, e in found.errors(found.seen).items()},
@@ -67,6 +76,9 @@ def record(found: Identification) -> dict[str, Any]:
         "condition_number": fit.condition,
         "base_parameters": base,
         "joints": joints,
+        "joints_that_follow": {name: friction[name] for name in found.followers},
+        "friction_counted_in_others": list(found.shared_friction),
+        "largest_violation": None if found.log.closed is None else found.log.closed.largest,
         "unmeasured_joints": list(found.unmeasured),
         "joints_without_bearings": list(found.floating),
         "hidden": list(found.base.hidden),
@@ -102,13 +114,14 @@ def _joints(found: Identification) -> Iterator[str]:
     seen, unseen = found.errors(found.seen), found.errors(found.unseen)
     shown = unseen if found.unseen.rows else seen
     columns = (found.seen.sizes(), seen["fit"], unseen["fit"], shown["bodies"], shown["package"])
-    units = [found.robot.units[i] for i in found.log.measured]
-    for i, (name, unit) in enumerate(zip(found.joints, units, strict=True)):
-        numbers = [f"{column[i]:.3g}" for column in columns]
+    units = [found.robot.units[i] for i in found.bearings.joints]
+    for i, (name, unit) in enumerate(zip((*found.joints, *found.followers), units, strict=True)):
+        numbers = [f"{column[i]:.3g}" if i < len(found.joints) else "-" for column in columns]
         numbers[2] = numbers[2] if found.unseen.rows else "-"
         rubs = zip(found.fit.friction[i], found.fit.friction_errors[i], strict=True)
         cells = [markdown(name), *numbers, *(f"{f:.4g} ± {e:.1g}" for f, e in rubs)]
         yield f"| {' | '.join([*cells, ', '.join(COEFFICIENTS[unit])])} |"
+    yield from _follow(found)
     if found.floating:
         yield ""
         names = ", ".join(map(markdown, found.floating))
@@ -116,6 +129,19 @@ def _joints(found: Identification) -> Iterator[str]:
     if found.unmeasured:
         yield ""
         yield f"Not measured, and left out of the fit: {', '.join(map(markdown, found.unmeasured))}."
+
+
+def _follow(found: Identification) -> Iterator[str]:
+    if not found.followers:
+        return
+    yield ""
+    yield (
+        f"{', '.join(map(markdown, found.followers))} follow by the constraints and have no torque: what "
+        "they take is borne by the others."
+    )
+    if found.shared_friction:
+        names = ", ".join(map(markdown, found.shared_friction))
+        yield f"No motion tells the friction of {names} from that of the others, in which it counts."
 
 
 def _base(found: Identification) -> Iterator[str]:

@@ -4,19 +4,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.analysis.settings import Processing, Reading
 from linkwise.errors import LinkwiseError, within
-from linkwise.identification.base_parameters import BaseParameters, base_parameters
-from linkwise.identification.bearings import floating_coordinates
+from linkwise.identification.base_parameters import BaseParameters, base_parameters, samples_needed
+from linkwise.identification.bearings import Bearings
 from linkwise.identification.fit import WORST, Excitation, excitation, weighted_fit
 from linkwise.identification.identification_result import Identification
 from linkwise.identification.log_warnings import doubts, noisy_positions
 from linkwise.identification.normal_factors import JointEquations, joint_equations
 from linkwise.identification.physical_fit import physical_fit
-from linkwise.identification.torque_log import read_torque_log
+from linkwise.identification.random_motions import Motion, random_closed_motion, random_motion
+from linkwise.identification.torque_log import TorqueLog, read_torque_log
 from linkwise.package.load import Array
 from linkwise.progress import Progress, silent
 from linkwise.runtime.rule.joint_tree import Bodies
@@ -63,36 +63,36 @@ def identify(
     reading, processing, fitting = reading or Reading(), processing or Processing(), fitting or Fitting()
     torques = fitting.torques, fitting.unmeasured, fitting.factor
     read = read_torque_log(Path(log), loaded, reading, processing, *torques, progress)
-    base = base_parameters(loaded.model, read.measured)
+    motion = _random_motion(loaded, read)
+    base = base_parameters(loaded.model, read.measured, motion)
+    bearings = Bearings.of(loaded, read.measured, motion, fitting.friction)
     end = read.stop - round(fitting.unseen * (read.stop - read.start))
     seen, unseen = (
-        joint_equations(read, span, loaded.model, base, processing, progress)
+        joint_equations(read, span, bearings, base, processing, progress)
         for span in ((read.start, end), (end, read.stop))
     )
-    joints = [loaded.joints[i] for i in read.measured]
-    without = floating_coordinates(loaded.bodies or ())
-    floating = tuple(joint for joint in joints if joint in without)
-    rubs = np.array([fitting.friction and joint not in floating for joint in joints])
     noisy = noisy_positions(read, loaded.joints, loaded.units, processing)
     with within(str(log)):
-        _refuse_few(seen, base, rubs)
-        _refuse_unexcited(excitation(seen, base, rubs), base, noisy)
-        fit = weighted_fit(seen, base, rubs)
-        physical = physical_fit(fit, base, own, rubs)
-    found = Identification(loaded, read, base, fit, physical, own, seen, unseen, read.warnings, floating)
+        _refuse_few(seen, base, bearings)
+        _refuse_unexcited(excitation(seen, base, bearings), base, noisy)
+        fit = weighted_fit(seen, base, bearings)
+        physical = physical_fit(fit, base, own, bearings.rubs)
+    found = Identification(loaded, read, base, bearings, fit, physical, own, seen, unseen, read.warnings)
     return replace(found, warnings=(*read.warnings, *doubts(found, noisy)))
+
+
+def _random_motion(robot: LoadedRobot, read: TorqueLog) -> Motion:
+    samples = samples_needed(robot.model, len(robot.driven))
+    if robot.constrained is None:
+        return random_motion(robot.model, samples)
+    return random_closed_motion(robot.constrained, read.q[read.start : read.stop], samples)
 
 
 def _own_parameters(robot: LoadedRobot) -> Array:
     if robot.bodies is None:
         raise LinkwiseError(f"{robot.name} is made of energies; only rigid links have parameters to identify")
-    if robot.constrained is not None:
-        tied = ", ".join(robot.constrained.constraints.names)
-        raise LinkwiseError(
-            f"{robot.name} has constraints ({tied}), which identify does not know; measure the open tree, and"
-            " generate it without them"
-        )
-    if not hasattr(robot.model, "regressor") or robot.model.backend.rule is None:
+    model = robot.model if robot.constrained is None else robot.constrained.open
+    if not hasattr(model, "regressor") or model.backend.rule is None:
         raise LinkwiseError(
             f"{robot.name} has no back end with regressors; generate the robot again, with --backend numpy"
         )
@@ -103,10 +103,10 @@ def _own_parameters(robot: LoadedRobot) -> Array:
     return pi
 
 
-def _refuse_few(seen: JointEquations, base: BaseParameters, rubs: NDArray[np.bool_]) -> None:
+def _refuse_few(seen: JointEquations, base: BaseParameters, bearings: Bearings) -> None:
     if not seen.sizes().any():
         raise LinkwiseError("every torque is 0 throughout, which tells nothing; see the columns")
-    unknowns = base.count + 2 * int(rubs.sum())
+    unknowns = base.count + 2 * int(bearings.rubs.sum())
     if seen.rows * len(seen.triangles) < 2 * unknowns:
         raise LinkwiseError(
             f"{seen.rows} samples are too few for {unknowns} unknowns; give a longer log, or lower --unseen"

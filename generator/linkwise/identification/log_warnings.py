@@ -144,11 +144,11 @@ def _impossible(found: Identification) -> Iterator[str]:
 def _expected(found: Identification) -> tuple[Array, Array]:
     """What the package expects of each joint, (n,): root mean square, and correlation with the log's."""
     beta = found.base.combinations @ found.own.reshape(-1)
-    n, count = len(found.seen.triangles), len(beta)
+    count = len(beta)
     # Y beta is the error of the equations without their torque.
     bare = JointEquations(found.seen.triangles.copy(), found.seen.rows)
     bare.triangles[:, :, -1] = 0.0
-    expected, sizes = bare.errors(beta, np.zeros((n, 2))), found.seen.sizes()
+    expected, sizes = bare.errors(beta, np.zeros_like(found.fit.friction)), found.seen.sizes()
     products = [(t[:, :count] @ beta) @ t[:, -1] for t in found.seen.triangles]
     both = expected * sizes * found.seen.rows
     return expected, np.array(products) / np.where(both > 0, both, np.inf)

@@ -1,7 +1,8 @@
 """Least squares of a long log in one pass: each joint's equations as the triangle that QR leaves of them.
 
-Row s of joint i is  [Y1_i | qd_i, sign(qd_i) | tau_i]  with the base columns Y1. Of A = Q R, R alone says all
-that a fit needs: ||A x|| = ||R x||. So blocks of a log are stacked on the triangle so far and made one again.
+Row s of joint i is  [Y1_i | F_i | tau_i]  with the base columns Y1 and F_i what it bears of every joint's
+friction: qd_i, sign(qd_i) in its own columns where joints are free. Of A = Q R, R alone says all that a fit
+needs: ||A x|| = ||R x||. So blocks of a log are stacked on the triangle so far and made one again.
 """
 
 from collections.abc import Iterator
@@ -12,8 +13,9 @@ import numpy as np
 from linkwise.analysis.derivatives import derivatives
 from linkwise.analysis.settings import Processing
 from linkwise.identification.base_parameters import BaseParameters
+from linkwise.identification.bearings import Bearings
 from linkwise.identification.torque_log import TorqueLog
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 NUMBERS = 1 << 23
@@ -22,31 +24,30 @@ NUMBERS = 1 << 23
 
 @dataclass(frozen=True)
 class JointEquations:
-    """Triangles (n, base + 3, base + 3) of equations, and how many rows each stands for.
+    """Triangles (n, base + 2 B + 1, base + 2 B + 1) of equations, and how many rows each stands for.
 
-    n here and below are the joints whose torques are measured, in the robot's order.
+    n here and below are the joints whose torques are measured, in the robot's order, B those of `Bearings`.
     """
 
     triangles: Array
     rows: int
 
     def errors(self, beta: Array, friction: Array) -> Array:
-        """Root of the mean square error of each joint, (n,), for beta (base,) and friction (n, 2)."""
-        unknowns = [np.concatenate([beta, own, [-1.0]]) for own in friction]
-        residuals = [triangle @ x for triangle, x in zip(self.triangles, unknowns, strict=True)]
+        """Root of the mean square error of each joint, (n,), for beta (base,) and friction (B, 2)."""
+        residuals = self.triangles @ np.concatenate([beta, friction.reshape(-1), [-1.0]])
         found: Array = np.linalg.norm(residuals, axis=1) / np.sqrt(max(self.rows, 1))
         return found
 
     def sizes(self) -> Array:
         """Root of the mean square torque of each joint, (n,)."""
-        n, base = len(self.triangles), self.triangles.shape[1] - 3
-        return self.errors(np.zeros(base), np.zeros((n, 2)))
+        found: Array = np.linalg.norm(self.triangles[:, :, -1], axis=1) / np.sqrt(max(self.rows, 1))
+        return found
 
 
 def joint_equations(
     log: TorqueLog,
     span: tuple[int, int],
-    model: Model,
+    bearings: Bearings,
     base: BaseParameters,
     processing: Processing,
     progress: Progress,
@@ -55,21 +56,21 @@ def joint_equations(
 
     What a joint's own spring and armature take is known, and off; friction is found anew.
     """
+    robot = bearings.robot
     n, columns, start = log.q.shape[1], base.combinations.shape[1], span[0]
-    triangles = np.zeros((len(log.measured), base.count + 3, base.count + 3))
+    size = base.count + 2 * len(bearings.joints) + 1
+    triangles = np.zeros((len(log.measured), size, size))
     picked = np.array(base.picked, dtype=np.intp)
     for first, last in _blocks(span, max(1, NUMBERS // (n * columns))):
         q, qd, qdd = derivatives(log.q, log.rate, first, last, processing)
-        known = model.passive_torque(q, qd, qdd)
-        torque = log.torque[first:last] - (known.spring + known.armature)[:, list(log.measured)]
-        y = model.regressor(q, qd, qdd).reshape(last - first, n, columns)
+        if robot.constrained is not None:
+            q, qd, qdd = robot.constrained.consistent(q, qd, qdd)
+        spring, _, _, armature = robot.model.passive_torque(q, qd, qdd)
+        torque = log.torque[first:last] - (spring + armature)[:, list(log.measured)]
+        y = robot.model.regressor(q, qd, qdd).reshape(last - first, n, columns)
+        rubbed = bearings.columns(q, qd).reshape(last - first, len(log.measured), -1)
         for at, i in enumerate(log.measured):
-            own = (
-                y[:, i, picked],
-                qd[:, i : i + 1],
-                np.sign(qd[:, i : i + 1]),
-                torque[:, at : at + 1],
-            )
+            own = y[:, i, picked], rubbed[:, at], torque[:, at : at + 1]
             stacked = np.concatenate([triangles[at], np.concatenate(own, axis=1)])
             triangles[at] = np.linalg.qr(stacked, mode="r")
         progress("fitting", last - start, span[1] - start)

@@ -32,17 +32,15 @@ SOLVED = ("Solved", "AlmostSolved")
 
 @dataclass(frozen=True, eq=False)
 class PhysicalFit:
-    """Parameters of links (N, 10), each of a body that can exist, and friction (n, 2), nowhere below 0.
-
-    n are the joints whose torques are measured, as in `Fit`.
-    """
+    """Parameters of links (N, 10), each of a body that can exist, and friction (B, 2) as in `Fit`, nowhere
+    below 0."""
 
     pi: Array
     friction: Array
 
 
 def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: NDArray[np.bool_]) -> PhysicalFit:
-    """Fit bodies near the robot's `own` parameters (N, 10), and friction where a joint rubs, (n,).
+    """Fit bodies near the robot's `own` parameters (N, 10), and friction where a joint rubs, (B,).
 
     Raises LinkwiseError where the solver fails.
     """

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from linkwise.analysis.closed_motion import ClosedLog, closed_samples
+from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.logs import open_log
-from linkwise.analysis.samples import read_samples
+from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Lowpass, Processing, Reading
 from linkwise.analysis.stream import span_of
 from linkwise.errors import LinkwiseError, within
@@ -46,6 +48,8 @@ class TorqueLog:
     """First sample to use, and the one after the last: derivatives may need those beyond."""
     warnings: tuple[str, ...]
     ignored: tuple[str, ...]
+    closed: ClosedLog | None = None
+    """How far positions of the log were off, where joints are tied; those of `q` close."""
 
 
 def read_torque_log(
@@ -63,25 +67,28 @@ def read_torque_log(
     Raises LinkwiseError for a joint without a torque that is not `unmeasured`, and for one with a torque that
     stands still.
     """
-    measured = _measured(robot.joints, torques, unmeasured)
+    measured = _measured(robot, torques, unmeasured)
     there = open_log(path).columns
     with within(str(path)):
         columns = _torque_columns(there, robot.joints, [robot.joints[i] for i in measured], torques)
         if not reading.ignore_extra:
-            _refuse_more_torques(there, robot.joints, columns, measured)
+            _refuse_more_torques(there, robot, columns, measured)
+        moving = with_columns(there, robot.joints, followers(robot), reading)
     names = tuple(f"torque of {robot.joints[i]}" for i in measured)
     mapping = (*reading.mapping, *zip(columns, names, strict=True))
     samples = read_samples(
         path,
-        (*robot.joints, *names),
-        (*robot.units, *["N m"] * len(names)),
+        (*(robot.joints[k] for k in moving), *names),
+        (*(robot.units[k] for k in moving), *["N m"] * len(names)),
         replace(reading, mapping=mapping),
         progress,
     )
-    n = len(robot.joints)
-    q, torque = samples.q[:, :n].copy(), samples.q[:, n:] * factor
-    noise = position_noise(q)
+    torque = samples.q[:, len(moving) :] * factor
     with within(str(path)):
+        q, closed = _positions(
+            replace(samples, q=samples.q[:, : len(moving)]), moving, robot, reading, progress
+        )
+        noise = position_noise(q)
         _refuse_endless(q, robot.joints, "position")
         _refuse_endless(torque, [robot.joints[i] for i in measured], "torque")
         start, stop = span_of(samples, processing)
@@ -90,13 +97,36 @@ def read_torque_log(
             start, stop = _settled(start, stop, samples.rate, processing.lowpass)
         _refuse_still(q[start:stop], robot, measured)
     told = samples.warnings, samples.ignored
-    return TorqueLog(path.name, samples.rate, q, noise, measured, torque, start, stop, *told)
+    return TorqueLog(path.name, samples.rate, q, noise, measured, torque, start, stop, *told, closed)
+
+
+def followers(robot: LoadedRobot) -> tuple[str, ...]:
+    """Joints that follow others, which have no torque; none where joints are free."""
+    return () if robot.constrained is None else tuple(robot.constrained.constraints.dependent)
+
+
+def _positions(
+    samples: Samples, moving: Sequence[int], robot: LoadedRobot, reading: Reading, progress: Progress
+) -> tuple[Array, ClosedLog | None]:
+    """Positions of all joints, of those of `moving`; ties close in them, where joints are tied."""
+    if robot.constrained is None:
+        return samples.q.copy(), None
+    told = reading.loop_tolerance
+    found, closed = closed_samples(samples, moving, robot.constrained, told, progress)
+    return found.q.copy(), closed
 
 
 def _measured(
-    joints: Sequence[str], torques: Sequence[tuple[str, str]], unmeasured: Sequence[str]
+    robot: LoadedRobot, torques: Sequence[tuple[str, str]], unmeasured: Sequence[str]
 ) -> tuple[int, ...]:
     """Joints that must have a torque, from 0; LinkwiseError where what is asked for cannot be."""
+    joints = robot.driven_joints
+    for joint in (*unmeasured, *(joint for _, joint in torques)):
+        if joint in followers(robot):
+            raise LinkwiseError(
+                f"{joint} follows {listed(map(repr, joints))} and gives no torque; leave it out, or generate"
+                " the robot with --independent and other joints"
+            )
     for joint in unmeasured:
         if joint not in joints:
             raise LinkwiseError(
@@ -107,7 +137,7 @@ def _measured(
             raise LinkwiseError(
                 f"--torque {column}={joint} and --unmeasured {joint} contradict each other; leave one out"
             )
-    found = tuple(i for i, joint in enumerate(joints) if joint not in unmeasured)
+    found = tuple(i for i in robot.driven if robot.joints[i] not in unmeasured)
     if not found:
         raise LinkwiseError("--unmeasured names every joint; at least one torque must be there")
     return found
@@ -152,13 +182,19 @@ def _torque_columns(
 
 
 def _refuse_more_torques(
-    columns: Sequence[str], joints: Sequence[str], used: Sequence[str], measured: Sequence[int]
+    columns: Sequence[str], robot: LoadedRobot, used: Sequence[str], measured: Sequence[int]
 ) -> None:
-    """LinkwiseError for a torque's column left over: of a joint that has another, or is unmeasured."""
-    for i, joint in enumerate(joints):
+    """LinkwiseError for a torque's column left over: its joint has another, is unmeasured or follows."""
+    for i, joint in enumerate(robot.joints):
         for column in (spelling.format(joint) for spelling in SPELLINGS):
-            if column not in columns or column in (*used, *joints):
+            if column not in columns or column in (*used, *robot.joints):
                 continue
+            if i not in robot.driven:
+                raise LinkwiseError(
+                    f"column {column!r} is a torque of {joint}, which follows {listed(robot.driven_joints)}"
+                    " and gives none; leave such columns out with --ignore-extra, or generate the robot with"
+                    " --independent and other joints"
+                )
             if i not in measured:
                 raise LinkwiseError(
                     f"column {column!r} is a torque of {joint}, which is --unmeasured; leave such columns "

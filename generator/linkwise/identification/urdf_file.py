@@ -38,16 +38,14 @@ def urdf_text(
     friction: Mapping[str, Array],
 ) -> str:
     """The file; pi: inertial parameters (10,) by link, friction: viscous and Coulomb (2,) by joint."""
-    base = _unused("base", [body.link for body in tree.bodies])
+    base, root = _base(tree), root_link(tree)
     lines = [
         '<?xml version="1.0"?>',
         *([f"<!-- Gravity is lost: {lost}. -->"] if (lost := lost_gravity(tree)) else []),
         f"<robot name={_attribute(name)}>",
         f"  <link name={_attribute(base)}/>",
     ]
-    root = base
     if (turn := _upright(tree)) is not None:
-        root = _unused(f"{base}_upright", [body.link for body in tree.bodies])
         lines += [f"  <link name={_attribute(root)}/>"]
         mount = _unused("mount", [body.joint for body in tree.bodies])
         lines += _joint(mount, "fixed", base, root, (0.0, 0.0, 0.0), turn, [])
@@ -67,6 +65,16 @@ def urdf_text(
         lines += _joint(body.joint, kind, parent, body.link, body.translation, turn, more + limits)
     lines += [line for entry in tree.passive for line in _passive(entry)]
     return "\n".join([*lines, "</robot>", ""])
+
+
+def root_link(tree: RigidTree) -> str:
+    """The file's link that stands on the ground in the axes of the package's base."""
+    base = _base(tree)
+    return base if _upright(tree) is None else _unused(f"{base}_upright", [body.link for body in tree.bodies])
+
+
+def _base(tree: RigidTree) -> str:
+    return _unused("base", [body.link for body in tree.bodies])
 
 
 def _passive(entry: PassiveEntry) -> list[str]:
@@ -121,7 +129,7 @@ def _joint(
 ) -> list[str]:
     return [
         f"  <joint name={_attribute(name)} type={_attribute(kind)}>",
-        f'    <origin xyz="{_row(np.array(place))}" rpy="{_row(_rpy(turn))}"/>',
+        f'    <origin xyz="{_row(np.array(place))}" rpy="{_row(rpy(turn))}"/>',
         f"    <parent link={_attribute(parent)}/>",
         f"    <child link={_attribute(child)}/>",
         *(f"    {line}" for line in more),
@@ -149,7 +157,7 @@ def _upright(tree: RigidTree) -> Array | None:
     return np.stack([x, np.cross(up, x), up])
 
 
-def _rpy(turn: Array) -> Array:
+def rpy(turn: Array) -> Array:
     """Angles with Rz(yaw) Ry(pitch) Rx(roll) = turn."""
     pitch = math.atan2(-turn[2, 0], math.hypot(turn[0, 0], turn[1, 0]))
     if abs(math.cos(pitch)) < 1e-9:  # roll and yaw turn about one axis: all of it is roll
