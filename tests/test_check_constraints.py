@@ -1,5 +1,7 @@
 """`linkwise check` holds what constraints answer against motion that it works out in another way."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from linkwise import Options, generate, read_system, write_package
@@ -63,6 +65,26 @@ def test_another_mass_is_found_in_shares_and_forces(
 ) -> None:
     model = package.load("numpy", {"L": 0.7, "m": mass})
     assert [result.passed for result in loop_calls("numpy", model, reference)] == passes
+
+
+@pytest.mark.parametrize(("mass", "passes"), [(2.0, [True, True, True]), (2.001, [True, False, False])])
+def test_loops_of_rounded_angles_are_checked_where_they_are_open_least(
+    mass: float, passes: list[bool], tmp_path: Path
+) -> None:
+    text = ROBOT.replace('child = "a"', 'child = "a", rpy = [1.5708, 0, 0]')
+    text = text.replace("xyz = [0.6, 0.1, 0]", "xyz = [0.6, 0, 0.1], rpy = [1.570796, 0, 0]")
+    (tmp_path / "robot.toml").write_text(text)
+    system = read_system(tmp_path / "robot.toml", Options("symbolic"))
+    write_package(generate(system, ["numpy"], kernel="loops"), tmp_path / "tied")
+    package = load_package(tmp_path / "tied", Manifest.read(tmp_path / "tied"))
+    tree = package.manifest.tree
+    assert tree is not None
+    found = loop_reference(package.manifest, tree, random_states(4, 60))
+    assert found is not None
+    assert len(found.states.q) >= 6
+    assert np.abs(found.equations.violation(found.states.q)).max(-1).min() > 1e-7
+    model = package.load("numpy", {"L": 0.7, "m": mass})
+    assert [result.passed for result in loop_calls("numpy", model, found)] == passes
 
 
 def test_another_length_is_open_where_loops_close(package: Package, reference: LoopReference) -> None:

@@ -138,6 +138,47 @@ def test_a_four_bar_turns_closed_and_keeps_its_energy(package_of: Callable[[str]
     assert relative_error(exact.qd, own.y[3:].T) <= 1e-8
 
 
+def test_a_step_evaluates_ties_no_more_than_twice_a_stage(package_of: Callable[[str], ModuleType]) -> None:
+    robot = package_of(CRANK).load("numpy")
+    q, qd, tau = (a[0] for a in states(robot, 4))
+    rows, calls = type(robot.constraints._answers._tie_rows), []
+    whole = rows.at
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rows, "at", lambda *given: (calls.append(1), whole(*given))[1])
+        robot.simulate(q, qd, [0.0, 0.02], tau, step=1e-3)
+    assert len(calls) <= 8 * 20 + 2
+
+
+def test_gradients_flow_through_steps_of_a_tied_robot(package_of: Callable[[str], ModuleType]) -> None:
+    robot = package_of(CRANK).load("torch")
+    torch = pytest.importorskip("torch")
+    q, qd, tau = (torch.as_tensor(a[0]) for a in states(robot, 4))
+
+    def start(crank: Any, speed: Any, torque: Any) -> Any:
+        moved = q + torch.stack([crank, 0.0 * crank, 0.0 * crank])
+        found = robot.simulate(moved, speed * qd, [0.0, 0.03], torque * tau)
+        return torch.cat([found.q[-1], found.qd[-1]])
+
+    given = [torch.tensor(a, dtype=torch.float64, requires_grad=True) for a in (0.1, 0.8, 1.2)]
+    assert torch.autograd.gradcheck(start, given)
+
+
+@pytest.mark.parametrize("how", [{"step": 0.01}, {"method": "RK45"}])
+def test_a_dead_point_is_told_with_its_time(
+    how: dict[str, Any], package_of: Callable[[str], ModuleType]
+) -> None:
+    robot = package_of(CRANK).load("numpy")
+    q = states(robot, 4)[0][0]
+    rocked = robot.constrained(["knee"])
+    torque = np.array([0.0, 0.0, 30.0])
+    message = (
+        r"^at t = 0\.\d+ s knee goes no further: the independent joints do not tell the others: "
+        r"\w+, \w+ can move while knee stands still; there, choose independent="
+    )
+    with pytest.raises(ValueError, match=message):
+        robot.simulate(q, 0.0 * q, [0.0, 2.0], torque, constraints=rocked, **how)
+
+
 def test_the_open_tree_of_a_tied_robot_is_asked_for_in_words(
     package_of: Callable[[str], ModuleType],
 ) -> None:

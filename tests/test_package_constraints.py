@@ -246,6 +246,19 @@ def test_a_loop_out_of_reach_never_closes(fourbar: ModuleType) -> None:
         constraints.closed(NEAR)
 
 
+def test_a_singular_start_is_not_laid_on_the_choice_of_joints(fourbar: ModuleType) -> None:
+    constraints = fourbar.load("numpy").constraints
+    start = np.stack([NEAR, np.zeros(3)])
+    message = (
+        r"^pin cannot be closed at sample 1, for the start is singular: knee, rocker can move there while "
+        r"crank stands still, and no step of theirs closes it; start them off it, by 0\.1 say"
+    )
+    with pytest.raises(ValueError, match=message):
+        constraints.closed(start)
+    start[1, 1:] = -0.1, 0.1
+    assert np.abs(constraints.violation(constraints.closed(start))).max() <= 1e-12
+
+
 def test_a_singular_position_is_told_from_a_bad_choice(fourbar: ModuleType) -> None:
     robot = fourbar.load("numpy", parameters={"L": 0.5})
     # crank 0.3, rod 0.5, rocker 0.5: stretched, crank and rod lie in one line.

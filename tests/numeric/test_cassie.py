@@ -7,7 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from linkwise import generate, read_system, write_package
+from linkwise.check.loop_checks import loop_calls
+from linkwise.check.loop_reference import loop_reference
+from linkwise.check.states import random_states
 from linkwise.package.load import import_package
+from linkwise.package.manifest import Manifest
 
 pytest.importorskip("pinocchio")
 
@@ -80,11 +84,24 @@ def _inertia(link: ET.Element) -> Any:
 
 
 @pytest.fixture(scope="module")
-def robot(tmp_path_factory: pytest.TempPathFactory) -> Any:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     system = read_system(FILE)
-    folder: Path = tmp_path_factory.mktemp("cassie") / system.name
-    write_package(generate(system, backends=["numpy"], kernel="loops"), folder)
+    written: Path = tmp_path_factory.mktemp("cassie") / system.name
+    write_package(generate(system, backends=["numpy"], kernel="loops"), written)
+    return written
+
+
+@pytest.fixture(scope="module")
+def robot(folder: Path) -> Any:
     return import_package(folder).load("numpy")
+
+
+def test_check_holds_the_rods_of_rounded_places(folder: Path, robot: Any) -> None:
+    manifest = Manifest.read(folder)
+    assert manifest.tree is not None
+    reference = loop_reference(manifest, manifest.tree, random_states(robot.n, 15))
+    assert reference is not None
+    assert all(result.passed for result in loop_calls("numpy", robot, reference))
 
 
 def test_the_open_tree_is_the_files(robot: Any) -> None:

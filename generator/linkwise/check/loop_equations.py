@@ -10,13 +10,17 @@ from numpy.polynomial.polynomial import polyder, polyval
 
 from linkwise.check.body_reference import COMPLEX_STEP
 from linkwise.check.newton_euler import NewtonEuler
+from linkwise.package.entries import FrameEntry, RigidTree
 from linkwise.package.load import Array
-from linkwise.package.manifest import RigidTree
 
 STEPS = 60
 LONGEST = 0.5
 """Of a step towards closing, in rad and m."""
-CLOSED = 1e-11
+CLOSED = 1e-4
+"""In m, rad and units of couplings, as a package has it: numbers of files are rounded, and loops that hold
+something twice then close to some micrometres only."""
+SETTLED = 1e-9
+"""Of the last step, in rad and m, where nothing can be closed further."""
 RANK = 1e-5
 """Singular values below this part of the largest are zero: numbers of files are rounded."""
 
@@ -27,13 +31,17 @@ class LoopEquations(NamedTuple):
     recursion: NewtonEuler
     tree: RigidTree
 
+    @property
+    def _ends(self) -> list[FrameEntry]:
+        """Frames of the ties, the first and the second of each."""
+        return [self.tree.frames[f] for tie in self.tree.ties for f in (tie.first, tie.second)]
+
     def violation(self, q: Array) -> Array:
         """phi, (samples, C); of small turns about axes, the sines."""
         found: list[Array] = []
-        for tie in self.tree.ties:
-            first, second = (
-                self.recursion.poses([self.tree.frames[f]], q)[:, 0] for f in (tie.first, tie.second)
-            )
+        poses = self.recursion.poses(self._ends, q)
+        for at, tie in enumerate(self.tree.ties):
+            first, second = poses[:, 2 * at], poses[:, 2 * at + 1]
             gap = first[:, :3, 3] - second[:, :3, 3]
             # R1 R2^T = 1 + [turn]x, to first order
             turn = np.cross(second[:, :3, :3], first[:, :3, :3], axis=1).sum(-1) / 2
@@ -61,18 +69,19 @@ class LoopEquations(NamedTuple):
         samples, n = q.shape
         units, many = np.tile(np.eye(n), (samples, 1)), np.repeat(q, n, 0)
         found = []
-        for tie in self.tree.ties:
-            frames = [self.tree.frames[f] for f in (tie.first, tie.second)]
-            ends = [(frame.body, np.array(frame.translation)) for frame in frames]
-            speed = self.recursion.points(ends, many, units, 0.0 * units)[0].reshape(samples, n, 2, 6)
-            moved = np.swapaxes(speed[:, :, 0] - speed[:, :, 1], -1, -2)
-            poses = self.recursion.poses(frames, q)
-            gap = poses[:, 0, :3, 3] - poses[:, 1, :3, 3]
+        poses, speeds = self.recursion.poses(self._ends, q), np.zeros((samples, n, 0, 6))
+        if self.tree.ties:
+            places = [(frame.body, np.array(frame.translation)) for frame in self._ends]
+            speeds = self.recursion.points(places, many, units, 0.0 * units)[0].reshape(samples, n, -1, 6)
+        for at, tie in enumerate(self.tree.ties):
+            moved = np.swapaxes(speeds[:, :, 2 * at] - speeds[:, :, 2 * at + 1], -1, -2)
+            own = poses[:, 2 * at]
+            gap = own[:, :3, 3] - poses[:, 2 * at + 1, :3, 3]
             match tie.kind:
                 case "point":
                     parts = [moved[:, 3:]]
                 case "hinge":
-                    across = np.swapaxes(poses[:, 0, :3, :2], -1, -2)
+                    across = np.swapaxes(own[:, :3, :2], -1, -2)
                     parts = [across @ moved[:, :3], moved[:, 3:]]
                 case "frame":
                     parts = [moved]
@@ -96,16 +105,33 @@ class LoopEquations(NamedTuple):
         found[:, rest] = -np.linalg.pinv(rows[..., rest]) @ rows[..., own]
         return found
 
+    def basis(self, q: Array) -> Array:
+        """Orthonormal columns (samples, C, d) of what dependent joints move of the rows.
+
+        Where loops close, no joint moves anything else; where they are open a little, this is what is held.
+        """
+        rest = [k for k in range(q.shape[1]) if k not in self.tree.independent]
+        basis: Array = np.linalg.svd(self.rows(q)[..., rest])[0][..., : len(rest)]
+        return basis
+
     def rates(self, q: Array, qd: Array) -> Array:
         """dA/dt, (samples, C, n)."""
         rate: Array = self.rows(q + 1j * COMPLEX_STEP * qd).imag / COMPLEX_STEP
         return rate
 
     def closed_near(self, q: Array) -> Array:
-        """Those of some positions from which least steps of all joints lead to where loops close."""
+        """Those of some positions from which least steps of all joints lead to where loops are open least.
+
+        That is not at all, but for what the numbers of a file leave.
+        """
+        q, size = q.copy(), np.full(len(q), np.inf)
         for _ in range(STEPS):
-            step = -(np.linalg.pinv(self.rows(q), rcond=RANK) @ self.violation(q)[..., None])[..., 0]
-            size = np.abs(step).max(-1, keepdims=True)
-            q = q + step * (LONGEST / np.maximum(size, LONGEST))
-        closed: Array = q[np.abs(self.violation(q)).max(-1) < CLOSED]
+            moving = np.flatnonzero(size >= SETTLED)
+            if not len(moving):
+                break
+            at = q[moving]
+            step = -(np.linalg.pinv(self.rows(at), rcond=RANK) @ self.violation(at)[..., None])[..., 0]
+            size[moving] = np.abs(step).max(-1)
+            q[moving] += step * (LONGEST / np.maximum(size[moving], LONGEST))[:, None]
+        closed: Array = q[(np.abs(self.violation(q)).max(-1) < CLOSED) & (size < SETTLED)]
         return closed

@@ -52,16 +52,17 @@ def _shares(reference: LoopReference) -> tuple[dict[str, Array], dict[str, Array
         "gravity": -torque(q, rest, rest),
         "constraints": np.zeros((*q.shape, n)),
     }
-    rows, moved, borne = reference.rows, {}, {}
+    onto = np.swapaxes(reference.basis, -1, -2)
+    rows, moved, borne = onto @ reference.rows, {}, {}
     free = len(reference.independent)
     null = np.swapaxes(np.linalg.svd(rows)[2][:, -free:], -1, -2)
     back, turned = np.swapaxes(null, -1, -2), np.swapaxes(rows, -1, -2)
-    own = -np.linalg.pinv(rows, rcond=SMALL) @ (reference.rates * qd[:, None, :])
+    own = -np.linalg.pinv(rows, rcond=SMALL) @ (onto @ reference.rates * qd[:, None, :])
     for source, force in forces.items():
         bias = own if source == "constraints" else 0.0 * flat(force)
         driven = np.linalg.solve(back @ mass @ null, back @ (flat(force) - mass @ bias))
         shares = null @ driven + bias
         held = np.linalg.pinv(turned, rcond=SMALL) @ (mass @ shares - flat(force))
         moved[source] = shares.reshape(force.shape)
-        borne[source] = held.reshape(len(q), -1, *force.shape[2:])
+        borne[source] = (reference.basis @ held).reshape(len(q), -1, *force.shape[2:])
     return moved, borne

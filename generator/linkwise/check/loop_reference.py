@@ -3,6 +3,9 @@
 With N an orthonormal basis of the null space, M qdd + h = tau + A^T lambda and A qdd = -dA/dt qd give
 (N^T M N) z = N^T (tau - h - M p) for qdd = N z + p, p = -A^+ dA/dt qd; lambda is what A^T lambda fits best.
 The package goes another way: it takes the dependent joints out, by QR.
+
+Loops may be open by some micrometres, where a file's numbers are rounded: rows are those of `basis`, U^T A
+and U^T dA/dt for U^T lambda, which are as good as all of them where loops close.
 """
 
 from collections.abc import Sequence
@@ -33,6 +36,7 @@ class LoopReference:
     tau: Array
     rows: Array
     rates: Array
+    basis: Array
     map: Array
     qdd: Array
     forces: Array
@@ -54,26 +58,28 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     q = q[sizes[:, -1] > FAR * sizes[:, 0]][:STATES]
     if not len(q):
         return None
-    rows = equations.rows(q)
+    rows, basis = equations.rows(q), equations.basis(q)
+    back = np.swapaxes(basis, -1, -2)
     followed = _Followed(equations, own, rest, q)
     yd, ydd = states.qd[: len(q), own], states.qdd[: len(q), own]
     qd = followed.velocity(yd)
     moved = States(q, qd, followed.acceleration(qd, ydd))
     tau = np.random.default_rng(5).uniform(-1.0, 1.0, q.shape)
     rates = equations.rates(q, qd)
-    qdd, forces = _motion(equations, moved, rows, rates, tau)
-    shares, link_forces = _shared(equations, own, rows, moved)
+    qdd, forces = _motion(equations, moved, back @ rows, back @ rates, tau)
+    shares, link_forces = _shared(equations, own, back @ rows, moved)
     rest_yd = 0.0 * yd
 
     def share(speed: Array, change: Array) -> Array:
         full = followed.velocity(speed)
-        return _shared(equations, own, rows, States(q, full, followed.acceleration(full, change)))[0]
+        return _shared(equations, own, back @ rows, States(q, full, followed.acceleration(full, change)))[0]
 
     weight = share(rest_yd, rest_yd)
     c2 = columns(lambda unit: share(rest_yd, rest_yd + unit) - weight, len(own))
     # A quadratic form of yd, whose central difference is its derivative; the closing convention takes half.
     c1 = columns(lambda unit: (share(yd + unit, rest_yd) - share(yd - unit, rest_yd)) / 4.0, len(own))
-    found = (rows, rates, followed.map, qdd, forces, shares, link_forces, (c2, c1, weight))
+    forces, link_forces = (basis @ forces[..., None])[..., 0], basis @ link_forces
+    found = (rows, rates, basis, followed.map, qdd, forces, shares, link_forces, (c2, c1, weight))
     return LoopReference(equations, own, moved, tau, *found)
 
 

@@ -2,19 +2,14 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from linkwise.emit.definition import rigid_tree
 from linkwise.emit.loop_closing import Array, closed_loops
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note
 from linkwise.robot.robot import Coupling, Robot, Tie
-from linkwise.runtime.constraints.independent_joints import rank_of, redundant_names
+from linkwise.runtime.constraints.independent_joints import chosen_independent, rank_of, redundant_names
 from linkwise.symbolic.system import RigidSystem, System
-
-SHARE = 0.05
-"""Columns smaller than this part of the largest are not pivots, whatever joints they are of."""
 
 
 def constrained_system(system: System) -> System:
@@ -54,7 +49,7 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
             f"the constraints {constraints} leave nothing to move, so the robot stands still; remove one, or "
             "let it tie less"
         )
-    proposed = _proposed(robot, rows, rank)
+    proposed = _proposed(robot, rows)
     if not robot.wanted:
         return proposed
     chosen = sorted(names.index(name) for name in robot.wanted)
@@ -73,27 +68,17 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
     return tuple(chosen)
 
 
-def _proposed(robot: Robot, rows: Array, rank: int) -> tuple[int, ...]:
-    """Return those that pivoting leaves: columns of A are taken one by one, as of dependent ones.
+def _proposed(robot: Robot, rows: Array) -> tuple[int, ...]:
+    """Return those that pivoting leaves.
 
-    Of the columns that are not small beside the largest, as far as they stand across those taken, it is
-    that of a joint that nothing drives and no spring holds, then of the one farthest from the ground, then of
-    the last.
+    Dependent are rather joints that nothing drives, then those that no spring holds, then those farthest
+    from the ground, then the last.
     """
-    names = [coordinate.name for coordinate in robot.coordinates]
-    depths = [min(_depths(robot, k), default=0) for k in range(len(names))]
     sprung = {axis.coordinate for axis in robot.passive if axis.own.stiffness}
-    left, free = rows, set(range(len(names)))
-    for _ in range(rank):
-        sizes = np.linalg.norm(left, axis=0)
-        most = max(sizes[k] for k in free)
-        able = [k for k in free if sizes[k] >= SHARE * most]
-        pivot = max(able, key=lambda k: (k not in robot.driven, k not in sprung, depths[k], k))
-        free.remove(pivot)
-        axis = left[:, pivot] / sizes[pivot]
-        for _ in range(2):  # once more for what rounding leaves
-            left = left - np.outer(axis, axis @ left)
-    return tuple(sorted(free))
+    free = range(len(robot.coordinates))
+    depths = [min(_depths(robot, k), default=0) for k in free]
+    preference = [(k not in robot.driven, k not in sprung, depths[k]) for k in free]
+    return chosen_independent(rows, preference=preference)
 
 
 def _depths(robot: Robot, coordinate: int) -> list[int]:

@@ -6,6 +6,7 @@ taken before.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ RANK = 1e-5
 
 A file's right angle of 1.5708 tilts by 4e-6 what is meant to be parallel.
 """
+ABLE = 0.05
+"""Columns smaller than this part of the largest are not preferred to it, whatever joints they are of."""
 SHARE = 1e-3
 """Rows that have less than this part in a sum of rows that is zero are not among those that it ties."""
 
@@ -28,26 +31,34 @@ def rank_of(rows: NDArray[np.float64], tolerance: float = RANK) -> int:
 
 
 def chosen_independent(
-    rows: NDArray[np.float64], rather_dependent: Sequence[int] = (), tolerance: float = RANK
+    rows: NDArray[np.float64],
+    rather_dependent: Sequence[int] = (),
+    preference: Sequence[Any] | None = None,
+    tolerance: float = RANK,
 ) -> tuple[int, ...]:
-    """Coordinates that are left when columns of A (C, n) are taken by pivoting, largest first.
+    """Coordinates that are left when columns of A (C, n) are taken by pivoting, as of dependent ones.
 
     rather_dependent: those that are taken before any other, as far as they can be, since nothing drives them
+    preference: of each coordinate, what compares; of columns that are not small beside the largest that of
+    the greatest is taken, unless given the largest
     """
-    left = rows.copy()
-    largest = np.linalg.norm(left, axis=0).max(initial=1.0)
+    left, rank = rows.copy(), rank_of(rows, tolerance)
+    least = tolerance * np.linalg.norm(left, axis=0).max(initial=1.0)
     rest = [k for k in range(rows.shape[1]) if k not in rather_dependent]
     taken: list[int] = []
     for group in (list(rather_dependent), rest):
         open_ones = list(group)
-        while open_ones:
+        while open_ones and len(taken) < rank:
             sizes = np.linalg.norm(left[:, open_ones], axis=0)
-            at = int(sizes.argmax())
-            if not sizes[at] > tolerance * largest:
+            if group is not rest and not sizes.max() > least:
                 break
-            pivot = open_ones.pop(at)
+            pivot = open_ones[int(sizes.argmax())]
+            if preference is not None:
+                able = [k for k, size in zip(open_ones, sizes, strict=True) if size >= ABLE * sizes.max()]
+                pivot = max(able, key=lambda k: (preference[k], k))
+            open_ones.remove(pivot)
             taken.append(pivot)
-            axis = left[:, pivot] / sizes[at]
+            axis = left[:, pivot] / np.linalg.norm(left[:, pivot])
             for _ in range(2):  # once more for what rounding leaves
                 left -= np.outer(axis, axis @ left)
     return tuple(k for k in range(rows.shape[1]) if k not in taken)
