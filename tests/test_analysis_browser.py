@@ -13,12 +13,13 @@ import pytest
 import urdf_text
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import Payload, Processing, Reading, analyze
+from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.payload import carrying
 from linkwise.analysis.result import Totals
 from linkwise.analysis.result_columns import Column, columns_of
-from linkwise.analysis.run import Wanted, analyze_to
+from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import report
 from linkwise.analysis.show.poses import poses
 from linkwise.analysis.work import Work

@@ -8,9 +8,10 @@ import pytest
 from conftest import DATA
 from linkwise import Load, generate, read_system, write_package
 from linkwise.analysis import Processing, Reading, analyze
+from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.loads import Loads
-from linkwise.analysis.run import Wanted, analyze_to
+from linkwise.analysis.run import analyze_to
 from linkwise.errors import LinkwiseError
 from linkwise.progress import silent
 from motion_logs import LEG, smooth, write_csv, write_mot

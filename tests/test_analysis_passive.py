@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import Processing, Reading, analyze
+from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import load_robot
-from linkwise.analysis.run import Wanted, analyze_to
+from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import page_data
 from linkwise.progress import silent
 from urdf_text import joint, link, robot

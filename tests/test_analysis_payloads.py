@@ -7,9 +7,10 @@ import pytest
 from conftest import DATA
 from linkwise import Payload, generate, read_system, write_package
 from linkwise.analysis import Processing, Reading, analyze
+from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.payload import carrying
-from linkwise.analysis.run import Wanted, analyze_to
+from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import page_data
 from linkwise.cli.log_options import carried
 from linkwise.errors import LinkwiseError

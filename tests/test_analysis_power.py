@@ -8,9 +8,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from linkwise.analysis import Processing, Reading, analyze
+from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.paper_motions import SIMULATED, write_motions
-from linkwise.analysis.run import Wanted, analyze_to
+from linkwise.analysis.run import analyze_to
 from linkwise.errors import LinkwiseError
 from linkwise.progress import silent
 from motion_logs import JOINTS, PLANAR3, PUMA560, smooth, write_csv

@@ -14,7 +14,8 @@ from linkwise.analysis.contacts.contact_times import ContactTimes
 from linkwise.analysis.contacts.ground_contacts import Standing
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
-from linkwise.analysis.result_columns import FORCE_OF, PASSIVE, Column
+from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_quantities import FORCE_OF, PASSIVE
 from linkwise.package.load import Array
 
 Motion = tuple[Array, Array, Array]

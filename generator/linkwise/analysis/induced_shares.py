@@ -25,7 +25,8 @@ from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.induced_sources import InducedSources, opened
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.model_side import NAMES, Side
-from linkwise.analysis.result_columns import Column, Quantity
+from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_quantities import Quantity
 from linkwise.analysis.verify import Closure, worst_of
 from linkwise.errors import LinkwiseError
 from linkwise.escape import column_part

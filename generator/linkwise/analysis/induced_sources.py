@@ -15,7 +15,8 @@ import numpy as np
 
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.model_side import Side
-from linkwise.analysis.result_columns import PASSIVE, Column, Quantity
+from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_quantities import PASSIVE, Quantity
 from linkwise.analysis.term_rows import mirrored
 from linkwise.package.load import Array
 

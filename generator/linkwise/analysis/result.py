@@ -8,7 +8,8 @@ import numpy as np
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
-from linkwise.analysis.result_columns import MEANING, Column, Quantity
+from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_quantities import MEANING, Quantity
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.verify import Closure
 from linkwise.analysis.work import Work

@@ -6,7 +6,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Protocol, Self
 
-from linkwise.analysis.result_columns import MEANING, Column
+from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_quantities import MEANING
 from linkwise.extras import extra
 from linkwise.package.load import Array
 

@@ -13,16 +13,8 @@ from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
-from linkwise.analysis.result_columns import (
-    PASSIVE,
-    TERMS,
-    TORQUE_OF,
-    Column,
-    Key,
-    Quantity,
-    columns_of,
-    load_unit,
-)
+from linkwise.analysis.result_columns import Column, Key, columns_of, load_unit
+from linkwise.analysis.result_quantities import PASSIVE, TERMS, TORQUE_OF, Quantity
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermRows, term_rows
 from linkwise.analysis.verify import Closure, residual, worst_of

@@ -10,7 +10,8 @@ import numpy as np
 from linkwise.analysis.contacts.contact_reference import ContactReference
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
-from linkwise.analysis.result_columns import Column, Quantity
+from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_quantities import Quantity
 from linkwise.check.loop_equations import LoopEquations
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError

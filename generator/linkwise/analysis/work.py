@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.analysis.result_columns import POWER, Column, Quantity
+from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_quantities import POWER, Quantity
 from linkwise.package.load import Array
 
 

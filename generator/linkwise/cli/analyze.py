@@ -7,10 +7,11 @@ from typing import Annotated
 import typer
 
 from linkwise.analysis import Analysis
+from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.payload import carrying
-from linkwise.analysis.run import Wanted, analyze_to
+from linkwise.analysis.run import analyze_to
 from linkwise.analysis.settings import Convention, Reading
 from linkwise.analysis.tables import Format
 from linkwise.cli import Json, tell

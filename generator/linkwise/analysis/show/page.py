@@ -8,7 +8,8 @@ import numpy as np
 
 from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import FORCES, GROUND, INDUCED, TORQUE_OF, Column
+from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_quantities import FORCES, GROUND, INDUCED, TORQUE_OF
 from linkwise.analysis.show.induced_figure import TITLES
 from linkwise.analysis.show.poses import poses
 from linkwise.analysis.show.source_curves import components, numbers_of_curves, source_curves

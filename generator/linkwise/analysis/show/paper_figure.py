@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import Column, Quantity, load_unit
+from linkwise.analysis.result_columns import Column, load_unit
+from linkwise.analysis.result_quantities import Quantity
 from linkwise.extras import extra
 from linkwise.plotstyle import colour, dash, drawn
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import PASSIVE, Quantity
+from linkwise.analysis.result_quantities import PASSIVE, Quantity
 from linkwise.extras import extra
 from linkwise.plotstyle import GRAVITY, drawn, tone
 

@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import Column, Quantity
+from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_quantities import Quantity
 from linkwise.package.load import Array
 
 MOST = 8
