@@ -22,6 +22,7 @@ from linkwise.analysis.result_columns import Column, columns_of
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import report
 from linkwise.analysis.show.poses import poses
+from linkwise.analysis.term_rows import term_rows
 from linkwise.analysis.work import Work
 from linkwise.progress import silent
 from motion_logs import PLANAR3, smooth, write_csv
@@ -402,7 +403,9 @@ def test_names_are_shown_and_not_obeyed(driver, tmp_path):
     names = ("%{x} %{customdata}", "</script><script>document.title=1</script>", "<b>$x^\n\u202e&lt;")
     analysis = analyze(write_csv(tmp_path / "a.csv", smooth(40, 3)), PLANAR3)
     robot = replace(analysis.robot, name=names[1], joints=names, links=names)
-    made = replace(analysis, robot=robot, columns=columns_of(robot, robot.model.layout), source=names[2])
+    made = replace(
+        analysis, robot=robot, columns=columns_of(robot, term_rows(robot.model.layout)), source=names[2]
+    )
     (tmp_path / "report.html").write_text(report(made), encoding="utf-8")
     driver.get((tmp_path / "report.html").as_uri())
     shown = [*names[:2], "<b>$x^\\n\\u202e&lt;"]

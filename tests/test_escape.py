@@ -22,6 +22,7 @@ from linkwise.analysis import analyze
 from linkwise.analysis.result_columns import columns_of
 from linkwise.analysis.show import figure_png
 from linkwise.analysis.show.page import report
+from linkwise.analysis.term_rows import term_rows
 from linkwise.emit.render import render
 from linkwise.package.load import import_package
 from linkwise.plotstyle import drawn
@@ -180,7 +181,7 @@ def analysis(tmp_path_factory):
 
 def renamed(analysis, names, source="a.csv"):
     robot = replace(analysis.robot, name=names[0], joints=names, links=names)
-    columns = columns_of(robot, robot.model.layout)
+    columns = columns_of(robot, term_rows(robot.model.layout))
     return replace(analysis, robot=robot, columns=columns, source=source)
 
 
