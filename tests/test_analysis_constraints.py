@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linkwise import LinkwiseError, Load, Payload, generate, read_system, write_package
+from linkwise import LinkwiseError, Load, Payload, generate, identify, read_system, write_package
 from linkwise.analysis import Processing, Reading, analyze
 from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import load_robot
@@ -268,6 +268,36 @@ def test_page_table_and_record_have_the_joints_that_are_driven(folder: Path, tmp
     assert sorted(data["bodies"]["coordinates"]) == [0, 1, 2]
     with pytest.raises(LinkwiseError, match="paper:JOINT with a joint of turn"):
         result.figure("paper:bend")
+
+
+def test_links_and_losses_are_identified_from_the_cranks_angle_and_torque_alone(
+    folder: Path, tmp_path: Path
+) -> None:
+    time = np.arange(1600) / 200
+    sizes, rates, starts = (
+        np.array([[0.6], [0.3], [0.2]]),
+        np.array([[1.1], [2.3], [3.7]]),
+        [[0.0], [1.0], [2.0]],
+    )
+    at = rates * time + starts
+    x = 1.0 + (sizes * np.sin(at)).sum(0)
+    xd, xdd = (sizes * rates * np.cos(at)).sum(0), -(sizes * rates**2 * np.sin(at)).sum(0)
+    bend = slope(lambda at: angles(at)[1] - at, x)
+    torque = sum(sum(share_of(name, x, xd, xdd)) for name in MASSES) + 2.0 * (x - 0.2) + 0.3 * bend**2 * xd
+    log = write_csv(tmp_path / "log.csv", np.column_stack([time, x, torque]), ["turn", "tau/turn"])
+    found = identify(log, folder / "robot")
+    assert found.joints == ("turn",)
+    assert found.followers == ("bend", "swing")
+    assert found.warnings == ()
+    np.testing.assert_allclose(found.fit.friction, [[0, 0], [0.3, 0], [0, 0]], rtol=0, atol=1e-5)
+    own = found.base.combinations @ found.own.reshape(-1)
+    np.testing.assert_allclose(found.fit.beta, own, rtol=0, atol=1e-5)
+    table = np.loadtxt(folder / "joints.csv", delimiter=",", skiprows=1)
+    table[:, 3] += 0.05
+    off = np.column_stack([table, table[:, 1]])
+    log = write_csv(tmp_path / "off.csv", off, ["turn", "bend", "swing", "tau/turn"])
+    with pytest.raises(LinkwiseError, match=r"off.csv: time .* s: pin force_. is open by"):
+        identify(log, folder / "robot")
 
 
 def test_joints_that_follow_are_found_from_the_logs_own_first_sample(folder: Path, tmp_path: Path) -> None:
