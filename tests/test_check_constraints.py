@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from linkwise import Options, generate, read_system, write_package
+from linkwise.check.contact_checks import contact_calls
 from linkwise.check.loop_checks import loop_calls
 from linkwise.check.loop_reference import LoopReference, loop_reference
+from linkwise.check.simulation_checks import simulated_motion, simulation_calls
 from linkwise.check.states import random_states
 from linkwise.package.load import Package, load_package
 from linkwise.package.manifest import Manifest
@@ -91,3 +93,22 @@ def test_another_length_is_open_where_loops_close(package: Package, reference: L
     model = package.load("numpy", {"L": 0.7001, "m": 2.0})
     with pytest.raises(ValueError, match=r"^pin is open by 0\.\d+ mm at sample 0"):
         list(loop_calls("numpy", model, reference))
+
+
+@pytest.mark.parametrize("tied", [False, True])
+@pytest.mark.parametrize(("mass", "passes"), [(2.0, True), (2.001, False)])
+def test_another_mass_is_found_under_contacts_and_in_a_simulation(
+    mass: float, passes: bool, tied: bool, reference: LoopReference, tmp_path: Path
+) -> None:
+    text = ROBOT if tied else ROBOT[: ROBOT.index("constraint = [")]
+    (tmp_path / "robot.toml").write_text(text)
+    system = read_system(tmp_path / "robot.toml", Options("symbolic"))
+    write_package(generate(system, ["numpy"], kernel="loops"), tmp_path / "robot")
+    package = load_package(tmp_path / "robot", Manifest.read(tmp_path / "robot"))
+    manifest, model = package.manifest, package.load("numpy", {"L": 0.7, "m": mass} if tied else {"m": mass})
+    assert manifest.tree is not None
+    states = reference.states if tied else random_states(4, 20)
+    moved = simulated_motion(manifest, manifest.tree, states)
+    assert [result.passed for result in simulation_calls("numpy", model, moved)] == [passes]
+    held = contact_calls("numpy", model, manifest, manifest.tree, states, package.module.Contact)
+    assert [result.passed for result in held] == ([] if tied else [passes]), "one freedom is left to the ties"

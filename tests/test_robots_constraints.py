@@ -272,6 +272,14 @@ BAD: dict[str, tuple[dict[str, str], str]] = {
         {"text": COUPLED + "terms = { a = nan, b = 1 }"},
         "constraint 'own' has NaN or infinity in its terms; give numbers",
     ),
+    "square": (
+        {"text": COUPLED + "terms = { a = [0, 0, 1] }"},
+        "constraint 'own' closes only where it is singular: no motion of its joints changes",
+    ),
+    "sum without a zero": (
+        {"text": COUPLED + "terms = { a = [0.5, 0, 1], b = [0, 0, 1] }"},
+        " of its sum, in rad and m are left at best",
+    ),
     "high power": (
         {"text": COUPLED + f"terms = {{ a = {[1] * 10} }}"},
         "constraint 'own': 'a' in 'terms' has the power 9; 8 is the highest",
@@ -303,6 +311,36 @@ BAD: dict[str, tuple[dict[str, str], str]] = {
     "no schema": ({"text": ""}, "the schema is None; write schema = 1 at the top"),
     "robot": ({"text": FOURBAR.read_text()}, "the file has the unknown key 'name'"),
 }
+
+
+@pytest.mark.parametrize("case", ["unknown link", "unknown joint", "name of another", "nan", "no length"])
+def test_the_file_beside_is_named_for_what_is_wrong_in_it(case: str, tmp_path: Path) -> None:
+    file = beside(tmp_path, **BAD[case][0])
+    with pytest.raises(LinkwiseError) as caught:
+        robot_of(FOURBAR, constraints=file)
+    assert str(caught.value).startswith(f"{FOURBAR}: {file}: ")
+
+
+def test_joints_whose_names_have_commas_can_be_independent(tmp_path: Path) -> None:
+    comma = written(tmp_path, "comma.toml", FOURBAR.read_text().replace('name = "a"', 'name = "a,1"'))
+    assert robot_of(comma, independent=("a,1",)).independent == (0,)
+    with pytest.raises(
+        LinkwiseError, match=r"^.*--independent '' is not a moving joint; the joints are a,1, b, c$"
+    ):
+        robot_of(comma, independent=("b,",))
+
+
+def test_a_distance_may_be_a_formula_of_numbers(tmp_path: Path) -> None:
+    bar = 'schema = 1\nparameters = { L = 0.1 }\n[[constraint]]\nname = "own"\ntype = "distance"\n'
+    bar += 'first = { frame = "rod", xyz = [0.31, 0, 0] }\nsecond = { frame = "rocker" }\n'
+    bar += 'length = "2*L + 0.04"\n'
+    tree = written(tmp_path, "tree.toml", FOURBAR.read_text().partition("[[constraint]]")[0])
+    file = str(written(tmp_path, "bar.toml", bar))
+    assert robot_of(tree, constraints=file).ties[0].length == pytest.approx(0.24)
+    with pytest.raises(
+        LinkwiseError, match=r"'own' has the length .*L.*, which stays a number in generated code"
+    ):
+        robot_of(tree, constraints=file, parameters="symbolic")
 
 
 @pytest.mark.parametrize("case", BAD)

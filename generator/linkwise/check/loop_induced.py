@@ -13,7 +13,7 @@ import numpy as np
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.check.induced_checks import diagonal, flat
 from linkwise.check.loop_checks import TOLD, loop_entries
-from linkwise.check.loop_reference import LoopReference
+from linkwise.check.loop_reference import LoopReference, mass_matrix
 from linkwise.check.reference import columns
 from linkwise.package.load import Array, Model
 
@@ -44,7 +44,7 @@ def _shares(reference: LoopReference) -> tuple[dict[str, Array], dict[str, Array
     """Accelerations (samples, n, ...) and forces (samples, C, ...) by source."""
     torque, (q, qd, _) = reference.equations.recursion.partial_torque, reference.states.motion
     n, rest = q.shape[1], 0.0 * q
-    mass = columns(lambda unit: torque(q, rest, rest + unit, gravity=False).sum(-1), n)
+    mass = mass_matrix(reference.equations.recursion, q)
     velocity = columns(lambda unit: 0.5 * torque(q, qd + 1j * unit, rest, gravity=False).imag, n)
     forces = {
         "actuators": diagonal(reference.tau),

@@ -66,7 +66,7 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     moved = States(q, qd, followed.acceleration(qd, ydd))
     tau = np.random.default_rng(5).uniform(-1.0, 1.0, q.shape)
     rates = equations.rates(q, qd)
-    qdd, forces = _motion(equations, moved, back @ rows, back @ rates, tau)
+    qdd, forces = held_motion(equations.recursion, moved, back @ rows, back @ rates, tau)
     shares, link_forces = _shared(equations, own, back @ rows, moved)
     rest_yd = 0.0 * yd
 
@@ -110,15 +110,21 @@ class _Followed:
         return full
 
 
-def _motion(
-    equations: LoopEquations, states: States, rows: Array, rates: Array, tau: Array
+def mass_matrix(recursion: NewtonEuler, q: Array) -> Array:
+    """M (samples, n, n), column by column, all columns at once."""
+    samples, n = q.shape
+    rest, units = np.zeros((samples * n, n)), np.tile(np.eye(n), (samples, 1))
+    torque = recursion.partial_torque(np.repeat(q, n, 0), rest, units, gravity=False).sum(-1)
+    return np.swapaxes(torque.reshape(samples, n, n), -1, -2)
+
+
+def held_motion(
+    recursion: NewtonEuler, states: States, rows: Array, rates: Array, tau: Array
 ) -> tuple[Array, Array]:
-    """qdd and lambda of torques."""
-    torque, (q, qd, _) = equations.recursion.partial_torque, states.motion
-    rest = 0.0 * q
-    mass = columns(lambda unit: torque(q, rest, rest + unit, gravity=False).sum(-1), q.shape[1])
-    bias = torque(q, qd, rest).sum(-1)
-    free = len(equations.tree.independent)
+    """qdd and lambda of torques under rows that do not follow from each other."""
+    q, qd, _ = states.motion
+    free, mass = q.shape[1] - rows.shape[1], mass_matrix(recursion, q)
+    bias = recursion.partial_torque(q, qd, 0.0 * q).sum(-1)
     null = np.swapaxes(np.linalg.svd(rows)[2][:, -free:], -1, -2)
     back = np.swapaxes(null, -1, -2)
     moved = -np.linalg.pinv(rows, rcond=1e-7) @ (rates @ qd[..., None])

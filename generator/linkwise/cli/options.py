@@ -50,8 +50,8 @@ def robot_options(
     independent: Annotated[
         list[str] | None,
         _flag(
-            help="Joints whose motion gives that of all others under the constraints: A,B; may be repeated; "
-            "chosen by pivoting unless given"
+            help="Joints whose motion gives that of all others under the constraints: A,B; may be repeated, "
+            "as for names with a comma; chosen by pivoting unless given"
         ),
     ] = None,
 ) -> Options:
@@ -95,11 +95,11 @@ def reads_robot(
 
 
 def _names(items: Iterable[str]) -> tuple[str, ...]:
-    """Names out of lists A,B."""
-    names = tuple(name.strip() for item in items for name in item.split(","))
-    if not all(names):
+    """Lists A,B as they were given, for a joint's name may have a comma."""
+    given = tuple(item.strip() for item in items)
+    if not all(name.strip() for item in given for name in item.split(",")):
         raise LinkwiseError("--independent has an empty name; give joints as A,B")
-    return names
+    return given
 
 
 def _locks(items: Iterable[str]) -> dict[str, float]:

@@ -25,6 +25,8 @@ from linkwise.runtime.rule.joint_tree import (
 )
 
 Array = NDArray[np.float64]
+FLAT = 1e-4
+"""Slopes below this part of a coupling's factors are none: steps end where rows have all but lost rank."""
 
 
 class ClosedLoops(NamedTuple):
@@ -46,7 +48,19 @@ def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
     if not found.is_closed:
         rows = [*(row for one in held for row in one.row_names), *couplings]
         raise LinkwiseError(_told(found, owners, rows, len(starts)))
+    _check_slopes(tree, found)
     return ClosedLoops(found.q, found.comparable, owners)
+
+
+def _check_slopes(tree: RigidTree, found: Closing) -> None:
+    """Raise LinkwiseError for a coupling whose sum has no slope where it is zero, as that of squares."""
+    for number, coupling in enumerate(tree.couplings, len(found.rows) - len(tree.couplings)):
+        size = min(max(map(abs, factors[1:])) for _, factors in coupling.terms)
+        if np.abs(found.rows[number]).max() <= FLAT * size:
+            raise LinkwiseError(
+                f"constraint {coupling.name!r} closes only where it is singular: no motion of its joints "
+                "changes its sum there, so that none follows from others; write a sum that changes its sign"
+            )
 
 
 def _told(found: Closing, owners: tuple[str, ...], rows: list[str], tries: int) -> str:

@@ -66,6 +66,7 @@ def constrained(
             raise LinkwiseError("--independent is for constraints, and here are none; leave it out")
         wanted = ()
     known = {coordinate.name: k for k, coordinate in enumerate(movement.coordinates)}
+    wanted = tuple(name for item in wanted for name in (_names(item, known) if independent else [item]))
     for name, count in Counter(wanted).items():
         if name not in known:
             raise LinkwiseError(
@@ -78,3 +79,8 @@ def constrained(
     rules = (movement.motion[name].coordinate for name in description.driven if name in movement.motion)
     driven = sorted({k for k in rules if k is not None})
     return Constrained(ties, couplings, wanted, tuple(driven), (*lost, *uncoupled))
+
+
+def _names(item: str, known: Collection[str]) -> list[str]:
+    """Return the names in a list A,B of the command line; a joint's own name may have commas."""
+    return [item] if item in known else [name.strip() for name in item.split(",")]

@@ -64,7 +64,7 @@ class AnchoredTie:
     kind: TieKind
     first: Anchor
     second: Anchor
-    length: float = 0.0
+    length: Scalar = 0.0
     """In m, of a distance only."""
 
 

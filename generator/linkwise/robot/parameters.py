@@ -30,7 +30,7 @@ def _tie(tie: AnchoredTie, values: dict[sp.Symbol, float]) -> AnchoredTie:
     first, second = (
         replace(end, translation=_vector(end.translation, values)) for end in (tie.first, tie.second)
     )
-    return replace(tie, first=first, second=second)
+    return replace(tie, first=first, second=second, length=_number(tie.length, values))
 
 
 def _symbols(values: Values) -> dict[sp.Symbol, float]:

@@ -8,7 +8,9 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import require_file
 from linkwise.robot.build import Options, build
 from linkwise.robot.builtin.planar import planar
+from linkwise.robot.constrained import check_constraints
 from linkwise.robot.description import Description
+from linkwise.robot.parameters import numeric
 from linkwise.robot.readers.mjcf import read_mjcf
 from linkwise.robot.readers.sdf import read_sdf
 from linkwise.robot.readers.toml import read_toml
@@ -58,11 +60,13 @@ def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
 def _built(description: Description, options: Options) -> Robot:
     """Robot of a description and of the constraints beside it."""
     if options.constraints is not None:
+        check_constraints(numeric(description))
         with within(options.constraints):
             try:
                 description = with_constraint_file(description, Path(options.constraints))
             except OSError as error:
                 raise LinkwiseError(f"cannot be read: {error.strerror}") from None
+            check_constraints(numeric(description))
     return build(description, options)
 
 

@@ -63,11 +63,12 @@ def check_ties(ties: Iterable[AnchoredTie], bodies: Iterable[Body]) -> None:
             raise LinkwiseError(
                 f"constraint {tie.name!r} ties link {tie.first.body!r} to itself; name two links"
             )
-        if fault := unusable(tie.length):
+        length = _length(tie)
+        if fault := unusable(length):
             raise LinkwiseError(f"constraint {tie.name!r} has {fault} for its length; give m")
-        if tie.kind == "distance" and tie.length <= 0:
+        if tie.kind == "distance" and length <= 0:
             raise LinkwiseError(
-                f"constraint {tie.name!r} has the length {tie.length:g}; give one above 0, or the type point"
+                f"constraint {tie.name!r} has the length {length:g}; give one above 0, or the type point"
             )
 
 
@@ -94,8 +95,18 @@ def tied(
             notes.append(_as_one(tie, there[0], there[1], values))
         else:
             first, second = (at[name] for name in ends[tie.name])
-            found.append(Tie(tie.name, tie.kind, first, second, tie.length))
+            found.append(Tie(tie.name, tie.kind, first, second, _length(tie)))
     return tuple(found), notes
+
+
+def _length(tie: AnchoredTie) -> float:
+    """Return the length as a number; raises LinkwiseError for a formula, which stays none."""
+    if isinstance(tie.length, float):
+        return tie.length
+    raise LinkwiseError(
+        f"constraint {tie.name!r} has the length {tie.length}, which stays a number in generated code; "
+        "generate with --parameters numeric, or write the number"
+    )
 
 
 def _torn(tie: AnchoredTie, there: list[bool]) -> str:
@@ -109,7 +120,7 @@ def _torn(tie: AnchoredTie, there: list[bool]) -> str:
 def _as_one(tie: AnchoredTie, first: Frame, second: Frame, values: Mapping[sp.Symbol, float]) -> Note:
     """Say that both ends move as one, and how far apart they are if that is not what the tie asks for."""
     apart = transforms.add(first.translation, transforms.minus(second.translation))
-    off = abs(math.hypot(*(float(sp.sympify(x).xreplace(dict(values))) for x in apart)) - tie.length)
+    off = abs(math.hypot(*(float(sp.sympify(x).xreplace(dict(values))) for x in apart)) - _length(tie))
     if off <= CLOSE:
         return Note("ignored", tie.name, "a constraint whose ends move as one")
     detail = f"its ends move as one, {1000 * off:.3g} mm away from it"

@@ -74,7 +74,7 @@ def _tie(table: TomlTable, kind: TieKind, description: Description) -> AnchoredT
     if kind == "distance" and "length" not in table.data:
         raise LinkwiseError(f"{table.place} needs 'length', in m")
     first, second = (_anchor(table, end, kind, description) for end in ("first", "second"))
-    length = table.number("length") if kind == "distance" else 0.0
+    length = table.scalar("length", table.data["length"]) if kind == "distance" else 0.0
     return AnchoredTie(table.text("name"), kind, first, second, length)
 
 

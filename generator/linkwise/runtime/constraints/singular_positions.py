@@ -137,7 +137,7 @@ def open_by(size: float, row: str) -> str:
     """How much a row is open, in its unit."""
     if " force" in row:
         return f"{1e3 * size:.3g} mm"
-    return f"{size:.3g} rad" if " moment" in row else f"{size:.3g}"
+    return f"{size:.3g} rad" if " moment" in row else f"{size:.3g} of its sum, in rad and m"
 
 
 def _epsilon(like: Any) -> float:

@@ -1,0 +1,79 @@
+"""Rows of a frame that the ground holds, from the recursion's own velocities, and how joints follow there."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from linkwise.check.body_reference import COMPLEX_STEP
+from linkwise.check.loop_equations import LoopEquations
+from linkwise.check.newton_euler import NewtonEuler
+from linkwise.package.entries import FrameEntry
+from linkwise.package.load import Array
+
+POINT = np.array([0.1, -0.2, 0.15])
+AXIS = np.array([0.3, 0.5, -0.8])
+NORMAL = np.array([0.2, -0.1, 0.9])
+RADIUS = 0.07
+KINDS = {"held": 6, "hinged": 5, "point": 3, "rolling": 3}
+"""Number of rows of each."""
+
+
+@dataclass(frozen=True)
+class ContactEquations:
+    """A contact, beside the ties of the robot if it has some."""
+
+    recursion: NewtonEuler
+    ties: LoopEquations | None
+    frame: FrameEntry
+    kind: str
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """What the package is asked for."""
+        given: dict[str, Any] = {"frame": self.frame.name, "kind": self.kind, "point": tuple(POINT)}
+        if self.kind == "hinged":
+            given["axis"] = tuple(AXIS)
+        if self.kind == "rolling":
+            given |= {"normal": tuple(NORMAL), "radius": RADIUS}
+        return given
+
+    def own(self, rows: Any) -> slice:
+        """Where the contact's rows stand among all, which have those of couplings last."""
+        end = rows.shape[1] - (0 if self.ties is None else len(self.ties.tree.couplings))
+        return slice(end - KINDS[self.kind], end)
+
+    def rows(self, q: Array) -> Array:
+        """A, (samples, C, n)."""
+        own = self._contact(q)
+        if self.ties is None:
+            return own
+        rows = self.ties.rows(q)
+        before = rows.shape[1] - len(self.ties.tree.couplings)
+        return np.concatenate([rows[:, :before], own, rows[:, before:]], 1)
+
+    def rates(self, q: Array, qd: Array) -> Array:
+        """dA/dt."""
+        rate: Array = self.rows(q + 1j * COMPLEX_STEP * qd).imag / COMPLEX_STEP
+        return rate
+
+    def _contact(self, q: Array) -> Array:
+        samples, n = q.shape
+        units, many = np.tile(np.eye(n), (samples, 1)), np.repeat(q, n, 0)
+        place = np.array(self.frame.translation) + np.array(self.frame.rotation) @ POINT
+        speed = self.recursion.points([(self.frame.body, place)], many, units, 0.0 * units)[0]
+        moved = np.swapaxes(speed.reshape(samples, n, 6), -1, -2)
+        turn, shift = moved[:, :3], moved[:, 3:]
+        match self.kind:
+            case "held":
+                parts = [turn, shift]
+            case "hinged":
+                across = np.linalg.svd(AXIS[None])[2][1:]
+                axes = self.recursion.poses([self.frame], q)[:, 0, :3, :3]
+                parts = [across @ np.swapaxes(axes, -1, -2) @ turn, shift]
+            case "point":
+                parts = [shift]
+            case _:  # a ball rolls: at rest is the point that is a radius below its centre
+                down = -RADIUS * NORMAL / np.linalg.norm(NORMAL)
+                parts = [shift + np.cross(turn, down[None, :, None], axis=1)]
+        return np.concatenate(parts, 1)

@@ -1,0 +1,109 @@
+"""A short simulated motion against Runge and Kutta's method on the recursion's own mass matrix and forces."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from linkwise.check.compare import Entries, Result, compare
+from linkwise.check.loop_checks import loop_entries
+from linkwise.check.loop_equations import LoopEquations
+from linkwise.check.loop_reference import held_motion, mass_matrix
+from linkwise.check.newton_euler import NewtonEuler
+from linkwise.check.states import States
+from linkwise.package.entries import RigidTree
+from linkwise.package.load import Array, Model
+from linkwise.package.manifest import Manifest
+
+STEP = 2e-3
+STEPS = 2
+CLOSING = 8
+"""Most steps that close ties from where an integration has left them."""
+CLOSED = 1e-12
+"""Of such a step, in rad and m; what is left is about its square."""
+
+
+class SimulatedMotion(NamedTuple):
+    """Torques tau that act from a state on, and what comes of it."""
+
+    q: Array
+    qd: Array
+    tau: Array
+    ends: tuple[Array, Array, Array]
+    """q, qd and work."""
+
+
+def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion:
+    """From the first of the states on, in which ties close."""
+    recursion = NewtonEuler(manifest, tree)
+    q, qd, _ = (a[:1] for a in states.motion)
+    tau = np.random.default_rng(9).uniform(-1.0, 1.0, q.shape)
+    motion = _tied(recursion, tree, tau) if tree.tied else _free(recursion, tau)
+    own = list(tree.independent) if tree.tied else list(range(q.shape[1]))
+    return SimulatedMotion(q, qd, tau, _integrated(motion, (q, qd[:, own], np.zeros(1))))
+
+
+def simulation_calls(name: str, model: Model, expected: SimulatedMotion) -> Iterator[Result]:
+    """The motion of one back end."""
+    calls: Any = model
+    time = [STEP * k for k in range(STEPS + 1)]
+    found = calls.simulate(expected.q, expected.qd, time, expected.tau, passive=False)
+    entries = _compared(calls, found, expected.ends)
+    yield compare(f"{name}: a simulated motion against Newton-Euler recursion", entries)
+
+
+def _compared(calls: Any, found: Any, expected: tuple[Array, Array, Array]) -> Iterator[Entries]:
+    for what, value, own in zip(("q", "qd", "work"), (found.q, found.qd, found.work), expected, strict=True):
+        yield loop_entries(what, np.asarray(value)[-1], own)
+    energy = np.asarray(calls.energy(found.q[-1], found.qd[-1]).total).sum(-1)
+    yield loop_entries("energy", np.asarray(found.energy)[-1], energy)
+
+
+Rates = Callable[[Array, Array], tuple[Array, Array, Array, Array]]
+"""q that ties allow, qd of all joints, accelerations of the independent ones and power, of q and v."""
+
+
+def _integrated(motion: Rates, start: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+    """q, qd and work after all steps of order 4."""
+    q, v, work = start
+    for _ in range(STEPS):
+        slopes: list[tuple[Array, ...]] = []
+        for part in (0.0, 0.5, 0.5, 1.0):
+            by = part * STEP
+            at, speed = (q + by * slopes[-1][0], v + by * slopes[-1][1]) if slopes else (q, v)
+            slopes.append(motion(at, speed)[1:])
+        by_q, by_v, by_work = (STEP * (a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(*slopes, strict=True))
+        q, v, work = q + by_q, v + by_v, work + by_work
+        q = motion(q, v)[0]
+    return q, motion(q, v)[1], work
+
+
+def _free(recursion: NewtonEuler, tau: Array) -> Rates:
+    def motion(q: Array, qd: Array) -> tuple[Array, Array, Array, Array]:
+        bias = recursion.partial_torque(q, qd, 0.0 * q).sum(-1)
+        moved = np.linalg.solve(mass_matrix(recursion, q), (tau - bias)[..., None])[..., 0]
+        return q, qd, moved, (qd * tau).sum(-1)
+
+    return motion
+
+
+def _tied(recursion: NewtonEuler, tree: RigidTree, tau: Array) -> Rates:
+    ties, own = LoopEquations(recursion, tree), list(tree.independent)
+    rest = [k for k in range(tau.shape[1]) if k not in own]
+
+    def motion(q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
+        q, rows = q.copy(), ties.rows(q)
+        for _ in range(CLOSING):
+            step = (np.linalg.pinv(rows[..., rest]) @ ties.violation(q)[..., None])[..., 0]
+            q[:, rest] -= step
+            if np.abs(step).max() < CLOSED:
+                break
+            rows = ties.rows(q)
+        qd = np.zeros_like(q)
+        qd[:, own] = v
+        qd[:, rest] = -(np.linalg.pinv(rows[..., rest]) @ rows[..., own] @ v[..., None])[..., 0]
+        onto = np.swapaxes(np.linalg.svd(rows[..., rest])[0][..., : len(rest)], -1, -2)
+        moved = held_motion(recursion, States(q, qd, qd), onto @ rows, onto @ ties.rates(q, qd), tau)[0]
+        return q, qd, moved[:, own], (qd * tau).sum(-1)
+
+    return motion
