@@ -10,6 +10,7 @@ from linkwise.check.loop_equations import LoopEquations
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.entries import FrameEntry
 from linkwise.package.load import Array
+from linkwise.runtime.robot_constraints import Contact
 
 POINT = np.array([0.1, -0.2, 0.15])
 AXIS = np.array([0.3, 0.5, -0.8])
@@ -45,7 +46,7 @@ class ContactEquations:
 
     def rows(self, q: Array) -> Array:
         """A, (samples, C, n)."""
-        own = self._contact(q)
+        own = contact_rows(self.recursion, self.frame, Contact(**self.asked), q)
         if self.ties is None:
             return own
         rows = self.ties.rows(q)
@@ -57,23 +58,25 @@ class ContactEquations:
         rate: Array = self.rows(q + 1j * COMPLEX_STEP * qd).imag / COMPLEX_STEP
         return rate
 
-    def _contact(self, q: Array) -> Array:
-        samples, n = q.shape
-        units, many = np.tile(np.eye(n), (samples, 1)), np.repeat(q, n, 0)
-        place = np.array(self.frame.translation) + np.array(self.frame.rotation) @ POINT
-        speed = self.recursion.points([(self.frame.body, place)], many, units, 0.0 * units)[0]
-        moved = np.swapaxes(speed.reshape(samples, n, 6), -1, -2)
-        turn, shift = moved[:, :3], moved[:, 3:]
-        match self.kind:
-            case "held":
-                parts = [turn, shift]
-            case "hinged":
-                across = np.linalg.svd(AXIS[None])[2][1:]
-                axes = self.recursion.poses([self.frame], q)[:, 0, :3, :3]
-                parts = [across @ np.swapaxes(axes, -1, -2) @ turn, shift]
-            case "point":
-                parts = [shift]
-            case _:  # a ball rolls: at rest is the point that is a radius below its centre
-                down = -RADIUS * NORMAL / np.linalg.norm(NORMAL)
-                parts = [shift + np.cross(turn, down[None, :, None], axis=1)]
-        return np.concatenate(parts, 1)
+
+def contact_rows(recursion: NewtonEuler, frame: FrameEntry, contact: Contact, q: Array) -> Array:
+    """A of a contact on a frame, (samples, rows, n)."""
+    samples, n = q.shape
+    units, many = np.tile(np.eye(n), (samples, 1)), np.repeat(q, n, 0)
+    place = np.array(frame.translation) + np.array(frame.rotation) @ np.array(contact.point)
+    speed = recursion.points([(frame.body, place)], many, units, 0.0 * units)[0]
+    moved = np.swapaxes(speed.reshape(samples, n, 6), -1, -2)
+    turn, shift = moved[:, :3], moved[:, 3:]
+    match contact.kind:
+        case "held":
+            parts = [turn, shift]
+        case "hinged":
+            across = np.linalg.svd(np.array(contact.axis)[None])[2][1:]
+            axes = recursion.poses([frame], q)[:, 0, :3, :3]
+            parts = [across @ np.swapaxes(axes, -1, -2) @ turn, shift]
+        case "point":
+            parts = [shift]
+        case _:  # a ball rolls: at rest is the point that is a radius below its centre
+            down = -contact.radius * np.array(contact.normal) / np.linalg.norm(contact.normal)
+            parts = [shift + np.cross(turn, down[None, :, None], axis=1)]
+    return np.concatenate(parts, 1)
