@@ -117,6 +117,9 @@ def test_power_of_joints_and_of_slip_is_the_gain_of_energy(folder: Path) -> None
     result = analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT])
     slip = np.stack([result[f"slip/sole {part}"] for part in ("angular_z", "x", "y")], 1)
     fed = (slip * result.contact_wrench[:, 0, [2, 3, 4]]).sum(1)
+    by_link = sum(result[f"power_contact/sole/{link}"] for link in MASSES)
+    assert np.abs(by_link - fed).max() < 1e-9 * np.abs(fed).max()
+    assert result.contact_work.net.sum() == pytest.approx(np.trapezoid(fed, result.time))
     free = analyze(folder / "moving.csv", folder / "leg")
     assert np.abs(result.joint_power.sum(1) + fed - free.joint_power.sum(1)).max() < 1e-9 * np.abs(fed).max()
     assert result.closure.energy_relative is not None
@@ -130,7 +133,10 @@ def test_the_command_writes_forces_and_draws_them(folder: Path, tmp_path: Path) 
     assert done.returncode == 0, done.stderr
     record = json.loads((tmp_path / "out" / "analysis.json").read_text())
     assert record["contacts"]["unactuated"] == JOINTS[:3]
-    assert record["contacts"]["held"][0]["point"] == [0.1, -0.06, 0.0]
+    held = record["contacts"]["held"][0]
+    assert held["point"] == [0.1, -0.06, 0.0]
+    assert held["on"] == {"column": "stands", "above": 0.5}
+    assert "nothing drives pelvis_tx, pelvis_ty, pelvis_tilt" in done.stdout
     assert (tmp_path / "out" / "contacts.png").stat().st_size > 10_000
     header = (tmp_path / "out" / "analysis.csv").read_text().splitlines()
     assert any("force/sole force_y/pelvis" in line for line in header[:3])
@@ -174,6 +180,10 @@ def test_what_does_not_go_with_contacts_is_refused(folder: Path) -> None:
         analyze(folder / "moving.csv", leg, contacts=Contacts((FOOT, knee), loads=shank))
     with pytest.raises(LinkwiseError, match="goes with --contact; add it"):
         Contacts(unactuated=("pelvis_tx",))
+    with pytest.raises(LinkwiseError, match="give a list of Contact"):
+        analyze(log, leg, contacts=FOOT)
+    with pytest.raises(LinkwiseError, match="'foot' is not a Contact"):
+        analyze(log, leg, contacts=["foot"])  # type: ignore[list-item]
 
 
 def test_contacts_of_an_arm_that_is_driven_throughout_are_refused(folder: Path, tmp_path: Path) -> None:
@@ -181,3 +191,37 @@ def test_contacts_of_an_arm_that_is_driven_throughout_are_refused(folder: Path, 
     log = write_csv(tmp_path / "log.csv", smooth(20, 3))
     with pytest.raises(LinkwiseError, match="does not tell what a contact bears; measure that"):
         analyze(log, tmp_path / "arm", contacts=[Contact("link3", "point")])
+
+
+def test_a_wheel_rolls_on_ground_across_gravity(folder: Path) -> None:
+    wheel = Contact("foot", "rolling", radius=0.05)
+    result = analyze(folder / "moving.csv", folder / "leg", contacts=[wheel])
+    assert result.robot.contacts is not None
+    assert result.robot.contacts.contacts[0].normal == (0.0, GRAVITY, 0.0)
+    down = np.cross([0.0, -0.05, 0.0], result.contact_wrench[:, 0, 3:])
+    assert np.abs(result.contact_wrench[:, 0, :3] - down).max() < 1e-9 * np.abs(down).max()
+
+
+def test_a_contact_that_is_never_on_is_told(folder: Path) -> None:
+    contacts = Contacts((FOOT,), {"sole": WhileColumn("stands", 5.0)})
+    result = analyze(folder / "still.csv", folder / "leg", contacts=contacts)
+    assert "contact 'sole' is never on: 'stands' is 1 at most" in result.warnings
+
+
+def test_a_foot_beside_its_plate_bears_little_and_is_no_fault(folder: Path) -> None:
+    shank = Contact("shank", "point", name="knee")
+    loads = Load("plate", "foot", (0.0, 600.0, 0.0)), Load("missed", "shank", (0.0, 0.0, 0.0))
+    columns = {"sole": WhileColumn("stands"), "knee": WhileColumn("stands")}
+    contacts = Contacts((FOOT, shank), columns, loads)
+    result = analyze(folder / "still.csv", folder / "leg", contacts=contacts)
+    on = result.time > 0.395
+    assert result["contact/knee"][on] == pytest.approx(1e-3 / 1.001)
+
+
+def test_a_base_floats_wherever_its_slides_are(folder: Path, tmp_path: Path) -> None:
+    text = LEG.read_text().replace('child = "carriage"', 'child = "carriage"\nxyz = [0.3, -1.2, 0.1]')
+    (tmp_path / "leg.toml").write_text(text)
+    write_package(generate(read_system(tmp_path / "leg.toml"), ["numpy"]), tmp_path / "leg")
+    result = analyze(folder / "moving.csv", tmp_path / "leg", contacts=[FOOT])
+    assert result.robot.contacts is not None
+    assert result.robot.contacts.unactuated == (0, 1, 2)

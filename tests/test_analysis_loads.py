@@ -256,5 +256,7 @@ def test_values_that_are_no_load_are_refused(arm: Path) -> None:
             analyze(arm / "log.csv", arm / "arm", loads=[load])
     with pytest.raises(LinkwiseError, match="load 'f': another has that name"):
         analyze(arm / "log.csv", arm / "arm", loads=[Load("f", "tool"), Load("f", "d")])
-    with pytest.raises(LinkwiseError, match="--loads-cutoff goes with --loads; add it"):
+    with pytest.raises(
+        LinkwiseError, match="--loads-cutoff goes with --loads, or with --contact-loads; add one"
+    ):
         Loads.of([], 5.0)

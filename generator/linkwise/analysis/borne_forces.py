@@ -59,6 +59,7 @@ class BorneForces:
                     values[:] = own[:, column.cause, place[quantity]]
         if standing is not None:
             self._fill_ground(out, columns, standing, time, motion)
+            self._fill_fed(out, columns, standing, motion[1], by_link)
 
     def _by_link(self, standing: Standing | None, motion: Motion, partial: Array) -> Array:
         """Of each link, (S, C, N)."""
@@ -95,6 +96,18 @@ class BorneForces:
         q = motion[0]
         own = [np.asarray(a) + 0.0 * q for a in model.passive_torque(*motion)]
         return np.stack([*own, *(borne.torque(model, time, q) for borne in self.loads)], axis=-1)
+
+    def _fill_fed(
+        self, out: Array, columns: Sequence[Column], standing: Standing, qd: Array, by_link: Array
+    ) -> None:
+        """Fill what contacts feed into links as they slip."""
+        ground = self.robot.contacts
+        assert ground is not None
+        own = by_link[:, len(self.robot.constraint_rows) - len(ground.rows) :]
+        fed = standing.fed(qd, own, ground.owners, len(ground.names))
+        for column, values in zip(columns, out, strict=True):
+            if column.quantity == "power_contact":
+                values[:] = fed[:, column.cause, column.link]
 
     def _fill_ground(
         self, out: Array, columns: Sequence[Column], standing: Standing, time: Array, motion: Motion

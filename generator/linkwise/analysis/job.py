@@ -83,6 +83,7 @@ class Job:
             **choices(self.reading, self.processing),
             "payloads": [payload.record() for payload in robot.payloads],
             "loads": [borne.record() for borne in self.decomposer.loads],
+            "contacts": [] if robot.contacts is None else list(robot.contacts.names),
             "induced": [point.name for point in self.decomposer.induced.points],
         }
 
@@ -106,15 +107,25 @@ class Job:
             done.work,
             done.joint_work,
             done.load_work,
+            done.contact_work,
             self.decomposer.loads,
             tuple(point.name for point in self.decomposer.induced.points),
             done.closure,
             self.samples.ignored,
-            (*self.samples.warnings, *self._twice_borne()),
+            (*self.samples.warnings, *self._twice_borne(), *self._never_on(done)),
             done.samples,
             kept.stride,
             self.closed,
+            self.decomposer.times,
         )
+
+    def _never_on(self, done: Streamed) -> Iterator[str]:
+        """Warnings of contacts that are off throughout."""
+        ground, times = self.decomposer.robot.contacts, self.decomposer.times
+        for column, peak in zip(self.decomposer.columns, done.totals.peak, strict=True):
+            c = column.cause
+            if column.quantity == "contact" and not peak and ground and times and c is not None:
+                yield f"contact {ground.names[c]!r} is never on: {times.largest(c)}"
 
     def _twice_borne(self) -> Iterator[str]:
         """Warnings of contacts on bodies that bear loads too, which may be what was measured there."""

@@ -1,11 +1,13 @@
 """The result of an analysis: named arrays, and the record of how they were made."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from linkwise.analysis.closed_motion import ClosedLog
+from linkwise.analysis.contacts.contact_times import ContactTimes
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import Column
@@ -54,6 +56,8 @@ class AnalysisResult:
     """The same for all links together, (n,) in J: the integral of τ_i q̇_i where it is positive, negative."""
     load_work: Work
     """What each joint gave against each load and took back, (n, loads) in J."""
+    contact_work: Work
+    """What each contact fed into each link as what it holds slipped, and took back, (N, contacts) in J."""
     loads: tuple[PlacedLoad, ...]
     induced: tuple[str, ...]
     """Whose acceleration is told by its sources, in the columns that begin with acc."""
@@ -65,6 +69,8 @@ class AnalysisResult:
     stride: int = 1
     closed: ClosedLog | None = None
     """How far positions of the log were off, where joints are tied; None where none are."""
+    times: ContactTimes | None = None
+    """When contacts are on, where there are any."""
 
     def __getitem__(self, name: str) -> Array:
         """One column (S,) by its name, as in the Parquet file: "tau/joint1/link2"; else LinkwiseError."""
@@ -221,17 +227,14 @@ class AnalysisResult:
     def contact_wrench(self) -> Array:
         """What the ground puts on each contact, (S, contacts, 6): moment about its point, force; world axes.
 
-        In N m and N. Moments of a hinge, along its own axes, are not in it.
+        In N m and N.
         """
         ground = self.robot.contacts
-        out = np.zeros((len(self.time), 0 if ground is None else len(ground.names), 6))
         if ground is None:
-            return out
+            return np.zeros((len(self.time), 0, 6))
         forces = self.constraint_force[:, self._rows - len(ground.rows) :]
-        for row, (contact, place) in enumerate(zip(ground.owners, ground.wrench_rows, strict=True)):
-            if place is not None:
-                out[:, contact, place] = forces[:, row]
-        return out
+        each = range(len(ground.names))
+        return np.stack([ground.wrench(c, self.robot.model, self.q, forces) for c in each], axis=1)
 
     @property
     def _rows(self) -> int:
@@ -258,6 +261,7 @@ class AnalysisResult:
         assert ground is not None
         record = ground.record(self.robot.joints)
         for number, one in enumerate(record["held"]):
+            one |= {} if self.times is None else self.times.record(number)
             one["largest_slip"] = dict(zip(("m/s", "rad/s"), self.largest_slip(number), strict=True))
         return record
 
@@ -281,7 +285,20 @@ class AnalysisResult:
                 {"joint": joints[i], "load": self.loads[e].name, **entry(self.load_work, i, e)}
                 for i, e in borne
             ],
+            **self._fed(entry),
         }
+
+    def _fed(self, entry: Callable[..., dict[str, float]]) -> dict[str, Any]:
+        """Work of contacts that slip, where there are any."""
+        ground, links = self.robot.contacts, self.robot.links
+        if ground is None:
+            return {}
+        fed = [
+            {"contact": name, "link": link, **entry(self.contact_work, j, c)}
+            for c, name in enumerate(ground.names)
+            for j, link in enumerate(links)
+        ]
+        return {"of_contacts": fed}
 
     def _dense(self, quantity: Quantity, rank: int) -> Array:
         """Return a quantity's columns as one array (S, n, N, n)[: rank + 1], zeros where none is."""

@@ -114,6 +114,10 @@ def _ground(robot: LoadedRobot, measured: Sequence[int]) -> Iterator[Column]:
         return
     for number, name in enumerate(ground.names):
         yield Column("contact", f"contact/{column_part(name)}", "1", cause=number)
+    for number, name in enumerate(ground.names):
+        for j, link in enumerate(robot.links):
+            named = "/".join(["power_contact", column_part(name), column_part(link)])
+            yield Column("power_contact", named, "W", link=j, cause=number)
     first = len(robot.constraint_rows) - len(ground.rows)
     for row, name in enumerate(ground.rows, first):
         unit = "rad/s" if force_unit(name) == "N·m" else "m/s"

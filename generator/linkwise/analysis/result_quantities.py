@@ -31,6 +31,7 @@ Quantity = Literal[
     "power",
     "power_link",
     "power_load",
+    "power_contact",
     "power_qdd",
     "power_qd",
     "power_gravity",
@@ -78,6 +79,7 @@ MEANING: dict[Quantity, str] = {
     "slip": "velocity of what the contact holds, while it is on",
     "power": "power of the joint: what it sends into all links together, what it has of its own, and loads",
     "power_link": "power that the joint sends into the link",
+    "power_contact": "power that the contact feeds into the link as what it holds slips",
     "power_load": "power that the joint sends out against the load",
     "power_qdd": "power that the joint sends into the link, by the cause's acceleration",
     "power_qd": "power that the joint sends into the link, by the cause's velocity",
@@ -123,6 +125,7 @@ PASSIVE: dict[Quantity, str] = {
 """Beside the links' what a joint's torque consists of, in the order of `passive_torque`, and the number that
 says whether a joint has it."""
 POWER: tuple[Quantity, ...] = ("power", "power_link", "power_load")
+"""Torques of joints times their velocities; beside them contacts have power, as they slip."""
 POWER_TERMS: tuple[Quantity, ...] = (
     "power_qdd",
     "power_qd",
@@ -147,5 +150,5 @@ FORCE_OF: dict[Quantity, Quantity] = {
 }
 """What constraints bear of what stands beside the links' torques."""
 FORCES: tuple[Quantity, ...] = ("force", "force_link", *FORCE_OF.values())
-GROUND: tuple[Quantity, ...] = ("contact", "slip", "force_measured", "tau_as_loads")
+GROUND: tuple[Quantity, ...] = ("contact", "slip", "force_measured", "tau_as_loads", "power_contact")
 """What is known of contacts beside the forces that they bear."""

@@ -60,6 +60,7 @@ class Streamed:
     work: Work
     joint_work: Work
     load_work: Work
+    contact_work: Work
     closure: Closure
     samples: int
 
@@ -114,7 +115,9 @@ def stream(
         if pending is not None:
             pending.result()
     robot = decomposer.robot
-    works = work.work(1 / samples.rate, len(robot.joints), len(robot.links), len(decomposer.loads))
+    contacts = 0 if robot.contacts is None else len(robot.contacts.names)
+    sizes = len(robot.joints), len(robot.links), len(decomposer.loads), contacts
+    works = work.work(1 / samples.rate, *sizes)
     return Streamed(Totals(total / (stop - start), peak), *works, closure, stop - start)
 
 

@@ -19,6 +19,7 @@ from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermRows, term_rows
 from linkwise.analysis.verify import Closure, residual, worst_of
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.package.load import Array
 
 Source = tuple[int, int, int]
@@ -153,7 +154,16 @@ class Decomposer:
         """How the ground holds the robot; None where nothing does."""
         if self.times is None or self.robot.contacts is None:
             return None
-        return self.robot.contacts.standing(q, self.times.shares(self.robot.model, time, q))
+        model, ground = self.robot.model, self.robot.contacts
+        blind = ground.blind(model, q)
+        if blind is not None:
+            joints = listed([self.robot.joints[i] for i in ground.unactuated])
+            raise LinkwiseError(
+                f"time {time[blind]:.6g} s: two of {joints} turn about one axis there, so that their torques"
+                " do not tell a moment that contacts bear, nor the log how the base turns; cut the log"
+                " there, or describe the base by turns that stay apart"
+            )
+        return ground.standing(q, self.times.shares(model, time, q))
 
     def _add_passive(self, out: Array, standing: Standing | None, q: Array, qd: Array, qdd: Array) -> None:
         """Fill what joints have of their own, and add it to their torques."""

@@ -136,17 +136,19 @@ def against_recursion(
         projected = np.einsum("snm,snj->smj", mapped, expected)
         expected = np.zeros_like(expected)
         expected[:, list(robot.driven)] = projected
-    fed, free = np.zeros((len(q), len(robot.links))), expected
+    free = expected
     if robot.contacts is not None and tree is not None:
         reference = ContactReference(robot.recursion, tree, robot.contacts)
-        expected, given = reference.left(expected, q, qd, dense("contact"), mapped)
-        fed = given[:, : len(robot.links)]
+        expected = reference.left(expected, q, dense("contact"), mapped)
     ours, power = np.zeros_like(expected), np.zeros_like(partial)
+    fed = np.zeros((len(q), len(robot.links)))
     for row, column in enumerate(columns):
         if column.quantity == "tau_link":
             ours[:, column.joint, column.link] = block[row, at]
         elif column.quantity == "tau_load" and column.cause is not None:
             ours[:, column.joint, len(robot.links) + column.cause] = block[row, at]
+        elif column.quantity == "power_contact":
+            fed[:, column.link] += block[row, at]
         elif column.quantity == "power_link":
             power[:, column.joint, column.link] = block[row, at]
     absolute, relative, watts = 0.0, 0.0, 0.0

@@ -33,7 +33,7 @@ class WorkSum:
 
     def __init__(self, columns: Sequence[Column]) -> None:
         self._columns = columns
-        self._rows = [at for at, c in enumerate(columns) if c.quantity in POWER]
+        self._rows = [at for at, c in enumerate(columns) if c.quantity in (*POWER, "power_contact")]
         self._sums = np.zeros((2, len(self._rows)))
         self._first: Array | None = None
         self._last = self._sums
@@ -47,10 +47,12 @@ class WorkSum:
             self._first = parts[..., 0].copy()
         self._last = parts[..., -1].copy()
 
-    def work(self, step: float, joints: int, links: int, loads: int) -> tuple[Work, Work, Work]:
+    def work(
+        self, step: float, joints: int, links: int, loads: int, contacts: int
+    ) -> tuple[Work, Work, Work, Work]:
         """Work in J into each link (n, N), into all together (n,), against each load (n, loads).
 
-        Samples are `step` s apart.
+        And what contacts fed into links (N, contacts). Samples are `step` s apart.
         """
         first = self._last if self._first is None else self._first
         energy = step * (self._sums - 0.5 * (first + self._last))
@@ -58,6 +60,7 @@ class WorkSum:
             self._work("power_link", energy, (joints, links)),
             self._work("power", energy, (joints,)),
             self._work("power_load", energy, (joints, loads)),
+            self._work("power_contact", energy, (links, contacts)),
         )
 
     def _work(self, quantity: Quantity, energy: Array, shape: tuple[int, ...]) -> Work:

@@ -77,6 +77,7 @@ def contact_rows(recursion: NewtonEuler, frame: FrameEntry, contact: Contact, q:
         case "point":
             parts = [shift]
         case _:  # a ball rolls: at rest is the point that is a radius below its centre
-            down = -contact.radius * np.array(contact.normal) / np.linalg.norm(contact.normal)
+            normal: Array = np.array(contact.normal)
+            down = -contact.radius * normal / np.linalg.norm(normal)
             parts = [shift + np.cross(turn, down[None, :, None], axis=1)]
     return np.concatenate(parts, 1)

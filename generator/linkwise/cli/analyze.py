@@ -183,9 +183,12 @@ def _told(analysis: Analysis, files: Sequence[Path]) -> list[str]:
 
 def _of_contacts(analysis: Analysis) -> list[str]:
     """How far a motion is from keeping its contacts."""
-    ground = analysis.robot.contacts
-    slips = [] if ground is None else [analysis.largest_slip(c) for c in range(len(ground.names))]
-    return [
-        f"contact {name} moves by up to {metres:.3g} m/s and {turns:.3g} rad/s while it is on"
-        for name, (metres, turns) in zip(() if ground is None else ground.names, slips, strict=True)
-    ]
+    robot, ground = analysis.robot, analysis.robot.contacts
+    if ground is None:
+        return []
+    still = listed([robot.joints[i] for i in ground.unactuated])
+    told = [f"nothing drives {still}: what these would have to give, contacts bear"]
+    for c, name in enumerate(ground.names):
+        metres, turns = analysis.largest_slip(c)
+        told.append(f"contact {name} moves by up to {metres:.3g} m/s and {turns:.3g} rad/s while it is on")
+    return told

@@ -66,7 +66,12 @@ def chosen_contacts(
     cutoff: of the low-pass that loads get, in Hz
     """
     given = tuple(_contact(text, robot) for text in contact)
-    columns = dict(_while(text) for text in while_above)
+    columns: dict[str, WhileColumn] = {}
+    for text in while_above:
+        name, column = _while(text, [contact.name or "" for contact in given])
+        if name in columns:
+            raise LinkwiseError(f"--contact-while {text}: {name} has one already; give one for each contact")
+        columns[name] = column
     low = cutoff if loads else None
     return Contacts(given, columns, tuple(loads), threshold, low, tuple(unactuated))
 
@@ -89,15 +94,18 @@ def _contact(text: str, robot: LoadedRobot) -> Contact:
     if len(more) != len(NUMBERS[kind]):
         raise LinkwiseError(f"--contact {text}: write it as FRAME={named}@X,Y,Z, in m")
     name, frame = named_body(where, robot)
-    made = Contact(frame, kind, (x, y, z), normal=robot.up, name=name or frame)
+    made = Contact(frame, kind, (x, y, z), name=name or frame)
     if kind == "hinged":
         return made._replace(axis=(more[0], more[1], more[2]))
     return made._replace(radius=more[0]) if more else made
 
 
-def _while(text: str) -> tuple[str, WhileColumn]:
-    """Of NAME=COLUMN[>VALUE]."""
+def _while(text: str, names: Sequence[str]) -> tuple[str, WhileColumn]:
+    """Of NAME=COLUMN[>VALUE]; a name that has a sign of its own is found too."""
     name, sign, rest = text.partition("=")
+    for own in names:
+        if text.startswith(f"{own}=") and len(own) > len(name):
+            name, rest = own, text[len(own) + 1 :]
     column, above, value = rest.rpartition(">")
     try:
         found = WhileColumn(column, float(value)) if above else WhileColumn(rest)

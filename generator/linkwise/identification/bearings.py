@@ -15,8 +15,6 @@ from linkwise.identification.random_motions import SPEED, Motion
 from linkwise.package.load import Array
 from linkwise.runtime.constraints.independent_joints import loose_base
 
-LEAST = 3
-"""Coordinates of a base that floats, in a plane or in space: a slide that turns, too, has bearings."""
 RANK = 1e-6
 """Of a column: what is left of it across others is rounding where it is smaller."""
 
@@ -63,8 +61,7 @@ class Bearings:
 
 def floating_coordinates(robot: LoadedRobot) -> frozenset[int]:
     """Coordinates of a base that floats, in space or in a plane; none of another."""
-    base = loose_base(robot.model.backend.tree)
-    return frozenset(base if len(base) >= LEAST else ())
+    return frozenset(loose_base(robot.model.backend.tree))
 
 
 def _independent(columns: Array) -> NDArray[np.bool_]:

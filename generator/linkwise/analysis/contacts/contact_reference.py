@@ -21,10 +21,8 @@ class ContactReference(NamedTuple):
     tree: RigidTree
     contacts: GroundContacts
 
-    def left(
-        self, torque: Array, q: Array, qd: Array, shares: Array, mapped: Array | None
-    ) -> tuple[Array, Array]:
-        """What contacts of shares (S, contacts) leave of torques (S, n, X), and what power they give (S, X).
+    def left(self, torque: Array, q: Array, shares: Array, mapped: Array | None) -> Array:
+        """What contacts of shares (S, contacts) leave of torques (S, n, X).
 
         mapped: G (S, n, m) of the joints that do not follow, in whose places torques stand; None of all
         """
@@ -37,7 +35,6 @@ class ContactReference(NamedTuple):
             [np.repeat(shares[:, [c]], one.shape[1], 1) for c, one in enumerate(each)], 1
         )
         rows = np.concatenate(each, axis=1) * (weights > 0.0)[..., None]
-        slip = np.einsum("scn,sn->sc", rows, qd)
         if mapped is not None:
             assert self.contacts.tied is not None
             own = list(self.contacts.tied.following.independent)
@@ -46,7 +43,8 @@ class ContactReference(NamedTuple):
             rows = projected
         base = list(self.contacts.unactuated)
         forces = _least(np.swapaxes(rows[..., base], 1, 2), weights, torque[:, base])
-        return torque - np.swapaxes(rows, 1, 2) @ forces, np.einsum("sc,scx->sx", slip, forces)
+        left: Array = torque - np.swapaxes(rows, 1, 2) @ forces
+        return left
 
 
 def _least(equations: Array, weights: Array, torque: Array) -> Array:

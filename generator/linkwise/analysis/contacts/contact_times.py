@@ -3,12 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwise.analysis.column_matching import time_column
 from linkwise.analysis.contacts.given_contacts import Contacts, WhileColumn
 from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads.given_loads import FORCE
 from linkwise.analysis.loads.placed_load import PlacedLoad, Wrench, model_pose
 from linkwise.analysis.loads.read_loads import placed_loads
 from linkwise.analysis.logs import open_log
@@ -19,16 +22,29 @@ from linkwise.escape import listed
 from linkwise.package.load import Array, Model
 from linkwise.progress import Progress
 
-TINY = 1e-6
-"""N; nothing, beside what a force plate reads."""
+FLOOR = 1e-3
+"""Of the largest measured force, that a contact which is on has at least: a plate may be missed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Switch:
+    """A column of the motion's log, (S, 2) of time in s and value, above which value a contact is on."""
+
+    given: WhileColumn
+    rows: Array
+
+    def on(self, time: Array) -> NDArray[np.bool_]:
+        """At instants (S,)."""
+        is_on: NDArray[np.bool_] = np.interp(time, self.rows[:, 0], self.rows[:, 1]) > self.given.above
+        return is_on
 
 
 @dataclass(frozen=True, eq=False)
 class ContactTimes:
     """Which contacts are on at an instant, and what was measured of them."""
 
-    series: tuple[Array | None, ...]
-    """Of each contact rows of time in s, value, and the value above which it is on, (S, 3); or None."""
+    switches: tuple[Switch | None, ...]
+    """Of each contact, where a column says when it is on."""
     measured: tuple[tuple[PlacedLoad, ...], ...]
     """Of each contact the loads on its body, where such were given."""
     least_force: float
@@ -39,23 +55,55 @@ class ContactTimes:
         """Those of all contacts."""
         return tuple(load for some in self.measured for load in some)
 
+    def record(self, number: int) -> dict[str, Any]:
+        """When a contact is on, as plain data."""
+        switch, loads = self.switches[number], self.measured[number]
+        told: dict[str, Any] = {"on": "always"}
+        if switch is not None:
+            told = {"on": {"column": switch.given.column, "above": switch.given.above}}
+        elif loads:
+            told = {"on": {"force_above": self.least_force}}
+        return told | ({"measured": [load.record() for load in loads]} if loads else {})
+
+    def largest(self, number: int) -> str:
+        """What was seen at most of what says that a contact is on, in words."""
+        switch = self.switches[number]
+        if switch is not None:
+            return f"{switch.given.column!r} is {switch.rows[:, 1].max():.4g} at most"
+        force = [np.linalg.norm(load.table[:, FORCE], axis=1).max() for load in self.measured[number]]
+        return f"the loads on its body are {sum(force):.4g} N at most"
+
     def shares(self, model: Model, time: Array, q: Array) -> Array:
         """Of what contacts could bear in several ways, (S, contacts): 0 of those that are off, 1 in all.
 
         At instants (S,) with the robot at q (S, n). In proportion to the measured forces where all contacts
         have such, else alike.
         """
-        out = np.ones((len(time), len(self.series)))
-        for number, (series, loads) in enumerate(zip(self.series, self.measured, strict=True)):
-            pushes = [wrench.force for wrench in _wrenches(loads, model, time, q)]
-            force = np.linalg.norm(sum(pushes, np.zeros((len(time), 3))), axis=1)
-            if series is not None:
-                is_on = np.interp(time, series[:, 0], series[:, 1]) > series[0, 2]
-            else:
-                is_on = force > self.least_force if loads else np.ones(len(time), dtype=bool)
-            out[:, number] = is_on * (np.maximum(force, TINY) if all(self.measured) else 1.0)
-        shares: Array = out / np.maximum(out.sum(axis=1, keepdims=True), TINY)
+        force = np.stack([self._force(number, model, time, q) for number in range(len(self.switches))], 1)
+        on = np.stack([self._on(number, time, force[:, number]) for number in range(len(self.switches))], 1)
+        out = np.ones_like(force)
+        if all(self.measured):
+            out = np.maximum(force, FLOOR * force.max(axis=1, keepdims=True, initial=0.0))
+            out = np.where(out.max(axis=1, keepdims=True) > 0.0, out, 1.0)
+        out = out * on
+        whole = out.sum(axis=1, keepdims=True)
+        shares: Array = out / np.where(whole > 0.0, whole, 1.0)
         return shares
+
+    def _on(self, number: int, time: Array, force: Array) -> NDArray[np.bool_]:
+        switch = self.switches[number]
+        if switch is not None:
+            return switch.on(time)
+        if not self.measured[number]:
+            return np.ones(len(time), dtype=np.bool_)
+        is_on: NDArray[np.bool_] = force > self.least_force
+        return is_on
+
+    def _force(self, number: int, model: Model, time: Array, q: Array) -> Array:
+        """Size of what was measured of a contact, (S,)."""
+        pushes = [wrench.force for wrench in _wrenches(self.measured[number], model, time, q)]
+        size: Array = np.linalg.norm(sum(pushes, np.zeros((len(time), 3))), axis=1)
+        return size
 
     def torque(self, model: Model, time: Array, q: Array) -> Array:
         """What joints would take to bear the measured loads, (S, n)."""
@@ -91,15 +139,15 @@ def contact_times(
         return None
     loads = placed_loads(contacts.measured, robot, motion, reading.ignore_extra, progress, buffer)
     names = robot.contacts.names
-    series = tuple(_series(contacts.columns.get(name), log, reading, progress) for name in names)
+    switches = tuple(_switch(contacts.columns.get(name), log, reading, progress) for name in names)
     found = _by_contact(robot, loads)
-    for name, column, some in zip(names, series, found, strict=True):
+    for name, column, some in zip(names, switches, found, strict=True):
         if contacts.loads and column is None and not some:
             raise LinkwiseError(
                 f"contact {name!r}: no load of --contact-loads acts on its body ({_told(loads)}); say when"
                 f" it is on with --contact-while {name}=COLUMN"
             )
-    return ContactTimes(series, found, contacts.least_force)
+    return ContactTimes(switches, found, contacts.least_force)
 
 
 def _told(loads: Sequence[PlacedLoad]) -> str:
@@ -113,19 +161,18 @@ def switch_columns(contacts: Contacts, log: Path) -> tuple[str, ...]:
         if given.column not in there:
             raise LinkwiseError(
                 f"{log}: --contact-while {name}={given.column}: no column {given.column!r}; the log has"
-                f" {listed(map(repr, there))}"
+                f" {listed(map(repr, there))}; write it as NAME=COLUMN>VALUE"
             )
     return tuple(given.column for given in contacts.columns.values())
 
 
-def _series(given: WhileColumn | None, log: Path, reading: Reading, progress: Progress) -> Array | None:
+def _switch(given: WhileColumn | None, log: Path, reading: Reading, progress: Progress) -> Switch | None:
     if given is None:
         return None
     opened = open_log(log)
     with within(str(log)):
         columns = time_column(opened.columns, reading), list(opened.columns).index(given.column)
-    rows = collected(finite_blocks(opened, log, columns, progress), 2, None)
-    return np.column_stack([rows, np.full(len(rows), given.above)])
+    return Switch(given, collected(finite_blocks(opened, log, columns, progress), 2, None))
 
 
 def _by_contact(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[PlacedLoad, ...], ...]:
@@ -142,10 +189,14 @@ def _by_contact(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[
             if body[str(contact.frame)] == load.seat.frame.body
         ]
         if len(there) != 1:
-            stands = "two contacts are, of which it cannot be told apart" if there else "no contact is"
+            mend = "where no contact is; give it with --loads, or leave it out"
+            if there:
+                mend = (
+                    "where two contacts are, of which it cannot be told apart; leave it out, and say when"
+                    " they stand with --contact-while"
+                )
             raise LinkwiseError(
-                f"--contact-loads: load {load.name!r} acts on {load.seat.frame.name!r}, where {stands}; give"
-                " it with --loads, or leave it out"
+                f"--contact-loads: load {load.name!r} acts on {load.seat.frame.name!r}, {mend}"
             )
         found[there[0]].append(load)
     return tuple(map(tuple, found))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from linkwise.analysis.loads import Load, Loads
 from linkwise.errors import LinkwiseError
+from linkwise.runtime.constraints.held_frames import is_contact
 from linkwise.runtime.robot_constraints import Contact
 
 THRESHOLD = 20.0
@@ -47,6 +48,7 @@ class Contacts:
     unactuated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        self._check_kinds()
         if not self.given:
             for flag, there in (
                 ("--contact-while", self.columns),
@@ -60,10 +62,20 @@ class Contacts:
         if self.threshold is not None and not 0.0 <= self.threshold < math.inf:
             raise LinkwiseError(f"--contact-threshold {self.threshold:g}: give a force in N, 0 or more")
 
+    def _check_kinds(self) -> None:
+        if not isinstance(self.given, list | tuple) or is_contact(self.given):
+            raise LinkwiseError("contacts: give a list of Contact, or Contacts")
+        for one in self.given:
+            if not is_contact(one):
+                raise LinkwiseError(f"contacts: {str(one)[:60]!r} is not a Contact")
+        for name, column in self.columns.items():
+            if not isinstance(column, WhileColumn):
+                raise LinkwiseError(f"contacts: columns[{name!r}] is not a WhileColumn")
+
     @classmethod
     def of(cls, given: "Contacts | Sequence[Contact]") -> "Contacts":
         """Themselves, or contacts that are on all the time."""
-        return given if isinstance(given, Contacts) else cls(tuple(given))
+        return given if isinstance(given, Contacts) else cls(given)  # type: ignore[arg-type]
 
     @property
     def measured(self) -> Loads:

@@ -23,9 +23,12 @@ import numpy as np
 
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.package.load import Array, Model
+from linkwise.runtime.constraints.held_frames import axes_around
 from linkwise.runtime.robot_constraints import Contact
 
 WRENCH = ("moment_x", "moment_y", "moment_z", "force_x", "force_y", "force_z")
+BLIND = 1e-4
+"""Part of the most that the least turn of a base moves: below it the base's torques do not tell a moment."""
 RANK = 1e-6
 """Singular values of A_b below this part of the largest are zero."""
 
@@ -70,10 +73,49 @@ class GroundContacts:
             for turns, part in zip(held, parts, strict=True)
         )
 
+    def wrench(self, number: int, model: Model, q: Array, forces: Array) -> Array:
+        """What a contact puts on its body, (S, 6): moment about its point, and force, in the world's axes.
+
+        forces: of all rows, (S, C)
+        """
+        contact, own = self.contacts[number], forces[:, self.owners == number]
+        force, moment = own[:, -3:], np.zeros((len(own), 3))
+        match contact.kind:
+            case "held":
+                moment = own[:, :3]
+            case "hinged":
+                axes = np.asarray(model.kinematics.pose(q, contact.frame))[:, :3, :3] @ axes_around(
+                    contact.axis
+                )
+                moment = np.einsum("sxa,sa->sx", axes[..., :2], own[:, :2])
+            case "rolling":
+                moment = np.cross(self.touch(number), force)
+        return np.concatenate([moment, force], axis=1)
+
+    def touch(self, number: int) -> Array:
+        """From a contact's point to where it touches, (3,): of what rolls down its radius."""
+        contact = self.contacts[number]
+        if contact.kind != "rolling" or contact.normal is None:
+            return np.zeros(3)
+        normal = np.array(contact.normal)
+        down: Array = -contact.radius * normal / np.linalg.norm(normal)
+        return down
+
     def record(self, joints: Sequence[str]) -> dict[str, Any]:
         """As plain data, to record in the outputs; m."""
         held = [
-            {"name": name, "frame": contact.frame, "kind": contact.kind, "point": list(contact.point)}
+            {
+                "name": name,
+                "frame": contact.frame,
+                "kind": contact.kind,
+                "point": list(contact.point),
+                **({"axis": list(contact.axis)} if contact.kind == "hinged" else {}),
+                **(
+                    {"normal": list(contact.normal or ()), "radius": contact.radius}
+                    if contact.kind == "rolling"
+                    else {}
+                ),
+            }
             for name, contact in zip(self.names, self.contacts, strict=True)
         ]
         return {"held": held, "unactuated": [joints[i] for i in self.unactuated]}
@@ -85,6 +127,22 @@ class GroundContacts:
             pose = np.asarray(model.kinematics.pose(q, contact.frame))
             found.append(pose[:, :3, :3] @ np.array(contact.point) + pose[:, :3, 3])
         return found
+
+    def blind(self, model: Model, q: Array) -> int | None:
+        """The first sample at which torques of the unactuated joints do not tell all that they ask for.
+
+        A base's turns lose one where two of its joints turn about one axis: pitched by 90 degrees.
+        """
+        base = list(self.unactuated)
+        for contact in self.contacts:
+            moved = np.asarray(model.kinematics.jacobian(q, contact.frame))[..., base]
+            moved[:, 3:] /= max(1.0, np.abs(moved[:, 3:]).max(initial=0.0))  # of far turns, beside turns
+            moving = moved[..., np.abs(moved).max(axis=(0, 1), initial=0.0) > 0.0]
+            values = np.linalg.svd(moving, compute_uv=False)
+            lost = values[:, -1:] < BLIND * values[:, :1]
+            if moving.shape[-1] <= len(WRENCH) and lost.any():
+                return int(lost[:, 0].argmax())
+        return None
 
     def standing(self, q: Array, shares: Array) -> "Standing":
         """How the ground holds the robot at q (S, n), by shares w (S, contacts), 0 of what is off."""
@@ -144,6 +202,11 @@ class Standing:
     def loads(self, reactions: Array) -> Array:
         """Torques (S, n, X) that reactions (S, C, X) take from all joints, followers too."""
         return np.swapaxes(self.every, 1, 2) @ reactions
+
+    def fed(self, qd: Array, reactions: Array, owners: Array, count: int) -> Array:
+        """Power (S, contacts, X) that contacts give as they slip, of reactions (S, C, X)."""
+        power = self.slip(qd)[..., None] * reactions
+        return np.stack([power[:, owners == c].sum(1) for c in range(count)], axis=1)
 
     def slip(self, qd: Array) -> Array:
         """A q̇ (S, C): how the motion moves what is held, in m/s and rad/s."""

@@ -11,6 +11,7 @@ from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import moving_joints
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
+from linkwise.runtime.constraints.held_frames import ground_normal
 from linkwise.runtime.constraints.independent_joints import loose_base
 from linkwise.runtime.robot_constraints import Contact
 
@@ -31,14 +32,15 @@ def standing_on(robot: LoadedRobot, contacts: Contacts) -> LoadedRobot:
             " anything is; contacts are for rigid links"
         )
     frames = [body_frame("contact on", str(contact.frame), robot) for contact in contacts.given]
-    names = [contact.name or f"{contact.frame} {contact.kind}" for contact in contacts.given]
+    names = [contact.name or str(contact.frame) for contact in contacts.given]
     _check_names(names, contacts)
     unactuated = _unactuated(robot, contacts.unactuated)
-    made = tuple(_constraints(robot, contact) for contact in contacts.given)
+    given = tuple(_named(robot, contact) for contact in contacts.given)
+    made = tuple(_constraints(robot, contact) for contact in given)
     loaded = robot.borne_by({i for frame in frames for i in moving_joints(tree, frame.body)})
     ground = GroundContacts(
         tuple(names),
-        contacts.given,
+        given,
         made,
         unactuated,
         tuple(sorted({*loaded, *unactuated})),
@@ -67,12 +69,28 @@ def _unactuated(robot: LoadedRobot, given: Sequence[str]) -> tuple[int, ...]:
     return found
 
 
+def _named(robot: LoadedRobot, contact: Contact) -> Contact:
+    """The contact with its name, and the ground across gravity."""
+    tree = robot.package.manifest.tree
+    gravity = (0.0, 0.0, 0.0) if tree is None else tree.gravity
+    name = contact.name or str(contact.frame)
+    if contact.kind != "rolling":
+        return contact._replace(name=name)
+    try:
+        return contact._replace(name=name, normal=ground_normal(contact, f"contact {name!r}", gravity))
+    except ValueError as error:
+        raise LinkwiseError(str(error)) from None
+
+
 def _constraints(robot: LoadedRobot, contact: Contact) -> Any:
     model: Any = robot.model
     try:
         return model.constrained(contacts=[contact])
     except (TypeError, ValueError) as error:
-        told = str(error).replace("contacts[0]", f"contact {contact.name or contact.frame!r}")
+        told = str(error).replace("contacts[0]", f"contact {contact.name!r}")
+        told = told.replace("give it a name=", "give it another, as NAME:FRAME")
+        if "over-constrained" in told:
+            told += "; hold less of it, at a point say"
         raise LinkwiseError(f"--contact: {told}") from None
 
 

@@ -71,7 +71,7 @@ class Loads:
         if self.cutoff is not None and not 0 < self.cutoff < float("inf"):
             raise LinkwiseError(f"--loads-cutoff {self.cutoff:g}: give a frequency in Hz above 0")
         if self.cutoff is not None and not self.paths:
-            raise LinkwiseError("--loads-cutoff goes with --loads; add it")
+            raise LinkwiseError("--loads-cutoff goes with --loads, or with --contact-loads; add one")
 
     @classmethod
     def of(cls, several: Sequence[Load | str | Path], cutoff: float | None = None) -> "Loads":

@@ -43,10 +43,15 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
             _draw_force(panel, result, force[c], (c, axis), alone)
         for panel, i in zip(panels[len(shown) :, c], joints[c], strict=False):
             _draw_torque(panel, result, c, i)
-        panels[-1, c].set_xlabel("time (s)")
+        drawn_here = len(shown) + len(joints[c])
+        for panel in panels[drawn_here:, c]:
+            panel.set_axis_off()
+        panels[drawn_here - 1, c].set_xlabel("time (s)")
+        panels[drawn_here - 1, c].tick_params(labelbottom=True)
         panels[-1, c].set_xlim(result.time[0], result.time[-1])
     for panel, axis in zip(panels[:, 0], shown, strict=False):
         panel.set_ylabel(f"force {PARTS[axis]} (N)")
+    figure.align_ylabels(panels[:, 0])
     handles: dict[str, Any] = {}
     for panel in panels.flat:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
@@ -124,7 +129,7 @@ def _draw_force(
     parts = force[axis]
     areas = [(drawn(result.robot.links[j]), tone(at), parts[j]) for at, j in enumerate(alone)]
     rest = [j for j in range(len(parts)) if j not in alone]
-    if rest and np.abs(parts[rest]).max() > LITTLE * np.abs(parts.sum(axis=0)).max():
+    if rest and np.abs(parts[rest]).max() > 0.0:
         areas.append(("all else", GRAVITY, parts[rest].sum(axis=0)))
     for sign in (1.0, -1.0):
         base = np.zeros(len(result.time))
@@ -155,7 +160,7 @@ def _draw_torque(panel: Any, result: AnalysisResult, contact: int, i: int) -> No
         if column.joint == i and column.quantity == "tau":
             panel.plot(result.time, values, color=INK, linewidth=1.6, label="found from the motion")
         if column.joint == i and column.quantity == "tau_as_loads":
-            panel.plot(result.time, values, color="#C21E56", linestyle="dashed", label="measured")
+            panel.plot(result.time, values, color="#C21E56", linestyle="dotted", label="by what was measured")
     panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
     panel.set_title(f"torque of {name} ({unit})", fontsize=9)
 

@@ -137,7 +137,10 @@ def _loads(result: AnalysisResult) -> list[dict[str, str]]:
 
 
 def _reactions(result: AnalysisResult) -> list[dict[str, str]]:
-    """The same of contacts; a frame that is held bears where the moment has no share along the ground."""
+    """The same of contacts, and what they feed into links, (N, samples) in W.
+
+    A frame that is held bears where the moment has no share along the ground.
+    """
     ground = result.robot.contacts
     if ground is None:
         return []
@@ -148,9 +151,17 @@ def _reactions(result: AnalysisResult) -> list[dict[str, str]]:
         pressed = force @ up
         firm = np.abs(pressed) > FIRM * np.abs(pressed).max(initial=0.0)
         centre = place + np.cross(up, moment) / np.where(firm, pressed, np.inf)[:, None]
+        if ground.contacts[c].kind == "rolling":
+            centre = place + ground.touch(c)
+        powers = [v for col, v in zip(result.columns, result.values, strict=True) if _feeds(col, c)]
         label = printable(f"ground at {ground.names[c]}")
-        out.append({"name": label, "places": _encode(centre), "forces": _encode(force)})
+        arrow = {"name": label, "places": _encode(centre), "forces": _encode(force)}
+        out.append(arrow | {"powers": _encode(np.array(powers))})
     return out
+
+
+def _feeds(column: Column, contact: int) -> bool:
+    return column.quantity == "power_contact" and column.cause == contact
 
 
 def _induced(result: AnalysisResult, point: int) -> dict[str, Any]:
@@ -179,10 +190,13 @@ def _work(result: AnalysisResult) -> list[dict[str, float]]:
             j, work, at = c.link or 0, result.work, (c.joint, c.link)
         elif c.quantity == "power_load":
             j, work, at = len(result.robot.links) + (c.cause or 0), result.load_work, (c.joint, c.cause)
+        elif c.quantity == "power_contact":
+            j, work, at = c.link or 0, result.contact_work, (c.link, c.cause)
         else:
             continue
         given, taken = float(work.given[at]), float(work.taken[at])
-        out.append({"i": place[c.joint or 0], "j": j, "given": given, "taken": taken})
+        i = len(place) + (c.cause or 0) if c.quantity == "power_contact" else place[c.joint or 0]
+        out.append({"i": i, "j": j, "given": given, "taken": taken})
     return out
 
 

@@ -18,6 +18,8 @@ RANK = 1e-5
 
 A file's right angle of 1.5708 tilts by 4e-6 what is meant to be parallel.
 """
+LEAST = 3
+"""Coordinates of a body that floats, in a plane or in space: a slide that turns, too, has bearings."""
 ABLE = 0.05
 """Columns smaller than this part of the largest are not preferred to it, whatever joints they are of."""
 SHARE = 1e-3
@@ -84,16 +86,24 @@ def redundant_names(rows: NDArray[np.float64], owners: Sequence[str]) -> tuple[s
 
 
 def loose_base(tree: JointTree) -> tuple[int, ...]:
-    """Coordinates of a base that slides and turns in one place, which nobody drives; none of another."""
+    """Coordinates of bodies that float: that slide and turn in one place, and hang on nothing else.
+
+    Nobody drives these. Where a slide is says nothing, so that only what turns must be in one place.
+    """
     carried = {link.joint for link in tree.links}
-    run: list[int] = []
-    parent = None
-    while True:
-        children = [f for f, joint in enumerate(tree.joints) if joint.parent == parent]
-        together = len(children) == 1 and (not run or not any(tree.joints[children[0]].translation))
-        if not together or (parent is not None and parent in carried):
+    roots = [f for f, joint in enumerate(tree.joints) if joint.parent is None]
+    return tuple(k for root in roots for k in _floating(tree, root, carried))
+
+
+def _floating(tree: JointTree, root: int, carried: set[int]) -> tuple[int, ...]:
+    """Coordinates on the way from a root to the first link, if they slide and turn; else none."""
+    run = [root]
+    while run[-1] not in carried:
+        children = [f for f, joint in enumerate(tree.joints) if joint.parent == run[-1]]
+        turned = any(tree.joints[f].kind == "revolute" for f in run)
+        if len(children) != 1 or (turned and any(tree.joints[children[0]].translation)):
             break
-        parent = children[0]
-        run.append(parent)
+        run.append(children[0])
     kinds = {tree.joints[f].kind for f in run}
-    return tuple(tree.joints[f].coordinate for f in run) if len(kinds) > 1 else ()
+    floats = len(kinds) > 1 and len(run) >= LEAST
+    return tuple(tree.joints[f].coordinate for f in run) if floats else ()
