@@ -22,10 +22,12 @@ LEGEND = 12
 
 
 def power(result: AnalysisResult, _: int) -> "Figure":
-    """Curves of P_i = τ_i q̇_i in W; for each joint bars of work in J, into links, and against loads."""
+    """Curves of P_i = τ_i q̇_i in W; bars of work in J of each joint and contact, into links and loads."""
     robot = result.robot
     joints, driven = [drawn(name) for name in robot.driven_joints], list(robot.driven)
-    height = 0.9 + 0.34 * len(joints)
+    ground = () if robot.contacts is None else robot.contacts.names
+    givers = [*joints, *(drawn(f"ground at {name}") for name in ground)]
+    height = 0.9 + 0.34 * len(givers)
     figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.4 + height), layout="constrained")
     curves, bars = figure.subplots(2, 1, height_ratios=(2.4, height))
     for i, values in enumerate(result.joint_power.T[driven]):
@@ -37,11 +39,10 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     curves.set_xlim(result.time[0], result.time[-1])
     _legend(curves, "joint", len(joints))
     targets = [drawn(name) for name in (*robot.links, *result.load_labels)]
-    work = _with_loads(result)
-    _bars(bars, Work(work.given[driven], work.taken[driven]), targets)
+    _bars(bars, _every_work(result, driven), targets)
     into = "links and loads" if result.loads else "links"
     bars.set_title(f"Work: taken back out of {into}, and given to them")
-    bars.set_yticks(range(len(joints)), joints)
+    bars.set_yticks(range(len(givers)), givers)
     bars.invert_yaxis()
     bars.set_xlabel("J")
     bars.grid(axis="y", visible=False)
@@ -52,10 +53,16 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     return figure  # type: ignore[no-any-return]
 
 
-def _with_loads(result: AnalysisResult) -> Work:
-    """What each joint gave to each link, and behind them against each load, and took back, (n, N + loads)."""
-    parts = ((getattr(work, side) for work in (result.work, result.load_work)) for side in ("given", "taken"))
-    return Work(*(np.concatenate(list(part), axis=1) for part in parts))
+def _every_work(result: AnalysisResult, driven: list[int]) -> Work:
+    """What each joint, then each contact that slips, gave to each link, each load, and took back."""
+    found = []
+    for side in ("given", "taken"):
+        links, loads, fed = (
+            getattr(work, side) for work in (result.work, result.load_work, result.contact_work)
+        )
+        joints = np.concatenate([links, loads], axis=1)[driven]
+        found.append(np.concatenate([joints, np.pad(fed.T, ((0, 0), (0, loads.shape[1])))]))
+    return Work(*found)
 
 
 def _bars(axis: Any, work: Work, targets: list[str]) -> None:
