@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from linkwise import Options, generate, read_system, write_package
+from linkwise import Options, check_package, generate, read_system, write_package
 from linkwise.check.contact_checks import contact_calls
 from linkwise.check.loop_checks import loop_calls
 from linkwise.check.loop_reference import LoopReference, loop_reference
@@ -112,3 +112,32 @@ def test_another_mass_is_found_under_contacts_and_in_a_simulation(
     assert [result.passed for result in simulation_calls("numpy", model, moved)] == [passes]
     held = contact_calls("numpy", model, manifest, manifest.tree, states, package.module.Contact)
     assert [result.passed for result in held] == ([] if tied else [passes]), "one freedom is left to the ties"
+
+
+FLOATING = """schema = 1
+name = "walker"
+joint = [
+  { name = "root", type = "floating", parent = "base", child = "trunk" },
+  { name = "hip", parent = "trunk", child = "thigh", axis = [0, 1, 0], xyz = [0.05,0,-0.1] },
+  { name = "knee", parent = "thigh", child = "shank", axis = [0, 1, 0], xyz = [0,0,-0.3] },
+  { name = "hip2", parent = "trunk", child = "link2", axis = [0, 1, 0], xyz = [-0.05,0,-0.1] },
+]
+link = [
+  {name = "trunk", mass = 4, com = [0, 0.01, 0.1], inertia = {xx = 0.05, yy = 0.06, zz = 0.04, xy = 0.003}},
+  { name = "thigh", mass = 1, com = [0, 0, -0.15], inertia = { xx = 0.01, yy = 0.01, zz = 0.002 } },
+  { name = "shank", mass = 0.5, com = [0.01, 0.01, -0.15], inertia = { xx = 0.005, yy = 0.005, zz = 0.001 } },
+  { name = "link2", mass = 0.4, com = [0, 0, -0.15], inertia = { xx = 0.005, yy = 0.005, zz = 0.001 } },
+]
+[[constraint]]
+name = "pin"
+type = "point"
+first = { frame = "shank", xyz = [-0.1, 0, 0.02] }
+second = { frame = "link2", xyz = [0, 0, -0.3] }
+"""
+"""Its first closed state is next to a base's pitch of 90 degrees."""
+
+
+def test_states_next_to_a_singular_mass_matrix_are_left_out(tmp_path: Path) -> None:
+    (tmp_path / "walker.toml").write_text(FLOATING)
+    write_package(generate(read_system(tmp_path / "walker.toml"), ["numpy"]), tmp_path / "walker")
+    assert not [result for result in check_package(tmp_path / "walker", samples=5) if not result.passed]

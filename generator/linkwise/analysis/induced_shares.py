@@ -13,6 +13,7 @@ Where the robot stands on contacts, `StandingResponse` says how it answers, and 
 A point accelerates by J q̈_x, and by J̇ q̇ itself.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -85,7 +86,7 @@ class InducedShares:
         try:
             moved = self._moved(self._response(mass, q, qd), forces, rows, qdd)
         except ValueError as error:
-            raise LinkwiseError(f"--induced: {error}") from error
+            raise LinkwiseError(f"--induced: {_timed(str(error), out[0])}") from error
         row, worst = self.first, Closure()
         for point in self.points:
             jacobian, rate = point.maps(self.robot, q, qd)
@@ -121,6 +122,15 @@ class InducedShares:
         ties = self.robot.constrained.constraints
         mapped, bias = (np.asarray(a) for a in (ties.velocity_map(q), ties.velocity_accelerations(q, qd)))
         return TiedResponse(model, q, mass, ties, mapped, bias)
+
+
+def _timed(text: str, time: Array) -> str:
+    """What a block of samples is refused for, with the time in place of the sample's number, and a mend."""
+    found = re.search(r" at sample (\d+)", text)
+    if found is None:
+        return text
+    told = text.replace(found[0], f" at {time[int(found[1])]:.6g} s", 1)
+    return f"{told}; cut the log there, or leave --induced out"
 
 
 def _columns(

@@ -245,6 +245,11 @@ class AnalysisResult:
         names = () if tied is None else tied.constraints.independent
         return {"independent": list(names), **closed.record()}
 
+    def is_ever_on(self, contact: int) -> bool:
+        """Whether a contact is on at any sample."""
+        peaks = zip(self.columns, self.totals.peak, strict=True)
+        return any(c.quantity == "contact" and c.cause == contact and peak > 0.0 for c, peak in peaks)
+
     def largest_slip(self, contact: int) -> tuple[float, float]:
         """How fast what a contact holds moves at most while it is on, in m/s and rad/s, over all samples."""
         ground = self.robot.contacts

@@ -160,8 +160,8 @@ class Decomposer:
             joints = listed([self.robot.joints[i] for i in ground.unactuated])
             raise LinkwiseError(
                 f"time {time[blind]:.6g} s: two of {joints} turn about one axis there, so that their torques"
-                " do not tell a moment that contacts bear, nor the log how the base turns; cut the log"
-                " there, or describe the base by turns that stay apart"
+                " do not tell all that contacts bear, nor the log how the base turns; cut the log there, or"
+                " describe the base by turns that stay apart"
             )
         return ground.standing(q, self.times.shares(model, time, q))
 

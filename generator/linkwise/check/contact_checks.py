@@ -14,7 +14,7 @@ from linkwise.check.compare import Entries, Result, compare
 from linkwise.check.contact_equations import KINDS, ContactEquations
 from linkwise.check.loop_checks import loop_entries
 from linkwise.check.loop_equations import RANK, LoopEquations
-from linkwise.check.loop_reference import FAR, held_motion
+from linkwise.check.loop_reference import FAR, held_motion, steady
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.states import States
 from linkwise.package.entries import RigidTree
@@ -22,7 +22,7 @@ from linkwise.package.load import Array, Model
 from linkwise.package.manifest import Manifest
 
 STATES = 2
-TRIED = 4
+TRIED = 6
 
 
 def contact_calls(
@@ -59,9 +59,17 @@ def _of_one(
     own = [model.joint_names.index(name) for name in made.independent]
     rest = [k for k in range(states.q.shape[1]) if k not in own]
     sizes = np.linalg.svd(rows[..., rest], compute_uv=False)
-    clear = np.flatnonzero(sizes[:, -1] > FAR * sizes[:, 0])[:STATES]
+    clear = np.flatnonzero(sizes[:, -1] > FAR * sizes[:, 0])
     if clear.size:
+        clear = clear[steady(held.recursion, states.q[clear], _mapped(rows[clear], own, rest))][:STATES]
         yield from _compared(made, held, states.at(clear), own, rest)
+
+
+def _mapped(rows: Array, own: list[int], rest: list[int]) -> Array:
+    """G (samples, n, m)."""
+    found = np.zeros((len(rows), rows.shape[2], len(own)))
+    found[:, own], found[:, rest] = np.eye(len(own)), -np.linalg.pinv(rows[..., rest]) @ rows[..., own]
+    return found
 
 
 def _compared(
@@ -69,8 +77,7 @@ def _compared(
 ) -> Iterator[Entries]:
     q, yd, ydd = states.q, states.qd[:, own], states.qdd[:, own]
     rows = held.rows(q)
-    inverse, follows = np.linalg.pinv(rows[..., rest]), np.zeros((*q.shape, len(own)))
-    follows[:, own], follows[:, rest] = np.eye(len(own)), -inverse @ rows[..., own]
+    inverse, follows = np.linalg.pinv(rows[..., rest]), _mapped(rows, own, rest)
     qd = (follows @ yd[..., None])[..., 0]
     rates = held.rates(q, qd)
     qdd = (follows @ ydd[..., None])[..., 0]

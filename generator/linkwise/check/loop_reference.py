@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwise.check.loop_equations import LoopEquations
 from linkwise.check.newton_euler import NewtonEuler
@@ -55,9 +56,10 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     rest = [k for k in range(len(manifest.joints)) if k not in own]
     q = equations.closed_near(states.q[:TRIED])
     sizes = np.linalg.svd(equations.rows(q)[..., rest], compute_uv=False)
-    q = q[sizes[:, -1] > FAR * sizes[:, 0]][:STATES]
+    q = q[sizes[:, -1] > FAR * sizes[:, 0]]
     if not len(q):
         return None
+    q = q[steady(equations.recursion, q, equations.velocity_map(q))][:STATES]
     rows, basis = equations.rows(q), equations.basis(q)
     back = np.swapaxes(basis, -1, -2)
     followed = _Followed(equations, own, rest, q)
@@ -116,6 +118,18 @@ def mass_matrix(recursion: NewtonEuler, q: Array) -> Array:
     rest, units = np.zeros((samples * n, n)), np.tile(np.eye(n), (samples, 1))
     torque = recursion.partial_torque(np.repeat(q, n, 0), rest, units, gravity=False).sum(-1)
     return np.swapaxes(torque.reshape(samples, n, n), -1, -2)
+
+
+def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]:
+    """Which positions (samples, n) are not next to a singular mass matrix, as others go.
+
+    mapped: G (samples, n, m); of G^T M G, with ones on its diagonal, the least eigenvalue counts
+    """
+    mass = np.swapaxes(mapped, -1, -2) @ mass_matrix(recursion, q) @ mapped
+    size = np.sqrt(mass.diagonal(0, -2, -1))
+    least = np.linalg.eigvalsh(mass / (size[:, :, None] * size[:, None, :]))[:, 0]
+    found: NDArray[np.bool_] = least >= FAR * np.median(least)
+    return found
 
 
 def held_motion(

@@ -15,6 +15,9 @@ from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array, Model
 from linkwise.package.manifest import Manifest
 
+TRIED = 8
+"""States, of which the motion starts from that with the least acceleration: next to a base's pitch of 90
+degrees, or to a dead point, there is no bound to it."""
 STEP = 2e-3
 STEPS = 2
 CLOSING = 8
@@ -34,12 +37,19 @@ class SimulatedMotion(NamedTuple):
 
 
 def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion:
-    """From the first of the states on, in which ties close."""
-    recursion = NewtonEuler(manifest, tree)
-    q, qd, _ = (a[:1] for a in states.motion)
-    tau = np.random.default_rng(9).uniform(-1.0, 1.0, q.shape)
-    motion = _tied(recursion, tree, tau) if tree.tied else _free(recursion, tau)
-    own = list(tree.independent) if tree.tied else list(range(q.shape[1]))
+    """From the calmest of the first states on, in which ties close."""
+    recursion, n = NewtonEuler(manifest, tree), states.q.shape[1]
+    tau = np.random.default_rng(9).uniform(-1.0, 1.0, (1, n))
+    own = list(tree.independent) if tree.tied else list(range(n))
+
+    def motion(q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
+        torque = tau + 0.0 * q
+        return (_tied(recursion, tree, torque) if tree.tied else _free(recursion, torque))(q, v)
+
+    tried = states.at(slice(0, TRIED))
+    sizes = np.abs(motion(tried.q, tried.qd[:, own])[2]).max(axis=-1)
+    calm = [int(np.where(np.isfinite(sizes), sizes, np.inf).argmin())]
+    q, qd, _ = states.at(np.array(calm)).motion
     return SimulatedMotion(q, qd, tau, _integrated(motion, (q, qd[:, own], np.zeros(1))))
 
 

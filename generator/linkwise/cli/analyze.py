@@ -189,6 +189,8 @@ def _of_contacts(analysis: Analysis) -> list[str]:
     still = listed([robot.joints[i] for i in ground.unactuated])
     told = [f"nothing drives {still}: what these would have to give, contacts bear"]
     for c, name in enumerate(ground.names):
+        if not analysis.is_ever_on(c):
+            continue
         metres, turns = analysis.largest_slip(c)
         told.append(f"contact {name} moves by up to {metres:.3g} m/s and {turns:.3g} rad/s while it is on")
     return told

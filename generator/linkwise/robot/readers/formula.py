@@ -17,6 +17,7 @@ OPERATORS: dict[type[ast.operator], Callable[..., Scalar]] = {
     ast.Div: operator.truediv,
 }
 FUNCTIONS = {"sin": math.sin, "cos": math.cos, "sqrt": math.sqrt}
+ALLOWED = "write numbers, parameters, pi and + - * / **, and sin, cos, sqrt of numbers"
 MAX_LENGTH = 200
 MAX_POWER = 8
 
@@ -30,7 +31,7 @@ def parse_formula(text: str, parameters: Mapping[str, float]) -> Scalar:
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise LinkwiseError(f"{text!r} is not a formula; write numbers, parameters and + - * / **") from None
+        raise LinkwiseError(f"{text!r} is not a formula; {ALLOWED}") from None
     try:
         value = _value(tree, text, parameters)
         _check_finite(value, parameters)
@@ -80,4 +81,4 @@ def _value(node: ast.expr, text: str, parameters: Mapping[str, float]) -> Scalar
             value = _value(argument, text, parameters)
             if isinstance(value, float):
                 return FUNCTIONS[name](value)
-    raise LinkwiseError(f"{text!r} is not a formula; write numbers, parameters and + - * / **")
+    raise LinkwiseError(f"{text!r} is not a formula; {ALLOWED}")

@@ -13,6 +13,8 @@ HALVES = 30
 """Of the way to a position that does not close, to find how far it goes."""
 DEAD = 1e-3
 """Joints are at a dead point where no more is left of columns of A_d than this part of that at the start."""
+LEAP = 0.5
+"""rad and m: joints that go farther from one place to the next have left the motion."""
 NEAR = 10.0
 """So many times as much is left where the last position beside a dead point closes."""
 
@@ -38,7 +40,7 @@ class TiedMotion:
             found: ClosedPlace = self._answers.closed_place(q, self._held_at)
         except ValueError as error:
             with _without_gradient(q):
-                reason = self._dead_point(self._furthest(self._last[1], q), NEAR)
+                reason = self._leap(q) or self._dead_point(self._furthest(self._last[1], q), NEAR)
             raise ValueError(f"at t = {t:g} s {reason or error}") from None
         reason = self._dead_point(found)
         if reason is not None:
@@ -55,6 +57,21 @@ class TiedMotion:
     def accelerated(self, t: float, q: Any, qd: Any, tau: Any, passive: bool) -> Any:
         """Accelerations of the independent joints."""
         return self._answers.independent_acceleration(self.place(t, q), qd, tau, passive)
+
+    def _leap(self, q: Any) -> str | None:
+        """That independent joints leap away from where they were; None where they do not."""
+        place = self._last[1]
+        if hidden(q):
+            return None
+        far = place.own(abs(q - place.q))
+        far = far if isinstance(far, np.ndarray) else far.detach().cpu().numpy()
+        if not far.max(initial=0.0) > LEAP:
+            return None
+        joint = self._answers.independent[int(far.reshape(-1, far.shape[-1]).max(0).argmax())]
+        return (
+            f"{joint} leaps by {far.max():.3g}: take smaller steps, or look at the torques; next to a "
+            "singular mass matrix, as of a base pitched by 90 degrees, accelerations have no bound"
+        )
 
     def _furthest(self, place: ClosedPlace, q: Any) -> ClosedPlace:
         """The last place that closes on the straight way of the independent joints."""
