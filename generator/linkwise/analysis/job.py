@@ -16,6 +16,7 @@ from linkwise.analysis.loads import Loads
 from linkwise.analysis.loads.read_loads import placed_loads
 from linkwise.analysis.logs import open_log
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.result_record import record
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Analysis(AnalysisResult):
-    """What `analyze` returns: an `AnalysisResult` that draws itself."""
+    """What `analyze` returns: an `AnalysisResult` that draws and records itself."""
 
     def figure(self, name: str = "paper") -> "Figure":
         """A matplotlib figure: "paper", or "paper:JOINT" for another joint than the first; "shares"; "power";
@@ -42,6 +43,10 @@ class Analysis(AnalysisResult):
         """
         extra("matplotlib.pyplot")  # switches on a notebook's display of figures
         return draw(self, name)
+
+    def record(self) -> dict[str, Any]:
+        """Everything but the samples, as plain data: choices, closure, columns and their totals."""
+        return record(self)
 
 
 @dataclass(frozen=True)

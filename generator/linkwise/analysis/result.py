@@ -1,8 +1,6 @@
 """The result of an analysis: named arrays, and the record of how they were made."""
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,16 +9,13 @@ from linkwise.analysis.contacts.contact_times import ContactTimes
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import Column
-from linkwise.analysis.result_quantities import MEANING, Quantity
-from linkwise.analysis.settings import Processing, Reading, choices
+from linkwise.analysis.result_quantities import Quantity
+from linkwise.analysis.settings import Processing, Reading
 from linkwise.analysis.verify import Closure
 from linkwise.analysis.work import Work
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, printable
 from linkwise.package.load import Array
-
-SCHEMA = 2
-"""Version of the record's fields."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,43 +171,6 @@ class AnalysisResult:
             parts.append(f"one sample in {self.stride} shown")
         return " · ".join(parts)
 
-    def record(self) -> dict[str, Any]:
-        """Everything but the samples, as plain data: choices, closure, columns and their totals."""
-        robot = self.robot
-        return {
-            "schema": SCHEMA,
-            "log": self.source,
-            "robot": {
-                "name": robot.name,
-                "joints": list(robot.joints),
-                "links": list(robot.links),
-                "backend": robot.backend,
-                "manifest_sha256": robot.manifest_sha256,
-            },
-            **choices(self.reading, self.processing),
-            "payloads": [payload.record() for payload in robot.payloads],
-            "rate_hz": self.rate,
-            "samples": self.total,
-            "loads": [borne.record() for borne in self.loads],
-            "induced": list(self.induced),
-            "closure": asdict(self.closure),
-            **({} if self.closed is None else {"constraints": self._constraints(self.closed)}),
-            **({} if robot.contacts is None else {"contacts": self._contacts()}),
-            "work": self._work(),
-            "ignored_columns": list(self.ignored),
-            "warnings": [*self.warnings, *self.load_warnings],
-            "columns": [
-                {
-                    "name": column.name,
-                    "unit": column.unit,
-                    "meaning": MEANING[column.quantity],
-                    "mean_magnitude": float(mean),
-                    "peak_magnitude": float(peak),
-                }
-                for column, mean, peak in zip(self.columns, self.totals.mean, self.totals.peak, strict=True)
-            ],
-        }
-
     @property
     def constraint_force(self) -> Array:
         """What each row of the constraints bears, (S, C), in N or N·m; no column without constraints."""
@@ -240,11 +198,6 @@ class AnalysisResult:
     def _rows(self) -> int:
         return len(self.robot.constraint_rows)
 
-    def _constraints(self, closed: ClosedLog) -> dict[str, Any]:
-        tied = self.robot.constrained
-        names = () if tied is None else tied.constraints.independent
-        return {"independent": list(names), **closed.record()}
-
     def is_ever_on(self, contact: int) -> bool:
         """Whether a contact is on at any sample."""
         peaks = zip(self.columns, self.totals.peak, strict=True)
@@ -260,50 +213,6 @@ class AnalysisResult:
             if ground.owners[column.cause - self._rows + len(ground.rows)] == contact:
                 found[column.unit] = max(found[column.unit], float(peak))
         return found["m/s"], found["rad/s"]
-
-    def _contacts(self) -> dict[str, Any]:
-        ground = self.robot.contacts
-        assert ground is not None
-        record = ground.record(self.robot.joints)
-        for number, one in enumerate(record["held"]):
-            one |= {} if self.times is None else self.times.record(number)
-            one["largest_slip"] = dict(zip(("m/s", "rad/s"), self.largest_slip(number), strict=True))
-        return record
-
-    def _work(self) -> dict[str, Any]:
-        """Work in J of each joint, all links together, and of each joint into each link that it moves."""
-        joints, links = self.robot.joints, self.robot.links
-
-        def entry(work: Work, *at: int) -> dict[str, float]:
-            given, taken = float(work.given[at]), float(work.taken[at])
-            return {"given": given, "taken_back": taken, "net": given - taken}
-
-        borne = [(c.joint or 0, c.cause or 0) for c in self.columns if c.quantity == "power_load"]
-        pairs = [(c.joint or 0, c.link or 0) for c in self.columns if c.quantity == "power_link"]
-        return {
-            "unit": "J",
-            "of_joints": [{"joint": name, **entry(self.joint_work, i)} for i, name in enumerate(joints)],
-            "into_links": [
-                {"joint": joints[i], "link": links[j], **entry(self.work, i, j)} for i, j in pairs
-            ],
-            "against_loads": [
-                {"joint": joints[i], "load": self.loads[e].name, **entry(self.load_work, i, e)}
-                for i, e in borne
-            ],
-            **self._fed(entry),
-        }
-
-    def _fed(self, entry: Callable[..., dict[str, float]]) -> dict[str, Any]:
-        """Work of contacts that slip, where there are any."""
-        ground, links = self.robot.contacts, self.robot.links
-        if ground is None:
-            return {}
-        fed = [
-            {"contact": name, "link": link, **entry(self.contact_work, j, c)}
-            for c, name in enumerate(ground.names)
-            for j, link in enumerate(links)
-        ]
-        return {"of_contacts": fed}
 
     def _dense(self, quantity: Quantity, rank: int) -> Array:
         """Return a quantity's columns as one array (S, n, N, n)[: rank + 1], zeros where none is."""

@@ -13,7 +13,6 @@ from linkwise.check.body_reference import body_reference
 from linkwise.check.c_functions import CFunctions, References, compile_c
 from linkwise.check.compare import Result, Skipped
 from linkwise.check.compiled_c import CompiledPackage
-from linkwise.check.contact_checks import contact_calls
 from linkwise.check.derivations import derivations
 from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.formula_texts import check_formulas
@@ -24,6 +23,7 @@ from linkwise.check.loop_induced import induced_loop_calls
 from linkwise.check.loop_reference import LoopReference, loop_reference
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.model_calls import Named, against_reference
+from linkwise.check.motion_checks import MotionReference
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.own_process import Ended, in_own_process
 from linkwise.check.packed_layout import IndexRows
@@ -32,13 +32,12 @@ from linkwise.check.passive_reference import passive_calls
 from linkwise.check.recorded_parts import recorded_parts
 from linkwise.check.reference import Reference
 from linkwise.check.regressor_reference import regressor_calls, regressor_reference
-from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion, simulation_calls
-from linkwise.check.states import States, random_states
+from linkwise.check.states import random_states
 from linkwise.check.sum_checks import sums_against_reference
 from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.torque_reference import states_of_torques, torque_reference
 from linkwise.package.load import Array, Model, Package, load_package, staying
-from linkwise.package.manifest import Manifest, RigidTree
+from linkwise.package.manifest import Manifest
 
 OPTIONAL = ("torch",)
 """Libraries that a package's back ends may need beside NumPy."""
@@ -167,11 +166,8 @@ class _Checks:
             yield Skipped(f"constraints{label}", "loops close near none of the states")
         motions = None
         if manifest.tree is not None and (loops is not None or not self._is_tied):
-            closed, tree = (
-                reference.states if loops is None else loops.states,
-                tree_with(manifest.tree, values),
-            )
-            motions = tree, closed, simulated_motion(manifest, tree, closed)
+            closed = reference.states if loops is None else loops.states
+            motions = MotionReference.of(manifest, tree_with(manifest.tree, values), closed)
         references = References(reference, regressors, frames)
         for result in _c_results(functions, f"c{label}", references) if functions else ():
             c_passes &= result.passed
@@ -193,7 +189,7 @@ class _Checks:
                     yield from loop_calls(f"{way.label}{label}", model, loops)
                     yield from induced_loop_calls(f"{way.label}{label}", model, loops)
                 if way.kernel != "rule" and motions is not None:
-                    yield from self._motions(f"{way.label}{label}", model, *motions)
+                    yield from motions.calls(f"{way.label}{label}", model, self.package.module.Contact)
                 joints = manifest.tree.passive if manifest.tree is not None else ()
                 yield from passive_calls(f"{way.label}{label}", model, joints, reference.states)
                 if way.kernel != "rule":  # they are composed of what every kernel was held against
@@ -255,14 +251,6 @@ class _Checks:
         if manifest.tree is None or not self._is_tied:
             return None
         return loop_reference(manifest, tree_with(manifest.tree, values), reference.states)
-
-    def _motions(
-        self, name: str, model: Model, tree: RigidTree, states: States, simulated: SimulatedMotion
-    ) -> Iterator[Result]:
-        """Contacts, and a simulated motion, of rigid links; states: in which ties close."""
-        record = self.package.module.Contact
-        yield from contact_calls(name, model, self.package.manifest, tree, states, record)
-        yield from simulation_calls(name, model, simulated)
 
     def _own_reference(
         self, loaded: Mapping[Way, Model], functions: CFunctions | None
