@@ -37,20 +37,22 @@ class SimulatedMotion(NamedTuple):
 
 
 def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion:
-    """From the calmest of the first states on, in which ties close."""
+    """From the calmest of the first states on, in which ties close.
+
+    Torques are those of its acceleration: of any others a light link would be thrown away.
+    """
     recursion, n = NewtonEuler(manifest, tree), states.q.shape[1]
-    tau = np.random.default_rng(9).uniform(-1.0, 1.0, (1, n))
     own = list(tree.independent) if tree.tied else list(range(n))
 
-    def motion(q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
-        torque = tau + 0.0 * q
-        return (_tied(recursion, tree, torque) if tree.tied else _free(recursion, torque))(q, v)
+    def motion(tau: Array) -> Rates:
+        return _tied(recursion, tree, tau) if tree.tied else _free(recursion, tau)
 
     tried = states.at(slice(0, TRIED))
-    sizes = np.abs(motion(tried.q, tried.qd[:, own])[2]).max(axis=-1)
-    calm = [int(np.where(np.isfinite(sizes), sizes, np.inf).argmin())]
-    q, qd, _ = states.at(np.array(calm)).motion
-    return SimulatedMotion(q, qd, tau, _integrated(motion, (q, qd[:, own], np.zeros(1))))
+    sizes = np.abs(motion(np.ones(n) + 0.0 * tried.q)(tried.q, tried.qd[:, own])[2]).max(axis=-1)
+    calm = np.array([int(np.where(np.isfinite(sizes), sizes, np.inf).argmin())])
+    q, qd, qdd = states.at(calm).motion
+    tau = recursion.partial_torque(q, qd, qdd).sum(-1)
+    return SimulatedMotion(q, qd, tau, _integrated(motion(tau), (q, qd[:, own], np.zeros(1))))
 
 
 def simulation_calls(name: str, model: Model, expected: SimulatedMotion) -> Iterator[Result]:
