@@ -24,8 +24,8 @@ class Contact(NamedTuple):
     """In the frame, in m; of a ball its centre."""
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     """Of `hinged`, in the frame."""
-    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    """Of `rolling`: the ground's, in the world, away from it."""
+    normal: tuple[float, float, float] | None = None
+    """Of `rolling`: the ground's, in the world, away from it; against gravity unless given."""
     radius: float = 0.0
     """Of `rolling`, in m."""
     name: str | None = None

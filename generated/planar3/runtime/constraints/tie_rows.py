@@ -28,18 +28,24 @@ class TieRows(KinematicAnswers):
     ) -> None:
         super().__init__(structure, backend, check_finite, read_beside_motion)
         self._constants, self._count = chosen.tables, len(chosen.rows)
+        self._has_contacts = chosen.tables.ties < chosen.tables.pairs
 
-    def at(self, q: Any) -> "RowsAt":
-        """Rows at positions that have been read, (..., n)."""
+    def at(self, q: Any, held_at: Any = None) -> "RowsAt":
+        """Rows at positions that have been read, (..., n); contacts are held as they are, or at others."""
         own = self._backend.side(q)
-        return RowsAt(own, self._asked(own, ROWS_OF, [q], {}), tuple(q.shape), self._count)
+        return RowsAt(own, self._asked_at(own, q, held_at), tuple(q.shape), self._count)
+
+    def _asked_at(self, own: Any, q: Any, held_at: Any) -> Asked:
+        is_held = self._has_contacts and held_at is not None
+        return self._asked(own, ROWS_OF, [q, held_at] if is_held else [q], {})
 
     def violation(self, q: Any, held_at: Any) -> Any:
         """phi, (..., C), from where contacts took hold."""
 
         def answer(at: Asked) -> Any:
-            held = ends(at.xp, at.tables, at.numbers, at.motion[1])
-            return violation(at.xp, at.tables, at.motion[0], _pairs(at), held)
+            q, *held_at = at.motion
+            held = ends(at.xp, at.tables, at.numbers, *held_at) if self._has_contacts else None
+            return violation(at.xp, at.tables, q, _pairs(at), held)
 
         return self._rows("violation", (q, held_at), answer, (self._count,), ("q", "held_at"))
 
@@ -66,14 +72,16 @@ class RowsAt:
         self._kept: Pairs | None = None
 
     def positions(self) -> Any:
-        """phi, without what contacts have, and A beside it: (..., C, 1 + n)."""
+        """phi and A beside it, (..., C, 1 + n)."""
 
         def answer(at: Asked) -> Any:
             placed = self._pairs(at)
             if at is self._asked:
                 self._kept = placed
-            phi = violation(at.xp, at.tables, at.motion[0], placed)
-            return at.xp.concat([phi[:, None], tie_jacobian(at.xp, at.tables, at.motion[0], placed)], 1)
+            q, *held_at = at.motion
+            held = ends(at.xp, at.tables, at.numbers, *held_at) if held_at else None
+            phi = violation(at.xp, at.tables, q, placed, held)
+            return at.xp.concat([phi[:, None], tie_jacobian(at.xp, at.tables, q, placed)], 1)
 
         return self._made(answer, self._asked, 1 + self._shape[-1])
 
@@ -81,7 +89,7 @@ class RowsAt:
         """dA/dt, (..., C, n), for velocities (..., n) of the same samples."""
         first = self._asked
         flat = first.xp.swapaxes(qd.reshape(-1, qd.shape[-1]), 0, 1)
-        asked = first._replace(motion=[*first.motion, flat])
+        asked = first._replace(motion=[first.motion[0], flat])
 
         def answer(at: Asked) -> Any:
             placed = self._kept if at is asked and self._kept is not None else self._pairs(at)

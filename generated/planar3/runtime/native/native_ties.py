@@ -44,11 +44,11 @@ class NativeTieRows(TieRows):
         second = [TieEnd(one.second, np.zeros(3), np.eye(3)) for one in held if one.second is not None]
         self._ends, self._control = [*first, *second], control
 
-    def at(self, q: Any) -> RowsAt:
-        """Rows at positions that have been read, (..., n)."""
+    def at(self, q: Any, held_at: Any = None) -> RowsAt:
+        """Rows at positions that have been read, (..., n); contacts are held as they are, or at others."""
         if not (type(q) is np.ndarray and q.size == q.shape[-1] and self._ends):
-            return super().at(q)
-        asked = self._asked(self._backend.side(q), "rows", [q], {})
+            return super().at(q, held_at)
+        asked = self._asked_at(self._backend.side(q), q, held_at)
         return NativeRowsAt(self._backend, asked, q, self._count, self._ends, self._control)
 
 

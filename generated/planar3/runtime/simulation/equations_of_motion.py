@@ -15,6 +15,7 @@ import numpy as np
 
 from ..arguments import check_axes, no_common_shape
 from ..induced.source_forces import listed, load_torques
+from .tied_motion import TiedMotion
 
 
 class State(NamedTuple):
@@ -36,39 +37,40 @@ class EquationsOfMotion:
     tau: Any
     loads: Any
     passive: bool
-    constraints: Any
+    ties: TiedMotion | None
     """None for an open tree."""
-    own: Any
-    """Positions of the independent joints among all, None for an open tree."""
-    held_at: Any
-    """q at the start, where contacts took hold."""
 
-    def motion(self, state: State) -> tuple[Any, Any]:
+    def motion(self, t: float, state: State) -> tuple[Any, Any]:
         """q and qd of all joints, which keep the constraints."""
-        if self.constraints is None:
+        if self.ties is None:
             return state.q, state.v
-        q = self.constraints.closed(state.q, self.held_at)
-        return q, self.constraints.velocity(q, state.v)
+        place = self.ties.place(t, state.q)
+        return place.q, place.velocity(state.v)
 
     def rates(self, t: float, state: State) -> State:
         """Rates of a state."""
-        q, qd = self.motion(state)
+        q, qd = self.motion(t, state)
         tau, pull = self.torques(t, q, qd), self.load_torque(t, q, qd)
         given = tau if pull is None else tau - pull
+
+        def accelerated(given: Any, passive: bool) -> Any:
+            if self.ties is not None:
+                return self.ties.accelerated(t, state.q, qd, given, passive)
+            # its face does not answer for a robot whose ties are cut
+            return self.robot._answers.forward_dynamics(q, qd, given, passive)
+
         if not self.passive:
-            return State(qd, self._accelerated(q, qd, given, False), (qd * given).sum(-1))
+            return State(qd, accelerated(given, False), (qd * given).sum(-1))
         spring, damping, friction, _ = self.robot.passive_torque(q, qd, 0.0 * qd)
         work = (qd * (given - damping - friction)).sum(-1)
         if any(self.robot.structure.passive_sums.armature):
-            return State(qd, self._accelerated(q, qd, given, True), work)
+            return State(qd, accelerated(given, True), work)
         left = given - spring - damping - friction
-        return State(qd, self._accelerated(q, qd, left, False), work)
+        return State(qd, accelerated(left, False), work)
 
-    def _accelerated(self, q: Any, qd: Any, given: Any, passive: bool) -> Any:
-        """Rates of v; of a robot whose ties are cut, which its face does not answer, too."""
-        if self.constraints is None:
-            return self.robot._answers.forward_dynamics(q, qd, given, passive)
-        return self.constraints.forward_dynamics(q, qd, given, passive).qdd[..., self.own]
+    def settled(self, t: float, state: State) -> State:
+        """The same state with its dependent joints where the constraints want them."""
+        return state if self.ties is None else state._replace(q=self.ties.settled(t, state.q))
 
     def torques(self, t: float, q: Any, qd: Any) -> Any:
         """What the actuators give, (..., n)."""

@@ -7,7 +7,7 @@ from ..quantities import Coefficients, ConstrainedMotion, Propagation
 from ..sums.inertia_solve import solved
 from ..sums.namespace import namespace, side_by_side
 from .chosen_constraints import ChosenConstraints
-from .closed_places import ClosedPlace, RowNames, closed_place
+from .closed_places import ClosedPlace, RowNames, TiesAt, closed_place, followed
 from .followers import Followers, borne, joint_columns, projected, times
 from .newton_closing import closed
 from .tie_rows import TieRows
@@ -47,8 +47,7 @@ class ConstraintAnswers:
 
     def closed(self, q: Any, held_at: Any) -> Any:
         """See `Constraints.closed`."""
-        (q,) = self._read(q=q)
-        return closed(self._tie_rows, self._own_columns(q), q, held_at, self._tolerance, self._told)
+        return self._closed(q, held_at).q
 
     def velocity_map(self, q: Any) -> Any:
         """See `Constraints.velocity_map`."""
@@ -113,17 +112,40 @@ class ConstraintAnswers:
         """Solve (G^T M G) ydd = G^T (tau - h - g - M bias), then A^T lambda = M qdd + h + g - tau."""
         q, qd, tau = self._read(q=q, qd=qd, tau=tau)
         place, q, qd = self._moving(q, qd)
-        robot, found, rest = self.robot, place.found, 0.0 * qd
-        mass, force = robot.mass_matrix(q), tau - robot.inverse_dynamics(q, qd, rest)
-        if passive:
-            armature = robot.backend.constant(robot.structure.passive_sums.armature, q)
-            mass = mass + namespace(q).diag(armature)
-            force = force - robot.passive_torque(q, qd, rest).total
+        mass, force = self._driven(q, qd, tau, passive)
         bias = place.bias(qd)
-        driven = projected(found, (force - times(mass, bias))[..., None])[..., 0]
-        qdd = place.velocity(solved(projected(found, mass @ found.map), driven, self.independent)) + bias
-        forces = borne(found, (times(mass, qdd) - force)[..., None])[..., 0]
+        qdd = place.velocity(self._solved(place, mass, force, bias)) + bias
+        forces = borne(place.found, (times(mass, qdd) - force)[..., None])[..., 0]
         return ConstrainedMotion(qdd, forces)
+
+    def closed_place(self, q: Any, held_at: Any) -> ClosedPlace:
+        """The place of `closed`, and how joints follow there; raises as calls at q do."""
+        at = self._closed(q, held_at)
+        return followed(at, self._own_columns(at.q), self._told)
+
+    def independent_acceleration(self, place: ClosedPlace, qd: Any, tau: Any, passive: bool) -> Any:
+        """ydd of `forward_dynamics` at a place, (..., m), for motion that has been read and follows."""
+        mass, force = self._driven(place.q, qd, tau, passive)
+        return self._solved(place, mass, force, place.bias(qd))
+
+    def _driven(self, q: Any, qd: Any, tau: Any, passive: bool) -> tuple[Any, Any]:
+        """M and tau - h - g."""
+        robot, rest = self.robot, 0.0 * qd
+        mass, force = robot.mass_matrix(q), tau - robot.inverse_dynamics(q, qd, rest)
+        if not passive:
+            return mass, force
+        armature = robot.backend.constant(robot.structure.passive_sums.armature, q)
+        return mass + namespace(q).diag(armature), force - robot.passive_torque(q, qd, rest).total
+
+    def _solved(self, place: ClosedPlace, mass: Any, force: Any, bias: Any) -> Any:
+        """ydd (..., m)."""
+        found = place.found
+        driven = projected(found, (force - times(mass, bias))[..., None])[..., 0]
+        return solved(projected(found, mass @ found.map), driven, self.independent)
+
+    def _closed(self, q: Any, held_at: Any) -> TiesAt:
+        q, held_at = self._read(q=q, held_at=q if held_at is None else held_at)
+        return closed(self._tie_rows, self._own_columns(q), q, held_at, self._tolerance, self._told)
 
     def _coefficients(self, place: ClosedPlace, q: Any, qd: Any) -> Any:
         """c2^ = G^T c2 G, c1^ = G^T (c2 dG/dt + c1 G), g^ = G^T g, for each link."""

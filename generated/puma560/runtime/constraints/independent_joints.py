@@ -6,6 +6,7 @@ taken before.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,10 @@ RANK = 1e-5
 
 A file's right angle of 1.5708 tilts by 4e-6 what is meant to be parallel.
 """
+LEAST = 3
+"""Coordinates of a body that floats, in a plane or in space: a slide that turns, too, has bearings."""
+ABLE = 0.05
+"""Columns smaller than this part of the largest are not preferred to it, whatever joints they are of."""
 SHARE = 1e-3
 """Rows that have less than this part in a sum of rows that is zero are not among those that it ties."""
 
@@ -28,26 +33,34 @@ def rank_of(rows: NDArray[np.float64], tolerance: float = RANK) -> int:
 
 
 def chosen_independent(
-    rows: NDArray[np.float64], rather_dependent: Sequence[int] = (), tolerance: float = RANK
+    rows: NDArray[np.float64],
+    rather_dependent: Sequence[int] = (),
+    preference: Sequence[Any] | None = None,
+    tolerance: float = RANK,
 ) -> tuple[int, ...]:
-    """Coordinates that are left when columns of A (C, n) are taken by pivoting, largest first.
+    """Coordinates that are left when columns of A (C, n) are taken by pivoting, as of dependent ones.
 
     rather_dependent: those that are taken before any other, as far as they can be, since nothing drives them
+    preference: of each coordinate, what compares; of columns that are not small beside the largest that of
+    the greatest is taken, unless given the largest
     """
-    left = rows.copy()
-    largest = np.linalg.norm(left, axis=0).max(initial=1.0)
+    left, rank = rows.copy(), rank_of(rows, tolerance)
+    least = tolerance * np.linalg.norm(left, axis=0).max(initial=1.0)
     rest = [k for k in range(rows.shape[1]) if k not in rather_dependent]
     taken: list[int] = []
     for group in (list(rather_dependent), rest):
         open_ones = list(group)
-        while open_ones:
+        while open_ones and len(taken) < rank:
             sizes = np.linalg.norm(left[:, open_ones], axis=0)
-            at = int(sizes.argmax())
-            if not sizes[at] > tolerance * largest:
+            if group is not rest and not sizes.max() > least:
                 break
-            pivot = open_ones.pop(at)
+            pivot = open_ones[int(sizes.argmax())]
+            if preference is not None:
+                able = [k for k, size in zip(open_ones, sizes, strict=True) if size >= ABLE * sizes.max()]
+                pivot = max(able, key=lambda k: (preference[k], k))
+            open_ones.remove(pivot)
             taken.append(pivot)
-            axis = left[:, pivot] / sizes[at]
+            axis = left[:, pivot] / np.linalg.norm(left[:, pivot])
             for _ in range(2):  # once more for what rounding leaves
                 left -= np.outer(axis, axis @ left)
     return tuple(k for k in range(rows.shape[1]) if k not in taken)
@@ -73,16 +86,24 @@ def redundant_names(rows: NDArray[np.float64], owners: Sequence[str]) -> tuple[s
 
 
 def loose_base(tree: JointTree) -> tuple[int, ...]:
-    """Coordinates of a base that slides and turns in one place, which nobody drives; none of another."""
+    """Coordinates of bodies that float: that slide and turn in one place, and hang on nothing else.
+
+    Nobody drives these. Where a slide is says nothing, so that only what turns must be in one place.
+    """
     carried = {link.joint for link in tree.links}
-    run: list[int] = []
-    parent = None
-    while True:
-        children = [f for f, joint in enumerate(tree.joints) if joint.parent == parent]
-        together = len(children) == 1 and (not run or not any(tree.joints[children[0]].translation))
-        if not together or (parent is not None and parent in carried):
+    roots = [f for f, joint in enumerate(tree.joints) if joint.parent is None]
+    return tuple(k for root in roots for k in _floating(tree, root, carried))
+
+
+def _floating(tree: JointTree, root: int, carried: set[int]) -> tuple[int, ...]:
+    """Coordinates on the way from a root to the first link, if they slide and turn; else none."""
+    run = [root]
+    while run[-1] not in carried:
+        children = [f for f, joint in enumerate(tree.joints) if joint.parent == run[-1]]
+        turned = any(tree.joints[f].kind == "revolute" for f in run)
+        if len(children) != 1 or (turned and any(tree.joints[children[0]].translation)):
             break
-        parent = children[0]
-        run.append(parent)
+        run.append(children[0])
     kinds = {tree.joints[f].kind for f in run}
-    return tuple(tree.joints[f].coordinate for f in run) if len(kinds) > 1 else ()
+    floats = len(kinds) > 1 and len(run) >= LEAST
+    return tuple(tree.joints[f].coordinate for f in run) if floats else ()

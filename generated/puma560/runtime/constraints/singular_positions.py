@@ -30,38 +30,54 @@ def sample_of(place: Sequence[int]) -> str:
 
 
 def check_factors(rows: Any, triangle: Any, columns: JointColumns, joint_names: Sequence[str]) -> None:
-    """Raise ValueError for the first sample where A_d, of which R is given, loses its rank.
+    """Raise ValueError for the first sample where A_d, of which R is given, loses its rank."""
+    place = lost_at(triangle)
+    if place is not None:
+        own = _array(rows)[tuple(place)].astype(float)
+        raise ValueError(why_not_following(own, columns, _epsilon(rows), joint_names, sample_of(place)))
 
-    |R_ff| is what is left of column f across those before it.
-    """
-    if hidden(rows):
-        return
-    r, epsilon = _array(triangle), _epsilon(rows)
-    least = np.abs(r.diagonal(0, -2, -1))
+
+def least_left(triangle: Any) -> NDArray[Any]:
+    """Of R the least part of a column that is left across those before it, (...,): |R_ff| by its length."""
+    r = _array(triangle)
     sizes = np.sqrt((r * r).sum(-2))
-    lost = (least <= epsilon * sizes).any(-1)
+    least: NDArray[Any] = (np.abs(r.diagonal(0, -2, -1)) / np.where(sizes > 0.0, sizes, 1.0)).min(-1)
+    return least
+
+
+def lost_at(triangle: Any) -> list[int] | None:
+    """The first sample where R has lost its rank."""
+    if hidden(triangle):
+        return None
+    lost = least_left(triangle) <= _epsilon(triangle)
     if not lost.any():
-        return
-    place = np.argwhere(lost)[0].tolist()
-    own = _array(rows)[tuple(place)].astype(float)
-    raise ValueError(_not_following(own, columns, epsilon, joint_names, sample_of(place)))
+        return None
+    place: list[int] = np.argwhere(lost)[0].tolist()
+    return place
 
 
-def _not_following(
+def why_not_following(
     rows: NDArray[np.float64], columns: JointColumns, epsilon: float, joint_names: Sequence[str], where: str
 ) -> str:
-    dependent, independent = columns.dependent.tolist(), columns.independent.tolist()
-    still = np.abs(np.linalg.svd(rows[:, dependent])[2][-1])
-    moving = [joint_names[dependent[f]] for f in np.flatnonzero(still > SHARE * still.max())]
-    held = listed([joint_names[k] for k in independent])
-    stand = "stands" if len(independent) == 1 else "stand"
-    told = f"{listed(moving)} can move{where} while {held} {stand} still"
+    """Why A_d of one sample leaves joints free, of whose columns less than the part `epsilon` is left."""
+    dependent = columns.dependent.tolist()
+    told = left_free(rows, columns, joint_names, where)
     if rank_of(rows, epsilon) < len(dependent):
         return (
             f"the position is singular: {told}, for the constraints take fewer freedoms there than elsewhere"
         )
     others = [joint_names[k] for k in chosen_independent(rows, tolerance=epsilon)]
     return f"the independent joints do not tell the others: {told}; there, choose independent={others}"
+
+
+def left_free(rows: Any, columns: JointColumns, joint_names: Sequence[str], where: str) -> str:
+    """Which dependent joints A_d of one sample leaves free, in words."""
+    dependent, independent = columns.dependent.tolist(), columns.independent.tolist()
+    still = np.abs(np.linalg.svd(_array(rows).astype(float)[:, dependent])[2][-1])
+    moving = [joint_names[dependent[f]] for f in np.flatnonzero(still > SHARE * still.max())]
+    held = listed([joint_names[k] for k in independent])
+    stand = "stands" if len(independent) == 1 else "stand"
+    return f"{listed(moving)} can move{where} while {held} {stand} still"
 
 
 def check_following(rows: Any, found: Followers, names: Sequence[str], joint_names: Sequence[str]) -> None:
@@ -73,10 +89,9 @@ def check_following(rows: Any, found: Followers, names: Sequence[str], joint_nam
     if rows.shape[-2] == len(found.columns.dependent) or hidden(rows):
         return
     a, g = _array(rows), _array(found.map)
-    sizes, owners = np.abs(a).max(-1), np.array(names)
-    for owner in set(names):
-        own = owners == owner
-        sizes[..., own] = sizes[..., own].max(-1, keepdims=True)
+    starts = [at for at, name in enumerate(names) if not at or name != names[at - 1]]
+    largest = np.maximum.reduceat(np.abs(a).max(-1), starts, -1)
+    sizes = largest.repeat(np.diff([*starts, len(names)]), -1)
     scale = sizes[..., None] * np.abs(g).max(-2, keepdims=True)
     wrong = np.abs(a @ g) > (AGREE if rows.dtype.itemsize == 8 else 10.0 * AGREE) * scale
     if not wrong.any():
@@ -122,7 +137,7 @@ def open_by(size: float, row: str) -> str:
     """How much a row is open, in its unit."""
     if " force" in row:
         return f"{1e3 * size:.3g} mm"
-    return f"{size:.3g} rad" if " moment" in row else f"{size:.3g}"
+    return f"{size:.3g} rad" if " moment" in row else f"{size:.3g} of its sum, in rad and m"
 
 
 def _epsilon(like: Any) -> float:

@@ -13,6 +13,7 @@ from ..motion_quantities import Trajectory
 from ..sums.namespace import namespace
 from .equations_of_motion import EquationsOfMotion, State, checked_torques
 from .integrators import ADAPTIVE, by_scipy, in_fixed_steps
+from .tied_motion import TiedMotion
 
 
 def simulated(
@@ -35,7 +36,7 @@ def simulated(
     times, step = _instants(time), None if step is None else _positive("step", step)
     equations, start = _started(robot, q, qd, tau, loads, passive, constraints_of(robot, constraints))
     if method == "RK4":
-        states = in_fixed_steps(equations.rates, lambda state: _settled(equations, state), start, times, step)
+        states = in_fixed_steps(equations.rates, equations.settled, start, times, step)
     elif method in ADAPTIVE:
         if not isinstance(q, np.ndarray):
             raise TypeError(
@@ -56,18 +57,11 @@ def _started(
     if not callable(tau):
         tau = 0.0 * q if tau is None else checked_torques(robot, tau, q)
     if constraints is None:
-        return EquationsOfMotion(robot, tau, loads, passive, None, None, None), State(q, qd, work)
-    own = robot.backend.index(np.array([robot.joint_index(name) for name in constraints.independent]), q)
-    q = constraints.closed(q)
-    equations = EquationsOfMotion(robot, tau, loads, passive, constraints, own, q)
-    return equations, State(q, qd[..., own], work)
-
-
-def _settled(equations: EquationsOfMotion, state: State) -> State:
-    """The same state with its dependent joints where the constraints want them."""
-    if equations.constraints is None:
-        return state
-    return state._replace(q=equations.constraints.closed(state.q, equations.held_at))
+        return EquationsOfMotion(robot, tau, loads, passive, None), State(q, qd, work)
+    answers = constraints._answers
+    place = answers.closed_place(q, None)
+    equations = EquationsOfMotion(robot, tau, loads, passive, TiedMotion(answers, place))
+    return equations, State(place.q, place.own(qd), work)
 
 
 def _finite(states: Iterator[State], times: Sequence[float], like: Any) -> Iterator[State]:
@@ -87,7 +81,7 @@ def _collected(
     """The motion at all instants."""
     rows = []
     for t, state in zip(times, states, strict=True):
-        q, qd = equations.motion(state)
+        q, qd = equations.motion(t, state)
         tau = equations.torques(t, q, qd)
         rows.append((q, qd, tau, equations.energy(q, qd), state.work))
     like = rows[0][0]

@@ -1,9 +1,9 @@
 """How dependent joints d follow the independent ones y where A qd = 0, for matrices (..., C, n).
 
-    A_d = Q R    G_d = -R^-1 Q^T A_y    lambda = Q R^-T tau_d
+    A_d = Q R    A_d^+ = R^-1 Q^T    G_d = -A_d^+ A_y    lambda = A_d^+T tau_d
 
 A_d is tall and of full column rank, so that rows that say the same twice need no case of their own:
-A_d^+ = R^-1 Q^T is its pseudoinverse, and lambda the least that does tau_d = A_d^T lambda.
+A_d^+ is its pseudoinverse, and lambda the least that does tau_d = A_d^T lambda.
 """
 
 from typing import Any, NamedTuple
@@ -27,10 +27,8 @@ class Followers(NamedTuple):
     """The answers at one position, or at many."""
 
     columns: JointColumns
-    orthogonal: Any
-    """Q, (..., C, d)."""
-    triangle: Any
-    """R, (..., d, d)."""
+    inverse: Any
+    """A_d^+, (..., d, C)."""
     map: Any
     """G, (..., n, m)."""
 
@@ -48,22 +46,31 @@ def factored(rows: Any, columns: JointColumns) -> tuple[Any, Any]:
     return q, r
 
 
-def followers(rows: Any, columns: JointColumns, factors: tuple[Any, Any]) -> Followers:
+def inverted(factors: tuple[Any, Any]) -> Any:
+    """A_d^+ of a regular R."""
+    orthogonal, triangle = factors
+    xp, right = namespace(triangle), _transposed(orthogonal)
+    if xp is np:  # which has no solver of triangles; pivoting leaves R as it is
+        return np.linalg.solve(triangle, right)
+    return xp.linalg.solve_triangular(triangle, right, upper=True)
+
+
+def followers(rows: Any, columns: JointColumns, inverse: Any) -> Followers:
     """How joints follow."""
-    xp, (q, r) = namespace(rows), factors
-    moved = -_solved(r, _transposed(q) @ taken(rows, columns.independent, -1))
+    xp = namespace(rows)
+    moved = -inverse @ taken(rows, columns.independent, -1)
     m = len(columns.independent)
     # Zeros of the motion's own make a unit matrix of its kind, in which a gradient may run.
     unit = xp.zeros_like(moved[..., :1, :]) + xp.eye(m, dtype=rows.dtype, **_where(rows))
-    return Followers(columns, q, r, taken(xp.concat([unit, moved], -2), columns.order, -2))
+    return Followers(columns, inverse, taken(xp.concat([unit, moved], -2), columns.order, -2))
 
 
-def dependent_shares(found: Followers, changes: Any) -> Any:
+def dependent_shares(columns: JointColumns, inverse: Any, changes: Any) -> Any:
     """-A_d^+ of columns (..., C, X) on the dependent joints, zero on the independent ones, (..., n, X)."""
-    xp = namespace(changes)
-    moved = -_solved(found.triangle, _transposed(found.orthogonal) @ changes)
-    still = xp.zeros_like(found.map[..., 0, :, None] * moved[..., :1, :])
-    return taken(xp.concat([still, moved], -2), found.columns.order, -2)
+    xp, m = namespace(changes), len(columns.independent)
+    moved = -inverse @ changes
+    still = xp.zeros_like(moved[..., :1, :]) + xp.zeros((m, 1), dtype=moved.dtype, **_where(moved))
+    return taken(xp.concat([still, moved], -2), columns.order, -2)
 
 
 def closable(factors: tuple[Any, Any], violation: Any) -> Any:
@@ -73,8 +80,7 @@ def closable(factors: tuple[Any, Any], violation: Any) -> Any:
 
 def borne(found: Followers, torque: Any) -> Any:
     """lambda (..., C, X) of torques (..., n, X) that dependent joints need."""
-    own = taken(torque, found.columns.dependent, -2)
-    return found.orthogonal @ _solved(_transposed(found.triangle), own, upper=False)
+    return _transposed(found.inverse) @ taken(torque, found.columns.dependent, -2)
 
 
 def projected(found: Followers, torque: Any) -> Any:
@@ -85,13 +91,6 @@ def projected(found: Followers, torque: Any) -> Any:
 def times(matrix: Any, vector: Any) -> Any:
     """Matrices (..., a, b) times vectors (..., b)."""
     return (matrix @ vector[..., None])[..., 0]
-
-
-def _solved(triangle: Any, right: Any, upper: bool = True) -> Any:
-    xp = namespace(triangle)
-    if xp is np:  # which has no solver of triangles; pivoting leaves R as it is
-        return np.linalg.solve(triangle, right)
-    return xp.linalg.solve_triangular(triangle, right, upper=upper)
 
 
 def _transposed(matrix: Any) -> Any:

@@ -63,7 +63,7 @@ def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
         where = f"contacts[{number}]"
         if not is_contact(contact):
             raise TypeError(f"{where} is {short(contact)}; give a Contact")
-        made = _held(contact, where, frames, links)
+        made = _held(contact, where, frames, links, tree.gravity)
         if tree.frames[made.first].joint is None:
             raise ValueError(f"{where}.frame is {short(contact.frame)}, which stands on the ground anyway")
         if made.name in taken:
@@ -78,16 +78,16 @@ def is_contact(given: Any) -> bool:
     return isinstance(given, tuple) and getattr(given, "_fields", None) == Contact._fields
 
 
-def _held(contact: Contact, where: str, frames: Sequence[str], links: Sequence[str]) -> Held:
+def _held(contact: Contact, where: str, frames: Sequence[str], links: Sequence[str], gravity: Triple) -> Held:
     if contact.kind not in CONTACTS:
         raise ValueError(f"{where}.kind is {short(contact.kind)}; choose {', '.join(CONTACTS)}")
     first = frame_index(contact.frame, frames, links)
     point = _vector(contact.point, f"{where}.point")
     arm, axes = (0.0, 0.0, 0.0), np.eye(3)
     if contact.kind == "hinged":
-        axes = _around(_vector(contact.axis, f"{where}.axis", True))
+        axes = axes_around(_vector(contact.axis, f"{where}.axis", True))
     if contact.kind == "rolling":
-        radius, normal = contact.radius, _vector(contact.normal, f"{where}.normal", True)
+        radius, normal = contact.radius, ground_normal(contact, where, gravity)
         if not (isinstance(radius, int | float) and 0.0 < radius < math.inf):
             raise ValueError(f"{where}.radius is {short(radius)}; what rolls has one above 0, in m")
         size = math.hypot(*normal)
@@ -108,7 +108,16 @@ def _vector(given: Any, where: str, is_direction: bool = False) -> Triple:
     return x, y, z
 
 
-def _around(direction: Triple) -> NDArray[Any]:
+def ground_normal(contact: Contact, where: str, gravity: Triple) -> Triple:
+    """The normal of the ground on which it rolls: its own, or against gravity."""
+    if contact.normal is not None:
+        return _vector(contact.normal, f"{where}.normal", True)
+    if not any(gravity):
+        raise ValueError(f"{where} has no normal, and no gravity tells one; give normal=(x, y, z)")
+    return -gravity[0], -gravity[1], -gravity[2]
+
+
+def axes_around(direction: Triple) -> NDArray[Any]:
     """Axes whose z points in a direction."""
     z = np.array(direction) / math.hypot(*direction)
     x = np.cross(np.eye(3)[np.abs(z).argmin()], z)

@@ -6,7 +6,6 @@ The last step is one from the closed position, so that a gradient through it is 
 dq_d = -A_d^+ A_y dq_y.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,9 +13,17 @@ import numpy as np
 from ..chosen_names import plain
 from ..rule.kinematics import taken
 from ..sums.namespace import hidden, namespace
-from .closed_places import RowNames
-from .followers import JointColumns, closable, dependent_shares, factored, followers
-from .singular_positions import check_factors, closable_tolerance, open_by, sample_of, worst_open
+from .closed_places import RowNames, TiesAt, ties_at
+from .followers import JointColumns, dependent_shares, inverted
+from .singular_positions import (
+    check_factors,
+    closable_tolerance,
+    left_free,
+    lost_at,
+    open_by,
+    sample_of,
+    worst_open,
+)
 from .tie_rows import TieRows
 
 STEPS = 50
@@ -31,45 +38,71 @@ def closed(
     held_at: Any,
     tolerance: float | None,
     names: RowNames,
-) -> Any:
-    """q (..., n) with its dependent joints moved.
+) -> TiesAt:
+    """Ties at q (..., n) with its dependent joints moved until they close.
 
-    held_at: where contacts took hold, q unless given; names: what errors name
+    held_at: where contacts took hold, (..., n); names: what errors name
     Raises ValueError for the first sample that is singular, or stays open beyond the tolerance.
     """
-    start = q if held_at is None else held_at
     if isinstance(q, np.ndarray):
-        found = _found(ties, columns, q, start, names.joints)
+        at = _found(ties, columns, q, held_at, tolerance, names)
     else:
-        with namespace(q).no_grad():
-            found = _found(ties, columns, q, start, names.joints)
-        found = _with_independent_of(q, found.detach(), columns)
-        found = found + _step(ties, columns, found, start, names.joints)
-    violation = ties.violation(found, start)
-    _check(violation, tolerance, names)
+        xp = namespace(q)
+        with xp.no_grad():
+            at = _found(ties, columns, q, held_at, tolerance, names)
+        if xp.is_grad_enabled():
+            found = _with_independent_of(q, at.q.detach(), columns)
+            at = ties_at(ties, columns, found, held_at)
+            step = dependent_shares(columns, inverted(at.factors), at.violation[..., None])[..., 0]
+            at = ties_at(ties, columns, found + step, held_at)
+    _check(at.violation, tolerance, names)
     if tolerance is None:
-        factors = factored(ties.at(found).positions()[..., 1:], columns)
-        _check(closable(factors, violation), closable_tolerance(q), names)
-    return found
+        _check(at.closable, closable_tolerance(q), names)
+    return at
 
 
-def _found(ties: TieRows, columns: JointColumns, q: Any, start: Any, joint_names: Sequence[str]) -> Any:
-    precise = 1e-8 if q.dtype.itemsize == 8 else 1e-4  # of a step; what is left is about its square
-    for _ in range(STEPS):
-        step = _step(ties, columns, q, start, joint_names)
+def _found(
+    ties: TieRows, columns: JointColumns, q: Any, held_at: Any, tolerance: float | None, names: RowNames
+) -> TiesAt:
+    double = q.dtype.itemsize == 8
+    near = 1e-8 if double else 1e-4  # of a step; what is left is about its square
+    least = 1e-12 if double else 1e-6  # of a step that changes no row by more than rounding does
+    at, is_near, is_seen = ties_at(ties, columns, q, held_at), False, not hidden(q)
+    for count in range(STEPS):
+        _check_step(at, columns, tolerance, names, not count)
+        at = at._replace(inverse=inverted(at.factors))
+        step = dependent_shares(columns, at.inverse, at.violation[..., None])[..., 0]
         size = (step * step).sum(-1)[..., None] ** 0.5
-        q = q + step * (LONGEST / namespace(q).where(size > LONGEST, size, 0.0 * size + LONGEST))
-        if not hidden(q) and not bool((size > precise).any()):
-            break
-    return q
+        if is_near or (is_seen and not bool((size > least).any())):
+            return at._replace(q=at.q + step)
+        is_near = is_seen and not bool((size > near).any())
+        longest = namespace(q).where(size > LONGEST, size, 0.0 * size + LONGEST)
+        at = ties_at(ties, columns, at.q + step * (LONGEST / longest), held_at)
+    return at
 
 
-def _step(ties: TieRows, columns: JointColumns, q: Any, start: Any, joint_names: Sequence[str]) -> Any:
-    rows = ties.at(q).positions()[..., 1:]
-    factors = factored(rows, columns)
-    check_factors(rows, factors[1], columns, joint_names)
-    shares = dependent_shares(followers(rows, columns, factors), ties.violation(q, start)[..., None])
-    return shares[..., 0]
+def _check_step(
+    at: TiesAt, columns: JointColumns, tolerance: float | None, names: RowNames, is_start: bool
+) -> None:
+    """Raise ValueError where A_d has lost its rank: what is open has a place that was not asked for."""
+    place = lost_at(at.factors[1])
+    if place is None:
+        return
+    found = worst_open(at.violation[tuple(place)], tolerance)
+    if found is None:
+        check_factors(at.rows, at.factors[1], columns, names.joints)
+        return
+    tie, where = plain(names.owners[found[1]]), sample_of(place)
+    free = left_free(at.rows[tuple(place)], columns, names.joints, " there")
+    if is_start:
+        raise ValueError(
+            f"{tie} cannot be closed{where}, for the start is singular: {free}, and no step of theirs closes "
+            "it; start them off it, by 0.1 say, to the side on which it shall close"
+        )
+    raise ValueError(
+        f"{tie} does not close{where}: on the way the dependent joints come to a singular position, {free}; "
+        "start them elsewhere, if it can close at all"
+    )
 
 
 def _with_independent_of(q: Any, found: Any, columns: JointColumns) -> Any:

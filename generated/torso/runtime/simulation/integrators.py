@@ -17,11 +17,11 @@ ADAPTIVE = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
 def in_fixed_steps(
-    rates: Rates, settle: Callable[[State], State], start: State, times: Sequence[float], step: float | None
+    rates: Rates, settle: Rates, start: State, times: Sequence[float], step: float | None
 ) -> Iterator[State]:
     """States at `times`, between which there are as many equal steps as make none longer than `step`.
 
-    settle: what is made of a state after each step
+    settle: what is made of an instant and a state after each step
     """
     yield start
     state = start
@@ -29,7 +29,7 @@ def in_fixed_steps(
         count = 1 if step is None else max(1, math.ceil((end - begin) / step * (1.0 - 1e-12)))
         length = (end - begin) / count
         for k in range(count):
-            state = settle(_step(rates, begin + k * length, length, state))
+            state = settle(begin + (k + 1) * length, _step(rates, begin + k * length, length, state))
         yield state
 
 
