@@ -39,7 +39,7 @@ class SimulatedMotion(NamedTuple):
 def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion:
     """From the calmest of the first states on, in which ties close.
 
-    Torques are those of its acceleration: of any others a light link would be thrown away.
+    Torques are those of a modest acceleration: of any others a light link would be thrown away.
     """
     recursion, n = NewtonEuler(manifest, tree), states.q.shape[1]
     own = list(tree.independent) if tree.tied else list(range(n))
@@ -50,7 +50,8 @@ def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Sim
     tried = states.at(slice(0, TRIED))
     sizes = np.abs(motion(np.ones(n) + 0.0 * tried.q)(tried.q, tried.qd[:, own])[2]).max(axis=-1)
     calm = np.array([int(np.where(np.isfinite(sizes), sizes, np.inf).argmin())])
-    q, qd, qdd = states.at(calm).motion
+    q, qd, _ = states.at(calm).motion
+    qdd = np.random.default_rng(9).uniform(-1.0, 1.0, q.shape)  # that of states may be none
     tau = recursion.partial_torque(q, qd, qdd).sum(-1)
     return SimulatedMotion(q, qd, tau, _integrated(motion(tau), (q, qd[:, own], np.zeros(1))))
 
