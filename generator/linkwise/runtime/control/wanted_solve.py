@@ -21,7 +21,8 @@ def solved_wanted(
     natural: matrix (..., r, r) whose diagonal says how large each row is, so that kilograms and square metres
     go together; positive: whether M* must be positive (its symmetric part, that is), else regular
 
-    Raises ValueError for the first M* that is not, with the sample and the rows.
+    Raises ValueError for the first M* that is not, with the sample and the rows: of a singular one those
+    that say nothing, or the same as others.
     """
     xp = namespace(wanted)
     diagonal = abs(natural.diagonal(0, -2, -1))
@@ -50,8 +51,8 @@ def _check(what: str, scaled: NDArray[Any], names: Sequence[str], positive: bool
         values, vectors = np.linalg.eigh(symmetric)
         value, vector, wrong = values[..., 0], vectors[..., :, 0], "not positive"
     else:
-        _, values, vectors = np.linalg.svd(known)
-        value, vector, wrong = values[..., -1], vectors[..., -1, :], "singular"
+        vectors, values, _ = np.linalg.svd(known)
+        value, vector, wrong = values[..., -1], vectors[..., :, -1], "singular"
     bad = value <= least * np.maximum(1.0, np.abs(values).max(-1))
     if not bad.any():
         return
