@@ -41,6 +41,7 @@ RUNTIME = (
     "lagrangians",
     "recorded",
     "arrays",
+    "control",
     "simulation",
     "induced",
     "constraints",

@@ -30,6 +30,8 @@ SHARED_RUNTIME = (
     "arguments.py",
     "chosen_names.py",
     "composed.py",
+    "controller_calls.py",
+    "controllers.py",
     "dense.py",
     "dynamics.py",
     "interface.py",

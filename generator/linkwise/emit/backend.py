@@ -121,6 +121,7 @@ RULE = (
     "arrays/array_backend.py",
     "arrays/array_kernels.py",
     "constraints",
+    "control",
     "induced",
     "kinematics",
     "rule",

@@ -1,0 +1,248 @@
+"""`partial_impedance` and `cancel`: kinds of arrays, gradients, the joints' own torques, messages."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from answers import random_states, relative_error
+from conftest import DATA, needs_compiler
+from linkwise import generate, read_system, write_package
+from linkwise.package.load import import_package
+
+torch = pytest.importorskip("torch")
+
+Packages = Callable[[str], ModuleType]
+BACKENDS = ("numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler))
+CRANE = f"{DATA / 'crane.urdf'} loops"
+SPRUNG = """schema = 1
+name = "sprung"
+gravity = [0, -9.81, 0]
+link = [
+  {name = "base"},
+  {name = "one", mass = 2.0, com = [0.2, 0, 0], inertia = {xx = 0.1, yy = 0.1, zz = 0.05}},
+  {name = "two", mass = 1.0, com = [0.1, 0.05, 0], inertia = {xx = 0.1, yy = 0.1, zz = 0.05}},
+]
+
+[[joint]]
+name = "a"
+parent = "base"
+child = "one"
+stiffness = 3.0
+rest = 0.2
+damping = 0.5
+armature = 0.3
+
+[[joint]]
+name = "b"
+parent = "one"
+child = "two"
+xyz = [0.4, 0, 0]
+friction = 0.4
+armature = 0.1
+"""
+
+
+@pytest.fixture(scope="module")
+def sprung(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    folder = tmp_path_factory.mktemp("sprung")
+    (folder / "sprung.toml").write_text(SPRUNG, encoding="utf-8")
+    write_package(generate(read_system(folder / "sprung.toml"), ["numpy"]), folder / "sprung")
+    return import_package(folder / "sprung")
+
+
+def as_kind(backend: str, *arrays: Any) -> list[Any]:
+    return [torch.from_numpy(a) if backend in ("torch", "autograd") else a for a in arrays]
+
+
+@pytest.mark.parametrize("robot", ["torso", CRANE], ids=["torso", "crane"])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_every_back_end_says_the_same_of_one_state_and_of_many(
+    robot: str, backend: str, package_of: Packages
+) -> None:
+    package = package_of(robot)
+    known, model = package.load("numpy"), package.load(backend)
+    n, link, joint = known.n, known.link_names[-1], known.joint_names[-1]
+    q, qd, qdd = random_states(n, 3, seed=2)
+    row = np.arange(1.0, n + 1.0)
+    frame = package.FrameImpedance(link, damping=package.Natural(plus=2.0), stiffness=9.0, rows=("z",))
+    chosen = (
+        lambda r: r.partial_impedance(package.Natural({link: 0.5}), row, 2.0 * row),
+        lambda r: r.partial_impedance({(joint, link, joint): 9.0}, {(0, joint_link(known), 0): 3.0}, 2.0),
+        lambda r: r.partial_impedance(frame=frame),
+    )
+    for made in chosen:
+        expected = np.stack(
+            [made(known)(a, b, target(package, known, c)) for a, b, c in zip(q, qd, qdd, strict=True)]
+        )
+        answer = made(model)(*as_kind(backend, q, qd), moved_target(package, known, backend, qdd))
+        assert relative_error(np.asarray(answer), expected) <= 1e-11
+        single = made(model)(*as_kind(backend, q[0], qd[0]), target(package, known, qdd[0]))
+        assert relative_error(np.asarray(single), expected[0]) <= 1e-11
+    names = {(0, link, None, None), (0, joint_link(known), 0, 1)}
+    expected = np.stack([known.cancel(names)(a, b, c) for a, b, c in zip(q, qd, qdd, strict=True)])
+    assert relative_error(np.asarray(model.cancel(names)(*as_kind(backend, q, qd, qdd))), expected) <= 1e-11
+
+
+def joint_link(model: Any) -> int:
+    """A link that joint 0 moves."""
+    return next(j for j, path in enumerate(model.structure.paths) if 0 in path)
+
+
+def target(package: ModuleType, model: Any, at: Any) -> Any:
+    pose = model.kinematics.pose(at, model.link_names[-1])
+    return package.Target(at, 0.1 * at, 0.2 * at, pose, np.arange(6.0), np.ones(6))
+
+
+def moved_target(package: ModuleType, model: Any, backend: str, at: Any) -> Any:
+    return package.Target(*as_kind(backend, *target(package, model, at)[:4]), np.arange(6.0), np.ones(6))
+
+
+def test_gradients_flow_through_motion_gains_and_targets(package_of: Packages) -> None:
+    package = package_of("torso")
+    model = package.load("torch")
+    q, qd, at = (torch.from_numpy(a[0]).requires_grad_() for a in random_states(model.n, 1, seed=4))
+    gains = [torch.full((model.n,), x, dtype=torch.float64, requires_grad=True) for x in (2.0, 3.0, 4.0)]
+
+    def torque(q: Any, qd: Any, at: Any, *gains: Any) -> Any:
+        return model.partial_impedance(*gains)(q, qd, at)
+
+    assert torch.autograd.gradcheck(torque, (q, qd, at, *gains))
+    link = model.link_names[-1]
+    pose = model.kinematics.pose(0.9 * q.detach(), link)
+
+    def frame_torque(q: Any, qd: Any, damping: Any, stiffness: Any) -> Any:
+        rows = ("rx", "ry", "x")
+        frame = package.FrameImpedance(link, package.Natural(0.7, plus=1.0), damping, stiffness, rows)
+        return model.partial_impedance(frame=frame)(q, qd, package.Target(pose=pose))
+
+    own = [torch.tensor([3.0, 2.0, 4.0], dtype=torch.float64, requires_grad=True) for _ in range(2)]
+    assert torch.autograd.gradcheck(frame_torque, (q, qd, *own))
+    # at the target itself, where the rotation vector is zero
+    there = model.kinematics.pose(q, link).detach()
+    frame = package.FrameImpedance(link, package.Natural(plus=1.0), stiffness=5.0, rows=("rx", "ry", "x"))
+    pull = model.partial_impedance(frame=frame)(q, qd, package.Target(pose=there)).sum()
+    assert torch.isfinite(torch.autograd.grad(pull, q)[0]).all()
+
+
+def test_a_controller_maps_over_samples(package_of: Packages) -> None:
+    model = package_of("torso").load("torch")
+    q, qd, at = (torch.from_numpy(a) for a in random_states(model.n, 4, seed=5))
+    controller = model.partial_impedance(2.0, 3.0, 4.0)
+    mapped = torch.func.vmap(lambda *state: controller(*state))(q, qd, at)
+    assert relative_error(mapped, controller(q, qd, at)) <= 1e-12
+
+
+def test_joints_own_torques_are_compensated_and_armature_is_kept(sprung: ModuleType) -> None:
+    model = sprung.load()
+    q, qd, at, force = (np.array(row) for row in ([0.3, -0.5], [0.7, 0.4], [0.1, 0.2], [1.0, -2.0]))
+    armature = np.diag([0.3, 0.1])
+
+    def accelerated(controller: Any) -> Any:
+        torque = controller(q, qd, at, force) + force
+        return model.forward_dynamics(q, qd, torque, passive=True)
+
+    pull = force - 2.0 * qd - 5.0 * (q - at)
+    whole = model.partial_impedance(4.0, 2.0, 5.0)
+    assert relative_error(accelerated(whole), pull / 4.0) <= 1e-12
+    shares = np.zeros((2, 2, 2))
+    shares[0, 1, 0] = shares[1, 1, 1] = 4.0
+    beside = model.partial_impedance(shares, 2.0, 5.0)
+    assert relative_error(accelerated(beside), np.linalg.solve(4.0 * np.eye(2) + armature, pull)) <= 1e-12
+    natural = model.partial_impedance(damping=2.0, stiffness=5.0)
+    assert relative_error(natural(q, qd, at), natural(q, qd, at, force)) <= 1e-12  # no force need be measured
+    mass = model.mass_matrix(q) + armature
+    assert relative_error(accelerated(natural), np.linalg.solve(mass, pull)) <= 1e-12
+    bare = model.partial_impedance(4.0, 2.0, 5.0, passive=False)
+    alone = model.forward_dynamics(q, qd, bare(q, qd, at, force) + force)
+    assert relative_error(alone, pull / 4.0) <= 1e-12
+
+
+def test_hand_written_energies_are_controlled_too(package_of: Packages) -> None:
+    package = package_of(str(DATA / "turntable.py"))  # its energy has terms linear in the velocities
+    model = package.load("numpy")
+    q, qd, at = (a[0] for a in random_states(model.n, 1, seed=6))
+    controller = model.partial_impedance(4.0, 2.0, 5.0)
+    expected = (-2.0 * qd - 5.0 * (q - at)) / 4.0
+    assert relative_error(model.forward_dynamics(q, qd, controller(q, qd, at)), expected) <= 1e-12
+    assert not controller.dissipative
+    with pytest.raises(ValueError, match="are energies, which do not say where anything is"):
+        model.partial_impedance(frame=package.FrameImpedance(0))
+
+
+def test_targets_that_cannot_be_are_refused_in_one_line(package_of: Packages) -> None:
+    package = package_of("planar3")
+    robot, frame, natural = package.load("numpy"), package.FrameImpedance, package.Natural
+    first = ("joint1", "link3")
+    inertias = (
+        (-1.0, "inertia is not positive: along joint1"),
+        ([1.0, 0.0, 1.0], "inertia is not positive: along joint2"),
+        ([1.0, 2.0], r"inertia has shape \(2,\); give a number, \(3,\) for a diagonal"),
+        ([1.0, np.nan, 2.0], "inertia has numbers that are not finite"),
+        (natural(-1.0), "inertia.scale is -1; give 0 or above"),
+        (natural({first: -1.0}), r"of \(joint1, link3\) is -1"),
+        (natural({"link4": 1.0}), "inertia.scale: link is 'link4'; choose a link"),
+        (natural({("joint3", "link1"): 1.0}), "joint 'joint3' does not move link 'link1'"),
+        ({(0, 0): 1.0}, r"entries are \(joint, link, coordinate\)"),
+        ({(0, 0, 0): 1.0, ("joint1", 0, 0): 2.0}, "twice, by name and by number"),
+    )
+    others = (
+        ({"stiffness": np.triu(np.ones((3, 3)))}, r"not symmetric: \(joint1, joint2\) is 1"),
+        ({"stiffness": -1.0}, "stiffness is not positive or zero"),
+        ({"damping": natural(plus=-1.0)}, "damping.plus is not positive or zero"),
+        ({"frame": frame("hand")}, "frame is 'hand'"),
+        ({"frame": frame("link3", rows=("x", "x"))}, "choose some of rx, ry, rz, x, y, z"),
+        ({"frame": frame("link3", stiffness=-1.0)}, "frame.stiffness is not positive"),
+    )
+    for given, message in (*(({"inertia": a}, text) for a, text in inertias), *others):
+        with pytest.raises(ValueError, match=message) as caught:
+            robot.partial_impedance(**given)
+        assert "\n" not in str(caught.value)
+    cancelled = (
+        ([("joint3", "link1", None, None)], "is always zero"),
+        ([(*first, "joint2", 0)], "cancel 1, of velocity, or 2, of acceleration"),
+        ([(0, 2, 1, 2), (*first, "joint2", 2)], "cancelled twice; name it once"),
+        ([], "nothing is to be cancelled"),
+        ([(0, 1, 2)], r"give \(joint, link, coordinate, order\)"),
+    )
+    for entries, message in cancelled:
+        with pytest.raises(ValueError, match=message):
+            robot.cancel(entries)
+
+
+def test_states_that_cannot_be_controlled_are_refused_with_the_sample(package_of: Packages) -> None:
+    package = package_of("planar3")
+    robot, frame = package.load("numpy"), package.FrameImpedance
+    q, rest = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]), np.zeros(3)
+    light = robot.partial_impedance({("joint1", "link3", "joint1"): -5.0})
+    with pytest.raises(ValueError, match="the wanted inertia is not positive at sample 0: along joint1"):
+        light(q, rest)
+    left = robot.cancel({(None, None, None, 2)})
+    with pytest.raises(ValueError, match="what is left of the mass matrix is singular at sample 0"):
+        left(q, rest)
+    straight = robot.partial_impedance(frame=frame("link3", rows=("x", "y", "rz")))
+    q[1] = 0.0
+    with pytest.raises(
+        ValueError, match=r"the mobility of frame 'link3' is not positive at sample 1: along .*x"
+    ):
+        straight(q, rest)
+    turned = robot.partial_impedance(frame=frame("link3", stiffness=1.0, rows=("rz",)))
+    pose = robot.kinematics.pose(q[0] + [np.pi, 0.0, 0.0], "link3")
+    with pytest.raises(ValueError, match="half a turn from its target"):
+        turned(q[0], rest, package.Target(pose=pose))
+    with pytest.raises(ValueError, match="is stiff, but target has no pose"):
+        turned(q[0], rest)
+    with pytest.raises(ValueError, match="the joints are stiff, but target has no q"):
+        robot.partial_impedance(stiffness=1.0)(q[0], rest)
+    with pytest.raises(ValueError, match=r"the shapes do not go together: .*external \(4, 3\)"):
+        robot.partial_impedance()(q, rest, None, np.zeros((4, 3)))
+
+
+def test_tied_robots_are_refused(tmp_path: Path) -> None:
+    write_package(generate(read_system(DATA / "fourbar.toml"), ["numpy"]), tmp_path / "fourbar")
+    robot = import_package(tmp_path / "fourbar").load()
+    for made in (robot.partial_impedance, lambda: robot.cancel({(0, 0, 0, 1)})):
+        with pytest.raises(ValueError, match="are tied, and are not free to have an impedance each"):
+            made()
