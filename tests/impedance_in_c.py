@@ -1,4 +1,4 @@
-"""Partial impedance of the emitted C, called through the functions of its header, and the formulas in NumPy."""
+"""Partial impedance of the emitted C through the functions of its header, and its formulas in NumPy."""
 
 import ctypes
 from collections.abc import Mapping
@@ -53,9 +53,7 @@ class ImpedanceInC:
         of_joints, kept = _struct(posture, dtype)
         of_frame, kept_too = _frame_struct(self.frames.index(frame), given, dtype)
         arguments = (of_joints, *to, of_frame, *target, external)
-        return self._call(
-            "frame_partial_impedance", (q, qd), arguments, len(q), dtype, [*kept, *kept_too]
-        )
+        return self._call("frame_partial_impedance", (q, qd), arguments, len(q), dtype, [*kept, *kept_too])
 
     def _call(
         self, function: str, state: Any, arguments: Any, n: int, dtype: Any, kept: list[Any]
