@@ -53,6 +53,7 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
         "slopes": "r->h1" if robot.size.h1 else "NULL",
         "largest": max(waiting.of(array) for array in arrays),
         "rigid": isinstance(system, RigidSystem),
+        "of_sample": [(array, total(array)) for array in arrays],
         "largest_gradient": max(link.size.c1 for link in links),
     }
 
@@ -86,6 +87,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "parameters": header.parameter_lines(system),
         "blocks": tuple(header.BLOCK.values()),
         "rigid": isinstance(system, RigidSystem),
+        "passive": isinstance(system, RigidSystem) and bool(system.robot.passive),
         "frames": list(header.frame_lines(system)) if isinstance(system, RigidSystem) else [],
         "functions": list(functions(given(system), robot, links)),
     }

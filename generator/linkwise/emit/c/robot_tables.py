@@ -1,7 +1,7 @@
 """A tree of rigid bodies as tables in C: what a kernel in loops goes by."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import accumulate
 from typing import Any
 
@@ -13,6 +13,7 @@ from linkwise.emit.printer import CPrinter
 from linkwise.emit.straight_line import straight_line
 from linkwise.escape import c_comment
 from linkwise.robot.robot import Scalar
+from linkwise.runtime.passive_joints import PassiveJoint, passive_sums
 from linkwise.symbolic.system import RigidSystem
 
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -82,6 +83,7 @@ def table_view(system: RigidSystem) -> dict[str, Any]:
         "placings": list(_placings(system)),
         "bodies": list(_bodies(system)),
         "gravity": _row(_values(system, robot.gravity)),
+        "passive": list(_passive(system)),
         "named": list(_named_frames(system)),
         "parameters": bool(system.parameters),
         "formulas": formulas(system, _places(system)),
@@ -135,6 +137,15 @@ def _bodies(system: RigidSystem) -> Iterator[str]:
         [mass] = _values(system, (link.mass,))
         inertia = _values(system, (link.inertia[i][k] for i, k in PRODUCTS))
         yield f"{{{mass!r}, {_row(_values(system, link.com))}, {_row(inertia)}}}"
+
+
+def _passive(system: RigidSystem) -> Iterator[str]:
+    """What the joints of each coordinate have of their own; nothing where no joint has any."""
+    joints = [PassiveJoint(a.joint, a.coordinate, a.ratio, **asdict(a.own)) for a in system.robot.passive]
+    if joints:
+        sums = passive_sums(joints, len(system.coordinates))
+        for k, own in enumerate(zip(*sums, strict=True), 1):
+            yield f"{_row(own)}, /* {k}, {c_comment(system.coordinates[k - 1].name)} */"
 
 
 def _named_frames(system: RigidSystem) -> Iterator[NamedFrame]:

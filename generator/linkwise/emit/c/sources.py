@@ -26,15 +26,28 @@ from linkwise.escape import c_comment
 from linkwise.symbolic.system import RigidSystem, System
 from linkwise.version import VERSION
 
-FIXED = ("numbers.h", "sines.h", "rows.h", "dense.h", "stream.h", "dense_rows.h", "calls.h")
+FIXED = (
+    "calls.h",
+    "dense.h",
+    "dense_rows.h",
+    "elimination.h",
+    "impedance.h",
+    "numbers.h",
+    "passive.h",
+    "rows.h",
+    "sines.h",
+    "stream.h",
+)
 """Files that are the same in every package."""
 
 FIXED_OF_RIGID = (
     "angles.h",
     "blocks.h",
+    "frame_impedance.h",
     "frames.h",
     "lanes.h",
     "mass.h",
+    "moving_links.h",
     "one_motion.h",
     "regressors.h",
     "rule.h",
@@ -42,6 +55,9 @@ FIXED_OF_RIGID = (
     "vectors.h",
 )
 """Those beside them in every package of rigid links, of which some functions are in loops."""
+
+FIXED_OF_ENERGIES = ("packed_links.h",)
+"""Those beside them in every other."""
 
 
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
@@ -66,6 +82,8 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     if isinstance(system, RigidSystem):
         yield f"c/{name}_tree.h", render("c/tree.h.j2", common | table_view(system))
         fixed += FIXED_OF_RIGID
+    else:
+        fixed += FIXED_OF_ENERGIES
     for file in fixed:
         yield f"c/{file}", files("linkwise.runtime").joinpath("c", file).read_text(encoding="utf-8")
 
