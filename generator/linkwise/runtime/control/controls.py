@@ -12,7 +12,7 @@ from ..quantities import NaturalImpedance
 from .cancelled_motions import ORDERS, cancelled_motions
 from .frame_impedance import FrameTargets
 from .joint_impedance import Errors, JointImpedance, JointTargets, dissipates, times
-from .wanted_coefficients import Wanted, stiffness_of, wanted
+from .wanted_coefficients import WantedShares, stiffness_of, wanted
 
 
 class Controls:
@@ -58,7 +58,7 @@ class Controls:
         kept = {order: np.ones((structure.n, structure.N, structure.n)) for order in ORDERS}
         for i, j, k, order in chosen:
             kept[order][i, j, k] = 0.0
-        acceleration, velocity = (Wanted(kept[m], None, None, False, False) for m in (2, 1))
+        acceleration, velocity = (WantedShares(kept[m], None, None, False, False) for m in (2, 1))
         targets = JointTargets(acceleration, velocity, None, False, bool(passive))
         names = structure.joint_names, structure.link_names
         named = tuple((names[0][i], names[1][j], names[0][k], m) for i, j, k, m in chosen)

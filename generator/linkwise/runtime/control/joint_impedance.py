@@ -14,15 +14,15 @@ from ..dense import Dense
 from ..passive_joints import passive_torques
 from ..sums.joint_matrices import JointMatrices
 from .gains import Gain
-from .wanted_coefficients import Wanted
+from .wanted_coefficients import WantedShares
 from .wanted_solve import solved_wanted
 
 
 class JointTargets(NamedTuple):
     """What is wanted of the joints."""
 
-    inertia: Wanted
-    damping: Wanted
+    inertia: WantedShares
+    damping: WantedShares
     stiffness: Gain | None
     positive: bool
     """Whether M* must be positive; else it must be regular, as where motions are cancelled."""
@@ -126,7 +126,7 @@ def times(matrix: Any, vector: Any) -> Any:
     return (matrix @ vector[..., None])[..., 0]
 
 
-def dissipates(inertia: Wanted, damping: Wanted) -> bool:
+def dissipates(inertia: WantedShares, damping: WantedShares) -> bool:
     """Whether c2 and c1 of each link are kept alike: then dM*/dt - 2 B* is skew but for what is added."""
     if not (inertia.positive and damping.positive) or inertia.by_link is None or damping.by_link is None:
         return False
