@@ -97,7 +97,12 @@ class ControlAnswers:
         """See `PartialImpedance.__call__`."""
         target, given = self._given(q, qd, target, external)
         torque = self._at_once(given, target)
-        return self._followed(given, target)[1] if torque is None else torque
+        if torque is not None:
+            return torque
+        if self._frame is None and self._joints.targets.inertia.natural:
+            state = self._joints.state(given["q"], given["qd"])
+            return self._joints.natural_torque(state, given["qd"], _errors(given))
+        return self._followed(given, target)[1]
 
     def acceleration(self, q: Any, qd: Any, target: Any, external: Any) -> Any:
         """See `PartialImpedance.acceleration`."""
