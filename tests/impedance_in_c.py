@@ -53,9 +53,7 @@ class ImpedanceInC:
         of_joints, kept = _struct(posture, dtype)
         of_frame, kept_too = _frame_struct(self.frames.index(frame), given, dtype)
         arguments = (of_joints, *to, of_frame, *target, external)
-        return self._call(
-            "frame_partial_impedance", (q, qd), arguments, len(q), dtype, [*kept, *kept_too]
-        )
+        return self._call("frame_partial_impedance", (q, qd), arguments, len(q), dtype, [*kept, *kept_too])
 
     def _call(
         self, function: str, state: Any, arguments: Any, n: int, dtype: Any, kept: list[Any]
