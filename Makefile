@@ -3,7 +3,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint generate bench corpus crash random fuzz same mutate report clean
+.PHONY: demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -26,6 +26,15 @@ generate: $(READY)
 	$(BIN)/linkwise generate planar3 --out generated
 	$(BIN)/linkwise generate puma560 --out generated
 	$(BIN)/linkwise generate torso --out generated
+
+# The figure and the tables of docs/control.md: what is cancelled at the root, and what a loop at 1 kHz keeps.
+control: $(READY)
+	$(BIN)/python tests/control_root.py --out docs
+	$(BIN)/python tests/numeric/finite_rate.py --out out/control
+
+# Panda pushed at its hand in MuJoCo: limp, soft and stiff.
+demo-control: $(READY)
+	$(BIN)/python tests/demo_control.py --out out/control
 
 # Two files of tests at a time.
 test: $(READY)

@@ -7,18 +7,11 @@ import numpy as np
 import pytest
 from answers import random_states, relative_error
 
-mujoco = pytest.importorskip("mujoco")
+pytest.importorskip("mujoco")
 
-LINK = """<body pos="{at} 0 0"><joint type="hinge" axis="0 0 1"/>
-<inertial pos="0.125 0 0" mass="0.6" diaginertia="0.005 0.005 0.005"/>{inner}</body>"""
+import mujoco
 
-
-def table_2_arm() -> str:
-    inner = ""
-    for at in (0.25, 0.25, 0.0):
-        inner = LINK.format(at=at, inner=inner)
-    return f"""<mujoco><option gravity="0 -9.80665 0"/><compiler balanceinertia="false"/>
-    <worldbody>{inner}</worldbody></mujoco>"""
+from numeric.mujoco_plant import table_2_arm
 
 
 def test_torques_sum_to_mujocos_inverse_dynamics(package_of: Callable[[str], ModuleType]) -> None:

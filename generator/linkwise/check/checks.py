@@ -17,6 +17,7 @@ from linkwise.check.derivations import derivations
 from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.frame_reference import FrameReference, frame_calls, frame_reference
+from linkwise.check.impedance_checks import impedance_calls
 from linkwise.check.induced_checks import induced_calls
 from linkwise.check.loop_checks import loop_calls
 from linkwise.check.loop_induced import induced_loop_calls
@@ -195,6 +196,8 @@ class _Checks:
                 if way.kernel != "rule":  # they are composed of what every kernel was held against
                     record = self.package.module.AppliedLoad
                     yield from induced_calls(f"{way.label}{label}", model, joints, reference, frames, record)
+                    natural = self.package.module.Natural
+                    yield from impedance_calls(f"{way.label}{label}", model, joints, reference, natural)
         if manifest.tree is not None:
             how = "from energies" if manifest.request.get("derivation") == "energy" else "by the rigid rule"
             ways = {way.label: model for way, model in loaded.items()}

@@ -46,6 +46,12 @@ class Model(Protocol):
     def constraints(self) -> Any:
         """What ties leave of its motion, for rigid links with ties."""
 
+    def partial_impedance(self, **targets: Any) -> Any:
+        """A controller under which shares of the impedance are as asked."""
+
+    def cancel(self, entries: Any) -> Any:
+        """A controller that cancels motion propagation torques."""
+
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """τ_ij (..., n, N)."""
 

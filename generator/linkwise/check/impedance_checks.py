@@ -1,0 +1,85 @@
+"""Controllers of a back end: what they promise, held against the reference's coefficients."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from linkwise.check.compare import Entries, Result, Skipped, compare
+from linkwise.check.passive_reference import passive_reference
+from linkwise.check.reference import Reference
+from linkwise.check.states import States
+from linkwise.check.sum_checks import is_tied, regular
+from linkwise.package.entries import PassiveEntry
+from linkwise.package.load import Array, Model
+
+
+def impedance_calls(
+    name: str,
+    model: Model,
+    joints: Sequence[PassiveEntry],
+    reference: Reference,
+    natural: Callable[..., Any],
+) -> Iterator[Result]:
+    """A scaled impedance with springs, and a cancelled motion; `natural` is the package's `Natural`."""
+    if is_tied(model):
+        return
+    rows = np.flatnonzero(regular(reference))
+    if not rows.size:
+        yield Skipped(f"{name}: controllers", "no mass matrix can be inverted here")
+        return
+    entries = [*_shaped(model, joints, reference, rows, natural), _cancelled(model, joints, reference, rows)]
+    yield compare(f"{name}: controllers make the impedance that is asked for", entries, reference.tolerance)
+
+
+def _shaped(
+    model: Model, joints: Sequence[PassiveEntry], reference: Reference, rows: Any, natural: Any
+) -> Iterator[Entries]:
+    """M* qdd + B* qd + K* e = f of the acceleration, and the torque that the plant takes for it.
+
+    How much of each link is kept differs where links are bodies; of a user's energies it may not.
+    """
+    n, links = len(model.joint_names), len(model.link_names)
+    q, qd, _ = reference.states.at(rows).motion
+    kept = np.linspace(0.5, 1.5, links) if model.backend.tree is not None else np.full(links, 0.7)
+    mass, scale = (source["c2"][rows] for source in (reference.values, reference.scales))
+    coriolis, size = (source["c1"][rows] for source in (reference.values, reference.scales))
+    own = float(np.abs(mass.sum(2)).max())
+    more, stiffness, at = own * np.linspace(0.1, 0.3, n), own * np.linspace(1.0, 3.0, n), 0.9 * q
+    force = reference.values["tau"][rows].sum(-1)
+    shares = np.broadcast_to(kept, (n, links))
+    controller = model.partial_impedance(
+        inertia=natural(shares), damping=natural(shares, plus=more), stiffness=stiffness
+    )
+    qdd, tau = (np.asarray(call(q, qd, at, force)) for call in (controller.acceleration, controller))
+    (*lost, armature), (*sizes, armature_size) = passive_reference(joints, States(q, qd, qdd))
+    rest, rest_size = sum(lost), sum(sizes)
+
+    def along(matrix: Array, vector: Array) -> Array:
+        product: Array = np.einsum("sik,sk->si", matrix, vector)
+        return product
+
+    weight = kept[:, None]
+    wanted = along((weight * mass).sum(2), qdd) + armature
+    pull = force - along((weight * coriolis).sum(2), qd) - more * qd - stiffness * (q - at)
+    wanted_size = along((weight * scale).sum(2), np.abs(qdd)) + armature_size
+    pull_size = np.abs(force) + along((weight * size).sum(2), np.abs(qd)) + more * np.abs(qd)
+    yield Entries("M* qdd", wanted, pull, wanted_size + pull_size + stiffness * np.abs(q - at))
+    gravity, gravity_size = (source["g"][rows].sum(-1) for source in (reference.values, reference.scales))
+    taken = along(mass.sum(2), qdd) + armature + along(coriolis.sum(2), qd) + gravity + rest
+    taken_size = along(scale.sum(2), np.abs(qdd)) + armature_size + along(size.sum(2), np.abs(qd))
+    yield Entries("torque", tau + force, taken, taken_size + gravity_size + rest_size + np.abs(force))
+
+
+def _cancelled(model: Model, joints: Sequence[PassiveEntry], reference: Reference, rows: Any) -> Entries:
+    """Velocity torques of the last link on the first joint that moves it; no inertia is changed."""
+    q, qd, task = reference.states.at(rows).motion
+    moving = np.flatnonzero(np.abs(reference.values["c2"]).sum((0, 1, 3)))
+    j = int(moving[-1])
+    i = int(np.flatnonzero(np.abs(reference.values["c2"][:, :, j]).sum((0, 2)))[0])
+    tau = np.asarray(model.cancel(entries={(i, j, None, 1)})(q, qd, task))
+    sums = [source["g"][rows].sum(-1) for source in (reference.values, reference.scales)]
+    sums[0][:, i] += (reference.values["c1"][rows, i, j] * qd).sum(-1)
+    sums[1][:, i] += (reference.scales["c1"][rows, i, j] * np.abs(qd)).sum(-1)
+    rest, size = (a[:3].sum(0) for a in passive_reference(joints, States(q, qd, 0.0 * qd)))
+    return Entries("cancelling torque", tau, sums[0] + rest + task, sums[1] + size + np.abs(task))

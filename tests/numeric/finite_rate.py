@@ -1,0 +1,345 @@
+"""What is left of an impedance where the controller runs at a rate, late, or believes the wrong masses.
+
+Robots that MuJoCo moves are pushed by known forces, to which an impedance is fitted; let go beside their
+target, which shows the stored energy; and led along a moving target.
+
+    python tests/numeric/finite_rate.py [--out out/control]     writes the tables of docs/control.md
+"""
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import numpy as np
+
+from numeric.impedance_fit import Impedance, Sines, errors, fitted, sines_for
+from numeric.mujoco_plant import MujocoPlant
+
+PERIOD = 1e-3
+"""s, of the controller's step."""
+SWING = 1.0
+"""s, in which a moving target goes to and fro."""
+SECONDS = 2.0
+"""s, of the record that an impedance is fitted to in the tables."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """How a controller is run."""
+
+    name: str
+    held: bool = True
+    """Torques are held over a period; else they follow the motion at once."""
+    late: bool = False
+    """A torque acts one period after its measurement."""
+    differences: bool = False
+    """Velocities are differences of positions, one period apart."""
+    ahead: bool = False
+    """The controller is asked for the state expected in the middle of the time in which its torque acts."""
+    heavier: float = 0.0
+    """By this share each link is heavier than the controller believes, and its inertia larger."""
+
+
+HELD = Loop("torques held over 1 ms")
+AHEAD = Loop("held, asked half a step ahead", ahead=True)
+LOOPS = (
+    Loop("ideal: torques follow the motion at once", held=False),
+    HELD,
+    AHEAD,
+    Loop("held, and one step late", late=True),
+    Loop("one step late, asked one and a half ahead", late=True, ahead=True),
+    Loop("held, velocities by differences of positions", differences=True),
+    Loop("held, every link 5 % heavier than believed", heavier=0.05),
+    Loop("all of it together", late=True, differences=True, heavier=0.05),
+)
+
+
+@dataclass(frozen=True)
+class JointSpace:
+    """An impedance of all joints: x = q - start."""
+
+    package: Any
+    controller: Any
+    wanted: Impedance
+    start: Any
+    away: Any
+    """Positions at which joints are let go."""
+    pushed: str | None = None
+    """A body of the plant; None where forces act on the joints."""
+    unit: str = "mrad"
+    sensed: bool = True
+    """Whether the controller is told what acts from outside."""
+
+    def offset(self, q: Any) -> Any:
+        return q - self.start
+
+    def target(self, x: Any, xd: Any, xdd: Any) -> Any:
+        """Of the controller, at x (copies, m)."""
+        return self.package.Target(self.start + x, xd, xdd)
+
+    def external(self, q: Any, force: Any) -> Any:
+        """What forces (copies, m) put on the joints."""
+        return force
+
+    def push(self, force: Callable[[float], Any]) -> dict[str, Callable[[float], Any]]:
+        """The same for the plant."""
+        return {"joints": force}
+
+
+@dataclass(frozen=True)
+class HandSpace:
+    """An impedance of a point of a frame, x, y and z; `pushed` is the frame."""
+
+    package: Any
+    robot: Any
+    controller: Any
+    wanted: Impedance
+    start: Any
+    away: Any
+    pushed: str
+    unit: str = "mm"
+    sensed: bool = True
+
+    @property
+    def pose(self) -> Any:
+        return self.robot.kinematics.pose(self.start, self.pushed)
+
+    def offset(self, q: Any) -> Any:
+        return self.robot.kinematics.pose(q, self.pushed)[..., :3, 3] - self.pose[:3, 3]
+
+    def target(self, x: Any, xd: Any, xdd: Any) -> Any:
+        pose = np.tile(self.pose, (len(x), 1, 1))
+        pose[:, :3, 3] += x
+        still = np.zeros_like(x)
+        velocity, acceleration = np.hstack([still, xd]), np.hstack([still, xdd])
+        q = np.tile(self.start, (len(x), 1))
+        return self.package.Target(q, pose=pose, velocity=velocity, acceleration=acceleration)
+
+    def external(self, q: Any, force: Any) -> Any:
+        return -self.robot.kinematics.load_torque(q, self.pushed, force)
+
+    def push(self, force: Callable[[float], Any]) -> dict[str, Callable[[float], Any]]:
+        return {"body": lambda t: np.hstack([np.zeros_like(force(t)), force(t)])}
+
+
+@dataclass(frozen=True)
+class Course:
+    """What happens to one copy: a push, a moving target, or a start away from it."""
+
+    force: Sines | None = None
+    swing: Any = None
+    """(m,): the target goes to this and back, as (1 - cos) / 2."""
+    released: bool = False
+
+    def pushed(self, t: float, m: int) -> Any:
+        return np.zeros(m) if self.force is None else self.force(t)
+
+    def moved(self, t: float, m: int) -> tuple[Any, Any, Any]:
+        """x, xd and xdd of the target, to and fro in SWING seconds each."""
+        if self.swing is None:
+            return (np.zeros(m),) * 3
+        w = 2.0 * np.pi / SWING
+        shape = (1.0 - np.cos(w * t), w * np.sin(w * t), w * w * np.cos(w * t))
+        return tuple(np.asarray(self.swing) * s / 2.0 for s in shape)  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class Copy:
+    """One robot of those that move side by side."""
+
+    loop: Loop
+    course: Course
+
+
+@dataclass(frozen=True)
+class Record:
+    """Of one copy at every period."""
+
+    offset: Any
+    """(samples, m)"""
+    force: Any
+    wanted: Any
+    """x of the target."""
+    energy: Any
+    """Stored, (samples,)."""
+
+
+def run(space: Any, copies: Sequence[Copy], model: Callable[[float], Any], seconds: float) -> list[Record]:
+    """Records of all copies, under one controller; all held, or none.
+
+    model: MuJoCo's, heavier by a share
+    """
+    m, loops, controller = len(space.wanted.inertia), [copy.loop for copy in copies], space.controller
+    late, differences = np.array([(loop.late, loop.differences) for loop in loops]).T[..., None]
+    lead = np.array([PERIOD * (0.5 + loop.late) if loop.ahead else 0.0 for loop in loops])[:, None]
+    plant = MujocoPlant([model(loop.heavier) for loop in loops], space.pushed)
+    plant.start([space.away if copy.course.released else space.start for copy in copies])
+
+    def forces(t: float) -> Any:
+        return np.array([copy.course.pushed(t, m) for copy in copies])
+
+    def asked(times: Any, q: Any, qd: Any, force: Any) -> tuple[Any, ...]:
+        moved = [copy.course.moved(t, m) for copy, t in zip(copies, times, strict=True)]
+        target = space.target(*map(np.array, zip(*moved, strict=True)))
+        return q, qd, target, space.external(q, force) if space.sensed else None
+
+    def law(t: float, q: Any, qd: Any) -> Any:
+        return controller(*asked([t] * len(copies), q, qd, forces(t)))
+
+    def law_ahead(t: float, q: Any, qd: Any) -> Any:
+        force, before = forces(t), forces(t - PERIOD)
+        qdd = controller.acceleration(*asked([t] * len(copies), q, qd, force))
+        expected = (
+            q + lead * qd + lead**2 / 2 * qdd,
+            qd + lead * qdd,
+            force + lead / PERIOD * (force - before),
+        )
+        return controller(*asked(t + lead[:, 0], *expected))
+
+    push, times, states = space.push(forces), PERIOD * np.arange(round(seconds / PERIOD)), []
+    held_law, last, waiting = law_ahead if lead.any() else law, plant.q, None
+    for t in times:
+        q, qd = plant.q, plant.qd
+        states.append((q, qd))
+        if not loops[0].held:
+            plant.follow(law, PERIOD, **push)
+            continue
+        tau = held_law(t, q, np.where(differences, (q - last) / PERIOD, qd))
+        plant.hold(tau if waiting is None else np.where(late, waiting, tau), PERIOD, **push)
+        waiting, last = tau, q
+    q, qd = (np.stack(column, 1) for column in zip(*states, strict=True))
+    return [_record(space, copy.course, times, *state) for copy, *state in zip(copies, q, qd, strict=True)]
+
+
+def _record(space: Any, course: Course, times: Any, q: Any, qd: Any) -> Record:
+    m = len(space.wanted.inertia)
+    moved = [np.array(column) for column in zip(*(course.moved(t, m) for t in times), strict=True)]
+    energy = space.controller.stored_energy(q, qd, space.target(*moved))
+    return Record(space.offset(q), np.array([course.pushed(t, m) for t in times]), moved[0], energy)
+
+
+def measured(record: Record, seconds: float) -> Impedance:
+    """The impedance that pushes show, fitted to the last so many seconds."""
+    last = slice(-round(seconds / PERIOD), None)
+    return fitted(record.force[last], record.offset[last], seconds)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of one way to run the loop."""
+
+    loop: Loop
+    found: Impedance
+    error: Impedance
+    """Of the measured impedance, in a ratio to what was asked for."""
+    rise: float
+    """The most that stored energy rose again after the robot was let go, in a ratio to the start's."""
+    tracking: float
+    """Largest distance from the moving target, in m or rad."""
+
+
+def studied(
+    space: Any,
+    loops: Sequence[Loop],
+    model: Callable[[float], Any],
+    motion: Any,
+    swing: Any,
+    seconds: float,
+) -> list[Outcome]:
+    """What is left under each loop; all held, or none.
+
+    motion: how far each direction is pushed at each frequency; swing: how far the target goes and back;
+    seconds: of the fitted record, before which as many pass for the start to die away
+    """
+    courses = (
+        Course(sines_for(space.wanted, motion, seconds)),
+        Course(released=True),
+        Course(swing=swing),
+    )
+    copies = [Copy(loop, course) for loop in loops for course in courses]
+    records = iter(run(space, copies, model, 2 * seconds))
+    outcomes = []
+    for loop, pushed, released, led in zip(loops, records, records, records, strict=True):
+        energy = released.energy
+        rise = (energy - np.minimum.accumulate(energy)).max() / energy[0]
+        away = np.linalg.norm(led.offset - led.wanted, axis=-1).max()
+        found = measured(pushed, seconds)
+        outcomes.append(Outcome(loop, found, errors(found, space.wanted), float(rise), float(away)))
+    return outcomes
+
+
+def table(outcomes: Sequence[Outcome], unit: str) -> str:
+    """Markdown."""
+    lines = [
+        f"| loop | inertia | damping | stiffness | stored energy rises by | target missed by, {unit} |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in outcomes:
+        error = " | ".join(percent(e) for e in row.error)
+        rise = percent(row.rise)
+        lines.append(f"| {row.loop.name} | {error} | {rise} | {1e3 * row.tracking:.2g} |")
+    return "\n".join(lines)
+
+
+def percent(share: float) -> str:
+    """To two digits, and no more than two behind the point."""
+    return f"{round(float(f'{100.0 * share:.2g}'), 2):g} %" if share >= 1e-4 else "< 0.01 %"
+
+
+def main() -> None:
+    """Write finite-rate.md into the folder that --out names."""
+    from conftest import LOCKED_FINGERS, PANDA
+    from linkwise import Options, generate, read_system, write_package
+    from linkwise.package.load import import_package
+
+    from numeric.measured_spaces import panda_hand, planar3_joints
+    from numeric.mujoco_plant import heavier, panda_model, planar3_model
+
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("out/control"))
+    out = parser.parse_args().out
+    arm, panda = read_system("planar3"), read_system(PANDA, Options(lock=LOCKED_FINGERS))
+    with tempfile.TemporaryDirectory() as folder:
+        packages = []
+        for system in (arm, panda):
+            write_package(generate(system), Path(folder) / system.name)
+            packages.append(import_package(Path(folder) / system.name))
+        spaces = {
+            "planar3, its joints": (
+                planar3_joints(packages[0]),
+                lambda by: heavier(planar3_model(), np.full(3, 1.0 + by)),
+                1e-4,
+                np.full(3, 0.5),
+            ),
+            "Panda, its hand": (
+                panda_hand(packages[1]),
+                lambda by: heavier(panda_model(PANDA), np.full(7, 1.0 + by)),
+                5e-4,
+                np.full(3, 0.1),
+            ),
+        }
+        parts = []
+        for title, asked in spaces.items():
+            space, model, motion, swing = asked
+            outcomes = [
+                outcome
+                for held in (False, True)
+                for outcome in studied(
+                    space, [loop for loop in LOOPS if loop.held == held], model, motion, swing, SECONDS
+                )
+            ]
+            parts.append(f"{title}\n\n{table(outcomes, space.unit)}\n")
+            print(parts[-1], flush=True)
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "finite-rate.md").write_text("\n".join(parts), encoding="utf-8")
+    print(f"written to {out / 'finite-rate.md'}")
+
+
+if __name__ == "__main__":
+    main()
