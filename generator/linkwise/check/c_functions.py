@@ -14,6 +14,7 @@ from linkwise.check.compare import Entries, Result, Skipped, compare
 from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype, declared
 from linkwise.check.control_functions import CONTROL, control_calls, control_prototypes
 from linkwise.check.frame_reference import FrameReference
+from linkwise.check.impedance_functions import NOT_CALLED, impedance_calls, impedance_prototypes
 from linkwise.check.model_calls import FLOAT32
 from linkwise.check.packed_layout import IndexRows, Rows
 from linkwise.check.reference import Reference, dense_quantities
@@ -90,10 +91,14 @@ class CFunctions:
             if not hasattr(self.compiled.library, symbol):
                 yield Result(name, False, None, "there is no such function")
                 continue
+            if function.short == NOT_CALLED:
+                continue
             single = FLOAT32 if function.real == "float" else {"tolerance": reference.tolerance}
             try:
                 if function.short in REGRESSORS:
                     calls = self._regressors(function, references.regressors)
+                elif function.short.endswith("partial_impedance"):
+                    calls = impedance_calls(self._call, function, self.manifest, reference)
                 elif function.short in CONTROL:
                     calls = control_calls(self._call, function, self.manifest, reference, references.frames)
                 else:
@@ -201,6 +206,8 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
     ]
     if manifest.tree is not None:
         every_kind += [f for real, suffix in kinds for f in control_prototypes(real, suffix, inputs)]
+    for real, suffix in kinds:
+        every_kind += impedance_prototypes(manifest, real, suffix)
     return every_kind
 
 

@@ -31,6 +31,7 @@ class Prototype:
     """A function of the header: its name without the package's, its number type, and its arrays in order.
 
     counted: name of the argument that says how many samples or blocks, or which frame; empty for none
+    kinds: inputs that are not of the number type, and what they are
     """
 
     name: str
@@ -39,12 +40,14 @@ class Prototype:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     returns: str = "void"
+    kinds: tuple[tuple[str, str], ...] = ()
 
     def declaration(self, package: str) -> str:
         """Its prototype, on one line."""
         kind = "int" if self.counted == "frame" else "size_t"
         counts = [f"{kind} {self.counted}"] if self.counted else []
-        inputs = [f"const {self.real} *{array}" for array in self.inputs]
+        kinds = dict(self.kinds)
+        inputs = [f"const {kinds.get(array, self.real)} *{array}" for array in self.inputs]
         outputs = [f"{self.real} *{array}" for array in self.outputs]
         return f"{self.returns} {package}_{self.name}({', '.join([*counts, *inputs, *outputs])});"
 

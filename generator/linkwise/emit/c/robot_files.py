@@ -110,8 +110,8 @@ def given(system: System) -> tuple[str, ...]:
 
 
 def free(system: System) -> bool:
-    """Whether each joint may have an impedance of its own: no loop ties one to others."""
-    return not (isinstance(system, RigidSystem) and system.robot.ties)
+    """Whether each joint may have an impedance of its own: nothing ties one to others."""
+    return not (isinstance(system, RigidSystem) and (system.robot.ties or system.robot.couplings))
 
 
 def totals(size: EntryCounts) -> list[tuple[str, int]]:
