@@ -1,6 +1,6 @@
 """Controllers behind their face: targets are read, motion is checked, torques are computed."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,15 @@ from ..quantities import NaturalImpedance
 from .cancelled_motions import ORDERS, cancelled_motions
 from .frame_impedance import FrameTargets
 from .joint_impedance import Errors, JointImpedance, JointTargets, dissipates, times
-from .wanted_coefficients import Wanted, stiffness_of, wanted
+from .wanted_coefficients import WantedShares, stiffness_of, wanted
 
 
 class Controls:
     """What makes controllers of a robot on any back end; arguments as `ControllerCalls` says."""
 
-    def __init__(self, robot: Any) -> None:
-        self._robot = robot
+    def __init__(self, robot: Any, answers: "Callable[..., ControlAnswers] | None" = None) -> None:
+        """answers: what makes a controller of a robot, targets of joints, and of a frame or None."""
+        self._robot, self._answers = robot, answers or ControlAnswers
 
     def natural(self, q: Any, qd: Any, qdd: Any) -> NaturalImpedance[Any]:
         """See `ControllerCalls.natural_impedance`."""
@@ -44,9 +45,8 @@ class Controls:
             True,
             bool(passive),
         )
-        return ControlAnswers(
-            self._robot, targets, None if frame is None else FrameTargets(self._robot, frame)
-        )
+        held = None if frame is None else FrameTargets(self._robot, frame)
+        return self._answers(self._robot, targets, held)
 
     def cancellation(
         self, entries: Iterable[Any], passive: bool
@@ -58,11 +58,11 @@ class Controls:
         kept = {order: np.ones((structure.n, structure.N, structure.n)) for order in ORDERS}
         for i, j, k, order in chosen:
             kept[order][i, j, k] = 0.0
-        acceleration, velocity = (Wanted(kept[m], None, None, False, False) for m in (2, 1))
+        acceleration, velocity = (WantedShares(kept[m], None, None, False, False) for m in (2, 1))
         targets = JointTargets(acceleration, velocity, None, False, bool(passive))
         names = structure.joint_names, structure.link_names
         named = tuple((names[0][i], names[1][j], names[0][k], m) for i, j, k, m in chosen)
-        return ControlAnswers(self._robot, targets, None), named
+        return self._answers(self._robot, targets, None), named
 
     def _check_free(self) -> None:
         tree = self._robot.backend.tree
@@ -89,82 +89,88 @@ class ControlAnswers:
         """See `PartialImpedance.dissipative`; nobody knows what energies of a user's do."""
         if self._robot.backend.tree is None:
             return False
-        targets = self._joints.targets
-        return (
-            dissipates(targets.inertia, targets.damping) if self._frame is None else self._frame.dissipative
-        )
+        if self._frame is not None:
+            return self._frame.dissipative
+        return dissipates(self._joints.targets.inertia, self._joints.targets.damping)
 
     def torque(self, q: Any, qd: Any, target: Any, external: Any) -> Any:
         """See `PartialImpedance.__call__`."""
-        return self._followed(q, qd, target, external)[1]
+        target, given = self._given(q, qd, target, external)
+        torque = self._at_once(given, target)
+        if torque is not None:
+            return torque
+        if self._frame is None and self._joints.targets.inertia.natural:
+            state = self._joints.state(given["q"], given["qd"])
+            return self._joints.natural_torque(state, given["qd"], _errors(given))
+        return self._followed(given, target)[1]
 
     def acceleration(self, q: Any, qd: Any, target: Any, external: Any) -> Any:
         """See `PartialImpedance.acceleration`."""
-        return self._followed(q, qd, target, external)[0]
+        target, given = self._given(q, qd, target, external)
+        return self._followed(given, target)[0]
 
     def stored_energy(self, q: Any, qd: Any, target: Any) -> Any:
         """See `PartialImpedance.stored_energy`."""
-        target = self._read(target)
-        q, qd, errors, _ = self._errors(q, qd, target, None)
+        target, given = self._given(q, qd, target, None)
+        q, qd = given["q"], given["qd"]
         state = self._joints.state(q, qd)
         if self._frame is None:
-            return self._joints.stored(state, errors, q)
+            return self._joints.stored(state, _errors(given), q)
         return self._frame.stored(self._frame.state(state, q, qd, target))
 
     def cancelling(self, q: Any, qd: Any, tau: Any, external: Any, qdd: Any) -> Any:
         """See `Cancellation.__call__`: tau + M_S qdd + C_S qd + g + p."""
-        q, qd, tau, force, given = self._moved(q, qd, tau, external, qdd)
+        given = self._arrays({"q": q, "qd": qd}, {"task": tau, "external": external, "qdd": qdd})
+        q, qd, qdd = given["q"], given["qd"], given.pop("qdd", None)
+        if qdd is None and (torque := self._at_once(given, Target())) is not None:
+            return torque
         state = self._joints.state(q, qd)
-        if given is None:
-            given = self._joints.acceleration(state, Errors(None, qd, None, force), q)
-        cancelled = times(state.inertia - state.wanted_inertia, given)
+        if qdd is None:
+            qdd = self._joints.acceleration(state, _errors(given), q)
+        cancelled = times(state.inertia - state.wanted_inertia, qdd)
         cancelled = cancelled + times(state.coriolis - state.wanted_damping, qd) + state.rest
-        return cancelled if tau is None else cancelled + tau
+        return cancelled + given["task"] if "task" in given else cancelled
 
     def cancelled_acceleration(self, q: Any, qd: Any, tau: Any, external: Any) -> Any:
         """See `Cancellation.acceleration`."""
-        q, qd, _, force, _ = self._moved(q, qd, tau, external, None)
-        return self._joints.acceleration(self._joints.state(q, qd), Errors(None, qd, None, force), q)
+        given = self._arrays({"q": q, "qd": qd}, {"task": tau, "external": external})
+        return self._joints.acceleration(
+            self._joints.state(given["q"], given["qd"]), _errors(given), given["q"]
+        )
 
-    def _followed(self, q: Any, qd: Any, target: Any, external: Any) -> tuple[Any, Any]:
+    def _at_once(self, given: dict[str, Any], target: Target) -> Any:
+        """The torque, where a back end has it without these arrays; None where it does not."""
+
+    def _followed(self, given: dict[str, Any], target: Target) -> tuple[Any, Any]:
         """Acceleration that follows, and torque for it."""
-        target = self._read(target)
-        q, qd, errors, external = self._errors(q, qd, target, external)
+        q, qd, external = given["q"], given["qd"], given.get("external")
         state = self._joints.state(q, qd)
-        qdd = self._joints.acceleration(state, errors, q)
+        qdd = self._joints.acceleration(state, _errors(given), q)
         if self._frame is not None:
             qdd = self._frame.acceleration(self._frame.state(state, q, qd, target), qdd, external)
         return qdd, self._joints.torque(state, qd, qdd, external)
 
-    def _errors(self, q: Any, qd: Any, target: Target, external: Any) -> tuple[Any, Any, Errors, Any]:
-        """Motion of one shape, how far it is from the target, and the force from outside."""
-        if target.q is None and self._joints.targets.stiffness is not None:
+    def _given(self, q: Any, qd: Any, target: Any, external: Any) -> tuple[Target, dict[str, Any]]:
+        """Target and motion, as they were given and of one shape; positions alone are a target."""
+        # a Target of another package serves as well
+        read = Target(*target) if hasattr(target, "_fields") else Target(q=target)
+        if read.q is None and self._joints.targets.stiffness is not None:
             raise ValueError("the joints are stiff, but target has no q; give positions, (..., n)")
-        beside = {"target": target.q, "target.qd": target.qd, "target.qdd": target.qdd, "external": external}
-        q, qd, values = self._arrays({"q": q, "qd": qd}, beside)
-        place = None if target.q is None else q - values["target"]
-        rate = qd - values["target.qd"] if "target.qd" in values else qd
-        force = values.get("external")
-        return q, qd, Errors(place, rate, values.get("target.qdd"), force), force
+        beside = {"target": read.q, "target.qd": read.qd, "target.qdd": read.qdd, "external": external}
+        return read, self._arrays({"q": q, "qd": qd}, beside)
 
-    def _moved(self, q: Any, qd: Any, tau: Any, external: Any, qdd: Any) -> tuple[Any, ...]:
-        """Motion of one shape, tau, the sum of the forces, and qdd; None for what was not given."""
-        q, qd, values = self._arrays({"q": q, "qd": qd}, {"tau": tau, "external": external, "qdd": qdd})
-        tau, external = values.get("tau"), values.get("external")
-        force = external if tau is None else tau if external is None else tau + external
-        return q, qd, tau, force, values.get("qdd")
-
-    def _arrays(self, motion: dict[str, Any], beside: dict[str, Any]) -> tuple[Any, Any, dict[str, Any]]:
+    def _arrays(self, motion: dict[str, Any], beside: dict[str, Any]) -> dict[str, Any]:
+        """What was given, by name, in one shape (..., n)."""
         named = motion | {name: a for name, a in beside.items() if a is not None}
         arrays = self._robot.backend.arrays(named, self._robot.n)
         if self._robot.check_finite:
             check_numbers(named, self._robot.joint_names)
-        values = dict(zip(named, arrays, strict=True))
-        return values.pop("q"), values.pop("qd"), values
+        return dict(zip(named, arrays, strict=True))
 
-    @staticmethod
-    def _read(target: Any) -> Target:
-        """A Target as it is, positions as one, whose package it may be."""
-        if target is None or not hasattr(target, "_fields"):
-            return Target(q=target)
-        return Target(*target)
+
+def _errors(given: dict[str, Any]) -> Errors:
+    """How far motion is from its target, and the forces, from outside and of a task."""
+    place = given["q"] - given["target"] if "target" in given else None
+    rate = given["qd"] - given["target.qd"] if "target.qd" in given else given["qd"]
+    forces = [given[name] for name in ("external", "task") if name in given]
+    return Errors(place, rate, given.get("target.qdd"), sum(forces) if forces else None)

@@ -26,7 +26,8 @@ class Gain:
         """
         size = len(names)
         self.name, self.names, self._given = name, tuple(names), given
-        self._learned = has_tensors([given])
+        self.learned = has_tensors([given])
+        """Whether it was given as a tensor."""
         self._shapes: tuple[tuple[int, ...], ...] = ((), (size,), (size, size))
         if links is not None:
             self._shapes += ((size, links, size),)
@@ -34,7 +35,7 @@ class Gain:
         if tuple(read.shape) not in self._shapes:
             forms = (FORMS if links is None else BY_LINK).format(size, links)
             raise ValueError(f"{name} has shape {tuple(read.shape)}; give {forms}")
-        self.numbers = _square(np, np.asarray(read.detach().cpu() if self._learned else read, float), size)
+        self.numbers = _square(np, np.asarray(read.detach().cpu() if self.learned else read, float), size)
         """As they were given, (size, size)."""
         if not np.isfinite(self.numbers).all():
             raise ValueError(f"{name} has numbers that are not finite")
@@ -42,7 +43,7 @@ class Gain:
 
     def matrix(self, side: Any, like: Any) -> Any:
         """(size, size), to compute with `like`."""
-        if self._learned:
+        if self.learned:
             given = side.weights(self.name, self._given, like)
             return _square(side.xp, given, len(self.names), side.constant(np.eye(len(self.names)), like))
         key = like.dtype, getattr(like, "device", None)

@@ -14,15 +14,15 @@ from ..dense import Dense
 from ..passive_joints import passive_torques
 from ..sums.joint_matrices import JointMatrices
 from .gains import Gain
-from .wanted_coefficients import Wanted
+from .wanted_coefficients import WantedShares
 from .wanted_solve import solved_wanted
 
 
 class JointTargets(NamedTuple):
     """What is wanted of the joints."""
 
-    inertia: Wanted
-    damping: Wanted
+    inertia: WantedShares
+    damping: WantedShares
     stiffness: Gain | None
     positive: bool
     """Whether M* must be positive; else it must be regular, as where motions are cancelled."""
@@ -87,25 +87,28 @@ class JointImpedance:
             wanted = wanted if targets.inertia.whole else wanted + armature
         return JointState(inertia, coriolis, rest, wanted, targets.damping.of(side, coriolis, c1, q))
 
+    def pull(self, state: JointState, errors: Errors, like: Any) -> Any:
+        """-B* ed - K* e, (..., n)."""
+        pull = -times(state.wanted_damping, errors.rate)
+        if self.targets.stiffness is None:
+            return pull
+        return pull - times(self.targets.stiffness.matrix(self._robot.backend.side(like), like), errors.place)
+
     def acceleration(self, state: JointState, errors: Errors, like: Any) -> Any:
         """qdd = qdd_d + M*^-1 (f + v - B* ed - K* e), (..., n)."""
-        pull = -times(state.wanted_damping, errors.rate)
-        if self.targets.stiffness is not None:
-            pull = pull - times(
-                self.targets.stiffness.matrix(self._robot.backend.side(like), like), errors.place
-            )
+        pull = self.pull(state, errors, like)
         if errors.force is not None:
             pull = pull + errors.force
         what = "the wanted inertia" if self.targets.positive else "what is left of the mass matrix"
-        moved = solved_wanted(
-            what,
-            state.wanted_inertia,
-            pull[..., None],
-            state.inertia,
-            self._robot.joint_names,
-            self.targets.positive,
-        )[..., 0]
+        names, natural, positive = self._robot.joint_names, state.inertia, self.targets.positive
+        solved = solved_wanted(what, state.wanted_inertia, pull[..., None], natural, names, positive)
+        moved = solved[..., 0]
         return moved if errors.wanted is None else errors.wanted + moved
+
+    def natural_torque(self, state: JointState, qd: Any, errors: Errors) -> Any:
+        """u = H qdd_d + C qd + g + p - B* ed - K* e: f drops out where all inertia stays."""
+        torque = times(state.coriolis, qd) + state.rest + self.pull(state, errors, qd)
+        return torque if errors.wanted is None else torque + times(state.inertia, errors.wanted)
 
     def torque(self, state: JointState, qd: Any, qdd: Any, external: Any) -> Any:
         """u = H qdd + C qd + g + p - f, (..., n)."""
@@ -126,7 +129,7 @@ def times(matrix: Any, vector: Any) -> Any:
     return (matrix @ vector[..., None])[..., 0]
 
 
-def dissipates(inertia: Wanted, damping: Wanted) -> bool:
+def dissipates(inertia: WantedShares, damping: WantedShares) -> bool:
     """Whether c2 and c1 of each link are kept alike: then dM*/dt - 2 B* is skew but for what is added."""
     if not (inertia.positive and damping.positive) or inertia.by_link is None or damping.by_link is None:
         return False

@@ -18,7 +18,7 @@ from ..structure import Structure
 from .gains import Gain, check_positive
 
 
-class Wanted(NamedTuple):
+class WantedShares(NamedTuple):
     """Targets for the coefficients of one order."""
 
     kept: Any
@@ -45,7 +45,7 @@ class Wanted(NamedTuple):
         return kept if self.added is None else kept + self.added.matrix(side, like)
 
 
-def wanted(name: str, given: Any, structure: Structure, definite: bool) -> Wanted:
+def wanted(name: str, given: Any, structure: Structure, definite: bool) -> WantedShares:
     """Targets as `Dynamics.partial_impedance` takes them; raises ValueError and TypeError as it says.
 
     definite: whether a sum that is given must be positive definite and symmetric, as inertia must
@@ -55,14 +55,14 @@ def wanted(name: str, given: Any, structure: Structure, definite: bool) -> Wante
         added = None if given.plus is None else Gain(f"{name}.plus", given.plus, names)
         if added is not None:
             check_positive(added, False, symmetric=definite)
-        return Wanted(*_scaled(f"{name}.scale", given.scale, structure), added, False, True)
+        return WantedShares(*_scaled(f"{name}.scale", given.scale, structure), added, False, True)
     if isinstance(given, Mapping):
         kept, values = entries_apart(name, given, structure)
-        return Wanted(kept, None, Gain(name, values, names), False, False)
+        return WantedShares(kept, None, Gain(name, values, names), False, False)
     added = Gain(name, given, names, structure.N)
     check_positive(added, definite, symmetric=definite)
     whole = np.ndim(given.detach() if has_tensors([given]) else given) < 3
-    return Wanted(0.0, np.zeros(structure.N), added, whole, True)
+    return WantedShares(0.0, np.zeros(structure.N), added, whole, True)
 
 
 def stiffness_of(given: Any, structure: Structure) -> Gain | None:

@@ -65,7 +65,7 @@ class FrameTargets:
     def __init__(self, robot: Any, asked: FrameImpedance) -> None:
         """Raises ValueError and TypeError as `Dynamics.partial_impedance` does."""
         self._robot, self.rows, self.names = robot, _chosen(asked.rows), tuple(asked.rows)
-        self.frame, self._point = asked.frame, np.asarray(asked.point, float)
+        self.frame, self.point = asked.frame, np.asarray(asked.point, float)
         frame_index(asked.frame, robot.kinematics.frames, robot.link_names)
         self.inertia = self._part("frame.inertia", asked.inertia, True)
         self.damping = self._part("frame.damping", asked.damping, False)
@@ -81,7 +81,7 @@ class FrameTargets:
     def state(self, joints: JointState, q: Any, qd: Any, target: Any) -> FrameState:
         """The frame at q and qd, by `target` of `controllers.Target`."""
         robot, side, xp = self._robot, self._robot.backend.side(q), namespace(q)
-        point = side.constant(self._point, q)
+        point = side.constant(self.point, q)
         rows = side.index(np.array(self.rows, np.intp), q)
         j = robot.kinematics.jacobian(q, self.frame, point)[..., rows, :]
         rate = robot.kinematics.jacobian_rate(q, qd, self.frame, point)[..., rows, :]
@@ -157,7 +157,7 @@ class FrameTargets:
         wanted = side.weights("target.pose", target.pose, q)
         if tuple(wanted.shape[-2:]) != (4, 4):
             raise ValueError(f"target.pose has shape {tuple(wanted.shape)}; its last axes must be 4, 4")
-        point = side.constant(self._point, q)
+        point = side.constant(self.point, q)
         pose = self._robot.kinematics.pose(q, self.frame)
         places = [times(m[..., :3, :3], point) + m[..., :3, 3] for m in (pose, wanted)]
         moved = places[0] - places[1]
