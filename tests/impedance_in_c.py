@@ -34,7 +34,7 @@ class ImpedanceInC:
         dtype: Any = np.float64,
     ) -> tuple[int, Any]:
         """What it returns and tau; `to` is q_d, qd_d, qdd_d."""
-        wanted, kept = _struct(given, dtype)
+        wanted, kept = joint_struct(given, dtype)
         return self._call("partial_impedance", (q, qd), (wanted, *to, task, external), len(q), dtype, kept)
 
     def frame(
@@ -50,8 +50,8 @@ class ImpedanceInC:
         dtype: Any = np.float64,
     ) -> tuple[int, Any]:
         """The same of a frame; `target` is its pose, velocity and acceleration."""
-        of_joints, kept = _struct(posture, dtype)
-        of_frame, kept_too = _frame_struct(self.frames.index(frame), given, dtype)
+        of_joints, kept = joint_struct(posture, dtype)
+        of_frame, kept_too = frame_struct(self.frames.index(frame), given, dtype)
         arguments = (of_joints, *to, of_frame, *target, external)
         return self._call("frame_partial_impedance", (q, qd), arguments, len(q), dtype, [*kept, *kept_too])
 
@@ -61,7 +61,7 @@ class ImpedanceInC:
         tau = np.full(n, 7.0, dtype)
         entry = getattr(self.library, f"{self.name}_{function}{_suffix(dtype)}")
         motion = [*state, *([self.parameters] if len(self.parameters) else [])]
-        pointers = [_pointer(a, dtype, kept) for a in (*motion, *arguments)]
+        pointers = [pointer_to(a, dtype, kept) for a in (*motion, *arguments)]
         return entry(*pointers, ctypes.c_void_p(tau.ctypes.data)), tau
 
 
@@ -155,25 +155,25 @@ def _suffix(dtype: Any) -> str:
     return "f" if dtype == np.float32 else ""
 
 
-def _pointer(value: Any, dtype: Any, kept: list[Any]) -> Any:
+def pointer_to(value: Any, dtype: Any, kept: list[Any]) -> Any:
     if value is None or isinstance(value, ctypes.Structure):
         return None if value is None else ctypes.byref(value)
     kept.append(np.ascontiguousarray(value, dtype))
     return ctypes.c_void_p(kept[-1].ctypes.data)
 
 
-def _struct(given: Given | None, dtype: Any) -> tuple[Any, list[Any]]:
+def joint_struct(given: Given | None, dtype: Any) -> tuple[Any, list[Any]]:
     """NAME_impedance, and the arrays that it points to."""
     if given is None:
         return None, []
     names, kept = ("keep_inertia", "inertia", "keep_velocity", "damping", "stiffness"), list[Any]()
     fields = [*((name, ctypes.c_void_p) for name in names), ("regular", ctypes.c_int)]
     kind = type("Impedance", (ctypes.Structure,), {"_fields_": fields})
-    pointers = [_pointer(given.get(name), dtype, kept) for name in names]
+    pointers = [pointer_to(given.get(name), dtype, kept) for name in names]
     return kind(*pointers, given.get("regular", 0)), kept
 
 
-def _frame_struct(frame: int, given: Given, dtype: Any) -> tuple[Any, list[Any]]:
+def frame_struct(frame: int, given: Given, dtype: Any) -> tuple[Any, list[Any]]:
     """NAME_frame_impedance, and the arrays that it points to."""
     real, kept = ctypes.c_float if dtype == np.float32 else ctypes.c_double, list[Any]()
     names = ("inertia", "damping", "stiffness")
@@ -183,7 +183,7 @@ def _frame_struct(frame: int, given: Given, dtype: Any) -> tuple[Any, list[Any]]
     kind = type("FrameImpedance", (ctypes.Structure,), {"_fields_": fields})
     rows = np.array(given.get("rows", range(6)), np.intc)
     kept.append(rows)
-    point = _pointer(given.get("point"), dtype, kept)
-    pointers = [_pointer(given.get(name), dtype, kept) for name in names]
+    point = pointer_to(given.get("point"), dtype, kept)
+    pointers = [pointer_to(given.get(name), dtype, kept) for name in names]
     shares = (given.get("keep_inertia", 1.0), given.get("keep_velocity", 1.0))
     return kind(frame, point, len(rows), rows.ctypes.data, *shares, *pointers), kept

@@ -1,4 +1,4 @@
-"""C functions of one sample against Pinocchio: frames, mass matrix, forward dynamics of real robots."""
+"""C functions of one sample against Pinocchio: frames, mass matrix, forward dynamics, partial impedance."""
 
 import ctypes
 import subprocess
@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from compiled import STRICT
 from conftest import needs_compiler
+from impedance_in_c import frame_struct, joint_struct, left_jacobian, pointer_to, rotation_vector
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.manifest import Manifest
+from linkwise.runtime.passive_joints import passive_sums
 
 pytest.importorskip("pinocchio")
 
@@ -42,12 +44,12 @@ def test_what_control_needs_is_pinocchios(robot: str, tmp_path: Path) -> None:
     oracle = WithFrames(path, system, OPTIONS[robot])
     errors: dict[str, float] = {}
 
-    def held(call: str, expected: Any, *given: Any) -> None:
+    def held(call: str, expected: Any, *given: Any, known: float = 1.0) -> None:
         found = np.full(expected.shape, np.nan)
         pointers = [a if isinstance(a, int) else ctypes.c_void_p(a.ctypes.data) for a in (*given, found)]
         getattr(library, f"robot_{call}")(*pointers)
         error = float(np.abs(found - expected).max() / max(1.0, np.abs(expected).max()))
-        errors[call] = max(errors.get(call, 0.0), error)
+        errors[call] = max(errors.get(call, 0.0), error / known)
 
     assert tree is not None
     origin = np.zeros(3)
@@ -59,7 +61,92 @@ def test_what_control_needs_is_pinocchios(robot: str, tmp_path: Path) -> None:
                 held("pose", expected["pose"], f, q)
                 held("jacobian", expected["jacobian"], f, origin, q)
                 held("jacobian_rate", expected["rate"], f, origin, q, qd)
-        held("mass_matrix", oracle.mass(q), q)
+        mass = oracle.mass(q)
+        held("mass_matrix", mass, q)
         if "allow_unphysical" not in OPTIONS[robot]:
-            held("forward_dynamics", oracle.acceleration(q, qd, tau), q, qd, tau)
+            # accelerations are known as well as the matrix lets them be, Pinocchio's too
+            known = max(1.0, 1e-6 * np.linalg.cond(mass))
+            held("forward_dynamics", oracle.acceleration(q, qd, tau), q, qd, tau, known=known)
     assert max(errors.values()) <= LARGEST_ERROR, errors
+
+
+class Plant:
+    """A robot at a state, as Pinocchio and its file have it: H, C times velocities, and the rest."""
+
+    def __init__(self, oracle: WithFrames, tree: Any, q: Any, qd: Any) -> None:
+        stiffness, pull, damping, friction, armature = map(np.array, passive_sums(tree.passive, oracle.n))
+        self.oracle, self.q, self.qd, self.rest = oracle, q, qd, 0.0 * q
+        self.inertia = oracle.mass(q) + np.diag(armature)
+        self.other = oracle.gravity(q) + stiffness * q + pull + damping * qd + friction * np.sign(qd)
+
+    def felt(self, velocity: Any) -> Any:
+        """C v, bilinear in qd and v: a quarter of what qd + v asks for, less that of qd - v."""
+        there, back = (
+            self.oracle.torque(self.q, v, self.rest) for v in (self.qd + velocity, self.qd - velocity)
+        )
+        return (there - back) / 4.0
+
+    def torque(self, qdd: Any) -> Any:
+        return self.inertia @ qdd + self.felt(self.qd) + self.other
+
+
+@pytest.mark.parametrize("robot", [name for name in OPTIONS if "allow_unphysical" not in OPTIONS[name]])
+def test_impedance_is_what_pinocchios_matrices_say(robot: str, tmp_path: Path) -> None:
+    path = next(ROBOTS.rglob(f"{robot}.urdf"))
+    system = read_system(path, Options(**OPTIONS[robot]))
+    write_package(generate(system, ["c"], "robot", kernel="loops"), tmp_path)
+    tree, library = Manifest.read(tmp_path).tree, functions(tmp_path)
+    oracle = WithFrames(path, system, OPTIONS[robot])
+    assert tree is not None
+    generator, n = np.random.default_rng(1), oracle.n
+    names = [frame.name for frame in tree.frames]
+    frame = next(name for name in reversed(names) if oracle.model.existFrame(name, pin.BODY))
+    rows = np.array([3, 4, 5, 0, 1, 2] if n > 6 else [4, 5, 3])
+
+    def command(function: str, *given: Any) -> Any:
+        found, kept = np.full(n, np.nan), list[Any]()
+        pointers = [pointer_to(a, float, kept) for a in (*given, found)]
+        pointers[-1] = ctypes.c_void_p(found.ctypes.data)
+        assert getattr(library, f"robot_{function}")(*pointers) == 0
+        return found
+
+    def held(found: Any, expected: Any) -> None:
+        assert np.abs(found - expected).max() <= 1e-10 * np.abs(expected).max()
+
+    def positive(size: int) -> Any:
+        a = generator.normal(size=(size, size))
+        return a @ a.T + np.eye(size)
+
+    for q, qd, q_d, qd_d, qdd_d, external in generator.uniform(-1.0, 1.0, (3, 6, n)):
+        plant, (inertia, damping, stiffness) = Plant(oracle, tree, q, qd), (positive(n) for _ in range(3))
+        wanted = {"inertia": inertia, "damping": damping, "stiffness": stiffness}
+        pull = external - plant.felt(qd - qd_d) - damping @ (qd - qd_d) - stiffness @ (q - q_d)
+        qdd = qdd_d + np.linalg.solve(plant.inertia + inertia, pull)
+        struct, kept = joint_struct(wanted, float)
+        to = (q_d, qd_d, qdd_d)
+        found = command("partial_impedance", q, qd, struct, *to, None, external)
+        held(found, plant.torque(qdd) - external)
+
+        oracle.at(q_d, qd, qdd)
+        target = oracle.frame(frame)["pose"].copy()
+        oracle.at(q, qd, qdd)
+        here = oracle.frame(frame)
+        j, rate = here["jacobian"][rows], here["rate"][rows]
+        dual = np.linalg.solve(plant.inertia, j.T) @ np.linalg.inv(j @ np.linalg.solve(plant.inertia, j.T))
+        inverse = j @ np.linalg.solve(plant.inertia, j.T)
+        along = dual @ (j @ qd)
+        natural = dual.T @ plant.felt(along) - np.linalg.solve(inverse, rate @ along)
+        theta = rotation_vector(here["pose"][:3, :3] @ target[:3, :3].T)
+        whole = np.eye(6)
+        whole[:3, :3] = np.linalg.inv(left_jacobian(theta))
+        x = np.r_[theta, here["pose"][:3, 3] - target[:3, 3]][rows]
+        gains = positive(len(rows))
+        spring = whole[np.ix_(rows, rows)].T @ gains @ x
+        moved = inverse @ (dual.T @ external - natural - gains @ (j @ qd) - spring)
+        of_frame, kept_too = frame_struct(
+            names.index(frame), {"rows": rows, "stiffness": gains, "damping": gains}, float
+        )
+        found = command("frame_partial_impedance", q, qd, struct, *to, of_frame, target, None, None, external)
+        held(found, plant.torque(qdd + dual @ (moved - rate @ qd - j @ qdd)) - external)
+        assert kept
+        assert kept_too

@@ -87,23 +87,27 @@ static inline void keep(const struct sample *s, const real *inertia, const real 
         const int length = path_start[j + 1] - path_start[j];
         wrenches w;
         columns_one(&s->m, &s->links[j], columns + path_start[j], length, &w);
-        for (int a = 0; a < length; ++a)
-            for (int b = 0; b < length; ++b) {
-                const int i = joint[a], k = joint[b];
-                const size_t ik = (size_t)i * N + (size_t)k, ki = (size_t)k * N + (size_t)i;
-                const size_t ijk = ((size_t)i * LINKS + (size_t)j) * N + (size_t)k;
-                if (inertia && a <= b) {
-                    const real c2 = along(&w.moves[a], &w.c2[b]);
-                    mass[ik] += c2;
-                    kept[ik] += inertia[ijk] * c2;
-                    if (a < b) {
-                        mass[ki] += c2;
-                        kept[ki] += inertia[((size_t)k * LINKS + (size_t)j) * N + (size_t)i] * c2;
-                    }
-                }
-                if (damping && damping[ijk] != 0)
-                    torque[i] -= damping[ijk] * along(&w.moves[a], &w.c1[b]) * velocity[k];
+        for (int a = 0; a < length; ++a) {
+            const screw moves = w.moves[a];
+            const size_t i = (size_t)joint[a], row = (i * LINKS + (size_t)j) * N;
+            screw felt = {s->m.place[0], s->m.place[0]};
+            for (int b = a; inertia && b < length; ++b) {
+                const size_t k = (size_t)joint[b];
+                const real c2 = along(&moves, &w.c2[b]);
+                mass[i * N + k] += c2;
+                kept[i * N + k] += inertia[row + k] * c2;
+                if (a == b)
+                    continue;
+                mass[k * N + i] += c2;
+                kept[k * N + i] += inertia[(k * LINKS + (size_t)j) * N + i] * c2;
             }
+            for (int b = 0; damping && b < length; ++b) {
+                const real part = damping[row + (size_t)joint[b]] * velocity[joint[b]];
+                felt.z = add(felt.z, scale(part, w.c1[b].z));
+                felt.s = add(felt.s, scale(part, w.c1[b].s));
+            }
+            torque[i] -= along(&moves, &felt);
+        }
     }
 }
 
@@ -118,7 +122,7 @@ int API(forward_dynamics)(UNDER_TORQUE, real *qdd)
         size[i] = mass[i * N + i];
         force[i] = tau[i] - force[i];
     }
-    const int singular = eliminate(SYMMETRIC, N, 1, size, mass, force);
+    const int singular = eliminate(0, N, 1, size, mass, force);
     if (!singular)
         memcpy(qdd, force, sizeof force);
     return singular;

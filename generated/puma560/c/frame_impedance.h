@@ -11,13 +11,14 @@
        qdd = qdd_0 + X L (nud - dJ/dt qd - J qdd_0)                tau = H qdd + C qd + g + p - f */
 #include "frame_rotation.h"
 
-/* How the chosen rows of a frame move with the joints: J and dJ/dt, row by row, X with zeros for the rest of six, and L. */
+/* How a frame moves with the joints: J and dJ/dt by the rows that count, X, and L. To six, rows of zeros follow, and in L
+   those of the identity: they have no part in anything. */
 struct frame_motion {
     real jacobian[6 * N], rate[6 * N], moved[6 * N], inertia[36];
 };
 
-/* a x of a matrix (rows, columns); X y, and X' f. */
-static inline void times(int rows, int columns, const real *a, const real *x, real *product)
+/* a x of a matrix (rows, columns), and a' y. */
+INLINE void times(int rows, int columns, const real *a, const real *x, real *product)
 {
     for (int r = 0; r < rows; ++r) {
         real sum = 0;
@@ -27,67 +28,54 @@ static inline void times(int rows, int columns, const real *a, const real *x, re
     }
 }
 
-static inline void to_joints(int rows, const real *moved, const real *y, real *product)
+INLINE void transposed_times(int rows, int columns, const real *a, const real *y, real *product)
 {
-    for (int i = 0; i < N; ++i) {
-        real sum = 0;
-        for (int r = 0; r < rows; ++r)
-            sum += moved[i * 6 + r] * y[r];
-        product[i] = sum;
-    }
-}
-
-static inline void from_joints(const real *moved, const real *f, real *product)
-{
-    real sum[6] = {0};
-    for (int i = 0; i < N; ++i)
-        for (int r = 0; r < 6; ++r)
-            sum[r] += moved[i * 6 + r] * f[i];
-    memcpy(product, sum, sizeof sum);
+    real sum[LARGEST] = {0};
+    for (int r = 0; r < rows; ++r)
+        for (int k = 0; k < columns; ++k)
+            sum[k] += a[r * columns + k] * y[r];
+    memcpy(product, sum, (size_t)columns * sizeof(real));
 }
 
 /* Returns 0, the joint at which H is not positive, or - the row along which the frame cannot move, both from 1. Rows of turns
-   are judged together, and so are those of places: by how far joints would move the frame, were they alone. H is written
-   over. */
-static inline int frame_moved(const struct sample *s, const API(frame_impedance) * wanted, vector at, real *mass,
+   are judged together, and so are those of places: by how far joints would move the frame, were they alone. */
+static inline int frame_moved(const struct sample *s, const API(frame_impedance) * wanted, vector at, const real *mass,
     struct frame_motion *out)
 {
-    const int rows = wanted->rows;
-    real j[6 * N], rate[6 * N], mobility[36], size[LARGEST], reach[2] = {0, 0};
+    real j[6 * N], rate[6 * N], mobility[36] = {0}, size[LARGEST], reach[2] = {0, 0};
     const int carrier = named_frames[wanted->frame].frame;
+    const real distance = at.x * at.x + at.y * at.y + at.z * at.z;
     jacobian_rows(&s->m, carrier, at, j);
     rate_rows(&s->m, carrier, at, rate);
     for (int k = 0; k < N; ++k) {
         const real turn = j[k] * j[k] + j[N + k] * j[N + k] + j[2 * N + k] * j[2 * N + k];
-        const real length = at.x * at.x + at.y * at.y + at.z * at.z;
-        reach[0] += turn / mass[k * N + k];
-        for (int r = 3; r < 6; ++r)
-            reach[1] += j[r * N + k] * j[r * N + k] / mass[k * N + k];
-        reach[1] += turn * length / mass[k * N + k];
+        const real move = j[3 * N + k] * j[3 * N + k] + j[4 * N + k] * j[4 * N + k] + j[5 * N + k] * j[5 * N + k];
         size[k] = mass[k * N + k];
+        reach[0] += turn / size[k];
+        reach[1] += (move + turn * distance) / size[k];
     }
-    memset(out->moved, 0, sizeof out->moved);
-    for (int r = 0; r < rows; ++r)
+    memset(out, 0, sizeof *out);
+    for (int r = 0; r < wanted->rows; ++r)
         for (int k = 0; k < N; ++k) {
             out->jacobian[r * N + k] = out->moved[k * 6 + r] = j[wanted->row[r] * N + k];
             out->rate[r * N + k] = rate[wanted->row[r] * N + k];
         }
-    const int fault = eliminate(SYMMETRIC, N, 6, size, mass, out->moved);
+    int fault = eliminate(0, N, 6, size, mass, out->moved);
     if (fault)
         return fault;
-    for (int r = 0; r < rows; ++r) {
-        real row[6];
-        from_joints(out->moved, out->jacobian + r * N, row);
-        for (int k = 0; k < rows; ++k) {
-            mobility[r * rows + k] = row[k];
-            out->inertia[r * rows + k] = r == k;
-        }
-    }
-    for (int r = 0; r < rows; ++r) {
-        const real own = mobility[r * rows + r], all = reach[wanted->row[r] >= 3];
+    for (int r = 0; r < 6; ++r) {
+        out->inertia[r * 6 + r] = 1;
+        transposed_times(N, 6, out->moved, out->jacobian + r * N, mobility + r * 6);
+        if (r >= wanted->rows)
+            mobility[r * 6 + r] = 1;
+        const real own = mobility[r * 6 + r], all = r < wanted->rows ? reach[wanted->row[r] >= 3] : 1;
         size[r] = own > all ? own : all;
     }
-    return -eliminate(SYMMETRIC, rows, rows, size, mobility, out->inertia);
+    fault = eliminate(0, 6, 6, size, mobility, out->inertia);
+    for (int r = 0; r < 6; ++r)
+        for (int k = 0; k < r; ++k)
+            out->inertia[r * 6 + k] = out->inertia[k * 6 + r];
+    return -fault;
 }
 
 /* nud - nud_d, which M_e is to have, from - B_e (nu - nu_d) - E' K_e x + F; returns 0, -7, or - the row, from 1, at which M_e
@@ -97,32 +85,35 @@ static inline int frame_acceleration(const struct sample *s, const API(frame_imp
 {
     const int rows = wanted->rows;
     const real still[N] = {0};
-    real inertia[36], moment[6], share[6], joint[N], torque[N], part[6];
-    memset(out, 0, (size_t)rows * sizeof(real));
+    real inertia[36], moment[6], force[6], change[6], share[6] = {0}, joint[N], torque[N];
+    memset(out, 0, 6 * sizeof(real));
     resist(rows, wanted->damping, velocity, out);
-    if (wanted->stiffness) {
-        const int fault = pull(s, wanted, target, at, out);
-        if (fault)
-            return fault;
+    if (wanted->stiffness && pull(s, wanted, target, at, out))
+        return -7;
+    if (wanted->keep_velocity != 0) {
+        times(6, 6, frame->inertia, velocity, moment);
+        times(N, 6, frame->moved, moment, joint);
+        answer(s, still, joint, 0, torque);
+        transposed_times(N, 6, frame->moved, torque, force);
+        times(6, N, frame->rate, joint, change);
+        for (int r = 0; r < 6; ++r)
+            share[r] = wanted->keep_velocity * (change[r] - force[r]);
     }
-    times(rows, rows, frame->inertia, velocity, moment);
-    to_joints(rows, frame->moved, moment, joint);
-    answer(s, still, joint, 0, torque);
-    from_joints(frame->moved, torque, share);
-    times(rows, N, frame->rate, joint, part);
-    for (int r = 0; r < rows; ++r)
-        share[r] = -wanted->keep_velocity * (share[r] - part[r]);
     if (external) {
-        from_joints(frame->moved, external, part);
-        for (int r = 0; r < rows; ++r)
-            share[r] += part[r];
+        transposed_times(N, 6, frame->moved, external, force);
+        for (int r = 0; r < 6; ++r)
+            share[r] += force[r];
     }
-    times(rows, rows, frame->inertia, share, part);
-    for (int r = 0; r < rows; ++r)
-        out[r] += part[r];
-    for (int e = 0; e < rows * rows; ++e)
-        inertia[e] = wanted->keep_inertia * frame->inertia[e] + (wanted->inertia ? wanted->inertia[e] : 0);
-    return -solve(0, rows, frame->inertia, inertia, out);
+    times(6, 6, frame->inertia, share, force);
+    for (int r = 0; r < 6; ++r) {
+        out[r] += force[r];
+        for (int k = 0; k < 6; ++k)
+            inertia[r * 6 + k] = r < rows && k < rows ? wanted->keep_inertia * frame->inertia[r * 6 + k] : r == k;
+    }
+    for (int r = 0; wanted->inertia && r < rows; ++r)
+        for (int k = 0; k < rows; ++k)
+            inertia[r * 6 + k] += wanted->inertia[r * rows + k];
+    return -solve(0, 6, frame->inertia, inertia, out);
 }
 
 int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const real *q_d, const real *qd_d, const real *qdd_d,
@@ -133,7 +124,7 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
     const int rows = wanted->rows;
     struct deviation from;
     struct frame_motion frame;
-    real mass[N * N], kept[N * N], force[N], qdd[N], torque[N], velocity[6], wish_of_frame[6], part[6];
+    real mass[N * N], kept[N * N], force[N], qdd[N], torque[N], velocity[6], asked[6], change[6], follows[6];
     OFFSETS(o);
     SAMPLE(s);
     if (!posture)
@@ -147,21 +138,21 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
     fault = frame_moved(&s, wanted, at, mass, &frame);
     if (fault)
         return fault;
-    times(rows, N, frame.jacobian, qd, velocity);
+    times(6, N, frame.jacobian, qd, velocity);
     for (int r = 0; velocity_d && r < rows; ++r)
         velocity[r] -= velocity_d[wanted->row[r]];
     const vector there = place_in_world(&s, wanted->frame, o, wanted->point, q);
-    fault = frame_acceleration(&s, wanted, pose_d, there, &frame, velocity, external, wish_of_frame);
+    fault = frame_acceleration(&s, wanted, pose_d, there, &frame, velocity, external, asked);
     if (fault)
         return fault;
-    times(rows, N, frame.rate, qd, part);
-    for (int r = 0; r < rows; ++r)
-        wish_of_frame[r] += (acceleration_d ? acceleration_d[wanted->row[r]] : 0) - part[r];
-    times(rows, N, frame.jacobian, qdd, part);
-    for (int r = 0; r < rows; ++r)
-        wish_of_frame[r] -= part[r];
-    times(rows, rows, frame.inertia, wish_of_frame, part);
-    to_joints(rows, frame.moved, part, force);
+    for (int r = 0; acceleration_d && r < rows; ++r)
+        asked[r] += acceleration_d[wanted->row[r]];
+    times(6, N, frame.rate, qd, change);
+    times(6, N, frame.jacobian, qdd, follows);
+    for (int r = 0; r < 6; ++r)
+        asked[r] -= change[r] + follows[r];
+    times(6, 6, frame.inertia, asked, change);
+    times(N, 6, frame.moved, change, force);
     join_force(force, qdd);
     answer(&s, qdd, qd, 1, torque);
     add_passive(q, qd, qdd, torque);

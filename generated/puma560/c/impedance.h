@@ -47,9 +47,9 @@ static inline void resist(int n, const real *a, const real *x, real *force)
             force[i] -= a[i * n + k] * x[k];
 }
 
-/* Solves wanted x = force for a matrix (n, n), both written over; `natural` (n, n) is what its size is judged by. Returns 0,
-   or the row from 1 at which it is not positive, or not regular where this is enough. */
-static inline int solve(int regular, int n, const real *natural, real *wanted, real *force)
+/* Solves wanted x = force for a matrix (n, n); `natural` (n, n) is what its size is judged by. Returns 0, or the row from 1 at
+   which it is not positive, or not regular where this is enough. */
+INLINE int solve(int regular, int n, const real *natural, const real *wanted, real *force)
 {
     real size[LARGEST], part[LARGEST * LARGEST];
     int symmetric = 1;
@@ -57,15 +57,17 @@ static inline int solve(int regular, int n, const real *natural, real *wanted, r
         const real own = natural[i * n + i], asked = F(fabs)(wanted[i * n + i]);
         size[i] = own > asked ? own : asked;
         for (int k = 0; k < i; ++k)
-            symmetric = symmetric && wanted[i * n + k] == wanted[k * n + i];
+            symmetric &= wanted[i * n + k] == wanted[k * n + i];
     }
-    if (regular || symmetric)
-        return eliminate(regular ? REGULAR : SYMMETRIC, n, 1, size, wanted, force);
-    for (int i = 0; i < n; ++i)
-        for (int k = 0; k < n; ++k)
-            part[i * n + k] = R(0.5) * (wanted[i * n + k] + wanted[k * n + i]);
-    const int fault = eliminate(SYMMETRIC, n, 0, size, part, force);
-    return fault ? fault : eliminate(POSITIVE, n, 1, size, wanted, force);
+    if (!regular && !symmetric) {
+        for (int i = 0; i < n; ++i)
+            for (int k = 0; k < n; ++k)
+                part[i * n + k] = R(0.5) * (wanted[i * n + k] + wanted[k * n + i]);
+        const int fault = eliminate(0, n, 0, size, part, NULL);
+        if (fault)
+            return fault;
+    }
+    return eliminate(regular, n, 1, size, wanted, force);
 }
 
 /* H, M* and -(B* - C) ed - K e; where c1 is not kept as it is, C is in it too. Without weights kept is M*, from H. */
@@ -101,7 +103,7 @@ static inline int command(const real *torque, real *tau)
 
 /* The accelerations that are wanted; `force` is -(B* - C) ed - K e, or -B* ed - K e where c1 has weights. */
 static inline int wanted_acceleration(const struct sample *s, const API(impedance) * wanted, const struct deviation *from,
-    const real *mass, real *kept, const real *external, const real *task, const real *force, real *qdd)
+    const real *mass, const real *kept, const real *external, const real *task, const real *force, real *qdd)
 {
     real natural[N] = {0};
     if (!wanted->keep_velocity)
