@@ -2,19 +2,11 @@
 
 Robots that MuJoCo moves are pushed by known forces, to which an impedance is fitted; let go beside their
 target, which shows the stored energy; and led along a moving target.
-
-    python tests/numeric/finite_rate.py [--out out/control]     writes the tables of docs/control.md
 """
 
-import argparse
-import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
@@ -25,8 +17,6 @@ PERIOD = 1e-3
 """s, of the controller's step."""
 SWING = 1.0
 """s, in which a moving target goes to and fro."""
-SECONDS = 2.0
-"""s, of the record that an impedance is fitted to in the tables."""
 
 
 @dataclass(frozen=True)
@@ -272,74 +262,3 @@ def studied(
         found = measured(pushed, seconds)
         outcomes.append(Outcome(loop, found, errors(found, space.wanted), float(rise), float(away)))
     return outcomes
-
-
-def table(outcomes: Sequence[Outcome], unit: str) -> str:
-    """Markdown."""
-    lines = [
-        f"| loop | inertia | damping | stiffness | stored energy rises by | target missed by, {unit} |",
-        "|---|---|---|---|---|---|",
-    ]
-    for row in outcomes:
-        error = " | ".join(percent(e) for e in row.error)
-        rise = percent(row.rise)
-        lines.append(f"| {row.loop.name} | {error} | {rise} | {1e3 * row.tracking:.2g} |")
-    return "\n".join(lines)
-
-
-def percent(share: float) -> str:
-    """To two digits, and no more than two behind the point."""
-    return f"{round(float(f'{100.0 * share:.2g}'), 2):g} %" if share >= 1e-4 else "< 0.01 %"
-
-
-def main() -> None:
-    """Write finite-rate.md into the folder that --out names."""
-    from conftest import LOCKED_FINGERS, PANDA
-    from linkwise import Options, generate, read_system, write_package
-    from linkwise.package.load import import_package
-
-    from numeric.measured_spaces import panda_hand, planar3_joints
-    from numeric.mujoco_plant import heavier, panda_model, planar3_model
-
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("out/control"))
-    out = parser.parse_args().out
-    arm, panda = read_system("planar3"), read_system(PANDA, Options(lock=LOCKED_FINGERS))
-    with tempfile.TemporaryDirectory() as folder:
-        packages = []
-        for system in (arm, panda):
-            write_package(generate(system), Path(folder) / system.name)
-            packages.append(import_package(Path(folder) / system.name))
-        spaces = {
-            "planar3, its joints": (
-                planar3_joints(packages[0]),
-                lambda by: heavier(planar3_model(), np.full(3, 1.0 + by)),
-                1e-4,
-                np.full(3, 0.5),
-            ),
-            "Panda, its hand": (
-                panda_hand(packages[1]),
-                lambda by: heavier(panda_model(PANDA), np.full(7, 1.0 + by)),
-                5e-4,
-                np.full(3, 0.1),
-            ),
-        }
-        parts = []
-        for title, asked in spaces.items():
-            space, model, motion, swing = asked
-            outcomes = [
-                outcome
-                for held in (False, True)
-                for outcome in studied(
-                    space, [loop for loop in LOOPS if loop.held == held], model, motion, swing, SECONDS
-                )
-            ]
-            parts.append(f"{title}\n\n{table(outcomes, space.unit)}\n")
-            print(parts[-1], flush=True)
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "finite-rate.md").write_text("\n".join(parts), encoding="utf-8")
-    print(f"written to {out / 'finite-rate.md'}")
-
-
-if __name__ == "__main__":
-    main()
