@@ -1,4 +1,4 @@
-"""Partial impedance of the emitted C, called through the functions of its header, and the formulas in NumPy."""
+"""Partial impedance of the emitted C through the functions of its header, and its formulas in NumPy."""
 
 import ctypes
 from collections.abc import Mapping

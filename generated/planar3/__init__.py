@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from .names import ROBOT
+from .runtime.controllers import FrameImpedance, Natural, Target
 from .runtime.dynamics import Dynamics
 from .runtime.interface import Backend
 from .runtime.motion_quantities import AppliedLoad, InducedAccelerations, Trajectory
@@ -180,12 +181,15 @@ __all__ = [
     "Coefficients",
     "Contact",
     "Dynamics",
+    "FrameImpedance",
     "GradientPropagation",
     "InducedAccelerations",
     "Layout",
+    "Natural",
     "Packed",
     "PassiveTorque",
     "Propagation",
+    "Target",
     "Trajectory",
     "bodies",
     "inertial_parameters",

@@ -74,6 +74,27 @@ static inline void add_column(int k, vector z, vector s, real *rows)
         rows[r * N + k] += column[r];
 }
 
+/* Rows of the Jacobian of a point `at` that frame f carries, and of how it changes. */
+static inline void jacobian_rows(const motion *m, int f, vector at, real *rows)
+{
+    memset(rows, 0, 6 * N * sizeof(real));
+    for (; f; f = joints[f - 1].parent) {
+        const screw axis = m->axis[f - 1];
+        add_column(joints[f - 1].coordinate, axis.z, add_cross(axis.s, axis.z, at), rows);
+    }
+}
+
+static inline void rate_rows(const motion *m, int f, vector at, real *rows)
+{
+    const vector velocity = add_cross(m->twist[f].s, m->twist[f].z, at);
+    memset(rows, 0, 6 * N * sizeof(real));
+    for (; f; f = joints[f - 1].parent) {
+        const screw axis = m->axis[f - 1], change = m->change[f - 1];
+        const vector linear = add_cross(add_cross(change.s, change.z, at), axis.z, velocity);
+        add_column(joints[f - 1].coordinate, change.z, linear, rows);
+    }
+}
+
 void API(jacobian)(int frame, const real *point, AT_POSITION, real *jacobian)
 {
     NUMBERS(x);
@@ -82,12 +103,7 @@ void API(jacobian)(int frame, const real *point, AT_POSITION, real *jacobian)
     const int carrier = named_frames[frame].frame;
     motion m;
     carriers_moved(x, carrier, q, rest, &m);
-    const vector at = place_of(&m, frame, o, point);
-    memset(jacobian, 0, 6 * N * sizeof(real));
-    for (int f = carrier; f; f = joints[f - 1].parent) {
-        const screw axis = m.axis[f - 1];
-        add_column(joints[f - 1].coordinate, axis.z, add_cross(axis.s, axis.z, at), jacobian);
-    }
+    jacobian_rows(&m, carrier, place_of(&m, frame, o, point), jacobian);
 }
 
 void API(jacobian_rate)(int frame, const real *point, AT_REST, real *rate)
@@ -97,12 +113,5 @@ void API(jacobian_rate)(int frame, const real *point, AT_REST, real *rate)
     const int carrier = named_frames[frame].frame;
     motion m;
     carriers_moved(x, carrier, q, qd, &m);
-    const vector at = place_of(&m, frame, o, point);
-    const vector velocity = add_cross(m.twist[carrier].s, m.twist[carrier].z, at);
-    memset(rate, 0, 6 * N * sizeof(real));
-    for (int f = carrier; f; f = joints[f - 1].parent) {
-        const screw axis = m.axis[f - 1], change = m.change[f - 1];
-        const vector linear = add_cross(add_cross(change.s, change.z, at), axis.z, velocity);
-        add_column(joints[f - 1].coordinate, change.z, linear, rate);
-    }
+    rate_rows(&m, carrier, place_of(&m, frame, o, point), rate);
 }

@@ -1,4 +1,4 @@
-/* The mass matrix, and the accelerations that it gives. The same in every package of linkwise.
+/* The mass matrix. The same in every package of linkwise.
 
    The matrix is that of composite bodies (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6.2). What joint f
    carries is one body, with mass m, first moment h and inertia I about the place of frame f, in the base's axes. Moved by
@@ -7,11 +7,9 @@
    about that place, and n + d x f about that of a joint before it, from which d leads here. What the momentum does along
    the axes of joint f and of those before it are the entries of the matrix.
 
-   The file that includes this one says by AT_POSITION what functions are given that take q alone, and by UNDER_TORQUE those
-   that take q, qd and tau. */
+   The file that includes this one says by AT_POSITION what functions are given that take q alone. */
 #include "one_motion.h"
 
-#include <float.h>
 #include <string.h>
 
 /* m, h and I. */
@@ -41,8 +39,8 @@ static inline void join(const composite *b, vector d, composite *whole)
     whole->inertia.z = add(whole->inertia.z, inertia_from(b->inertia.z, z, h.z, d.z, b, d));
 }
 
-/* What each joint carries, by its frame. */
-static inline void composites(const struct numbers *x, const motion *m, composite *bodies)
+/* What each joint carries, by its frame; inertias are those of `moving` links, or found from the turns where it is NULL. */
+static inline void composites(const struct numbers *x, const motion *m, const moving_link *moving, composite *bodies)
 {
     const vector none = m->place[0];
     const composite nothing = {0, none, {none, none, none}};
@@ -52,8 +50,14 @@ static inline void composites(const struct numbers *x, const motion *m, composit
         const int f = links[j].frame;
         const struct body *const b = &x->bodies[j];
         const matrix turn = m->turn[f];
-        const composite link = {b->mass, none, {inertia_row_one(turn, turn.x, b->inertia),
-            inertia_row_one(turn, turn.y, b->inertia), inertia_row_one(turn, turn.z, b->inertia)}};
+        composite link = {b->mass, none, {none, none, none}};
+        if (moving) {
+            link.inertia = moving[j].inertia;
+        } else {
+            link.inertia.x = inertia_row_one(turn, turn.x, b->inertia);
+            link.inertia.y = inertia_row_one(turn, turn.y, b->inertia);
+            link.inertia.z = inertia_row_one(turn, turn.z, b->inertia);
+        }
         join(&link, turned(turn, b->com), &bodies[f]);
     }
     for (int f = FRAMES; f > 0; --f) {
@@ -71,10 +75,8 @@ static inline screw own_axis(const motion *m, int f)
 }
 
 /* M; joints that follow one coordinate add up. */
-static inline void masses(const struct numbers *x, const motion *m, real *mass)
+static inline void masses(const motion *m, const composite *bodies, real *mass)
 {
-    composite bodies[FRAMES + 1];
-    composites(x, m, bodies);
     memset(mass, 0, (size_t)N * N * sizeof(real));
     for (int f = 1; f <= FRAMES; ++f) {
         const screw axis = own_axis(m, f);
@@ -101,72 +103,8 @@ void API(mass_matrix)(AT_POSITION, real *mass)
     NUMBERS(x);
     const real rest[N] = {0};
     motion m;
+    composite bodies[FRAMES + 1];
     moved_one(x, q, rest, rest, NULL, &m);
-    masses(x, &m, mass);
-}
-
-/* What a motion asks of each joint: torques of the links, summed. */
-static inline void torques_of(const struct numbers *x, const motion *m, real *torque)
-{
-    memset(torque, 0, N * sizeof(real));
-    for (int j = 0; j < LINKS; ++j) {
-        const moving_link l = link_at_one(m, links[j].frame, &x->bodies[j], x->gravity);
-        for (int e = path_start[j]; e < path_start[j + 1]; ++e) {
-            const screw *axis = &m->axis[columns[e]], moves = moves_one(&l, axis, arm_one(&l, axis));
-            torque[path[e]] += along(&moves, &l.wrench);
-        }
-    }
-}
-
-/* x of M x = f by Cholesky's method, M scaled to ones on its diagonal. Where what is left of one of them is rounding, M is
-   singular: this is the answer, counted from 1, and otherwise 0. Both M and f are written over. */
-static inline int solve(real *mass, real *force)
-{
-    const real least = 4 * N * (sizeof(real) == sizeof(float) ? (real)FLT_EPSILON : (real)DBL_EPSILON);
-    real size[N];
-    for (int i = 0; i < N; ++i) {
-        real *const row = mass + (size_t)i * N;
-        size[i] = F(sqrt)(row[i]);
-        for (int k = 0; k <= i; ++k) {
-            const real *const before = mass + (size_t)k * N;
-            real left = row[k] / (size[i] * size[k]);
-            for (int l = 0; l < k; ++l)
-                left -= row[l] * before[l];
-            row[k] = k < i ? left / before[k] : left;
-        }
-        if (!(row[i] > least)) /* nor a number, perhaps */
-            return i + 1;
-        row[i] = F(sqrt)(row[i]);
-    }
-    for (int i = 0; i < N; ++i) {
-        force[i] /= size[i];
-        for (int k = 0; k < i; ++k)
-            force[i] -= mass[(size_t)i * N + k] * force[k];
-        force[i] /= mass[(size_t)i * N + i];
-    }
-    for (int i = N; i--;) {
-        for (int k = i + 1; k < N; ++k)
-            force[i] -= mass[(size_t)k * N + i] * force[k];
-        force[i] /= mass[(size_t)i * N + i];
-    }
-    for (int i = 0; i < N; ++i)
-        force[i] /= size[i];
-    return 0;
-}
-
-int API(forward_dynamics)(UNDER_TORQUE, real *qdd)
-{
-    NUMBERS(x);
-    const real rest[N] = {0};
-    motion m;
-    real mass[N * N], force[N];
-    moved_one(x, q, qd, rest, NULL, &m);
-    masses(x, &m, mass);
-    torques_of(x, &m, force);
-    for (int i = 0; i < N; ++i)
-        force[i] = tau[i] - force[i];
-    const int singular = solve(mass, force);
-    if (!singular)
-        memcpy(qdd, force, sizeof force);
-    return singular;
+    composites(x, &m, NULL, bodies);
+    masses(&m, bodies, mass);
 }

@@ -16,6 +16,7 @@ from typing import Any, Literal, overload
 
 from numpy.typing import ArrayLike
 
+from .controller_calls import ControllerCalls
 from .interface import Array, Backend
 from .motion_calls import MotionCalls
 from .quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
@@ -25,7 +26,7 @@ from .structure import Layout, Structure
 from .sum_calls import SumCalls
 
 
-class Dynamics(SumCalls, MotionCalls):
+class Dynamics(SumCalls, MotionCalls, ControllerCalls):
     """Partial torques of a robot on one back end; made by the package's `load`.
 
     The robot is the open tree of its joints: of one with ties, which close loops, or with contacts, calls are

@@ -196,6 +196,65 @@ void puma560_mass_matrix(const double *q, double *mass);
    moving any mass, and then leaves qdd as it was. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
 int puma560_forward_dynamics(const double *q, const double *qd, const double *tau, double *qdd);
 
+/* Partial impedance of the joints, of one sample: the torques tau under which the robot, pushed by torques f from outside,
+   answers as if its inertia and velocity coefficients were others:
+
+       M* (qdd - qdd_d) + B* (qd - qd_d) + K (q - q_d) = f + v
+       M*(i, k) = sum over j of keep_inertia(i, j, k) c2(i, j, k)  +  inertia(i, k)
+       B*(i, k) = sum over j of keep_velocity(i, j, k) c1(i, j, k)  +  damping(i, k)
+       tau = H qdd + C qd + g - f
+
+   H is M; C(i, k) and g(i) are sums over the links.
+   Weights are 1 for what is kept, 0 for what is not, or anything; those off a link's path are not looked at. */
+typedef struct {
+    const double *keep_inertia; /* (JOINTS, LINKS, JOINTS), or NULL: all of c2 is kept */
+    const double *inertia; /* (JOINTS, JOINTS), or NULL: nothing is added to it */
+    const double *keep_velocity; /* (JOINTS, LINKS, JOINTS), or NULL: all of c1 is kept */
+    const double *damping; /* (JOINTS, JOINTS), or NULL: nothing is added to it */
+    const double *stiffness; /* (JOINTS, JOINTS) K, or NULL: none */
+    int regular; /* 0: M* must be positive; 1: it need only be regular, as where motions are cancelled */
+} puma560_impedance;
+
+/* `wanted` may be NULL for all natural; so may q_d without stiffness, and for zeros qd_d, qdd_d, `task`, what a task asks for
+   beside (v), and `external` (f). To cancel motions alone, leave q_d, qd_d, qdd_d and stiffness NULL, have weights 0 for
+   them and `regular` 1: tau is then v, what they ask for, and g.
+   Returns 0, or the number of a joint, from 1: where M* is not positive along it and those before it, or not regular, or
+   its torque is not finite; tau is then as it was. With all inertia kept and none added, f takes no part, M* is not
+   looked at, and a call costs about as much as inverse dynamics.
+   Reads q, qd (JOINTS), q_d, qd_d, qdd_d, task, external (JOINTS); writes tau (JOINTS). */
+int puma560_partial_impedance(const double *q, const double *qd, const puma560_impedance *wanted,
+    const double *q_d, const double *qd_d, const double *qdd_d, const double *task, const double *external, double *tau);
+
+/* Partial impedance of a frame. `rows` of six count: turns about the world's x, y and z, 0 to 2, and moves of the point along
+   them, 3 to 5. With those of the Jacobian, J, and nu = J qd, the frame has L = (J H^-1 J')^-1 for inertia,
+   mu = L (J H^-1 C - dJ/dt) H^-1 J' L for velocity coefficients, and f is F = L J H^-1 f to it. Wanted is
+
+       M_e (dnu/dt - acceleration_d) + B_e (nu - velocity_d) + E' K_e x = F
+       M_e = keep_inertia L + inertia        B_e = keep_velocity mu + damping
+
+   x being the rotation vector that leads from pose_d to the frame, and the point's place from that of the same point there,
+   in the world's axes, and E x's rates by nu - nu_d, were only the frame to turn. */
+typedef struct {
+    int frame; /* one of the constants above */
+    const double *point; /* (3) in the frame's axes, or NULL: its origin */
+    int rows; /* how many count, 1 to 6 and no more than there are joints */
+    const int *row; /* (rows) which ones, each once */
+    double keep_inertia, keep_velocity; /* 1 for the natural ones, 0 for none of it */
+    const double *inertia, *damping, *stiffness; /* (rows, rows), or NULL: none */
+} puma560_frame_impedance;
+
+/* The frame comes first: of all accelerations that give what is wanted of it, the joints get those that are closest, in the
+   sense of H, to what `posture` wants of them, see above. pose_d may be NULL without stiffness, and velocity_d, acceleration_d
+   for zeros; both are of the point, and all six are there, whichever rows count.
+   Returns 0; the number of a joint, as above, also where H is not positive; - the number of a row, from 1, along which the
+   frame cannot move beside those before it, or its M_e is not positive; or -7 where the frame is half a turn away from a
+   pose_d to which it is to turn. tau is then as it was.
+   Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
+   velocity_d, acceleration_d (6); writes tau (JOINTS). */
+int puma560_frame_partial_impedance(const double *q, const double *qd, const puma560_impedance *posture,
+    const double *q_d, const double *qd_d, const double *qdd_d, const puma560_frame_impedance *wanted,
+    const double *pose_d, const double *velocity_d, const double *acceleration_d, const double *external, double *tau);
+
 /* ---- All links, many samples, in float ---- */
 
 /* All quantities but c0: 1516 operations.
@@ -309,6 +368,65 @@ void puma560_mass_matrixf(const float *q, float *mass);
    singular, or the motion not finite, the number of a joint, from 1, that can move together with those before it without
    moving any mass, and then leaves qdd as it was. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
 int puma560_forward_dynamicsf(const float *q, const float *qd, const float *tau, float *qdd);
+
+/* Partial impedance of the joints, of one sample: the torques tau under which the robot, pushed by torques f from outside,
+   answers as if its inertia and velocity coefficients were others:
+
+       M* (qdd - qdd_d) + B* (qd - qd_d) + K (q - q_d) = f + v
+       M*(i, k) = sum over j of keep_inertia(i, j, k) c2(i, j, k)  +  inertia(i, k)
+       B*(i, k) = sum over j of keep_velocity(i, j, k) c1(i, j, k)  +  damping(i, k)
+       tau = H qdd + C qd + g - f
+
+   H is M; C(i, k) and g(i) are sums over the links.
+   Weights are 1 for what is kept, 0 for what is not, or anything; those off a link's path are not looked at. */
+typedef struct {
+    const float *keep_inertia; /* (JOINTS, LINKS, JOINTS), or NULL: all of c2 is kept */
+    const float *inertia; /* (JOINTS, JOINTS), or NULL: nothing is added to it */
+    const float *keep_velocity; /* (JOINTS, LINKS, JOINTS), or NULL: all of c1 is kept */
+    const float *damping; /* (JOINTS, JOINTS), or NULL: nothing is added to it */
+    const float *stiffness; /* (JOINTS, JOINTS) K, or NULL: none */
+    int regular; /* 0: M* must be positive; 1: it need only be regular, as where motions are cancelled */
+} puma560_impedancef;
+
+/* `wanted` may be NULL for all natural; so may q_d without stiffness, and for zeros qd_d, qdd_d, `task`, what a task asks for
+   beside (v), and `external` (f). To cancel motions alone, leave q_d, qd_d, qdd_d and stiffness NULL, have weights 0 for
+   them and `regular` 1: tau is then v, what they ask for, and g.
+   Returns 0, or the number of a joint, from 1: where M* is not positive along it and those before it, or not regular, or
+   its torque is not finite; tau is then as it was. With all inertia kept and none added, f takes no part, M* is not
+   looked at, and a call costs about as much as inverse dynamics.
+   Reads q, qd (JOINTS), q_d, qd_d, qdd_d, task, external (JOINTS); writes tau (JOINTS). */
+int puma560_partial_impedancef(const float *q, const float *qd, const puma560_impedancef *wanted,
+    const float *q_d, const float *qd_d, const float *qdd_d, const float *task, const float *external, float *tau);
+
+/* Partial impedance of a frame. `rows` of six count: turns about the world's x, y and z, 0 to 2, and moves of the point along
+   them, 3 to 5. With those of the Jacobian, J, and nu = J qd, the frame has L = (J H^-1 J')^-1 for inertia,
+   mu = L (J H^-1 C - dJ/dt) H^-1 J' L for velocity coefficients, and f is F = L J H^-1 f to it. Wanted is
+
+       M_e (dnu/dt - acceleration_d) + B_e (nu - velocity_d) + E' K_e x = F
+       M_e = keep_inertia L + inertia        B_e = keep_velocity mu + damping
+
+   x being the rotation vector that leads from pose_d to the frame, and the point's place from that of the same point there,
+   in the world's axes, and E x's rates by nu - nu_d, were only the frame to turn. */
+typedef struct {
+    int frame; /* one of the constants above */
+    const float *point; /* (3) in the frame's axes, or NULL: its origin */
+    int rows; /* how many count, 1 to 6 and no more than there are joints */
+    const int *row; /* (rows) which ones, each once */
+    float keep_inertia, keep_velocity; /* 1 for the natural ones, 0 for none of it */
+    const float *inertia, *damping, *stiffness; /* (rows, rows), or NULL: none */
+} puma560_frame_impedancef;
+
+/* The frame comes first: of all accelerations that give what is wanted of it, the joints get those that are closest, in the
+   sense of H, to what `posture` wants of them, see above. pose_d may be NULL without stiffness, and velocity_d, acceleration_d
+   for zeros; both are of the point, and all six are there, whichever rows count.
+   Returns 0; the number of a joint, as above, also where H is not positive; - the number of a row, from 1, along which the
+   frame cannot move beside those before it, or its M_e is not positive; or -7 where the frame is half a turn away from a
+   pose_d to which it is to turn. tau is then as it was.
+   Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
+   velocity_d, acceleration_d (6); writes tau (JOINTS). */
+int puma560_frame_partial_impedancef(const float *q, const float *qd, const puma560_impedancef *posture,
+    const float *q_d, const float *qd_d, const float *qdd_d, const puma560_frame_impedancef *wanted,
+    const float *pose_d, const float *velocity_d, const float *acceleration_d, const float *external, float *tau);
 
 #ifdef __cplusplus
 }

@@ -94,6 +94,9 @@ class Backend(Protocol[Kind]):
     def induced(self, robot: Any) -> Any:
         """The calls for induced accelerations of a robot on this back end, an `InducedAnswers`."""
 
+    def controls(self, robot: Any) -> Any:
+        """What makes controllers of a robot on this back end, a `Controls`."""
+
     def constraints(self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any) -> Any:
         """The calls of `Constraints` on a robot with this back end; raises as `Dynamics.constrained` does."""
 

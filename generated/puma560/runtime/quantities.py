@@ -56,6 +56,17 @@ class GradientPropagation(NamedTuple, Generic[Array]):
         return "gradient"
 
 
+class NaturalImpedance(NamedTuple, Generic[Array]):
+    """How tau_ij changes with the motion of joint k, (..., n, N, n) each."""
+
+    inertia: Array
+    """c2_ijk, by acceleration."""
+    damping: Array
+    """2 c1_ijk - h1_ijk, by velocity."""
+    stiffness: Array
+    """c0_ijk, by position."""
+
+
 class Energy(NamedTuple, Generic[Array]):
     """Energies of the links in J."""
 

@@ -31,11 +31,4 @@ typedef real lanes, lanes_anywhere;
 #define WRITTEN_SOON(at) ((void)(at))
 #endif
 
-/* What is INLINE costs no call, not even without optimization: its vectors stay in registers. */
-#if defined(__GNUC__)
-#define INLINE __attribute__((always_inline)) static inline
-#else
-#define INLINE static inline
-#endif
-
 #endif

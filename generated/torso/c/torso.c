@@ -503,5 +503,6 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 #endif
 #if PART(CONTROL)
 #include "frames.h"
-#include "mass.h"
+#include "moving_links.h"
+#include "frame_impedance.h"
 #endif

@@ -45,6 +45,11 @@ struct numbers {
     real gravity[3];
 };
 
+/* What the joints of a coordinate have of their own: see passive.h. `pull` is what springs give at 0. */
+struct passive_joint {
+    real stiffness, pull, damping, friction, armature;
+};
+
 /* A frame that has a name: the frame in which it stands, and its turn there, row by row. */
 struct named_frame {
     short frame;

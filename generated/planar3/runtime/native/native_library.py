@@ -38,6 +38,8 @@ CONTROL = {
     "forward_dynamics": Control(3),
 }
 """Functions that take one sample and no count."""
+IMPEDANCE = ("partial_impedance", "frame_partial_impedance")
+"""Those beside them for control, which `native_impedance` calls."""
 
 
 @cache
@@ -69,7 +71,7 @@ def symbol(sources: Sources, call: str, kind: str) -> Any:
 
 def _library_of(call: str) -> str:
     """Which of a robot's libraries has a function."""
-    if call in CONTROL:
+    if call in CONTROL or call in IMPEDANCE:
         return "control"
     if call.endswith("position_gradient"):
         return "gradient"

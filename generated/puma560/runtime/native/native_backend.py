@@ -1,6 +1,7 @@
 """Compiled C on NumPy arrays and torch CPU tensors."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -10,12 +11,14 @@ from numpy.typing import NDArray
 from ..arguments import has_tensors
 from ..arrays.numpy_backend import NumpyBackend
 from ..constraints.chosen_constraints import ChosenConstraints
+from ..control.controls import Controls
 from ..interface import ClosedForms
 from ..rule.rule_calls import RigidRule
 from ..structure import Structure
 from .native_answers import NativeAnswers
 from .native_calls import NativeCalls, checked_threads
 from .native_control import ControlCalls, NativeKinematics
+from .native_impedance import NativeControlAnswers
 from .native_ties import NativeTieRows
 
 if TYPE_CHECKING:
@@ -73,6 +76,10 @@ class NativeBackend(NumpyBackend):
         """The calls of `Dynamics`: C writes the answers, but for tensors of which gradients are recorded."""
         control = None if self.tree is None else self.control
         return NativeAnswers(self, self.calls, self.on_torch, check_finite, control)
+
+    def controls(self, robot: Any) -> Controls:
+        """What makes controllers of a robot: C answers for one sample, arrays and tensors else."""
+        return Controls(robot, partial(NativeControlAnswers, self.calls))
 
     def kinematics(
         self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]

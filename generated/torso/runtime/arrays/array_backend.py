@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 from ..constraints.chosen_constraints import ChosenConstraints
 from ..constraints.constraint_answers import ConstraintAnswers, constraint_answers
 from ..constraints.tie_rows import TieRows
+from ..control.controls import Controls
 from ..induced.induced_answers import InducedAnswers
 from ..kinematics.kinematic_answers import KinematicAnswers
 from ..rule.joint_tree import JointTree
@@ -37,6 +38,10 @@ class ArrayBackend:
     def induced(self, robot: Any) -> InducedAnswers:
         """The calls for induced accelerations of a robot on this back end."""
         return InducedAnswers(robot)
+
+    def controls(self, robot: Any) -> Controls:
+        """What makes controllers of a robot on this back end."""
+        return Controls(robot)
 
     def constraints(
         self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any

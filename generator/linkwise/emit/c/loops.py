@@ -8,7 +8,7 @@ from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
 from linkwise.emit.c.loop_costs import decomposition_cost, gradient_cost, torque_cost
 from linkwise.emit.c.prototypes import at_position, pointers, under_torque
-from linkwise.emit.c.robot_files import given, header_view, path_fields, totals
+from linkwise.emit.c.robot_files import free, given, header_view, path_fields, totals
 from linkwise.emit.c.robot_tables import path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
 from linkwise.emit.c.stack import loops_stack
@@ -26,6 +26,7 @@ FIXED = (
     "dense_rows.h",
     "elimination.h",
     "frame_impedance.h",
+    "frame_rotation.h",
     "frames.h",
     "gradient.h",
     "impedance.h",
@@ -83,6 +84,7 @@ def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
     return path_fields(system) | {
         "n": len(system.coordinates),
         "links": len(links),
+        "free": free(system),
         "totals": totals(robot.size),
         "parameters": list(enumerate(parameter_names(system).values())),
         "inputs": pointers("const real", motion),

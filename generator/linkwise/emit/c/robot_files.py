@@ -53,6 +53,7 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
         "slopes": "r->h1" if robot.size.h1 else "NULL",
         "largest": max(waiting.of(array) for array in arrays),
         "rigid": isinstance(system, RigidSystem),
+        "free": free(system),
         "of_sample": [(array, total(array)) for array in arrays],
         "largest_gradient": max(link.size.c1 for link in links),
     }
@@ -87,6 +88,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "parameters": header.parameter_lines(system),
         "blocks": tuple(header.BLOCK.values()),
         "rigid": isinstance(system, RigidSystem),
+        "free": free(system),
         "passive": isinstance(system, RigidSystem) and bool(system.robot.passive),
         "frames": list(header.frame_lines(system)) if isinstance(system, RigidSystem) else [],
         "functions": list(functions(given(system), robot, links)),
@@ -105,6 +107,11 @@ def costs(kernels: Sequence[LinkKernels]) -> dict[str, int]:
 def given(system: System) -> tuple[str, ...]:
     """Arrays that every function takes."""
     return ("q", "qd", "qdd", "p") if system.parameters else ("q", "qd", "qdd")
+
+
+def free(system: System) -> bool:
+    """Whether each joint may have an impedance of its own: no loop ties one to others."""
+    return not (isinstance(system, RigidSystem) and system.robot.ties)
 
 
 def totals(size: EntryCounts) -> list[tuple[str, int]]:

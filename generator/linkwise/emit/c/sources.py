@@ -44,6 +44,7 @@ FIXED_OF_RIGID = (
     "angles.h",
     "blocks.h",
     "frame_impedance.h",
+    "frame_rotation.h",
     "frames.h",
     "lanes.h",
     "mass.h",

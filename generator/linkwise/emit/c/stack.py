@@ -40,15 +40,21 @@ def loops_stack(system: RigidSystem) -> int:
         6 * (frames + 1) + square + cubes,
     )
     blocks = VALUE * (moved + wrenches + values) + 8 * _numbers(system) + OWN
-    return max(blocks, control_stack(system))
+    return max(blocks, control_stack(system, ()))
 
 
-def control_stack(system: RigidSystem) -> int:
-    """Bytes that functions of one sample take at most that go over the tree: motion, bodies, mass matrix."""
-    n, frames = len(system.coordinates), len(system.robot.links)
+def control_stack(system: System, links: tuple[Span, ...]) -> int:
+    """Bytes that what control needs of one sample takes at most: motion, bodies, matrices of n rows."""
+    n = len(system.coordinates)
+    matrices = 2 * n * n + 3 * max(n, 6) ** 2 + 60 * n + 250
+    if not isinstance(system, RigidSystem):
+        whole_robot = whole(links).size
+        return 8 * (whole_robot.total + matrices) + OWN
+    frames = len(system.robot.links)
     moved = 24 * (frames + 1) + 12 * (frames + len(columns(system).sums)) + 3 * n + 3 * frames
-    bodies, offsets = 13 * (frames + 1), 3 * len(system.robot.named_frames)
-    return 8 * (moved + bodies + n * n + _numbers(system) + offsets) + OWN
+    bodies = 34 * len(system.links) + 31 * (frames + 1) + 18 * _longest(system)
+    offsets = 3 * len(system.robot.named_frames)
+    return 8 * (moved + bodies + matrices + _numbers(system) + offsets) + OWN
 
 
 def straight_stack(system: System, links: tuple[Span, ...]) -> int:
@@ -59,7 +65,7 @@ def straight_stack(system: System, links: tuple[Span, ...]) -> int:
     largest = max(map(waiting.of, whole_robot.arrays))
     values = max(waiting.total * blocks + max(cubes, largest), max(link.size.c1 for link in links) + cubes)
     stack = VALUE * (5 * n * blocks + values) + OWN
-    return max(stack, control_stack(system)) if isinstance(system, RigidSystem) else stack
+    return max(stack, control_stack(system, links))
 
 
 def too_large_for_loops(system: System) -> str:

@@ -261,6 +261,6 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
 #endif
 
 #if PART(CONTROL)
+#include "frames.h"
 #include "moving_links.h"
-#include "frame_impedance.h"
 #endif

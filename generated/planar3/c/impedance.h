@@ -1,0 +1,145 @@
+/* Partial impedance of the joints. The same in every package of linkwise.
+
+   With H = M and the joints' armature, C, gravity g, springs and losses p of the joints, and torques f from outside, the
+   robot moves by
+       H qdd + C qd + g + p = tau + f
+   Of a wanted motion it is away by e = q - q_d and ed = qd - qd_d. What is wanted there is, v being a task's torques,
+       M* (qdd - qdd_d) + B* ed + K e = f + v
+   with M* and B* what is kept of the natural ones, and what is added, so that
+       qdd = qdd_d + M*^-1 (f + v - B* ed - K e)           tau = H qdd + C qd + g + p - f
+   As long as all of M* is natural, f drops out of this and nothing is to be solved:
+       tau = H qdd_d + C qd + g + p + v - B* ed - K e      and with B* = C + b, C qd - B* ed is C qd_d - b ed
+
+   The file that includes this one has `answer`, `natural_inertia` and `keep` of a SAMPLE. */
+#include "elimination.h"
+#include "passive.h"
+
+/* What is asked of a sample: where to, and how it is away from there. */
+struct deviation {
+    real place[N], velocity[N], still[N];
+    const real *qd_d, *qdd_d;
+};
+
+/* NULL stands for zeros. */
+static inline void deviate(const real *q, const real *qd, const real *q_d, const real *qd_d, const real *qdd_d,
+    struct deviation *from)
+{
+    memset(from->still, 0, sizeof from->still);
+    from->qd_d = qd_d ? qd_d : from->still;
+    from->qdd_d = qdd_d ? qdd_d : from->still;
+    for (int i = 0; i < N; ++i) {
+        from->place[i] = q_d ? q[i] - q_d[i] : q[i];
+        from->velocity[i] = qd[i] - from->qd_d[i];
+    }
+}
+
+/* force += a; force -= a x, of a matrix (n, n). Of both, NULL stands for zeros. */
+static inline void join_force(const real *a, real *force)
+{
+    for (int i = 0; a && i < N; ++i)
+        force[i] += a[i];
+}
+
+static inline void resist(int n, const real *a, const real *x, real *force)
+{
+    for (int i = 0; a && i < n; ++i)
+        for (int k = 0; k < n; ++k)
+            force[i] -= a[i * n + k] * x[k];
+}
+
+/* Solves wanted x = force for a matrix (n, n), both written over; `natural` (n, n) is what its size is judged by. Returns 0,
+   or the row from 1 at which it is not positive, or not regular where this is enough. */
+static inline int solve(int regular, int n, const real *natural, real *wanted, real *force)
+{
+    real size[LARGEST], part[LARGEST * LARGEST];
+    int symmetric = 1;
+    for (int i = 0; i < n; ++i) {
+        const real own = natural[i * n + i], asked = F(fabs)(wanted[i * n + i]);
+        size[i] = own > asked ? own : asked;
+        for (int k = 0; k < i; ++k)
+            symmetric = symmetric && wanted[i * n + k] == wanted[k * n + i];
+    }
+    if (regular || symmetric)
+        return eliminate(regular ? REGULAR : SYMMETRIC, n, 1, size, wanted, force);
+    for (int i = 0; i < n; ++i)
+        for (int k = 0; k < n; ++k)
+            part[i * n + k] = R(0.5) * (wanted[i * n + k] + wanted[k * n + i]);
+    const int fault = eliminate(SYMMETRIC, n, 0, size, part, force);
+    return fault ? fault : eliminate(POSITIVE, n, 1, size, wanted, force);
+}
+
+/* H, M* and -(B* - C) ed - K e; where c1 is not kept as it is, C is in it too. Without weights kept is M*, from H. */
+static inline void wish(const struct sample *s, const API(impedance) * wanted, const struct deviation *from, int inertia,
+    real *mass, real *kept, real *force)
+{
+    memset(force, 0, N * sizeof(real));
+    if (wanted->keep_inertia || wanted->keep_velocity)
+        keep(s, wanted->keep_inertia, wanted->keep_velocity, from->velocity, mass, kept, force);
+    resist(N, wanted->damping, from->velocity, force);
+    resist(N, wanted->stiffness, from->place, force);
+    if (!inertia)
+        return;
+    if (!wanted->keep_inertia) {
+        natural_inertia(s, mass);
+        memcpy(kept, mass, (size_t)N * N * sizeof(real));
+    }
+    add_armature(mass);
+    add_armature(kept);
+    for (int i = 0; wanted->inertia && i < N * N; ++i)
+        kept[i] += wanted->inertia[i];
+}
+
+/* Torques that give these accelerations, to `tau`; returns 0, or the joint, from 1, whose torque is not finite. */
+static inline int command(const real *torque, real *tau)
+{
+    for (int i = 0; i < N; ++i)
+        if (!(torque[i] - torque[i] == 0))
+            return i + 1;
+    memcpy(tau, torque, N * sizeof(real));
+    return 0;
+}
+
+/* The accelerations that are wanted; `force` is -(B* - C) ed - K e, or -B* ed - K e where c1 has weights. */
+static inline int wanted_acceleration(const struct sample *s, const API(impedance) * wanted, const struct deviation *from,
+    const real *mass, real *kept, const real *external, const real *task, const real *force, real *qdd)
+{
+    real natural[N] = {0};
+    if (!wanted->keep_velocity)
+        answer(s, from->still, from->velocity, 0, natural);
+    for (int i = 0; i < N; ++i)
+        qdd[i] = force[i] - natural[i];
+    join_force(external, qdd);
+    join_force(task, qdd);
+    const int fault = solve(wanted->regular, N, mass, kept, qdd);
+    join_force(from->qdd_d, qdd);
+    return fault;
+}
+
+int API(partial_impedance)(AT_REST, const API(impedance) * wanted, const real *q_d, const real *qd_d, const real *qdd_d,
+    const real *task, const real *external, real *tau)
+{
+    const API(impedance) natural = {NULL, NULL, NULL, NULL, NULL, 0};
+    struct deviation from;
+    real mass[N * N], kept[N * N], force[N], qdd[N], torque[N];
+    SAMPLE(s);
+    if (!wanted)
+        wanted = &natural;
+    deviate(q, qd, q_d, qd_d, qdd_d, &from);
+    const int changed = wanted->keep_inertia || wanted->inertia;
+    wish(&s, wanted, &from, changed, mass, kept, force);
+    if (!changed) {
+        answer(&s, from.qdd_d, wanted->keep_velocity ? qd : from.qd_d, 1, torque);
+        add_passive(q, qd, from.qdd_d, torque);
+        join_force(force, torque);
+        join_force(task, torque);
+        return command(torque, tau);
+    }
+    const int fault = wanted_acceleration(&s, wanted, &from, mass, kept, external, task, force, qdd);
+    if (fault)
+        return fault;
+    answer(&s, qdd, qd, 1, torque);
+    add_passive(q, qd, qdd, torque);
+    for (int i = 0; external && i < N; ++i)
+        torque[i] -= external[i];
+    return command(torque, tau);
+}

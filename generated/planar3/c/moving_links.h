@@ -1,0 +1,125 @@
+/* Rigid links in motion, and what they answer with to accelerations: sums over the links. The same in every package of
+   linkwise.
+
+   C v are velocities v times the c1 of the motion: a link bears f = a' + wd' x c + w' x cd for each unit of its mass and
+   N = I wd' - w x E w' (rule.h), where the twist w' is that of v, and the rates a' and wd' are those of its joints' axes,
+   which change by the motion. v = qd gives what the velocities ask for. */
+#include "elimination.h"
+#include "mass.h"
+
+/* A sample: its frames and its links. */
+struct sample {
+    const struct numbers *x;
+    motion m;
+    moving_link links[LINKS];
+};
+
+static inline void observe(const struct numbers *x, const real *q, const real *qd, struct sample *s)
+{
+    const real rest[N] = {0};
+    s->x = x;
+    moved_one(x, q, qd, rest, NULL, &s->m);
+    for (int j = 0; j < LINKS; ++j)
+        s->links[j] = link_at_one(&s->m, links[j].frame, &x->bodies[j], x->gravity);
+}
+#define SAMPLE(s) \
+    NUMBERS(x_of_##s); \
+    struct sample s; \
+    observe(x_of_##s, q, qd, &s)
+
+/* M a + C v, and what gravity asks for where it `weighs`. */
+static inline void answer(const struct sample *s, const real *acceleration, const real *velocity, int weighs, real *torque)
+{
+    const motion *const m = &s->m;
+    const vector none = m->place[0];
+    const screw rest = {none, none};
+    screw twist[FRAMES + 1], rate[FRAMES + 1], load[FRAMES + 1];
+    twist[0] = rate[0] = load[0] = rest;
+    if (weighs)
+        rate[0].s = s->links[0].weight;
+    for (int f = 1; f <= FRAMES; ++f) {
+        const int up = joints[f - 1].parent, k = joints[f - 1].coordinate;
+        const screw axis = m->axis[f - 1], change = m->change[f - 1];
+        twist[f].z = add(twist[up].z, scale(velocity[k], axis.z));
+        twist[f].s = add(twist[up].s, scale(velocity[k], axis.s));
+        rate[f].z = add(rate[up].z, add(scale(acceleration[k], axis.z), scale(velocity[k], change.z)));
+        rate[f].s = add(rate[up].s, add(scale(acceleration[k], axis.s), scale(velocity[k], change.s)));
+        load[f] = rest;
+    }
+    for (int j = 0; j < LINKS; ++j) {
+        const moving_link *const l = &s->links[j];
+        const int f = links[j].frame;
+        const vector acceleration_of_com = add_cross(add_cross(rate[f].s, rate[f].z, l->com), twist[f].z, l->velocity);
+        const vector force = scale(l->mass, acceleration_of_com);
+        const vector moment = add_applied(apply(l->inertia, rate[f].z), l->turning, twist[f].z);
+        load[f].z = add_cross(add(load[f].z, moment), subtract(l->com, m->place[f]), force);
+        load[f].s = add(load[f].s, force);
+    }
+    memset(torque, 0, N * sizeof(real));
+    for (int f = FRAMES; f; --f) {
+        const screw axis = own_axis(m, f);
+        const int up = joints[f - 1].parent;
+        torque[joints[f - 1].coordinate] += along(&axis, &load[f]);
+        load[up].z = add_cross(add(load[up].z, load[f].z), subtract(m->place[f], m->place[up]), load[f].s);
+        load[up].s = add(load[up].s, load[f].s);
+    }
+}
+
+/* M, of links whose motion is known. */
+static inline void natural_inertia(const struct sample *s, real *mass)
+{
+    composite bodies[FRAMES + 1];
+    composites(s->x, &s->m, s->links, bodies);
+    masses(&s->m, bodies, mass);
+}
+
+/* Weights w (N, LINKS, N) times the links' own, summed over the links, NULL standing for none: w c2 in kept (N, N), beside
+   M itself, and w c1 v taken from `torque`. */
+static inline void keep(const struct sample *s, const real *inertia, const real *damping, const real *velocity, real *mass,
+    real *kept, real *torque)
+{
+    if (inertia) {
+        memset(mass, 0, (size_t)N * N * sizeof(real));
+        memset(kept, 0, (size_t)N * N * sizeof(real));
+    }
+    for (int j = 0; j < LINKS; ++j) {
+        const short *const joint = path + path_start[j];
+        const int length = path_start[j + 1] - path_start[j];
+        wrenches w;
+        columns_one(&s->m, &s->links[j], columns + path_start[j], length, &w);
+        for (int a = 0; a < length; ++a)
+            for (int b = 0; b < length; ++b) {
+                const int i = joint[a], k = joint[b];
+                const size_t ik = (size_t)i * N + (size_t)k, ki = (size_t)k * N + (size_t)i;
+                const size_t ijk = ((size_t)i * LINKS + (size_t)j) * N + (size_t)k;
+                if (inertia && a <= b) {
+                    const real c2 = along(&w.moves[a], &w.c2[b]);
+                    mass[ik] += c2;
+                    kept[ik] += inertia[ijk] * c2;
+                    if (a < b) {
+                        mass[ki] += c2;
+                        kept[ki] += inertia[((size_t)k * LINKS + (size_t)j) * N + (size_t)i] * c2;
+                    }
+                }
+                if (damping && damping[ijk] != 0)
+                    torque[i] -= damping[ijk] * along(&w.moves[a], &w.c1[b]) * velocity[k];
+            }
+    }
+}
+
+int API(forward_dynamics)(UNDER_TORQUE, real *qdd)
+{
+    SAMPLE(s);
+    const real rest[N] = {0};
+    real mass[N * N], size[N], force[N];
+    natural_inertia(&s, mass);
+    answer(&s, rest, qd, 1, force);
+    for (int i = 0; i < N; ++i) {
+        size[i] = mass[i * N + i];
+        force[i] = tau[i] - force[i];
+    }
+    const int singular = eliminate(SYMMETRIC, N, 1, size, mass, force);
+    if (!singular)
+        memcpy(qdd, force, sizeof force);
+    return singular;
+}

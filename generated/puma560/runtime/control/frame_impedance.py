@@ -1,0 +1,194 @@
+"""The impedance of a frame, which has precedence over that of the joints (Eq. 18 of the paper).
+
+With r rows of the frame's Jacobian J, its velocity nu = J qd, and H, C, f as for joints:
+
+    L = (J H^-1 J')^-1      Jd = H^-1 J' L      F = Jd' f      mu = L (J H^-1 C - dJ/dt) Jd
+    M_e (nud - nud_d) + B_e (nu - nu_d) + E' K_e x = F          x = (rotation vector, place) of the error
+    qdd = qdd_0 + Jd (nud - dJ/dt qd - J qdd_0)
+
+L and mu are the frame's natural inertia and velocity forces: dL/dt - 2 mu is skew. E takes angular
+velocities to rates of the rotation vector. qdd_0 is what the joints' targets ask for; O. Khatib, A unified
+approach for motion and force control of robot manipulators, 1987.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..controllers import ROWS, FrameImpedance
+from ..kinematics.named_frames import frame_index
+from ..sums.namespace import namespace
+from .frame_rotation import rates_of_turning, rotation_vector
+from .gains import Gain, check_positive
+from .joint_impedance import JointState, times
+from .wanted_solve import solved_wanted
+
+
+class FramePart(NamedTuple):
+    """How much of the natural matrix is kept, and what is added to it."""
+
+    kept: float
+    added: Gain | None
+
+    def of(self, side: Any, natural: Any, like: Any) -> Any:
+        """The wanted matrix (..., r, r)."""
+        kept = natural if self.kept == 1.0 else self.kept * natural
+        return kept if self.added is None else kept + self.added.matrix(side, like)
+
+
+class FrameState(NamedTuple):
+    """A frame in motion, by its chosen rows."""
+
+    jacobian: Any
+    """J (..., r, n)."""
+    bias: Any
+    """dJ/dt qd (..., r)."""
+    inertia: Any
+    """L (..., r, r)."""
+    dual: Any
+    """Jd (..., n, r)."""
+    wanted_inertia: Any
+    wanted_damping: Any
+    rate: Any
+    """nu - nu_d (..., r)."""
+    place: Any
+    """x (..., r), None without stiffness."""
+    turning: Any
+    """E (..., r, r), None without stiffness."""
+    wanted: Any
+    """nud_d (..., r), None for none."""
+
+
+class FrameTargets:
+    """What is wanted of one frame, for whatever motion."""
+
+    def __init__(self, robot: Any, asked: FrameImpedance) -> None:
+        """Raises ValueError and TypeError as `Dynamics.partial_impedance` does."""
+        self._robot, self.rows, self.names = robot, _chosen(asked.rows), tuple(asked.rows)
+        self.frame, self.point = asked.frame, np.asarray(asked.point, float)
+        frame_index(asked.frame, robot.kinematics.frames, robot.link_names)
+        self.inertia = self._part("frame.inertia", asked.inertia, True)
+        self.damping = self._part("frame.damping", asked.damping, False)
+        gain = Gain("frame.stiffness", asked.stiffness, self.names)
+        check_positive(gain, False)
+        self.stiffness = gain if gain.numbers.any() else None
+
+    @property
+    def dissipative(self) -> bool:
+        """Whether the natural inertia and velocity forces are kept alike."""
+        return self.inertia.kept == self.damping.kept
+
+    def state(self, joints: JointState, q: Any, qd: Any, target: Any) -> FrameState:
+        """The frame at q and qd, by `target` of `controllers.Target`."""
+        robot, side, xp = self._robot, self._robot.backend.side(q), namespace(q)
+        point = side.constant(self.point, q)
+        rows = side.index(np.array(self.rows, np.intp), q)
+        j = robot.kinematics.jacobian(q, self.frame, point)[..., rows, :]
+        rate = robot.kinematics.jacobian_rate(q, qd, self.frame, point)[..., rows, :]
+        names = robot.joint_names
+        moved = solved_wanted(
+            "the inertia of the joints", joints.inertia, xp.swapaxes(j, -1, -2), joints.inertia, names
+        )
+        compliance = j @ moved
+        ones = side.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
+        inertia = solved_wanted(
+            f"the mobility of frame {self.frame!r}", compliance, ones, compliance, self.names
+        )
+        dual = moved @ inertia
+        natural = (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.coriolis - rate)) @ dual
+        place, turning = self._place(side, q, target)
+        velocity, wanted = (
+            None if a is None else side.weights(name, a, q)[..., rows]
+            for name, a in (
+                ("target.velocity", target.velocity),
+                ("target.acceleration", target.acceleration),
+            )
+        )
+        speed = times(j, qd)
+        return FrameState(
+            j,
+            times(rate, qd),
+            inertia,
+            dual,
+            self.inertia.of(side, inertia, q),
+            self.damping.of(side, natural, q),
+            speed if velocity is None else speed - velocity,
+            place,
+            turning,
+            wanted,
+        )
+
+    def acceleration(self, state: FrameState, qdd: Any, external: Any) -> Any:
+        """qdd of the joints, nearest to the one given, with which the frame moves as asked."""
+        xp = namespace(qdd)
+        pull = -times(state.wanted_damping, state.rate)
+        if state.place is not None:
+            pull = pull - times(xp.swapaxes(state.turning, -1, -2), self._pull(state.place))
+        if external is not None:
+            pull = pull + times(xp.swapaxes(state.dual, -1, -2), external)
+        what = f"the wanted inertia of frame {self.frame!r}"
+        moved = solved_wanted(what, state.wanted_inertia, pull[..., None], state.inertia, self.names)[..., 0]
+        if state.wanted is not None:
+            moved = moved + state.wanted
+        return qdd + times(state.dual, moved - state.bias - times(state.jacobian, qdd))
+
+    def stored(self, state: FrameState) -> Any:
+        """(nu~' M_e nu~ + x' K_e x) / 2, (...)."""
+        energy = (state.rate * times(state.wanted_inertia, state.rate)).sum(-1) / 2.0
+        if state.place is None:
+            return energy
+        return energy + (state.place * self._pull(state.place)).sum(-1) / 2.0
+
+    def _pull(self, place: Any) -> Any:
+        """K_e x."""
+        assert self.stiffness is not None  # there is no place without it
+        return times(self.stiffness.matrix(self._robot.backend.side(place), place), place)
+
+    def _place(self, side: Any, q: Any, target: Any) -> tuple[Any, Any]:
+        """x and E of the chosen rows; None where nothing is stiff."""
+        if self.stiffness is None:
+            return None, None
+        if target.pose is None:
+            raise ValueError(
+                f"frame {self.frame!r} is stiff, but target has no pose; give Target(pose=...), (..., 4, 4), "
+                "such as robot.kinematics.pose(q, frame) of where it shall be"
+            )
+        xp = side.xp
+        wanted = side.weights("target.pose", target.pose, q)
+        if tuple(wanted.shape[-2:]) != (4, 4):
+            raise ValueError(f"target.pose has shape {tuple(wanted.shape)}; its last axes must be 4, 4")
+        point = side.constant(self.point, q)
+        pose = self._robot.kinematics.pose(q, self.frame)
+        places = [times(m[..., :3, :3], point) + m[..., :3, 3] for m in (pose, wanted)]
+        moved = places[0] - places[1]
+        if max(self.rows) < 3 or min(self.rows) < 3:
+            theta = rotation_vector(pose[..., :3, :3], wanted[..., :3, :3])
+        else:
+            theta = 0.0 * moved
+        rows = side.index(np.array(self.rows, np.intp), q)
+        whole = xp.zeros_like(theta[..., :, None] * theta[..., None, :])
+        ones = whole + side.constant(np.eye(3), q)
+        upper = xp.concat([rates_of_turning(theta), whole], -1)
+        turning = xp.concat([upper, xp.concat([whole, ones], -1)], -2)
+        return xp.concat([theta, moved], -1)[..., rows], turning[..., rows, :][..., rows]
+
+    def _part(self, name: str, given: Any, definite: bool) -> FramePart:
+        if hasattr(given, "scale") and hasattr(given, "plus"):
+            if isinstance(given.scale, bool) or not isinstance(given.scale, int | float) or given.scale < 0.0:
+                raise ValueError(f"{name}.scale is {given.scale!r}; give a number, 0 or above")
+            if given.plus is None:
+                return FramePart(float(given.scale), None)
+            gain = Gain(f"{name}.plus", given.plus, self.names)
+            check_positive(gain, False, symmetric=definite)
+            return FramePart(float(given.scale), gain)
+        gain = Gain(name, given, self.names)
+        check_positive(gain, definite, symmetric=definite)
+        return FramePart(0.0, gain)
+
+
+def _chosen(rows: Any) -> tuple[int, ...]:
+    """Numbers of rows; raises ValueError for one that is not there, or there twice."""
+    unknown = [row for row in rows if row not in ROWS]
+    if unknown or len(set(rows)) < len(rows) or not len(rows):
+        raise ValueError(f"frame.rows is {rows!r}; choose some of {', '.join(ROWS)}, each once")
+    return tuple(ROWS.index(row) for row in rows)

@@ -1,0 +1,64 @@
+"""How far a frame is turned from another: the rotation vector, and how it changes with angular velocity."""
+
+import math
+from typing import Any
+
+from ..sums.namespace import hidden, namespace
+
+SMALL = 1e-2
+"""Radians below which series serve: their errors are some 1e-17."""
+HALF_TURN = math.pi - 1e-6
+
+
+def rotation_vector(turn: Any, wanted: Any) -> Any:
+    """theta (..., 3), in rad, with turn = exp([theta]) wanted, of matrices (..., 3, 3).
+
+    Raises ValueError at half a turn, which has no direction.
+    """
+    xp = namespace(turn)
+    relative = turn @ xp.swapaxes(wanted, -1, -2)
+    twice = xp.stack(
+        [relative[..., c, b] - relative[..., b, c] for b, c in ((1, 2), (2, 0), (0, 1))], -1
+    )  # 2 sin(theta) along the axis
+    cosine = (relative[..., 0, 0] + relative[..., 1, 1] + relative[..., 2, 2] - 1.0) / 2.0
+    square = (twice * twice).sum(-1) / 4.0
+    near = (square < SMALL * SMALL) & (cosine > 0.0)
+    sine = xp.where(near, xp.ones_like(square), square) ** 0.5
+    angle = xp.arctan2(sine, cosine)
+    if not hidden(turn) and bool((~near & (angle > HALF_TURN)).any()):
+        raise ValueError(
+            "the frame is half a turn from its target, which has no direction; take steps between"
+        )
+    # arcsin(s) / s, and theta / sin(theta)
+    series = 1.0 + square * (
+        1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0 + square * 35.0 / 1152.0))
+    )
+    return xp.where(near, series, angle / sine)[..., None] * twice / 2.0
+
+
+def rates_of_turning(theta: Any) -> Any:
+    """E (..., 3, 3) of d(theta)/dt = E w, w being the angular velocity in the same axes.
+
+    E = 1 - [theta]/2 + c [theta]^2 with c = (1 - t/2 cot(t/2)) / t^2, t the angle: the inverse of the left
+    Jacobian of rotations.
+    """
+    xp = namespace(theta)
+    square = (theta * theta).sum(-1)
+    near = square < SMALL * SMALL
+    t = xp.where(near, xp.ones_like(square), square) ** 0.5
+    c = xp.where(
+        near,
+        1.0 / 12.0 + square * (1.0 / 720.0 + square / 30240.0),
+        (1.0 - t / (2.0 * xp.tan(t / 2.0))) / (t * t),
+    )
+    x, y, z = theta[..., 0], theta[..., 1], theta[..., 2]
+    none = xp.zeros_like(x)
+    cross = xp.stack([xp.stack(row, -1) for row in ((none, -z, y), (z, none, -x), (-y, x, none))], -2)
+    product = cross @ cross
+    ones = xp.zeros_like(cross) + xp.eye(3, dtype=theta.dtype, **_on(theta))
+    return ones - cross / 2.0 + c[..., None, None] * product
+
+
+def _on(values: Any) -> dict[str, Any]:
+    device = getattr(values, "device", None)
+    return {} if device is None or isinstance(device, str) else {"device": device}
