@@ -6,6 +6,7 @@ target, which shows the stored energy; and led along a moving target.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,7 @@ class JointSpace:
     """An impedance of all joints: x = q - start."""
 
     package: Any
+    robot: Any
     controller: Any
     wanted: Impedance
     start: Any
@@ -70,11 +72,11 @@ class JointSpace:
         return q - self.start
 
     def target(self, x: Any, xd: Any, xdd: Any) -> Any:
-        """Of the controller, at x (copies, m)."""
+        """Of the controller, at x (..., m)."""
         return self.package.Target(self.start + x, xd, xdd)
 
     def external(self, q: Any, force: Any) -> Any:
-        """What forces (copies, m) put on the joints."""
+        """What a force (m,) at one position puts on the joints."""
         return force
 
     def push(self, force: Callable[[float], Any]) -> dict[str, Callable[[float], Any]]:
@@ -96,7 +98,7 @@ class HandSpace:
     unit: str = "mm"
     sensed: bool = True
 
-    @property
+    @cached_property
     def pose(self) -> Any:
         return self.robot.kinematics.pose(self.start, self.pushed)
 
@@ -104,15 +106,15 @@ class HandSpace:
         return self.robot.kinematics.pose(q, self.pushed)[..., :3, 3] - self.pose[:3, 3]
 
     def target(self, x: Any, xd: Any, xdd: Any) -> Any:
-        pose = np.tile(self.pose, (len(x), 1, 1))
-        pose[:, :3, 3] += x
+        pose = np.broadcast_to(self.pose, (*x.shape[:-1], 4, 4)).copy()
+        pose[..., :3, 3] += x
         still = np.zeros_like(x)
-        velocity, acceleration = np.hstack([still, xd]), np.hstack([still, xdd])
-        q = np.tile(self.start, (len(x), 1))
+        velocity, acceleration = (np.concatenate([still, a], -1) for a in (xd, xdd))
+        q = np.broadcast_to(self.start, (*x.shape[:-1], len(self.start)))
         return self.package.Target(q, pose=pose, velocity=velocity, acceleration=acceleration)
 
     def external(self, q: Any, force: Any) -> Any:
-        return -self.robot.kinematics.load_torque(q, self.pushed, force)
+        return force @ self.robot.kinematics.jacobian(q, self.pushed)[3:]
 
     def push(self, force: Callable[[float], Any]) -> dict[str, Callable[[float], Any]]:
         return {"body": lambda t: np.hstack([np.zeros_like(force(t)), force(t)])}
@@ -165,46 +167,50 @@ def run(space: Any, copies: Sequence[Copy], model: Callable[[float], Any], secon
 
     model: MuJoCo's, heavier by a share
     """
-    m, loops, controller = len(space.wanted.inertia), [copy.loop for copy in copies], space.controller
+    m, loops = len(space.wanted.inertia), [copy.loop for copy in copies]
     late, differences = np.array([(loop.late, loop.differences) for loop in loops]).T[..., None]
-    lead = np.array([PERIOD * (0.5 + loop.late) if loop.ahead else 0.0 for loop in loops])[:, None]
     plant = MujocoPlant([model(loop.heavier) for loop in loops], space.pushed)
     plant.start([space.away if copy.course.released else space.start for copy in copies])
 
     def forces(t: float) -> Any:
         return np.array([copy.course.pushed(t, m) for copy in copies])
 
-    def asked(times: Any, q: Any, qd: Any, force: Any) -> tuple[Any, ...]:
-        moved = [copy.course.moved(t, m) for copy, t in zip(copies, times, strict=True)]
-        target = space.target(*map(np.array, zip(*moved, strict=True)))
-        return q, qd, target, space.external(q, force) if space.sensed else None
-
     def law(t: float, q: Any, qd: Any) -> Any:
-        return controller(*asked([t] * len(copies), q, qd, forces(t)))
-
-    def law_ahead(t: float, q: Any, qd: Any) -> Any:
-        force, before = forces(t), forces(t - PERIOD)
-        qdd = controller.acceleration(*asked([t] * len(copies), q, qd, force))
-        expected = (
-            q + lead * qd + lead**2 / 2 * qdd,
-            qd + lead * qdd,
-            force + lead / PERIOD * (force - before),
-        )
-        return controller(*asked(t + lead[:, 0], *expected))
+        # one by one, as samples of their own are what C answers
+        return np.array([_torque(space, *each, t) for each in zip(copies, q, qd, strict=True)])
 
     push, times, states = space.push(forces), PERIOD * np.arange(round(seconds / PERIOD)), []
-    held_law, last, waiting = law_ahead if lead.any() else law, plant.q, None
+    last, waiting = plant.q, None
     for t in times:
         q, qd = plant.q, plant.qd
         states.append((q, qd))
         if not loops[0].held:
             plant.follow(law, PERIOD, **push)
             continue
-        tau = held_law(t, q, np.where(differences, (q - last) / PERIOD, qd))
+        tau = law(t, q, np.where(differences, (q - last) / PERIOD, qd))
         plant.hold(tau if waiting is None else np.where(late, waiting, tau), PERIOD, **push)
         waiting, last = tau, q
     q, qd = (np.stack(column, 1) for column in zip(*states, strict=True))
     return [_record(space, copy.course, times, *state) for copy, *state in zip(copies, q, qd, strict=True)]
+
+
+def _torque(space: Any, copy: Copy, q: Any, qd: Any, t: float) -> Any:
+    """Of one copy (joints,), for what is measured at t, or what that lets expect of a time ahead."""
+    course, m = copy.course, len(space.wanted.inertia)
+    force = course.pushed(t, m)
+
+    def asked(t: float, q: Any, qd: Any, force: Any) -> Any:
+        external = space.external(q, force) if space.sensed else None
+        return space.controller(q, qd, space.target(*course.moved(t, m)), external)
+
+    tau = asked(t, q, qd, force)
+    if not copy.loop.ahead:
+        return tau
+    ahead = PERIOD * (0.5 + copy.loop.late)
+    qdd = space.robot.forward_dynamics(q, qd, tau + space.external(q, force), passive=True)
+    trend = (force - course.pushed(t - PERIOD, m)) / PERIOD
+    expected = q + ahead * qd + ahead**2 / 2 * qdd, qd + ahead * qdd, force + ahead * trend
+    return asked(t + ahead, *expected)
 
 
 def _record(space: Any, course: Course, times: Any, q: Any, qd: Any) -> Record:

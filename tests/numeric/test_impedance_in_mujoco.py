@@ -123,21 +123,29 @@ def expected_change(space: Any, loop: Loop) -> Impedance:
 
 
 def test_what_a_rate_does_to_an_impedance(package_of: Callable[[str], ModuleType]) -> None:
-    asked, loops = planar3_joints(package_of("planar3")), [loop for loop in LOOPS if loop.held]
-    outcomes = {o.loop: o for o in studied(asked, loops, planar3_of, 1e-4, np.full(3, 0.5), 1.0)}
-    for loop, outcome in outcomes.items():
+    asked = planar3_joints(package_of("planar3"))
+    # heavier ones would still sink to where they settle
+    loops = [loop for loop in LOOPS if loop.held and not loop.heavier]
+    for loop, found in zip(loops, of_pushes(asked, planar3_of, loops, 1e-4, 1.0), strict=True):
         if loop.ahead:
-            assert max(outcome.error) < (5e-3 if loop.late else 1e-3), loop.name
-        elif not loop.heavier:  # heavier ones are still sinking to where they settle
+            assert max(errors(found, asked.wanted)) < (5e-3 if loop.late else 1e-3), loop.name
+        else:
             said = Impedance(*map(np.add, asked.wanted, expected_change(asked, loop)))
             most = max(errors(said, asked.wanted))
             assert 0.005 < most < 0.06
-            assert max(errors(outcome.found, said)) < most / 5 + 1e-3, loop.name
-        # What is stored falls under all of them; with wrong weights to where the arm settles.
-        assert outcome.rise < (1e-3 if loop.heavier else 1e-6), loop.name
+            assert max(errors(found, said)) < most / 5 + 1e-3, loop.name
+
+
+def test_what_holds_at_a_rate(package_of: Callable[[str], ModuleType]) -> None:
+    asked, together = planar3_joints(package_of("planar3")), LOOPS[-1]
+    outcomes = studied(asked, [HELD, AHEAD, together], planar3_of, 1e-4, np.full(3, 0.5), 0.5)
+    held, ahead, worst = outcomes
+    # What is stored falls under all of them, with wrong weights to where the arm settles.
+    assert max(held.rise, ahead.rise) < 1e-6
+    assert worst.rise < 1e-3
     # The target, which accelerates at up to 10 rad/s^2, is followed as it was half a step before.
-    assert outcomes[AHEAD].tracking < outcomes[HELD].tracking / 50
-    assert table(list(outcomes.values()), asked.unit).count("\n") == len(outcomes) + 1
+    assert ahead.tracking < held.tracking / 50 < worst.tracking / 500
+    assert table(outcomes, asked.unit).count("\n") == len(outcomes) + 1
 
 
 @pytest.mark.parametrize(("lighter", "late"), [(0.5, False), (0.1, True)])
