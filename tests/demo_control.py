@@ -2,7 +2,7 @@
 
     python tests/demo_control.py [--out out/control] [--sticks]
 
-Writes panda-pushed.png. Torques are held over 1 ms, and no force is measured, as inertia stays natural.
+Writes control-panda.png. Torques are held over 1 ms, and no force is measured, as inertia stays natural.
 Where MuJoCo cannot render, or with --sticks, the arm is drawn in lines.
 """
 
@@ -295,8 +295,8 @@ def main() -> None:
         settled = 1e3 * run.hand[round(STOP / PERIOD) - 1, 1]
         print(f"{run.title}: {settled:.1f} mm along the push at its end")
     chosen.out.mkdir(parents=True, exist_ok=True)
-    (chosen.out / "panda-pushed.png").write_bytes(png)
-    print(f"drawn into {chosen.out / 'panda-pushed.png'}")
+    (chosen.out / "control-panda.png").write_bytes(png)
+    print(f"drawn into {chosen.out / 'control-panda.png'}")
 
 
 if __name__ == "__main__":
