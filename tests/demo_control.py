@@ -2,13 +2,14 @@
 
     python tests/demo_control.py [--out out/control] [--sticks]
 
-Writes panda-pushed.png. Torques are held over 1 ms, and no force is measured, as inertia stays natural.
+Writes control-panda.png. Torques are held over 1 ms, and no force is measured, as inertia stays natural.
 Where MuJoCo cannot render, or with --sticks, the arm is drawn in lines.
 """
 
 import argparse
 import importlib
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -82,7 +83,7 @@ def pushed(package: Any, model: Any, start: Any) -> list[Pushed]:
     """The three runs."""
     from numeric.mujoco_plant import MujocoPlant
 
-    robot = package.load("numpy")
+    robot = package.load("native" if shutil.which("gcc") else "numpy")
     home, runs = robot.kinematics.pose(start, HAND)[:3, 3], []
     for title, (stiffness, torque) in zip(ROWS, controllers(package, robot, start), strict=True):
         plant, states = MujocoPlant([model], HAND), []
@@ -283,7 +284,7 @@ def main() -> None:
 
     with tempfile.TemporaryDirectory() as folder:
         system = read_system(PANDA, Options(lock=LOCKED_FINGERS))
-        write_package(generate(system, ["numpy"]), Path(folder) / "panda")
+        write_package(generate(system), Path(folder) / "panda")
         package = import_package(Path(folder) / "panda")
         runs = pushed(package, panda_model(PANDA), PANDA_AT_WORK)
         photographs = None if chosen.sticks else photographed(runs, Path(folder))
@@ -294,8 +295,8 @@ def main() -> None:
         settled = 1e3 * run.hand[round(STOP / PERIOD) - 1, 1]
         print(f"{run.title}: {settled:.1f} mm along the push at its end")
     chosen.out.mkdir(parents=True, exist_ok=True)
-    (chosen.out / "panda-pushed.png").write_bytes(png)
-    print(f"drawn into {chosen.out / 'panda-pushed.png'}")
+    (chosen.out / "control-panda.png").write_bytes(png)
+    print(f"drawn into {chosen.out / 'control-panda.png'}")
 
 
 if __name__ == "__main__":

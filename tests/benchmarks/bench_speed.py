@@ -18,7 +18,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from linkwise.version import VERSION
-from speed import casadi_peer, emitted, pinocchio_peer, python_calls
+from speed import casadi_peer, control_steps, emitted, pinocchio_peer, python_calls
 from speed.cases import CASES, Case
 from speed.limits import Mix, limits, mix
 from speed.package import Package, compiler, prepare, run
@@ -37,6 +37,8 @@ def measure(case: Case, work: Path, quick: bool, results: Results) -> None:
     results.packages.append(facts(package))
     say(case.name, "C, beside Pinocchio and CasADi")
     beside_peers(case, package, work, (largest, seconds, 30.0 if quick else 300.0), results)
+    if case.control:
+        results.figures += control_steps.measure(package, work)
     say(case.name, "Python")
     figures, peers = python_calls.measure(package, largest, seconds, case.every_backend)
     results.figures += figures

@@ -2,19 +2,12 @@
 
 Robots that MuJoCo moves are pushed by known forces, to which an impedance is fitted; let go beside their
 target, which shows the stored energy; and led along a moving target.
-
-    python tests/numeric/finite_rate.py [--out out/control]     writes the tables of docs/control.md
 """
 
-import argparse
-import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from functools import cached_property
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
@@ -25,8 +18,6 @@ PERIOD = 1e-3
 """s, of the controller's step."""
 SWING = 1.0
 """s, in which a moving target goes to and fro."""
-SECONDS = 2.0
-"""s, of the record that an impedance is fitted to in the tables."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +56,7 @@ class JointSpace:
     """An impedance of all joints: x = q - start."""
 
     package: Any
+    robot: Any
     controller: Any
     wanted: Impedance
     start: Any
@@ -80,11 +72,11 @@ class JointSpace:
         return q - self.start
 
     def target(self, x: Any, xd: Any, xdd: Any) -> Any:
-        """Of the controller, at x (copies, m)."""
+        """Of the controller, at x (..., m)."""
         return self.package.Target(self.start + x, xd, xdd)
 
     def external(self, q: Any, force: Any) -> Any:
-        """What forces (copies, m) put on the joints."""
+        """What a force (m,) at one position puts on the joints."""
         return force
 
     def push(self, force: Callable[[float], Any]) -> dict[str, Callable[[float], Any]]:
@@ -106,7 +98,7 @@ class HandSpace:
     unit: str = "mm"
     sensed: bool = True
 
-    @property
+    @cached_property
     def pose(self) -> Any:
         return self.robot.kinematics.pose(self.start, self.pushed)
 
@@ -114,15 +106,15 @@ class HandSpace:
         return self.robot.kinematics.pose(q, self.pushed)[..., :3, 3] - self.pose[:3, 3]
 
     def target(self, x: Any, xd: Any, xdd: Any) -> Any:
-        pose = np.tile(self.pose, (len(x), 1, 1))
-        pose[:, :3, 3] += x
+        pose = np.broadcast_to(self.pose, (*x.shape[:-1], 4, 4)).copy()
+        pose[..., :3, 3] += x
         still = np.zeros_like(x)
-        velocity, acceleration = np.hstack([still, xd]), np.hstack([still, xdd])
-        q = np.tile(self.start, (len(x), 1))
+        velocity, acceleration = (np.concatenate([still, a], -1) for a in (xd, xdd))
+        q = np.broadcast_to(self.start, (*x.shape[:-1], len(self.start)))
         return self.package.Target(q, pose=pose, velocity=velocity, acceleration=acceleration)
 
     def external(self, q: Any, force: Any) -> Any:
-        return -self.robot.kinematics.load_torque(q, self.pushed, force)
+        return force @ self.robot.kinematics.jacobian(q, self.pushed)[3:]
 
     def push(self, force: Callable[[float], Any]) -> dict[str, Callable[[float], Any]]:
         return {"body": lambda t: np.hstack([np.zeros_like(force(t)), force(t)])}
@@ -175,46 +167,50 @@ def run(space: Any, copies: Sequence[Copy], model: Callable[[float], Any], secon
 
     model: MuJoCo's, heavier by a share
     """
-    m, loops, controller = len(space.wanted.inertia), [copy.loop for copy in copies], space.controller
+    m, loops = len(space.wanted.inertia), [copy.loop for copy in copies]
     late, differences = np.array([(loop.late, loop.differences) for loop in loops]).T[..., None]
-    lead = np.array([PERIOD * (0.5 + loop.late) if loop.ahead else 0.0 for loop in loops])[:, None]
     plant = MujocoPlant([model(loop.heavier) for loop in loops], space.pushed)
     plant.start([space.away if copy.course.released else space.start for copy in copies])
 
     def forces(t: float) -> Any:
         return np.array([copy.course.pushed(t, m) for copy in copies])
 
-    def asked(times: Any, q: Any, qd: Any, force: Any) -> tuple[Any, ...]:
-        moved = [copy.course.moved(t, m) for copy, t in zip(copies, times, strict=True)]
-        target = space.target(*map(np.array, zip(*moved, strict=True)))
-        return q, qd, target, space.external(q, force) if space.sensed else None
-
     def law(t: float, q: Any, qd: Any) -> Any:
-        return controller(*asked([t] * len(copies), q, qd, forces(t)))
-
-    def law_ahead(t: float, q: Any, qd: Any) -> Any:
-        force, before = forces(t), forces(t - PERIOD)
-        qdd = controller.acceleration(*asked([t] * len(copies), q, qd, force))
-        expected = (
-            q + lead * qd + lead**2 / 2 * qdd,
-            qd + lead * qdd,
-            force + lead / PERIOD * (force - before),
-        )
-        return controller(*asked(t + lead[:, 0], *expected))
+        # one by one, as samples of their own are what C answers
+        return np.array([_torque(space, *each, t) for each in zip(copies, q, qd, strict=True)])
 
     push, times, states = space.push(forces), PERIOD * np.arange(round(seconds / PERIOD)), []
-    held_law, last, waiting = law_ahead if lead.any() else law, plant.q, None
+    last, waiting = plant.q, None
     for t in times:
         q, qd = plant.q, plant.qd
         states.append((q, qd))
         if not loops[0].held:
             plant.follow(law, PERIOD, **push)
             continue
-        tau = held_law(t, q, np.where(differences, (q - last) / PERIOD, qd))
+        tau = law(t, q, np.where(differences, (q - last) / PERIOD, qd))
         plant.hold(tau if waiting is None else np.where(late, waiting, tau), PERIOD, **push)
         waiting, last = tau, q
     q, qd = (np.stack(column, 1) for column in zip(*states, strict=True))
     return [_record(space, copy.course, times, *state) for copy, *state in zip(copies, q, qd, strict=True)]
+
+
+def _torque(space: Any, copy: Copy, q: Any, qd: Any, t: float) -> Any:
+    """Of one copy (joints,), for what is measured at t, or what that lets expect of a time ahead."""
+    course, m = copy.course, len(space.wanted.inertia)
+    force = course.pushed(t, m)
+
+    def asked(t: float, q: Any, qd: Any, force: Any) -> Any:
+        external = space.external(q, force) if space.sensed else None
+        return space.controller(q, qd, space.target(*course.moved(t, m)), external)
+
+    tau = asked(t, q, qd, force)
+    if not copy.loop.ahead:
+        return tau
+    ahead = PERIOD * (0.5 + copy.loop.late)
+    qdd = space.robot.forward_dynamics(q, qd, tau + space.external(q, force), passive=True)
+    trend = (force - course.pushed(t - PERIOD, m)) / PERIOD
+    expected = q + ahead * qd + ahead**2 / 2 * qdd, qd + ahead * qdd, force + ahead * trend
+    return asked(t + ahead, *expected)
 
 
 def _record(space: Any, course: Course, times: Any, q: Any, qd: Any) -> Record:
@@ -272,74 +268,3 @@ def studied(
         found = measured(pushed, seconds)
         outcomes.append(Outcome(loop, found, errors(found, space.wanted), float(rise), float(away)))
     return outcomes
-
-
-def table(outcomes: Sequence[Outcome], unit: str) -> str:
-    """Markdown."""
-    lines = [
-        f"| loop | inertia | damping | stiffness | stored energy rises by | target missed by, {unit} |",
-        "|---|---|---|---|---|---|",
-    ]
-    for row in outcomes:
-        error = " | ".join(percent(e) for e in row.error)
-        rise = percent(row.rise)
-        lines.append(f"| {row.loop.name} | {error} | {rise} | {1e3 * row.tracking:.2g} |")
-    return "\n".join(lines)
-
-
-def percent(share: float) -> str:
-    """To two digits, and no more than two behind the point."""
-    return f"{round(float(f'{100.0 * share:.2g}'), 2):g} %" if share >= 1e-4 else "< 0.01 %"
-
-
-def main() -> None:
-    """Write finite-rate.md into the folder that --out names."""
-    from conftest import LOCKED_FINGERS, PANDA
-    from linkwise import Options, generate, read_system, write_package
-    from linkwise.package.load import import_package
-
-    from numeric.measured_spaces import panda_hand, planar3_joints
-    from numeric.mujoco_plant import heavier, panda_model, planar3_model
-
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("out/control"))
-    out = parser.parse_args().out
-    arm, panda = read_system("planar3"), read_system(PANDA, Options(lock=LOCKED_FINGERS))
-    with tempfile.TemporaryDirectory() as folder:
-        packages = []
-        for system in (arm, panda):
-            write_package(generate(system), Path(folder) / system.name)
-            packages.append(import_package(Path(folder) / system.name))
-        spaces = {
-            "planar3, its joints": (
-                planar3_joints(packages[0]),
-                lambda by: heavier(planar3_model(), np.full(3, 1.0 + by)),
-                1e-4,
-                np.full(3, 0.5),
-            ),
-            "Panda, its hand": (
-                panda_hand(packages[1]),
-                lambda by: heavier(panda_model(PANDA), np.full(7, 1.0 + by)),
-                5e-4,
-                np.full(3, 0.1),
-            ),
-        }
-        parts = []
-        for title, asked in spaces.items():
-            space, model, motion, swing = asked
-            outcomes = [
-                outcome
-                for held in (False, True)
-                for outcome in studied(
-                    space, [loop for loop in LOOPS if loop.held == held], model, motion, swing, SECONDS
-                )
-            ]
-            parts.append(f"{title}\n\n{table(outcomes, space.unit)}\n")
-            print(parts[-1], flush=True)
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "finite-rate.md").write_text("\n".join(parts), encoding="utf-8")
-    print(f"written to {out / 'finite-rate.md'}")
-
-
-if __name__ == "__main__":
-    main()

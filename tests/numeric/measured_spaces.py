@@ -26,7 +26,7 @@ def planar3_joints(package: Any) -> JointSpace:
     """Inertia stays, wherever the arm goes, what it is where the arm starts."""
     robot, start = package.load("native"), np.array([-1.0, 0.8, 0.6])
     wanted = spring_and_damper(robot.mass_matrix(start))
-    return JointSpace(package, robot.partial_impedance(*wanted), wanted, start, start + 0.4)
+    return JointSpace(package, robot, robot.partial_impedance(*wanted), wanted, start, start + 0.4)
 
 
 def panda_joints(package: Any) -> JointSpace:
@@ -37,7 +37,9 @@ def panda_joints(package: Any) -> JointSpace:
     controller = robot.partial_impedance(
         package.Natural(), package.Natural(plus=wanted.damping), wanted.stiffness
     )
-    return JointSpace(package, controller, wanted._replace(inertia=natural), start, start + 0.1, sensed=False)
+    return JointSpace(
+        package, robot, controller, wanted._replace(inertia=natural), start, start + 0.1, sensed=False
+    )
 
 
 def panda_hand(package: Any) -> HandSpace:

@@ -21,18 +21,18 @@ Push = Callable[[float], Any]
 Law = Callable[[float, Any, Any], Any]
 
 
-def table_2_arm() -> str:
-    """The arm of the paper's Table 2 as MJCF."""
+def table_2_arm(links: int = 3) -> str:
+    """The first links of the arm of the paper's Table 2 as MJCF."""
     inner = ""
-    for number, at in ((3, 0.25), (2, 0.25), (1, 0.0)):
-        inner = LINK.format(number=number, at=at, inner=inner)
+    for number in range(links, 0, -1):
+        inner = LINK.format(number=number, at=0.25 if number > 1 else 0.0, inner=inner)
     return f"""<mujoco><option gravity="0 -9.80665 0"/><compiler balanceinertia="false"/>
     <worldbody>{inner}</worldbody></mujoco>"""
 
 
-def planar3_model() -> Any:
-    """MuJoCo's model of the arm of Table 2."""
-    return _free(mujoco.MjSpec.from_string(table_2_arm()).compile())
+def planar_model(links: int = 3) -> Any:
+    """MuJoCo's model of these links."""
+    return _free(mujoco.MjSpec.from_string(table_2_arm(links)).compile())
 
 
 def panda_spec(urdf: Path) -> Any:

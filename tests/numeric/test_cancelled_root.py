@@ -62,11 +62,11 @@ def test_the_motor_answers_link_3_and_nothing_else(runs: tuple[Run, Run]) -> Non
 
 def test_at_1_khz_in_mujoco_the_root_all_but_rests(robot: Any) -> None:
     pytest.importorskip("mujoco")
-    from numeric.mujoco_plant import MujocoPlant, planar3_model
+    from numeric.mujoco_plant import MujocoPlant, planar_model
 
     controller, kept, period = robot.cancel(CANCELLED), np.ones((3, 3, 3)), 1e-3
     kept[0, 2] = 0.0
-    plant, turned = MujocoPlant([planar3_model()]), []
+    plant, turned = MujocoPlant([planar_model()]), []
     plant.start(START)
     for k in range(round(LINK_2_MOVES / period)):
         q, qd = plant.q[0], plant.qd[0]

@@ -12,16 +12,16 @@ pytest.importorskip("mujoco")
 
 import mujoco
 
-from numeric.finite_rate import AHEAD, HELD, LOOPS, Copy, Course, Loop, measured, run, studied, table
+from numeric.finite_rate import AHEAD, HELD, LOOPS, Copy, Course, Loop, measured, run, studied
+from numeric.finite_rate_tables import panda_of, planar3_of, table
 from numeric.impedance_fit import WAVES, Impedance, errors, sines_for
 from numeric.measured_spaces import natural_hand, panda_hand, panda_joints, planar3_joints
 from numeric.mujoco_plant import (
     PANDA_AT_WORK,
     STEP,
     MujocoPlant,
-    heavier,
     panda_model,
-    planar3_model,
+    planar_model,
 )
 
 pytestmark = needs_compiler
@@ -29,14 +29,6 @@ needs_panda = pytest.mark.skipif(not PANDA.is_file(), reason="needs the package 
 ENOUGH = 0.02
 """What a measured impedance may differ by from what was asked for."""
 DT = 1e-3
-
-
-def planar3_of(heavier_by: float) -> Any:
-    return heavier(planar3_model(), np.full(3, 1.0 + heavier_by))
-
-
-def panda_of(heavier_by: float) -> Any:
-    return heavier(panda_model(PANDA), np.full(7, 1.0 + heavier_by))
 
 
 @needs_panda
@@ -131,18 +123,52 @@ def expected_change(space: Any, loop: Loop) -> Impedance:
 
 
 def test_what_a_rate_does_to_an_impedance(package_of: Callable[[str], ModuleType]) -> None:
-    asked, loops = planar3_joints(package_of("planar3")), [loop for loop in LOOPS if loop.held]
-    outcomes = {o.loop: o for o in studied(asked, loops, planar3_of, 1e-4, np.full(3, 0.5), 1.0)}
-    for loop, outcome in outcomes.items():
+    asked = planar3_joints(package_of("planar3"))
+    # heavier ones would still sink to where they settle
+    loops = [loop for loop in LOOPS if loop.held and not loop.heavier]
+    for loop, found in zip(loops, of_pushes(asked, planar3_of, loops, 1e-4, 1.0), strict=True):
         if loop.ahead:
-            assert max(outcome.error) < (5e-3 if loop.late else 1e-3), loop.name
-        elif not loop.heavier:  # heavier ones are still sinking to where they settle
+            assert max(errors(found, asked.wanted)) < (5e-3 if loop.late else 1e-3), loop.name
+        else:
             said = Impedance(*map(np.add, asked.wanted, expected_change(asked, loop)))
             most = max(errors(said, asked.wanted))
             assert 0.005 < most < 0.06
-            assert max(errors(outcome.found, said)) < most / 5 + 1e-3, loop.name
-        # What is stored falls under all of them; with wrong weights to where the arm settles.
-        assert outcome.rise < (1e-3 if loop.heavier else 1e-6), loop.name
+            assert max(errors(found, said)) < most / 5 + 1e-3, loop.name
+
+
+def test_what_holds_at_a_rate(package_of: Callable[[str], ModuleType]) -> None:
+    asked, together = planar3_joints(package_of("planar3")), LOOPS[-1]
+    outcomes = studied(asked, [HELD, AHEAD, together], planar3_of, 1e-4, np.full(3, 0.5), 0.5)
+    held, ahead, worst = outcomes
+    # What is stored falls under all of them, with wrong weights to where the arm settles.
+    assert max(held.rise, ahead.rise) < 1e-6
+    assert worst.rise < 1e-3
     # The target, which accelerates at up to 10 rad/s^2, is followed as it was half a step before.
-    assert outcomes[AHEAD].tracking < outcomes[HELD].tracking / 50
-    assert table(list(outcomes.values()), asked.unit).count("\n") == len(outcomes) + 1
+    assert ahead.tracking < held.tracking / 50 < worst.tracking / 500
+    assert table(outcomes, asked.unit).count("\n") == len(outcomes) + 1
+
+
+@pytest.mark.parametrize(("lighter", "late"), [(0.5, False), (0.1, True)])
+def test_contact_with_a_lighter_arm_is_stable_up_to_a_stiffness(
+    lighter: float, late: bool, package_of: Callable[[str], ModuleType]
+) -> None:
+    """Contact feeds d (1 - M*/M) k as negative damping, d being the time that torques are late by."""
+    package = package_of("planar1")
+    robot, start = package.load("numpy"), np.array([-1.0])
+    natural = float(robot.mass_matrix(start)[0, 0])
+    inertia, damping, stiffness = (lighter * natural * a for a in (1.0, 14.0, 100.0))
+    controller = robot.partial_impedance(inertia, damping, stiffness)
+    limit = damping / ((0.5 + late) * DT * (1.0 - lighter))
+    for share in (0.8, 1.25):
+        model = planar_model(1)
+        model.jnt_stiffness[0], model.qpos_spring[0] = share * limit, start[0]
+        plant, waiting, away = MujocoPlant([model]), None, []
+        plant.start(start + 1e-3)
+        for _ in range(2000):
+            q, qd = plant.q[0], plant.qd[0]
+            tau = controller(q, qd, start, -share * limit * (q - start))[None]
+            plant.hold(waiting if late and waiting is not None else tau, DT)
+            away.append(abs(q[0] - start[0]))
+            waiting = tau
+        grows = max(away[-300:]) > max(away[:300])
+        assert grows == (share > 1.0), (share, limit)

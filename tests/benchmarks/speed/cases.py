@@ -21,6 +21,8 @@ class Case:
     peers: bool = True
     every_backend: bool = False
     """Time the slow back ends at the largest batch, too."""
+    control: bool = False
+    """Time control steps, of robots whose last frame can move along all six axes."""
 
 
 def shipped(name: str) -> Callable[[Path], str]:
@@ -75,7 +77,7 @@ FINGERS = ("--lock", "panda_finger_joint1=0", "--lock", "panda_finger_joint2=0")
 
 CASES = (
     Case("planar3", built_in("planar3"), every_backend=True),
-    Case("panda", shipped("panda.urdf"), FINGERS, every_backend=True),
+    Case("panda", shipped("panda.urdf"), FINGERS, every_backend=True, control=True),
     Case("panda_loops", shipped("panda.urdf"), FINGERS, kernel="loops", peers=False),
     Case("puma560", built_in("puma560")),
     Case("planar10", built_in("planar10")),

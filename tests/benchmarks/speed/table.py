@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from speed.control_steps import CONTROL
 from speed.emitted import TYPES, Figure
 from speed.results import Results
 from speed.targets import Target, targets
@@ -19,6 +20,8 @@ def markdown(results: Results) -> str:
             emitted(results),
         ),
         limits_text(results),
+        "## Control steps of the emitted C, nanoseconds",
+        table(["robot", "step", "ns"], control_steps(results)),
         "## Calls from Python, nanoseconds a sample",
         table(["robot", "back end", "call", "type", "threads", *BATCHES], backends(results)),
         "## Peers, float64, one thread, nanoseconds a sample",
@@ -127,6 +130,13 @@ def emitted(results: Results) -> Iterator[list[str]]:
 def share(least: float | None, ns: float) -> str:
     """What part of a time is needed at least."""
     return f"{least / ns:.0%}" if least else "-"
+
+
+def control_steps(results: Results) -> Iterator[list[str]]:
+    """One row a robot and a kind of step."""
+    for f in results.figures:
+        if f.call.startswith(CONTROL):
+            yield [f.robot, f.call.removeprefix(CONTROL), number(f.ns)]
 
 
 def backends(results: Results) -> Iterator[list[str]]:

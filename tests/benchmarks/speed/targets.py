@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from speed.control_steps import CONTROL
 from speed.results import Results
 
 
@@ -26,6 +27,7 @@ class Target:
 def targets(results: Results) -> Iterator[Target]:
     """All of them; those of robots that were not timed have no value."""
     yield from in_c(results)
+    yield from control(results)
     yield from operations(results)
     yield from large_batches(results)
     yield from from_python(results)
@@ -51,6 +53,16 @@ def in_c(results: Results) -> Iterator[Target]:
     for batch in sorted(b for b in both if b >= 1024) or [1024]:
         shared = ratio(alone.get(batch), both.get(batch))
         yield Target(f"Panda, one thread / two, batch {batch:,}", shared, 1.8, False)
+
+
+def control(results: Results) -> Iterator[Target]:
+    """Panda's control steps in C, beside Pinocchio's sums alone."""
+    pin = results.pinocchio.get("panda")
+    for what, wanted in (("joints", 1.5), ("links", 5), ("frame", 5)):
+        took = results.find("panda", "C", "float64", "rows", call=CONTROL + what).get(1)
+        yield Target(
+            f"Panda, a control step, {what} / one rnea", ratio(took, pin.rnea if pin else None), wanted
+        )
 
 
 def operations(results: Results) -> Iterator[Target]:

@@ -1,0 +1,27 @@
+"""Control steps of the emitted C, called from C: one sample after another."""
+
+from pathlib import Path
+
+from speed.emitted import Figure
+from speed.package import PEERS, Package, build_flags, compiler, run
+
+CONTROL = "control of "
+"""How calls begin that are control steps."""
+
+
+def measure(package: Package, work: Path) -> list[Figure]:
+    """Nanoseconds of a step for all joints, for scaled links, and for a frame."""
+    made, name = work / f"{package.name}_control", package.name
+    c = package.directory / "c"
+    run(
+        [
+            compiler() or "cc", "-std=c99", *build_flags(), f"-DROBOT={name}", f"-DUPPER={name.upper()}",
+            f"-I{c}", "-include", str(c / f"{name}.h"), str(PEERS / "control.c"), str(c / f"{name}.c"),
+            "-lm", "-o", str(made),
+        ]
+    )  # fmt: skip
+    figures = []
+    for line in run([str(made)]).splitlines():
+        what, ns = line.split()
+        figures.append(Figure(name, "C", "float64", "rows", 1, 1, float(ns), CONTROL + what))
+    return figures
