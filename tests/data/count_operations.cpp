@@ -29,6 +29,7 @@ static real cos_counted(real a) { return real(std::cos(a.value), true); }
 #define RESTRICT
 #define ALIGNED
 #define APART static
+#define INLINE static inline
 #define SINES 1
 #define ONE_SAMPLE 2
 #define BLOCKS 3
