@@ -32,7 +32,7 @@ static void start(void)
 {
     double mass[N][N];
     for (int i = 0; i < N; ++i)
-        q[i] = q_d[i] = 0.2 * i - 0.3;
+        q[i] = q_d[i] = 0.2 * i - 0.3, qd[i] = 0.0;
     puma560_mass_matrix(q, &mass[0][0]);
     for (int i = 0; i < N; ++i) {
         stiffness[i][i] = 100.0 * mass[i][i];
@@ -92,20 +92,32 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* A million steps of the loop, the controller's share of each on the clock. */
+static void report(const char *what, float *took)
+{
+    qsort(took, STEPS, sizeof took[0], ascending);
+    printf("%s: a control step takes %.2f us, 999 of 1000 at most %.2f us, the worst of %d %.1f us\n", what,
+        (double)took[STEPS / 2], (double)took[STEPS / 1000 * 999], STEPS, (double)took[STEPS - 1]);
+}
+
+/* A million steps, the controller's share of each on the clock: once as they come, then each at its best of several times,
+   so that what else the machine does falls out. */
 static int measure(void)
 {
-    static float took[STEPS];
-    for (int step = 0; step < STEPS; ++step) {
-        const double from = now();
-        const int refused = control();
-        took[step] = (float)(now() - from);
-        if (refused || (step % 100 == 0 && move()))
-            return 1;
+    static float took[STEPS], least[STEPS];
+    for (int time = 0; time < 8; ++time) {
+        start();
+        for (int step = 0; step < STEPS; ++step) {
+            const double from = now();
+            const int refused = control();
+            took[step] = (float)(now() - from);
+            if (refused || (step % 100 == 0 && move()))
+                return 1;
+            least[step] = time == 0 || took[step] < least[step] ? took[step] : least[step];
+        }
+        if (time == 0)
+            report("as they come", took);
     }
-    qsort(took, STEPS, sizeof took[0], ascending);
-    printf("a control step takes %.2f us, 999 of 1000 at most %.2f us, the worst of %d %.1f us\n", (double)took[STEPS / 2],
-        (double)took[STEPS / 1000 * 999], STEPS, (double)took[STEPS - 1]);
+    report("undisturbed", least);
     return 0;
 }
 

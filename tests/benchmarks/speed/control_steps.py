@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+from linkwise.emit.c.header import commands
+
 from speed.emitted import Figure
-from speed.package import PEERS, Package, build_flags, compiler, run
+from speed.package import PEERS, Package, compiler, run
 
 CONTROL = "control of "
 """How calls begin that are control steps."""
@@ -13,10 +15,11 @@ def measure(package: Package, work: Path) -> list[Figure]:
     """Nanoseconds of a step for all joints, for scaled links, and for a frame."""
     made, name = work / f"{package.name}_control", package.name
     c = package.directory / "c"
+    flags = commands(name)[0].split()[1:-2]  # as the header says, for a compiler and a file
     run(
         [
-            compiler() or "cc", "-std=c99", *build_flags(), f"-DROBOT={name}", f"-DUPPER={name.upper()}",
-            f"-I{c}", "-include", str(c / f"{name}.h"), str(PEERS / "control.c"), str(c / f"{name}.c"),
+            compiler() or "cc", *flags, f"-DROBOT={name}", f"-DUPPER={name.upper()}", f"-I{c}",
+            "-include", str(c / f"{name}.h"), str(PEERS / "control.c"), str(c / f"{name}.c"),
             "-lm", "-o", str(made),
         ]
     )  # fmt: skip

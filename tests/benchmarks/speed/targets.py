@@ -58,7 +58,7 @@ def in_c(results: Results) -> Iterator[Target]:
 def control(results: Results) -> Iterator[Target]:
     """Panda's control steps in C, beside Pinocchio's sums alone."""
     pin = results.pinocchio.get("panda")
-    for what, wanted in (("joints", 1.5), ("links", 5), ("frame", 5)):
+    for what, wanted in (("joints", 0.6), ("links", 1.5), ("frame", 2.5)):
         took = results.find("panda", "C", "float64", "rows", call=CONTROL + what).get(1)
         yield Target(
             f"Panda, a control step, {what} / one rnea", ratio(took, pin.rnea if pin else None), wanted
