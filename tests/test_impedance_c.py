@@ -293,7 +293,7 @@ def test_the_control_loop_of_the_docs_runs_without_a_system_call(compiler: str, 
         return
     said = subprocess.run([made], check=True, capture_output=True, text=True).stdout.splitlines()
     pushed = next(line.split() for line in said if line.startswith("  1.75 s"))
-    asked = float(said[-2].split()[-2])
+    asked = float(said[-3].split()[-2])
     assert float(pushed[5]) == pytest.approx(asked, rel=0.02), "it gives way as a spring does"
     assert "a control step takes" in said[-1]
     sealed = subprocess.run([made, "--sealed"], check=False, capture_output=True, text=True)
