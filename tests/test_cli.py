@@ -30,7 +30,7 @@ def planar2(linkwise: Run, tmp_path: Path) -> Path:
 
 
 def test_generate_says_what_it_wrote_in_plain_lines(linkwise: Run, tmp_path: Path) -> None:
-    done = linkwise("generate", "planar2", "--out", "out", "--name", "arm", "--backend", "c")
+    done = linkwise("generate", "planar2", "--out", "out", "--name", "arm", "--backend", "c", "--verbose")
     assert done.returncode == 0
     files = [path for path in (tmp_path / "out/arm").rglob("*") if path.is_file()]
     assert done.stdout == f"wrote out/arm: 2 joints, 2 links, {len(files)} files\n"
@@ -512,7 +512,7 @@ def bars(tmp_path: Path) -> Path:
 def test_a_file_beside_the_robots_closes_its_loop(bars: Path, linkwise: Run, tmp_path: Path) -> None:
     (tmp_path / "loop.toml").write_text(LOOP.format(name="pin", at=0.24))
     asked = ("bars.toml", "--constraints", "loop.toml", "--independent", "c")
-    done = linkwise("generate", *asked, "--out", "out", "--backend", "numpy")
+    done = linkwise("generate", *asked, "--out", "out", "--backend", "numpy", "--verbose")
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[1] == "independent: c; following by constraints: a, b"
     assert done.stderr.splitlines() == [

@@ -245,7 +245,7 @@ def test_names_in_what_is_said_break_and_colour_nothing(
     robot = tmp_path / "robot.toml"
     robot.write_text(chain("r", (evil,)))
     arguments = {
-        "generate": ("generate", robot, "--out", tmp_path / evil, "--backend", "c"),
+        "generate": ("generate", robot, "--out", tmp_path / evil, "--backend", "c", "--verbose"),
         "inspect": ("inspect", robot),
         "analyze": (
             *("analyze", log, "--robot", PLANAR3, "--out", tmp_path / "out", "--ignore-extra"),

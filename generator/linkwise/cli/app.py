@@ -4,6 +4,7 @@ import io
 import sys
 import warnings
 from importlib import import_module
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -14,7 +15,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.version import VERSION
 
 COMMANDS = {
-    "generate": "Write the package of a robot.",
+    "generate": "Write the packages of robots.",
     "check": "Prove a package right: hashes, and every entry of every formula, back end and C function.",
     "inspect": "Show a robot's joints, links, parameters, and what was merged, locked, ignored or left out.",
     "analyze": "Who loads whom: every torque term of a recorded movement, as a table, figures and a page.",
@@ -73,6 +74,12 @@ def _show_version(asked: bool) -> None:
         raise typer.Exit
 
 
+def _show_cmake_dir(asked: bool) -> None:
+    if asked:
+        print((Path(__file__).parents[1] / "cmake").as_posix())
+        raise typer.Exit
+
+
 app = _group("Which joint's movement loads which joint, through which link.", COMMANDS, STATUSES)
 app.add_typer(_group("Term counts and the cost-reduction curve.", REPORTS), name="report")
 
@@ -81,6 +88,15 @@ app.add_typer(_group("Term counts and the cost-reduction curve.", REPORTS), name
 def _options(
     version: Annotated[
         bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Print the version")
+    ] = False,
+    cmake_dir: Annotated[
+        bool,
+        typer.Option(
+            "--cmake-dir",
+            is_eager=True,
+            callback=_show_cmake_dir,
+            help="Print the folder of linkwise's CMake module, for -Dlinkwise_DIR=",
+        ),
     ] = False,
 ) -> None:
     """Stand for the options of the whole."""

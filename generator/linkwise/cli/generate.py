@@ -1,5 +1,13 @@
-"""The command `generate`."""
+"""The command `generate`.
 
+For build tools it says what it would write, what that depends on and whether it is up to date; it says no
+more than that where nobody watches.
+"""
+
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -7,27 +15,56 @@ import typer
 
 from linkwise import pipeline
 from linkwise.cli import Details, counted, tell
-from linkwise.cli.options import RobotName, reads_robot
+from linkwise.cli.depfile import depfile_text, generator_files, own_modules
+from linkwise.cli.options import RobotNames, reads_robot
+from linkwise.dynamics.derive import Method
 from linkwise.emit.assemble import checked_identifier
 from linkwise.emit.backend import BACKENDS, backends_of, chosen_backends
 from linkwise.emit.kernel_choice import chosen_kernel
+from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.input_file import is_file
-from linkwise.output import require_writable, sweep
-from linkwise.package.write import check_target, write_package
-from linkwise.progress import progress
-from linkwise.robot import Options, effects
-from linkwise.symbolic.system import RigidSystem
+from linkwise.output import require_writable, sweep, write_files
+from linkwise.package.manifest import FILE
+from linkwise.package.write import check_target, differences, refuse_inside_package, write_package
+from linkwise.progress import Progress, progress, silent
+from linkwise.robot import Options, effects, robot_files
+from linkwise.symbolic.system import RigidSystem, System
 
 app = typer.Typer(add_completion=False)
+STALE = 1
+PANEL = "For build tools"
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What is asked of every robot of one call."""
+
+    options: Options
+    out: Path
+    name: str | None
+    backends: tuple[str, ...]
+    kernel: str
+    derivation: Method
+    replace: bool
+
+
+@dataclass(frozen=True)
+class Order:
+    """A package that was asked for: of which robot, where, and what makes its files."""
+
+    robot: str
+    system: System
+    directory: Path
+    files: Callable[[Progress], dict[str, str]]
 
 
 @app.command()
 @reads_robot()
 def generate(
-    robot: RobotName,
+    robot: RobotNames,
     options: Options,
-    out: Annotated[Path, typer.Option(help="Directory that gets the package")],
+    out: Annotated[Path, typer.Option(help="Directory that gets the packages")],
     name: Annotated[str | None, typer.Option(help="Name of the package; the robot's if not given")] = None,
     backend: Annotated[
         list[str] | None, typer.Option(help=f"{', '.join(BACKENDS)}; may be repeated; all if not given")
@@ -47,32 +84,168 @@ def generate(
         ),
     ] = "rule",
     details: Details = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Say what was written, as on a terminal, elsewhere too")
+    ] = False,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Take the place of another robot's package too")
+    ] = False,
+    list_outputs: Annotated[
+        bool,
+        typer.Option(
+            "--list-outputs", help="Print the paths that would be written; write none", rich_help_panel=PANEL
+        ),
+    ] = False,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check",
+            help="Say which files differ from what would be written; write none; exit status 1 if any does",
+            rich_help_panel=PANEL,
+        ),
+    ] = False,
+    depfile: Annotated[
+        Path | None,
+        typer.Option(
+            help="File that gets, as a rule of make, what the packages depend on", rich_help_panel=PANEL
+        ),
+    ] = None,
+    stamp: Annotated[
+        Path | None,
+        typer.Option(
+            help="Empty file that is made anew at the end: the target of --depfile's rule, by default the "
+            "manifests, which keep their time where nothing differs",
+            rich_help_panel=PANEL,
+        ),
+    ] = None,
 ) -> None:
-    """Write the package of a robot."""
-    sweep(out)  # also where this one is refused: an earlier one may have died while it took a package away
-    chosen_backends(backend or ())
-    path = Path(robot)
+    """Write the packages of robots."""
+    before = set(sys.modules)
+    _check_flags(list_outputs, check, depfile, stamp)
+    if name is not None and len(robot) > 1:
+        raise LinkwiseError("--name is for one robot; generate each with a name of its own in its own call")
+    if not (check or list_outputs):
+        sweep(out)  # also where this one is refused: an earlier one may have died in its exchange
+    asked = Choices(options, out, name, tuple(backend or ()), kernel, derivation, replace)
+    orders = [_order(spec, asked) for spec in robot]
+    _check_places(orders)
+    if depfile is not None or stamp is not None:
+        _check_side_files(orders, [place for place in (depfile, stamp) if place is not None], options)
+    if not (check or list_outputs):
+        for order in orders:
+            require_writable(order.directory)
+    watched = verbose or sys.stdout.isatty()
+    with progress() if verbose or sys.stderr.isatty() else nullcontext(silent) as report:
+        packages = [(order, order.files(report)) for order in orders]
+    if list_outputs:
+        tell(
+            *(f"{(order.directory / path).as_posix()}" for order, files in packages for path in sorted(files))
+        )
+        return
+    if check:
+        raise typer.Exit(_told_differences(packages, watched))
+    rule = "" if depfile is None else _rule(orders, options, stamp, before)
+    for order, files in packages:
+        written = write_package(files, order.directory, replace)
+        for effect in effects(order.system.notes, details):
+            tell(f"warning: {order.robot}: {effect}", err=True)
+        if watched:
+            _tell_written(order, len(files), written)
+    if depfile is not None:
+        write_files(depfile.parent, {depfile.name: rule.encode()})
+    if stamp is not None:
+        stamp.parent.mkdir(parents=True, exist_ok=True)
+        stamp.touch()  # the last of all: an interrupted build has none, or an older one
+
+
+def _check_flags(list_outputs: bool, check: bool, depfile: Path | None, stamp: Path | None) -> None:
+    """Raise LinkwiseError for flags of which one writes and another must not."""
+    flags = {"--list-outputs": list_outputs, "--check": check, "--depfile": depfile, "--stamp": stamp}
+    given = [flag for flag, value in flags.items() if value]
+    if len(given) > 1 and (list_outputs or check):
+        raise LinkwiseError(f"{given[0]} writes nothing and stands alone; leave {given[1]} out")
+
+
+def _order(robot: str, asked: Choices) -> Order:
+    """Read a robot; raises LinkwiseError, before anything is derived, where its package cannot be made."""
+    chosen_backends(asked.backends)
+    path, options = Path(robot), asked.options
     system = pipeline.read_system(robot, options)
-    kind = chosen_kernel(system, kernel, backend, derivation)
-    backends = [chosen.name for chosen in chosen_backends(backend or backends_of(kind), kind)]
+    kind = chosen_kernel(system, asked.kernel, asked.backends or None, asked.derivation)
+    backends = [chosen.name for chosen in chosen_backends(asked.backends or backends_of(kind), kind)]
     request = {
         "robot": path.name if is_file(path) else robot,
         "backends": backends,
-        "kernel": kernel,
-        "derivation": derivation,
+        "kernel": asked.kernel,
+        "derivation": asked.derivation,
         **options.request(),
     }
-    directory = out / checked_identifier(name, system.name)
-    check_target(directory, system.name)
-    require_writable(directory)
-    with progress() as report:
-        files = pipeline.generate(system, backends, name, request, report, kind, derivation)
-    write_package(files, directory)
-    for effect in effects(system.notes, details):
-        tell(f"warning: {robot}: {effect}", err=True)
+    directory = asked.out / checked_identifier(asked.name, system.name)
+    check_target(directory, None if asked.replace else system.name)
+
+    def files(report: Progress) -> dict[str, str]:
+        return pipeline.generate(system, backends, asked.name, request, report, kind, asked.derivation)
+
+    return Order(robot, system, directory, files)
+
+
+def _check_places(orders: Iterable[Order]) -> None:
+    """Raise LinkwiseError for two robots whose packages would have one place."""
+    taken: dict[Path, str] = {}
+    for order in orders:
+        if order.directory in taken:
+            raise LinkwiseError(
+                f"{taken[order.directory]} and {order.robot} would both be {order.directory}; generate one "
+                "of them in its own call, with --name"
+            )
+        taken[order.directory] = order.robot
+
+
+def _check_side_files(orders: Sequence[Order], places: Iterable[Path], options: Options) -> None:
+    """Raise LinkwiseError for a depfile or a stamp in the place of an input or inside a package."""
+    for place in places:
+        refuse_inside_package(place.parent)
+        here = place.resolve()
+        for order in orders:
+            inputs = {path.resolve() for path in robot_files(order.robot, options)}
+            if here in inputs or here.is_relative_to(order.directory.resolve()) or here.is_dir():
+                raise LinkwiseError(
+                    f"{place} cannot be a depfile or a stamp: {order.robot} is read from it, or it is a "
+                    "folder or in a package; choose another name"
+                )
+
+
+def _told_differences(packages: Iterable[tuple[Order, dict[str, str]]], watched: bool) -> int:
+    """Print how each package on disk differs from its files; the exit status that says whether any does."""
+    status = 0
+    for order, files in packages:
+        found = differences(files, order.directory)
+        if not order.directory.is_dir():
+            tell(f"{order.directory} is not there: {counted(len(files), 'file')}")
+        elif found:
+            tell(f"{order.directory} is stale: {counted(len(found), 'file')} of {len(files)}")
+            tell(*(f"  {path} {fault}" for path, fault in found.items()))
+        elif watched:
+            tell(f"{order.directory} is up to date")
+        status = STALE if found else status
+    return status
+
+
+def _rule(orders: Iterable[Order], options: Options, stamp: Path | None, before: Iterable[str]) -> str:
+    """Text of the depfile."""
+    inputs = [path.as_posix() for order in orders for path in robot_files(order.robot, options)]
+    manifests = [(order.directory / FILE).as_posix() for order in orders]
+    targets = manifests if stamp is None else [stamp.as_posix()]
+    imported = own_modules(before) if any(name.endswith(".py") for name in inputs) else ()
+    return depfile_text(targets, (*inputs, *imported, *generator_files()))
+
+
+def _tell_written(order: Order, files: int, written: bool) -> None:
+    system = order.system
     tell(
-        f"wrote {directory}: {counted(len(system.coordinates), 'joint')}, "
-        f"{counted(len(system.links), 'link')}, {counted(len(files), 'file')}"
+        f"{'wrote' if written else 'up to date:'} {order.directory}: "
+        f"{counted(len(system.coordinates), 'joint')}, {counted(len(system.links), 'link')}, "
+        f"{counted(files, 'file')}"
     )
     if isinstance(system, RigidSystem) and (free := system.robot.independent):
         names = [c.name for c in system.coordinates]

@@ -14,6 +14,7 @@ from linkwise.robot import DESCRIPTIONS, Options
 
 Parameters = Literal["numeric", "nonzero", "symbolic"]
 RobotName = Annotated[str, typer.Argument(help=DESCRIPTIONS)]
+RobotNames = Annotated[list[str], typer.Argument(help=DESCRIPTIONS)]
 PANEL = "Reading the robot"
 
 

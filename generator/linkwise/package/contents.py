@@ -11,7 +11,12 @@ from linkwise.package.manifest import FILE
 
 def changed(directory: Path, files: Mapping[str, str]) -> list[str]:
     """What is wrong with the listed files, in words, "forms/link_1.py was changed" say; empty if nothing."""
-    return [f"{path} {fault}" for path, digest in files.items() if (fault := _fault(directory, path, digest))]
+    return [f"{path} {fault}" for path, fault in faults(directory, files).items()]
+
+
+def faults(directory: Path, files: Mapping[str, str]) -> dict[str, str]:
+    """What is wrong with each of the listed files of which anything is: "was changed", "is missing"."""
+    return {path: fault for path, digest in files.items() if (fault := _fault(directory, path, digest))}
 
 
 def added(directory: Path, files: Mapping[str, str]) -> list[str]:

@@ -1,22 +1,29 @@
-"""Writing a package: all of it or nothing, over an earlier package of the same robot only."""
+"""Writing a package: all of it or nothing, over an earlier package of the same robot only.
 
+Build tools compare times: a file that says what it said keeps its time, and a package of which nothing
+differs is not touched.
+"""
+
+import hashlib
 import json
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError
 from linkwise.output import whole_directory
-from linkwise.package.contents import added
+from linkwise.package.contents import added, entries, faults
 from linkwise.package.manifest import FILE
 
 
-def check_target(directory: Path, robot: str) -> None:
+def check_target(directory: Path, robot: str | None) -> None:
     """Raise LinkwiseError unless a package of the robot named `robot` may be written to `directory`.
 
-    That is so where nothing is, and where an earlier package of the same robot is and nothing else; in no
-    case inside another package.
+    That is so where nothing is, and where an earlier package of the same robot is and nothing else, of any
+    robot if None is given; in no case inside another package. Empty folders, which build tools make for what
+    is to come, are nothing.
     """
     refuse_inside_package(directory.parent)
     if not os.path.lexists(directory):
@@ -26,7 +33,7 @@ def check_target(directory: Path, robot: str) -> None:
         raise LinkwiseError(f"{directory} is {what}; choose another --out or --name")
     earlier = earlier_package(directory)
     try:
-        foreign = not earlier and next(directory.iterdir(), None) is not None
+        foreign = not earlier and next(entries(directory), None) is not None
         own = added(directory, earlier.get("files", {}))
     except OSError as error:
         raise LinkwiseError(
@@ -41,10 +48,10 @@ def check_target(directory: Path, robot: str) -> None:
             f"{directory} holds {own[0][:80]!a}, which linkwise did not write; move it away, or choose "
             "another --out or --name"
         )
-    if earlier and earlier.get("robot") != robot:
+    if earlier and robot is not None and earlier.get("robot") != robot:
         raise LinkwiseError(
             f"{directory} holds the package of another robot, {ascii(earlier.get('robot'))[:80]}; give this "
-            "one a --name of its own, or remove that one"
+            "one a --name of its own, remove that one, or pass --replace"
         )
 
 
@@ -72,14 +79,40 @@ def earlier_package(directory: Path) -> dict[str, Any]:
     return data if own else {}
 
 
-def write_package(files: Mapping[str, str], directory: Path) -> None:
+def differences(files: Mapping[str, str], directory: Path) -> dict[str, str]:
+    """How a package in `directory` differs from `files`, by path, in words; empty if it is the same."""
+    wanted = {path: hashlib.sha256(text.encode()).hexdigest() for path, text in files.items()}
+    found = {
+        path: fault.replace("was changed", "differs") for path, fault in faults(directory, wanted).items()
+    }
+    former = earlier_package(directory).get("files", {})
+    gone = [path for path in former if path not in wanted and os.path.lexists(directory / path)]
+    return found | dict.fromkeys(sorted(gone), "is not written any more")
+
+
+def write_package(files: Mapping[str, str], directory: Path, replace: bool = False) -> bool:
     """Write files below `directory`, replacing an earlier package there, which a failure leaves as it was.
 
-    Raises LinkwiseError when the place is not writable or holds something else, see `check_target`.
+    With `replace` that may be of another robot. Returns whether anything differed. Raises LinkwiseError when
+    the place is not writable or holds something else, see `check_target`.
     """
-    robot = json.loads(files[FILE])["robot"]
+    robot = None if replace else json.loads(files[FILE])["robot"]
+    if os.path.lexists(directory):
+        check_target(directory, robot)
+    differing = differences(files, directory)
+    if not differing:
+        return False
     with whole_directory(directory, lambda target: check_target(target, robot)) as draft:
         for path, text in files.items():
             target = draft / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(text, encoding="utf-8")
+            if path not in differing:
+                _keep_times(directory / path, target)
+    return True
+
+
+def _keep_times(former: Path, target: Path) -> None:
+    with suppress(FileNotFoundError):  # another writer may be between its two renames
+        times = former.stat()
+        os.utime(target, ns=(times.st_atime_ns, times.st_mtime_ns))

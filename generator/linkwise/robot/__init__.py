@@ -2,7 +2,7 @@
 
 from linkwise.robot.build import Options
 from linkwise.robot.notes import Note, effects, kept_apart, left_out
-from linkwise.robot.read import BUILT_IN, DESCRIPTIONS, read_robot
+from linkwise.robot.read import BUILT_IN, DESCRIPTIONS, read_robot, robot_files
 from linkwise.robot.robot import Coordinate, Joint, Link, Robot
 
 __all__ = [
@@ -18,4 +18,5 @@ __all__ = [
     "kept_apart",
     "left_out",
     "read_robot",
+    "robot_files",
 ]

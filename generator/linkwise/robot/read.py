@@ -11,7 +11,7 @@ from linkwise.robot.builtin.planar import planar
 from linkwise.robot.constrained import check_constraints
 from linkwise.robot.description import Description
 from linkwise.robot.parameters import numeric
-from linkwise.robot.readers.mjcf import read_mjcf
+from linkwise.robot.readers.mjcf import mjcf_files, read_mjcf
 from linkwise.robot.readers.sdf import read_sdf
 from linkwise.robot.readers.toml import read_toml
 from linkwise.robot.readers.toml_constraints import with_constraint_file
@@ -55,6 +55,16 @@ def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
         except OSError as error:
             raise LinkwiseError(f"cannot be read: {error.strerror}") from None
         return _built(description, options)
+
+
+def robot_files(spec: str | Path, options: Options) -> tuple[Path, ...]:
+    """Files that a robot is read from, with those that they include; a built-in has none."""
+    path = Path(spec)
+    built_in = str(spec) in FILES or re.fullmatch(r"planar([1-9][0-9]*)", str(spec))
+    own: tuple[Path, ...] = () if built_in else (path,)
+    if own and READERS.get(path.suffix.lower()) is read_xml and root_tag(path) == "mujoco":
+        own = tuple(dict.fromkeys((path, *mjcf_files(path))))
+    return own if options.constraints is None else (*own, Path(options.constraints))
 
 
 def _built(description: Description, options: Options) -> Robot:

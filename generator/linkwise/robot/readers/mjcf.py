@@ -53,6 +53,17 @@ def read_mjcf(path: Path) -> Description:
     )
 
 
+def mjcf_files(path: Path) -> tuple[Path, ...]:
+    """Return the files that MuJoCo reads of a robot: its own, what it includes, and its assets.
+
+    Meshes are among them, for a body without an inertia of its own gets that of its meshes.
+    """
+    mujoco = extra("mujoco")
+    if not hasattr(mujoco, "mju_getXMLDependencies"):  # before MuJoCo 3.4
+        return (path,)
+    return tuple(Path(name) for name in mujoco.mju_getXMLDependencies(str(path)))
+
+
 def _compiled(mujoco: Any, path: Path) -> tuple[Any, list[str]]:
     """Compiled model, and MuJoCo's warnings, which it would write into a file in the working directory."""
     warnings: list[str] = []
