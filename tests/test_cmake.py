@@ -50,7 +50,8 @@ int main(void)
     const real q[ARM_JOINTS] = {0.3, -0.7}, qd[ARM_JOINTS] = {1, 0.5}, qdd[ARM_JOINTS] = {2, -3};
     real tau[ARM_JOINTS];
     arm_inverse_dynamics(1, q, qd, qdd, tau);
-    return printf("%.17g %.17g\\n", tau[0], tau[1]) < 0;
+    printf("%.17g %.17g\\n", tau[0], tau[1]);
+    return arm_lower_limit[0] != -9 || arm_effort_limit[1] != 9 || arm_joint_names[1][0] != 'b';
 }
 """
 MOTION = (np.array([0.3, -0.7]), np.array([1, 0.5]), np.array([2.0, -3.0]))

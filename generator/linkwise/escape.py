@@ -96,6 +96,12 @@ def c_comment(text: str) -> str:
     return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", literal)
 
 
+def c_string(text: str) -> str:
+    """A string literal of C in ASCII: its bytes are the name in UTF-8, and no trigraph is in it."""
+    plain = "".join(chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
+    return f'"{plain}"'
+
+
 def latex_symbol(identifier: str) -> str:
     """An identifier in a formula of LaTeX: its first letters, and the rest as their index, literally."""
     head = re.match("[A-Za-z]*", identifier)[0]  # type: ignore[index]

@@ -44,6 +44,7 @@
 #ifndef LINKWISE_PLANAR3_H
 #define LINKWISE_PLANAR3_H
 
+#include <math.h>
 #include <stddef.h>
 
 #ifdef __cplusplus
@@ -60,6 +61,22 @@ enum {
     PLANAR3_BLOCK = 8,
     PLANAR3_BLOCKF = 16
 };
+
+/* The joints in the order of q, and their limits as the robot's file has them, HUGE_VAL where it has none. No function
+   keeps to them, and those of a joint that follows another are not among them. */
+static const char *const planar3_joint_names[PLANAR3_JOINTS] = {
+    "joint1",
+    "joint2",
+    "joint3"
+};
+/* of the position, in rad or m */
+static const double planar3_lower_limit[PLANAR3_JOINTS] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+/* of the position */
+static const double planar3_upper_limit[PLANAR3_JOINTS] = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
+/* of the speed either way, in rad/s or m/s */
+static const double planar3_velocity_limit[PLANAR3_JOINTS] = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
+/* of the torque or force either way, in N m or N */
+static const double planar3_effort_limit[PLANAR3_JOINTS] = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
 
 /* Frames that functions are asked for: bodies of the robot's file and its sites, in the file's own axes. */
 enum {

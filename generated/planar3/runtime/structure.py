@@ -40,6 +40,25 @@ class Layout(NamedTuple):
     """h1: (i, j, k) of the links in `Structure.linear`."""
 
 
+class JointLimits(NamedTuple):
+    """Limits of the joints as the robot's file has them, one number for each; infinite where it has none.
+
+    No call keeps to them. Those of a joint that follows another are not among them.
+    """
+
+    lower: tuple[float, ...]
+    """Of the position, in rad or m."""
+    upper: tuple[float, ...]
+    velocity: tuple[float, ...]
+    """Of the speed either way, in rad/s or m/s."""
+    effort: tuple[float, ...]
+    """Of the torque or force either way, in N m or N."""
+
+
+NO_LIMITS = JointLimits((), (), (), ())
+"""Of a structure that was made without any."""
+
+
 @dataclass(frozen=True)
 class Structure:
     """A robot in names and numbers: n joint coordinates that move N links."""
@@ -60,6 +79,8 @@ class Structure:
     """Links that parameters may not make such as no body can be."""
     passive: tuple[PassiveJoint, ...] = ()
     """What joints have of their own: springs, damping, friction, armature."""
+    joint_limits: JointLimits = NO_LIMITS
+    """What each joint may reach, by the robot's file."""
 
     @cached_property
     def n(self) -> int:

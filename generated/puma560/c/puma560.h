@@ -50,6 +50,7 @@
 #ifndef LINKWISE_PUMA560_H
 #define LINKWISE_PUMA560_H
 
+#include <math.h>
 #include <stddef.h>
 
 #ifdef __cplusplus
@@ -66,6 +67,25 @@ enum {
     PUMA560_BLOCK = 8,
     PUMA560_BLOCKF = 16
 };
+
+/* The joints in the order of q, and their limits as the robot's file has them, HUGE_VAL where it has none. No function
+   keeps to them, and those of a joint that follows another are not among them. */
+static const char *const puma560_joint_names[PUMA560_JOINTS] = {
+    "joint1",
+    "joint2",
+    "joint3",
+    "joint4",
+    "joint5",
+    "joint6"
+};
+/* of the position, in rad or m */
+static const double puma560_lower_limit[PUMA560_JOINTS] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL, -HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+/* of the position */
+static const double puma560_upper_limit[PUMA560_JOINTS] = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
+/* of the speed either way, in rad/s or m/s */
+static const double puma560_velocity_limit[PUMA560_JOINTS] = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
+/* of the torque or force either way, in N m or N */
+static const double puma560_effort_limit[PUMA560_JOINTS] = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
 
 /* Frames that functions are asked for: bodies of the robot's file and its sites, in the file's own axes. */
 enum {

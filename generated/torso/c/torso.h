@@ -50,6 +50,7 @@
 #ifndef LINKWISE_TORSO_H
 #define LINKWISE_TORSO_H
 
+#include <math.h>
 #include <stddef.h>
 
 #ifdef __cplusplus
@@ -66,6 +67,26 @@ enum {
     TORSO_BLOCK = 8,
     TORSO_BLOCKF = 16
 };
+
+/* The joints in the order of q, and their limits as the robot's file has them, HUGE_VAL where it has none. No function
+   keeps to them, and those of a joint that follows another are not among them. */
+static const char *const torso_joint_names[TORSO_JOINTS] = {
+    "waist_turn",
+    "waist_lean",
+    "waist_bend",
+    "left_shoulder",
+    "left_elbow",
+    "right_shoulder",
+    "right_elbow"
+};
+/* of the position, in rad or m */
+static const double torso_lower_limit[TORSO_JOINTS] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL, -HUGE_VAL, -HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+/* of the position */
+static const double torso_upper_limit[TORSO_JOINTS] = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
+/* of the speed either way, in rad/s or m/s */
+static const double torso_velocity_limit[TORSO_JOINTS] = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
+/* of the torque or force either way, in N m or N */
+static const double torso_effort_limit[TORSO_JOINTS] = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
 
 /* Frames that functions are asked for: bodies of the robot's file and its sites, in the file's own axes. */
 enum {

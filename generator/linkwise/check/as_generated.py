@@ -107,11 +107,10 @@ def _made_otherwise(package: Package) -> Iterator[str]:
         BodyText(link, names, tuple(line.strip().removesuffix(",") for line in values.splitlines()))
         for link, names, values in BODY.findall(found)
     ]
-    joints = [(joint.name, joint.unit) for joint in manifest.joints]
     links = {link.name: link.path for link in manifest.links}
     passive = manifest.tree.passive if manifest.tree else ()
     parameters = manifest.parameters
-    if names_text(manifest.name, joints, links, robot.linear, parameters, bodies, passive) != found:
+    if names_text(manifest.name, manifest.joints, links, robot.linear, parameters, bodies, passive) != found:
         yield "names.py"
     if "tree.py" in manifest.files and manifest.tree is not None:
         text = tree_text(manifest.tree, list(links), list(manifest.parameters))

@@ -9,13 +9,16 @@ import typer
 from linkwise import pipeline
 from linkwise.cli import Details, Json, counted
 from linkwise.cli.options import RobotName, reads_robot
-from linkwise.emit.definition import rigid_tree
+from linkwise.emit.definition import joint_entries, rigid_tree
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, printable
 from linkwise.package.entries import RigidTree
 from linkwise.robot import Options, kept_apart, left_out
 from linkwise.robot.robot import Parameter
 from linkwise.symbolic.system import EnergySystem, System
+
+LESS = "…"
+"""In place of an end that a joint does not have."""
 
 app = typer.Typer(add_completion=False)
 
@@ -56,7 +59,7 @@ def inspection(system: System, details: bool = False, refused: str = "") -> dict
     mass = {body.link: body.mass for body in tree.bodies} if tree else {}
     return {
         "name": system.name,
-        "joints": [{"name": c.name, "unit": c.unit} for c in system.coordinates],
+        "joints": [asdict(joint) for joint in joint_entries(system)],
         "links": [
             {
                 "name": name,
@@ -116,7 +119,7 @@ def table(data: dict[str, Any]) -> str:
     if data["refused"]:
         lines += ["", f"refused by generate: {data['refused']}"]
     lines += ["", "joints"]
-    lines += [f"  {k}  {c['name']} [{c['unit']}]" for k, c in enumerate(data["joints"], 1)]
+    lines += [f"  {k}  {c['name']} [{c['unit']}]{_limits(c)}" for k, c in enumerate(data["joints"], 1)]
     lines += ["", "links (mass; moved by)"]
     for k, link in enumerate(data["links"], 1):
         mass = "" if link["mass"] is None else f"{link['mass']:.6g} kg; "
@@ -142,6 +145,17 @@ def table(data: dict[str, Any]) -> str:
                 effect = f"; {note['effect']}" if note["effect"] else ""
                 lines.append(f"  {note['subject']} {note['detail']}".rstrip() + effect)
     return "\n".join(map(printable, lines))
+
+
+def _limits(joint: dict[str, Any]) -> str:
+    """The limits of a joint that the file gives, in words."""
+    unit = joint["unit"]
+    ends = [joint[what] for what in ("lower", "upper")]
+    said = [f"{LESS if e is None else f'{e:g}'}" for e in ends]
+    parts = [f"{said[0]} to {said[1]} {unit}"] if ends != [None, None] else []
+    units = {"velocity": f"{unit}/s", "effort": "N·m" if unit == "rad" else "N"}
+    parts += [f"{joint[what]:g} {of}" for what, of in units.items() if joint[what] is not None]
+    return f"  ({', '.join(parts)})" if parts else ""
 
 
 def _held(constraint: dict[str, Any]) -> str:

@@ -14,11 +14,11 @@ from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
 from linkwise.emit.c import loop_costs
-from linkwise.emit.definition import energies, rigid_tree
+from linkwise.emit.definition import energies, joint_entries, rigid_tree
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.shared_texts import init_text, names_text
 from linkwise.errors import LinkwiseError
-from linkwise.package.manifest import FILE, JointEntry, LinkEntry, Manifest
+from linkwise.package.manifest import FILE, LinkEntry, Manifest
 from linkwise.progress import Progress, silent
 from linkwise.symbolic.system import RigidSystem
 from linkwise.version import VERSION
@@ -107,12 +107,14 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     about = parameter_rules(system, bodies)
     rigid = isinstance(system, RigidSystem)
     yield "__init__.py", init_text(derivation.package, loadable, parameters, about, rigid, derivation.kernel)
-    joints = [(c.name, c.unit) for c in system.coordinates]
     links = {name: system.path(j) for j, name in enumerate(system.link_names)}
     linear = derivation.linear
     tree = rigid_tree(system)
     passive = tree.passive if tree else ()
-    yield "names.py", names_text(derivation.package, joints, links, linear, parameters, bodies, passive)
+    yield (
+        "names.py",
+        names_text(derivation.package, joint_entries(system), links, linear, parameters, bodies, passive),
+    )
     yield "py.typed", ""
     copied = {name for backend in loadable for place in backend.runtime for name in _files_at(place)}
     for name in sorted(copied.union(SHARED_RUNTIME)):
@@ -138,7 +140,7 @@ def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
         {"linkwise": VERSION, "sympy": sp.__version__},
         dict(derivation.request),
         derivation.kernel,
-        tuple(JointEntry(c.name, c.unit) for c in system.coordinates),
+        joint_entries(system),
         tuple(
             LinkEntry(name, system.path(j), cost)
             for j, (name, cost) in enumerate(zip(system.link_names, costs, strict=True))

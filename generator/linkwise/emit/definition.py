@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import astuple
+from math import isfinite
 
 import sympy as sp
 from sympy.printing.str import StrPrinter
@@ -12,6 +13,7 @@ from linkwise.package.manifest import (
     CouplingEntry,
     EnergyEntry,
     FrameEntry,
+    JointEntry,
     PassiveEntry,
     RigidTree,
     TieEntry,
@@ -21,6 +23,16 @@ from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
 LARGEST = 2**53
 """Whole numbers beyond are no longer all floats; those of fractions need not even be near one."""
+
+
+def joint_entries(system: System) -> tuple[JointEntry, ...]:
+    """Names, units and limits of the coordinates."""
+    if not isinstance(system, RigidSystem):
+        return tuple(JointEntry(c.name, c.unit) for c in system.coordinates)
+    return tuple(
+        JointEntry(c.name, c.unit, *(x if isfinite(x) else None for x in astuple(limits)))
+        for c, limits in zip(system.coordinates, system.robot.joint_limits, strict=True)
+    )
 
 
 def rigid_tree(system: System) -> RigidTree | None:

@@ -9,10 +9,11 @@ from dataclasses import asdict, dataclass
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.render import render
 from linkwise.escape import python_docstring, python_literal
-from linkwise.package.entries import KernelKind, PassiveEntry
+from linkwise.package.entries import JointEntry, KernelKind, PassiveEntry
 from linkwise.version import VERSION
 
 LINE = 100
+LIMITS = ("lower", "upper", "velocity", "effort")
 
 
 @dataclass(frozen=True)
@@ -87,21 +88,21 @@ def init_text(
 
 def names_text(
     package: str,
-    joints: Iterable[tuple[str, str]],
+    joints: Sequence[JointEntry],
     links: Mapping[str, Sequence[int]],
     linear: Iterable[int],
     parameters: Mapping[str, float],
     bodies: Sequence[BodyText],
     passive: Sequence[PassiveEntry],
 ) -> str:
-    """names.py: names and units of the joints, what they have of their own, names and paths of the links, and
-    what hangs on parameters."""
-    joints = list(joints)
+    """names.py: names, units and limits of the joints, what they have of their own, names and paths of the
+    links, and what hangs on parameters."""
     view = {
         "version": VERSION,
         "name": repr(package),
-        "joints": [python_literal(name) for name, _ in joints],
-        "units": [repr(unit) for _, unit in joints],
+        "joints": [python_literal(joint.name) for joint in joints],
+        "units": [repr(joint.unit) for joint in joints],
+        "limits": [(what, _limit_text(what, joints)) for what in LIMITS],
         "links": [python_literal(name) for name in links],
         "paths": [repr(tuple(path)) for path in links.values()],
         "linear": repr(tuple(sorted(linear))),
@@ -111,6 +112,13 @@ def names_text(
         "calls_numpy": any("np." in value for body in bodies for value in body.values),
     }
     return render("package/names.py.j2", view)
+
+
+def _limit_text(what: str, joints: Iterable[JointEntry]) -> str:
+    """One limit of each joint, as a tuple of Python with `inf` in it."""
+    none = "-inf" if what == "lower" else "inf"
+    numbers = [none if (limit := getattr(joint, what)) is None else repr(limit) for joint in joints]
+    return f"({', '.join(numbers)},)"
 
 
 def _passive_text(entry: PassiveEntry) -> str:

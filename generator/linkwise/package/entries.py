@@ -26,10 +26,14 @@ PLACE = re.compile(
 
 @dataclass(frozen=True)
 class JointEntry:
-    """A coordinate's name and unit."""
+    """A coordinate's name and unit, and its limits in the file, as `Limits` in robot.robot; None for none."""
 
     name: str
     unit: Literal["rad", "m"]
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+    effort: float | None = None
 
 
 @dataclass(frozen=True)

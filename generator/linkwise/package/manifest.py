@@ -26,7 +26,7 @@ from linkwise.package.entries import (
     check_tree,
 )
 
-SCHEMA = 8
+SCHEMA = 9
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [
@@ -53,6 +53,8 @@ CONVENTIONS = {
     "indices": "in this file they count from 0; parent, and body of a frame, is an index of tree.bodies, "
     "None for the ground; first and second of a tie are of tree.frames, those of couplings' terms and "
     "independent of joints",
+    "limits": "of joints: lower and upper of the position, velocity and effort either way, as the robot's "
+    "file has them; null for none",
     "operations": "additions, multiplications and divisions for one sample; sines and the like apart",
 }
 

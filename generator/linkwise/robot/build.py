@@ -12,6 +12,7 @@ from linkwise.robot.constrained import check_constraints, constrained
 from linkwise.robot.coordinates import AxisRule, movement
 from linkwise.robot.description import Connection, Description
 from linkwise.robot.joint_types import Axis, expand, expansion_notes
+from linkwise.robot.limits import coordinate_limits
 from linkwise.robot.links import moving_links
 from linkwise.robot.mass import check_bodies
 from linkwise.robot.mass_matrix import check_mass_matrix
@@ -112,6 +113,7 @@ def build(description: Description, options: Options) -> Robot:
         held.couplings,
         held.wanted,
         held.driven,
+        limits=coordinate_limits(connections, moving.coordinates),
     )
 
 

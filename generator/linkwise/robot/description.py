@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from linkwise.robot.notes import Note, Omission
-from linkwise.robot.robot import NOTHING, Mat3, Passive, Rotation, Scalar, TieKind, Vec3
+from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Mat3, Passive, Rotation, Scalar, TieKind, Vec3
 
 ZERO3: Vec3 = (0.0, 0.0, 0.0)
 ZERO33: Mat3 = (ZERO3, ZERO3, ZERO3)
@@ -105,7 +105,7 @@ class Connection:
     """A joint as the file has it: any type, any axis; its place in the parent's frame, its axis in its own.
 
     `snapped` says that entries of the rotation were rounded to −1, 0 or 1; only a joint of one axis has
-    anything `passive`.
+    anything `passive`, and limits.
     """
 
     name: str
@@ -118,6 +118,7 @@ class Connection:
     mimic: Mimic | None = None
     snapped: bool = False
     passive: Passive = NOTHING
+    limits: Limits = UNLIMITED
 
 
 @dataclass(frozen=True)

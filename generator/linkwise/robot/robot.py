@@ -95,6 +95,25 @@ NOTHING = Passive()
 
 
 @dataclass(frozen=True)
+class Limits:
+    """What a joint of one axis may reach, as its file has it: infinite where that says nothing.
+
+    Nothing here keeps to them; they are there for whoever drives the joint.
+    """
+
+    lower: float = -math.inf
+    """Of its position, in rad or m."""
+    upper: float = math.inf
+    velocity: float = math.inf
+    """Of its speed either way, in rad/s or m/s."""
+    effort: float = math.inf
+    """Of its torque or force either way, in N·m or N."""
+
+
+UNLIMITED = Limits()
+
+
+@dataclass(frozen=True)
 class PassiveAxis:
     """What a joint at ratio · q of a coordinate has of its own."""
 
@@ -201,6 +220,8 @@ class Robot:
     wanted: tuple[str, ...] = ()
     driven: tuple[int, ...] = ()
     independent: tuple[int, ...] = ()
+    limits: tuple[Limits, ...] = ()
+    """Of each coordinate, or none at all; those of joints that follow another are no limits of that one."""
 
     def __post_init__(self) -> None:
         if not self.coordinates:
@@ -219,6 +240,11 @@ class Robot:
                     raise LinkwiseError(f"a {what} has an empty name; name it")
                 if count > 1:
                     raise LinkwiseError(f"two {what}s are named {name!r}; rename one")
+
+    @property
+    def joint_limits(self) -> tuple[Limits, ...]:
+        """The limits of each coordinate; of a robot that was given none, no limits."""
+        return self.limits or (UNLIMITED,) * len(self.coordinates)
 
     @property
     def named_frames(self) -> tuple[Frame, ...]:

@@ -22,7 +22,7 @@ from .motion_calls import MotionCalls
 from .quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
 from .robot_constraints import Constraints, Contact
 from .robot_kinematics import Kinematics
-from .structure import Layout, Structure
+from .structure import JointLimits, Layout, Structure
 from .sum_calls import SumCalls
 
 
@@ -57,6 +57,8 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
     """Names of the joints, in the order of i and k."""
     joint_units: tuple[str, ...]
     """Unit of each joint's position: rad or m."""
+    joint_limits: JointLimits
+    """Each joint's lower, upper, velocity and effort limit, as its file has it; no call keeps to them."""
     link_names: tuple[str, ...]
     """Names of the links, in the order of j."""
     layout: Layout
@@ -80,6 +82,7 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         self.name, self.check_finite = structure.name, check_finite
         self.n, self.N = structure.n, structure.N
         self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
+        self.joint_limits = structure.joint_limits
         self.link_names, self.layout = structure.link_names, structure.layout
         self.structure, self.backend = structure, backend
         self._load, self._asked = load, asked

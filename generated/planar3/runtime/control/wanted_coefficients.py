@@ -126,7 +126,9 @@ def _scaled(name: str, scale: Any, structure: Structure) -> tuple[Any, NDArray[A
     if not numbers.ndim:
         kept: Any = read if has_tensors([read]) else float(numbers)
         return kept, np.full(structure.N, float(numbers))
-    return read[..., None], _alike(numbers, structure)
+    # arrays are copied, tensors are taken as they are at each call
+    kept = read if has_tensors([read]) else numbers.copy()
+    return kept[..., None], _alike(numbers, structure)
 
 
 def _alike(numbers: NDArray[Any], structure: Structure) -> NDArray[Any] | None:

@@ -35,7 +35,7 @@ class Gain:
         if tuple(read.shape) not in self._shapes:
             forms = (FORMS if links is None else BY_LINK).format(size, links)
             raise ValueError(f"{name} has shape {tuple(read.shape)}; give {forms}")
-        self.numbers = _square(np, np.asarray(read.detach().cpu() if self.learned else read, float), size)
+        self.numbers = _square(np, np.array(read.detach().cpu() if self.learned else read, float), size)
         """As they were given, (size, size)."""
         if not np.isfinite(self.numbers).all():
             raise ValueError(f"{name} has numbers that are not finite")

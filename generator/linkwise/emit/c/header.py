@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise.emit.c.sizes import Span
+from linkwise.emit.definition import joint_entries
 from linkwise.escape import c_comment, identifiers
 from linkwise.runtime.native.native_compiler import FLAGS, TUNING
 from linkwise.symbolic.system import RigidSystem, System
@@ -23,6 +24,23 @@ class IndexTable:
     total: str
     columns: int
     lines: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class LimitTable:
+    """One limit of each joint: the array's name behind the robot's, what it is of, and its numbers in C."""
+
+    array: str
+    about: str
+    numbers: str
+
+
+LIMITS = {
+    "lower": "of the position, in rad or m",
+    "upper": "of the position",
+    "velocity": "of the speed either way, in rad/s or m/s",
+    "effort": "of the torque or force either way, in N m or N",
+}
 
 
 def commands(name: str) -> list[str]:
@@ -59,6 +77,15 @@ def joint_lines(system: System) -> Iterator[str]:
     """Return a table: each joint, its unit and its name."""
     rows = [[str(k), c.unit, c_comment(c.name)] for k, c in enumerate(system.coordinates, 1)]
     return aligned([["joint", "unit", "name"], *rows])
+
+
+def limit_tables(system: System) -> Iterator[LimitTable]:
+    """Return the limits of the joints as arrays of C, and what they are of."""
+    entries = joint_entries(system)
+    for what, about in LIMITS.items():
+        none = "-HUGE_VAL" if what == "lower" else "HUGE_VAL"
+        numbers = [none if (limit := getattr(e, what)) is None else repr(limit) for e in entries]
+        yield LimitTable(f"{what}_limit", about, ", ".join(numbers))
 
 
 def frame_lines(system: RigidSystem) -> Iterator[tuple[str, str]]:

@@ -10,6 +10,7 @@ from linkwise.emit.c.calls import LinkKernels, group_calls, link_calls, motions,
 from linkwise.emit.c.prototypes import at_position, cost, functions, pointers, under_torque
 from linkwise.emit.c.quantity_table import causes, quantity_lines
 from linkwise.emit.c.sizes import EntryCounts, Span, groups, most_counts, tile, waiting_counts, whole
+from linkwise.escape import c_string
 from linkwise.symbolic.system import RigidSystem, System
 
 
@@ -85,6 +86,8 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "quantities": list(quantity_lines(system, linear)),
         "links": list(header.link_lines(system, links)),
         "joints": list(header.joint_lines(system)),
+        "names": [c_string(c.name) for c in system.coordinates],
+        "limits": list(header.limit_tables(system)),
         "parameters": header.parameter_lines(system),
         "blocks": tuple(header.BLOCK.values()),
         "rigid": isinstance(system, RigidSystem),

@@ -4,7 +4,7 @@ A hinge's or slide's coordinate is its qpos. Where MuJoCo has a quaternion, a ba
 and a free joint by those after x, y, z of the world.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,9 @@ from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Descri
 from linkwise.robot.notes import WARNED, Note
 from linkwise.robot.readers.mjcf_equality import equalities
 from linkwise.robot.readers.mjcf_options import switched_off
-from linkwise.robot.readers.mjcf_passive import passive_of
+from linkwise.robot.readers.mjcf_passive import limits_of, passive_of
 from linkwise.robot.readers.mjcf_unmodelled import omissions, unused
-from linkwise.robot.robot import NOTHING, Mat3, Passive, Rotation, Vec3
+from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Mat3, Passive, Rotation, Vec3
 
 TYPES = ("floating", "ball", "prismatic", "revolute")
 """Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
@@ -98,6 +98,7 @@ class _Joint:
     anchor: Vec3 = ZERO3
     rest: float = 0.0
     passive: Passive = NOTHING
+    limits: Limits = UNLIMITED
 
 
 def _body(mujoco: Any, model: Any, number: int) -> tuple[list[Connection], Body]:
@@ -122,7 +123,8 @@ def _body(mujoco: Any, model: Any, number: int) -> tuple[list[Connection], Body]
             turn = transforms.compose(turn, _about(joint.axis, -joint.rest))
         child = name if joint is joints[-1] else f"{name}_{joint.name}"
         place = start, child, turn, position
-        chain.append(Connection(joint.name, joint.type, *place, joint.axis, None, snapped, joint.passive))
+        joined = Connection(joint.name, joint.type, *place, joint.axis, None, snapped, joint.passive)
+        chain.append(replace(joined, limits=joint.limits))
         turn, position, last, start, snapped = IDENTITY, ZERO3, joint.anchor, child, False
     mass, com = float(model.body_mass[number]), _vector(model.body_ipos[number])
     return chain, Body(name, mass, com, _inertia(model, number), origin=transforms.minus(last))
@@ -160,6 +162,7 @@ def _joints(mujoco: Any, model: Any, number: int, body: str) -> list[_Joint]:
                 _vector(model.jnt_pos[index]),
                 float(model.qpos0[model.jnt_qposadr[index]]) if single else 0.0,
                 passive_of(mujoco, model, index, off),
+                limits_of(model, index) if single else UNLIMITED,
             )
         )
     return joints

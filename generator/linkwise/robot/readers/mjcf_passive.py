@@ -1,11 +1,12 @@
-"""Springs, damping, friction and armature of a compiled MJCF model's hinges and slides."""
+"""Springs, damping, friction, armature and limits of a compiled MJCF model's hinges and slides."""
 
+import math
 from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
-from linkwise.robot.robot import Passive
+from linkwise.robot.robot import Limits, Passive
 
 SPRING = ("jnt_stiffness", "jnt_stiffnesspoly")
 DAMPING = ("dof_damping", "dof_dampingpoly")
@@ -45,6 +46,14 @@ def passive_of(mujoco: Any, model: Any, joint: int, off: Collection[str]) -> Pas
     return Passive(
         stiffness, rest, number(DAMPING, "damping"), number(FRICTION, "friction"), number(ARMATURE)
     )
+
+
+def limits_of(model: Any, joint: int) -> Limits:
+    """Range of a joint of one axis, and of the force that actuators may put on it; MJCF limits no speed."""
+    lower, upper = map(float, model.jnt_range[joint]) if model.jnt_limited[joint] else (-math.inf, math.inf)
+    forces = model.jnt_actfrcrange[joint] if model.jnt_actfrclimited[joint] else (math.inf,)
+    # A range may be wider on one side; the nearer end is what either way allows.
+    return Limits(lower, upper, effort=min(abs(float(force)) for force in forces))
 
 
 def _index(model: Any, joint: int, fields: tuple[str, ...]) -> int:

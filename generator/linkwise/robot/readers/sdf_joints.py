@@ -1,7 +1,7 @@
 """Joints of an SDFormat model: those of the tree, and those that close loops and become constraints."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from xml.etree.ElementTree import Element
 
 from linkwise.errors import LinkwiseError
@@ -10,7 +10,7 @@ from linkwise.robot.description import IDENTITY, Anchor, AnchoredTie, Connection
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.notes import Omission
 from linkwise.robot.readers.sdf_poses import ModelPoses, Pose, numbers_in, numbers_of, place_of, text_of
-from linkwise.robot.robot import NOTHING, Passive, Rotation, Scalar, TieKind
+from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Passive, Rotation, Scalar, TieKind
 
 TIES: dict[str, TieKind] = {"ball": "point", "revolute": "hinge", "continuous": "hinge", "fixed": "frame"}
 """What is left of a joint that is cut."""
@@ -20,6 +20,8 @@ DYNAMICS = {
     "damping": "damping",
     "friction": "friction",
 }
+ENDLESS = 1e16
+"""SDFormat's own number for a limit that is none."""
 YES = ("true", "1")
 
 
@@ -67,6 +69,7 @@ class SdfJoint:
             _numbers(transforms.rotate(transforms.transpose(self.of_child.rotation), self.axis)),
             self._mimic(),
             passive=Passive(**self._dynamics()) if self.type in SINGLE else NOTHING,
+            limits=self._limits() if self.type in SINGLE else UNLIMITED,
         )
 
     def tie(self) -> AnchoredTie:
@@ -113,6 +116,20 @@ class SdfJoint:
             what: numbers_in(self.element, f"axis/dynamics/{tag}", 0.0, place)
             for what, tag in DYNAMICS.items()
         }
+
+    def _limits(self) -> Limits:
+        """Numbers of 1e16 and beyond, and efforts and velocities below 0, stand for no limit there."""
+        place = place_of(self.element)
+        lower, upper, velocity, effort = (
+            numbers_in(self.element, f"axis/limit/{what}", usual, place)
+            for what, usual in asdict(UNLIMITED).items()
+        )
+        return Limits(
+            lower if self.type != "continuous" and lower > -ENDLESS else UNLIMITED.lower,
+            upper if self.type != "continuous" and upper < ENDLESS else UNLIMITED.upper,
+            velocity if 0 <= velocity < ENDLESS else UNLIMITED.velocity,
+            effort if 0 <= effort < ENDLESS else UNLIMITED.effort,
+        )
 
     def _mimic(self) -> Mimic | None:
         """SDFormat's rule is multiplier (q - reference) + offset."""

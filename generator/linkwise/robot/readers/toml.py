@@ -1,6 +1,6 @@
 """Robots in TOML, schema 1."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +10,13 @@ from linkwise.robot.description import Body, Connection, Description, Mimic
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.readers.toml_constraints import with_constraints
 from linkwise.robot.readers.toml_table import TomlTable, named_parameters, tables, toml_data
-from linkwise.robot.robot import Mat3, Passive
+from linkwise.robot.robot import Limits, Mat3, Passive
 
 TOP = {"schema", "name", "gravity", "base", "parameters", "link", "joint", "constraint", "independent"}
 LINK = {"name", "mass", "com", "inertia", "allow_unphysical"}
 PASSIVE = ("stiffness", "rest", "damping", "friction", "armature")
-JOINT = {"name", "type", "parent", "child", "xyz", "rpy", "axis", "mimic", *PASSIVE}
+LIMITS = ("lower", "upper", "velocity", "effort")
+JOINT = {"name", "type", "parent", "child", "xyz", "rpy", "axis", "mimic", *PASSIVE, *LIMITS}
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
@@ -70,16 +71,18 @@ def _connection(data: dict[str, Any], parameters: Mapping[str, float]) -> Connec
         table.numbers("axis", [0.0, 0.0, 1.0]),
         _mimic(table, data["mimic"]) if "mimic" in data else None,
         snapped=snapped,
-        passive=_passive(table),
+        passive=Passive(**_of_one_axis(table, PASSIVE)),
+        limits=Limits(**_of_one_axis(table, LIMITS)),
     )
 
 
-def _passive(table: TomlTable) -> Passive:
-    there = [key for key in PASSIVE if key in table.data]
+def _of_one_axis(table: TomlTable, keys: Iterable[str]) -> dict[str, float]:
+    """Those of the keys that are there, which only a joint of one axis takes."""
+    there = [key for key in keys if key in table.data]
     kind = table.data.get("type", "revolute")
     if there and kind not in SINGLE:
         raise LinkwiseError(f"{table.place} is {kind}, and only a joint of one axis takes {there[0]!r}")
-    return Passive(**{key: table.number(key) for key in there})
+    return {key: table.number(key) for key in there}
 
 
 def _mimic(table: TomlTable, data: Any) -> Mimic:

@@ -1,16 +1,18 @@
 """The dynamics of a URDF file; what it says beyond them is noted as ignored. Meshes are never opened."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
+from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.readers.urdf_passive import passives
 from linkwise.robot.readers.urdf_unmodelled import ignored, omissions
 from linkwise.robot.readers.xml_file import numbers, parse
-from linkwise.robot.robot import NOTHING, Passive
+from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Passive
 
 
 def read_urdf(path: Path) -> Description:
@@ -84,7 +86,21 @@ def _connection(element: Element, passive: Mapping[str, Passive]) -> Connection:
         _mimic(element, place),
         snapped,
         passive.get(name, NOTHING),
+        _limits(element, place),
     )
+
+
+def _limits(element: Element, place: str) -> Limits:
+    """What <limit> says; a continuous joint has no ends, whatever stands there."""
+    limit = element.find("limit")
+    if limit is None or element.get("type") not in SINGLE:
+        return UNLIMITED
+    given = {
+        what: numbers(limit, what, repr(usual), 1, place)[0] for what, usual in asdict(UNLIMITED).items()
+    }
+    if element.get("type") == "continuous":
+        given |= {"lower": UNLIMITED.lower, "upper": UNLIMITED.upper}
+    return Limits(**given)
 
 
 def _end(element: Element, role: str, place: str) -> str:
