@@ -264,7 +264,7 @@ def as_energies(data: Any) -> None:
 SLIPS: dict[str, tuple[Callable[[Any], object], str]] = {
     "name": (lambda d: d.update(name="arm"), "name 'arm', the package 'planar2'"),
     "version": (lambda d: d["generator"].update(linkwise="9"), "generator.linkwise '9', the package '"),
-    "joint": (lambda d: d["joints"].append({"name": "wrist", "unit": "m"}), ""),
+    "joint": (lambda d: d["joints"].append(d["joints"][0] | {"name": "wrist"}), ""),
     "operations": (lambda d: d["links"][1].update(operations=46), "links[1].operations 46, the package 40"),
     "parameter": (lambda d: d.update(parameters={"m": 1.0}), "parameters.m 1.0, the package not at all"),
     "back ends": (lambda d: d["request"].update(backends=["c"]), "request.backends {'c'}, the package {'"),
