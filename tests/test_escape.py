@@ -304,3 +304,9 @@ def test_templates_have_the_rules_as_filters() -> None:
 def test_a_text_is_cut_only_where_it_is_longer_than_it_may_be() -> None:
     assert to.short("a" * 24) == "a" * 24
     assert to.short(f"{'a' * 12}{'b' * 13}") == f"{'a' * 12}…{'b' * 11}"
+
+
+def test_a_string_of_c_has_the_bytes_of_the_name_and_nothing_that_ends_it() -> None:
+    assert to.c_string("left/knee") == '"left/knee"'
+    assert to.c_string('a"b\\c??/*/') == r'"a\042b\134c\077\077\057*\057"'
+    assert to.c_string("größe\n") == r'"gr\303\266\303\237e\012"'

@@ -97,9 +97,9 @@ def c_comment(text: str) -> str:
 
 
 def c_string(text: str) -> str:
-    """A string literal of C in ASCII: its bytes are the name in UTF-8, and no trigraph is in it."""
+    """A string literal of C in ASCII: its bytes are the name in UTF-8; neither trigraph nor comment in it."""
     plain = "".join(chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
-    return f'"{plain}"'
+    return '"{}"'.format(plain.replace("/*", "\\057*").replace("*/", "*\\057"))
 
 
 def latex_symbol(identifier: str) -> str:

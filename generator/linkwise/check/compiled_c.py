@@ -131,7 +131,7 @@ def _constants(name: str, header: str) -> dict[str, int]:
 
 def declared(name: str, header: str) -> dict[str, str]:
     """What a header says of each of the package's functions, on one line, by the name in C."""
-    code = " ".join(re.sub(r"/\*.*?\*/", " ", header, flags=re.DOTALL).split())
+    code = " ".join(re.sub(r'/\*.*?\*/|"[^"\n]*"', " ", header, flags=re.DOTALL).split())
     found = re.finditer(rf"[^;{{}}]*\b({re.escape(name)}_\w+) *\([^;]*;", code)
     return {statement[1]: statement[0].strip() for statement in found}
 
