@@ -69,17 +69,22 @@ def test_every_back_end_says_the_same_of_one_state_and_of_many(
     row = np.arange(1.0, n + 1.0)
     frame = package.FrameImpedance(link, damping=package.Natural(plus=2.0), stiffness=9.0, rows=("z",))
     chosen = (
-        lambda r: r.partial_impedance(package.Natural({link: 0.5}), row, 2.0 * row),
-        lambda r: r.partial_impedance({(joint, link, joint): 9.0}, {(0, joint_link(known), 0): 3.0}, 2.0),
-        lambda r: r.partial_impedance(frame=frame),
+        {"inertia": package.Natural({link: 0.5}), "damping": row, "stiffness": 2.0 * row},
+        {
+            "inertia": {(joint, link, joint): 9.0},
+            "damping": {(0, joint_link(known), 0): 3.0},
+            "stiffness": 2.0,
+        },
+        {"frame": frame},
     )
-    for made in chosen:
-        expected = np.stack(
-            [made(known)(a, b, target(package, known, c)) for a, b, c in zip(q, qd, qdd, strict=True)]
-        )
-        answer = made(model)(*as_kind(backend, q, qd), moved_target(package, known, backend, qdd))
-        assert relative_error(np.asarray(answer), expected) <= 1e-11
-        single = made(model)(*as_kind(backend, q[0], qd[0]), target(package, known, qdd[0]))
+    for given in chosen:
+        controller, same = known.partial_impedance(**given), model.partial_impedance(**given)
+        targets = [target(package, known, at, "frame" in given) for at in qdd]
+        expected = np.stack([controller(*state) for state in zip(q, qd, targets, strict=True)])
+        whole = target(package, known, qdd, "frame" in given)
+        moved = package.Target(*(a if a is None else as_kind(backend, a)[0] for a in whole))
+        assert relative_error(np.asarray(same(*as_kind(backend, q, qd), moved)), expected) <= 1e-11
+        single = same(*as_kind(backend, q[0], qd[0]), targets[0])
         assert relative_error(np.asarray(single), expected[0]) <= 1e-11
     names = {(0, link, None, None), (0, joint_link(known), 0, 1)}
     expected = np.stack([known.cancel(names)(a, b, c) for a, b, c in zip(q, qd, qdd, strict=True)])
@@ -91,13 +96,13 @@ def joint_link(model: Any) -> int:
     return next(j for j, path in enumerate(model.structure.paths) if 0 in path)
 
 
-def target(package: ModuleType, model: Any, at: Any) -> Any:
-    pose = model.kinematics.pose(at, model.link_names[-1])
-    return package.Target(at, 0.1 * at, 0.2 * at, pose, np.arange(6.0), np.ones(6))
-
-
-def moved_target(package: ModuleType, model: Any, backend: str, at: Any) -> Any:
-    return package.Target(*as_kind(backend, *target(package, model, at)[:4]), np.arange(6.0), np.ones(6))
+def target(package: ModuleType, model: Any, at: Any, of_frame: bool) -> Any:
+    joints = at, 0.1 * at, 0.2 * at
+    if not of_frame:
+        return package.Target(*joints)
+    return package.Target(
+        *joints, model.kinematics.pose(at, model.link_names[-1]), np.arange(6.0), np.ones(6)
+    )
 
 
 def test_gradients_flow_through_motion_gains_and_targets(package_of: Packages) -> None:
@@ -125,6 +130,35 @@ def test_gradients_flow_through_motion_gains_and_targets(package_of: Packages) -
     frame = package.FrameImpedance(link, package.Natural(plus=1.0), stiffness=5.0, rows=("rx", "ry", "x"))
     pull = model.partial_impedance(frame=frame)(q, qd, package.Target(pose=there)).sum()
     assert torch.isfinite(torch.autograd.grad(pull, q)[0]).all()
+
+
+def test_learned_gains_that_are_positive_no_more_are_refused(package_of: Packages) -> None:
+    model = package_of("torso").load("torch")
+    gain = torch.ones(model.n, dtype=torch.float64, requires_grad=True)
+    controller, rest = model.partial_impedance(stiffness=gain), torch.zeros(model.n)
+    controller(rest, rest, rest)
+    with torch.no_grad():
+        gain[1] = -1.0
+    with pytest.raises(
+        ValueError, match="stiffness is not positive or zero: along waist_lean it is negative"
+    ):
+        controller(rest, rest, rest)
+
+
+@needs_compiler
+@pytest.mark.parametrize("count", [16, 24, 40])
+def test_long_arms_are_controlled_in_single_precision(count: int, tmp_path: Path) -> None:
+    """gcc 12 wrote whole vectors beside their alignment here, of some lengths only."""
+    write_package(generate(read_system(f"planar{count}"), kernel="loops"), tmp_path / "arm")
+    package = import_package(tmp_path / "arm")
+    q, qd = np.linspace(0.1, 0.5, count), np.linspace(-0.2, 0.3, count)
+    frame = package.FrameImpedance(f"link{count}", stiffness=2.0, rows=("x", "rz"))
+    robot = package.load("native")
+    target = package.Target(pose=robot.kinematics.pose(q + 0.01, f"link{count}"))
+    expected = package.load("numpy").partial_impedance(frame=frame)(q, qd, target)
+    for kind, bound in ((np.float64, 1e-9), (np.float32, 1e-2)):
+        found = robot.partial_impedance(frame=frame)(q.astype(kind), qd.astype(kind), target)
+        assert relative_error(found, expected) <= bound
 
 
 def test_a_controller_maps_over_samples(package_of: Packages) -> None:
@@ -188,18 +222,38 @@ def test_targets_that_cannot_be_are_refused_in_one_line(package_of: Packages) ->
         ({(0, 0): 1.0}, r"entries are \(joint, link, coordinate\)"),
         ({(0, 0, 0): 1.0, ("joint1", 0, 0): 2.0}, "twice, by name and by number"),
     )
+    off_path = np.zeros((3, 3, 3))
+    off_path[2, 0, 2] = 1.0
     others = (
         ({"stiffness": np.triu(np.ones((3, 3)))}, r"not symmetric: \(joint1, joint2\) is 1"),
         ({"stiffness": -1.0}, "stiffness is not positive or zero"),
-        ({"damping": natural(plus=-1.0)}, "damping.plus is not positive or zero"),
+        (
+            {"damping": natural(plus=-1.0)},
+            "damping.plus is not positive or zero: along joint1 it is negative",
+        ),
+        ({"damping": off_path}, "joint 'joint3' does not move link 'link1'"),
+        ({"frame": frame("base", rows=("x",))}, "'base' cannot move along 1 rows, each by itself: 0 joints"),
+        ({"frame": frame("link3")}, "'link3' cannot move along 6 rows, each by itself: 3 joints move it"),
+        ({"frame": frame("link3", rows=("x",), point=(0, np.nan, 0))}, "frame.point is"),
         ({"frame": frame("hand")}, "frame is 'hand'"),
         ({"frame": frame("link3", rows=("x", "x"))}, "choose some of rx, ry, rz, x, y, z"),
-        ({"frame": frame("link3", stiffness=-1.0)}, "frame.stiffness is not positive"),
+        ({"frame": frame("link3", stiffness=-1.0, rows=("x",))}, "frame.stiffness is not positive"),
     )
     for given, message in (*(({"inertia": a}, text) for a, text in inertias), *others):
         with pytest.raises(ValueError, match=message) as caught:
             robot.partial_impedance(**given)
         assert "\n" not in str(caught.value)
+    numberless = (
+        ({"stiffness": natural()}, "stiffness is Natural, but a position loads nothing by itself"),
+        ({"frame": "link3"}, r"frame is 'link3'; give FrameImpedance\('link3', ...\)"),
+        ({"inertia": natural}, "which cannot be taken here; give numbers"),
+        ({"inertia": natural({"link3": torch.ones(())})}, "give a number, or a whole tensor to learn"),
+    )
+    for given, message in numberless:
+        with pytest.raises(TypeError, match=message):
+            robot.partial_impedance(**given)
+    with pytest.raises(TypeError, match="give a set of"):
+        robot.cancel("joint1")
     cancelled = (
         ([("joint3", "link1", None, None)], "is always zero"),
         ([(*first, "joint2", 0)], "cancel 1, of velocity, or 2, of acceleration"),
@@ -225,13 +279,20 @@ def test_states_that_cannot_be_controlled_are_refused_with_the_sample(package_of
     straight = robot.partial_impedance(frame=frame("link3", rows=("x", "y", "rz")))
     q[1] = 0.0
     with pytest.raises(
-        ValueError, match=r"the mobility of frame 'link3' is not positive at sample 1: along .*x"
+        ValueError, match=r"frame 'link3' cannot move along rows each by itself at sample 1: along .*x"
     ):
         straight(q, rest)
     turned = robot.partial_impedance(frame=frame("link3", stiffness=1.0, rows=("rz",)))
     pose = robot.kinematics.pose(q[0] + [np.pi, 0.0, 0.0], "link3")
-    with pytest.raises(ValueError, match="half a turn from its target"):
+    with pytest.raises(ValueError, match="half a turn from its target, which has no direction; take steps"):
         turned(q[0], rest, package.Target(pose=pose))
+    with pytest.raises(ValueError, match=r"target\.pose is no rotation"):
+        turned(q[0], rest, package.Target(pose=2.0 * np.eye(4)))
+    with pytest.raises(ValueError, match=r"target.velocity has shape \(1,\); its last axis must be 6"):
+        turned(q[0], rest, package.Target(pose=np.eye(4), velocity=[0.0]))
+    assert not turned.dissipative  # the angle about z changes by other turns, too
+    with pytest.raises(ValueError, match="target has what a frame shall do, but none is controlled"):
+        robot.partial_impedance()(q[0], rest, package.Target(pose=pose))
     with pytest.raises(ValueError, match="is stiff, but target has no pose"):
         turned(q[0], rest)
     with pytest.raises(ValueError, match="the joints are stiff, but target has no q"):

@@ -94,8 +94,12 @@ def test_joints_obey_the_target_equation(arm: Arm, form: str) -> None:
     force = np.array([3.0, -2.0, 1.0, 0.5, -0.4, 0.2])
     given = gains
     if form == "by link":  # any split over the links is the same controller: Eq. 20 is a choice of gauge
-        shares = np.random.default_rng(5).dirichlet(np.ones(arm.robot.N), (n, n))
-        given = [np.moveaxis(shares, -1, 1) * gain[:, None, :] for gain in gains]
+        shares = np.zeros((n, arm.robot.N, n))
+        shares[*arm.robot.layout.velocity.T] = np.random.default_rng(5).uniform(
+            size=len(arm.robot.layout.velocity)
+        )
+        shares /= shares.sum(1, keepdims=True)
+        given = [shares * gain[:, None, :] for gain in gains]
     controller = arm.robot.partial_impedance(*given)
     q, _ = arm.moved(lambda q, qd: controller(q, qd, AT, force), force, time)
     expected = AT + linear_motion(*gains, Q - AT, QD, force, time)

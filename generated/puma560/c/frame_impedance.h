@@ -55,11 +55,13 @@ static inline int frame_moved(const struct sample *s, const API(frame_impedance)
         reach[1] += (move + turn * distance) / size[k];
     }
     memset(out, 0, sizeof *out);
-    for (int r = 0; r < wanted->rows; ++r)
-        for (int k = 0; k < N; ++k) {
-            out->jacobian[r * N + k] = out->moved[k * 6 + r] = j[wanted->row[r] * N + k];
-            out->rate[r * N + k] = rate[wanted->row[r] * N + k];
-        }
+    for (int r = 0; r < wanted->rows; ++r) {
+        memcpy(out->jacobian + r * N, j + wanted->row[r] * N, N * sizeof(real));
+        memcpy(out->rate + r * N, rate + wanted->row[r] * N, N * sizeof(real));
+    }
+    for (int k = 0; k < N; ++k)
+        for (int r = 0; r < 6; ++r)
+            out->moved[k * 6 + r] = out->jacobian[r * N + k];
     int fault = eliminate(0, N, 6, size, mass, out->moved);
     if (fault)
         return fault;

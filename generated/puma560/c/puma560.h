@@ -224,7 +224,7 @@ int puma560_forward_dynamics(const double *q, const double *qd, const double *ta
        B*(i, k) = sum over j of keep_velocity(i, j, k) c1(i, j, k)  +  damping(i, k)
        tau = H qdd + C qd + g - f
 
-   H is M; C(i, k) and g(i) are sums over the links.
+   v is what a task asks for, H is M; C(i, k) and g(i) are sums over the links.
    Weights are 1 for what is kept, 0 for what is not, or anything; those off a link's path are not looked at. */
 typedef struct {
     const double *keep_inertia; /* (JOINTS, LINKS, JOINTS), or NULL: all of c2 is kept */
@@ -253,7 +253,7 @@ int puma560_partial_impedance(const double *q, const double *qd, const puma560_i
        M_e = keep_inertia L + inertia        B_e = keep_velocity mu + damping
 
    x being the rotation vector that leads from pose_d to the frame, and the point's place from that of the same point there,
-   in the world's axes, and E x's rates by nu - nu_d, were only the frame to turn. */
+   in the world's axes, and E, cut to these rows, what takes nu to the rates of x. */
 typedef struct {
     int frame; /* one of the constants above */
     const double *point; /* (3) in the frame's axes, or NULL: its origin */
@@ -397,7 +397,7 @@ int puma560_forward_dynamicsf(const float *q, const float *qd, const float *tau,
        B*(i, k) = sum over j of keep_velocity(i, j, k) c1(i, j, k)  +  damping(i, k)
        tau = H qdd + C qd + g - f
 
-   H is M; C(i, k) and g(i) are sums over the links.
+   v is what a task asks for, H is M; C(i, k) and g(i) are sums over the links.
    Weights are 1 for what is kept, 0 for what is not, or anything; those off a link's path are not looked at. */
 typedef struct {
     const float *keep_inertia; /* (JOINTS, LINKS, JOINTS), or NULL: all of c2 is kept */
@@ -426,7 +426,7 @@ int puma560_partial_impedancef(const float *q, const float *qd, const puma560_im
        M_e = keep_inertia L + inertia        B_e = keep_velocity mu + damping
 
    x being the rotation vector that leads from pose_d to the frame, and the point's place from that of the same point there,
-   in the world's axes, and E x's rates by nu - nu_d, were only the frame to turn. */
+   in the world's axes, and E, cut to these rows, what takes nu to the rates of x. */
 typedef struct {
     int frame; /* one of the constants above */
     const float *point; /* (3) in the frame's axes, or NULL: its origin */

@@ -222,7 +222,7 @@ int torso_forward_dynamics(const double *q, const double *qd, const double *tau,
        B*(i, k) = sum over j of keep_velocity(i, j, k) c1(i, j, k)  +  damping(i, k)
        tau = H qdd + C qd + g - f
 
-   H is M; C(i, k) and g(i) are sums over the links.
+   v is what a task asks for, H is M; C(i, k) and g(i) are sums over the links.
    Weights are 1 for what is kept, 0 for what is not, or anything; those off a link's path are not looked at. */
 typedef struct {
     const double *keep_inertia; /* (JOINTS, LINKS, JOINTS), or NULL: all of c2 is kept */
@@ -251,7 +251,7 @@ int torso_partial_impedance(const double *q, const double *qd, const torso_imped
        M_e = keep_inertia L + inertia        B_e = keep_velocity mu + damping
 
    x being the rotation vector that leads from pose_d to the frame, and the point's place from that of the same point there,
-   in the world's axes, and E x's rates by nu - nu_d, were only the frame to turn. */
+   in the world's axes, and E, cut to these rows, what takes nu to the rates of x. */
 typedef struct {
     int frame; /* one of the constants above */
     const double *point; /* (3) in the frame's axes, or NULL: its origin */
@@ -391,7 +391,7 @@ int torso_forward_dynamicsf(const float *q, const float *qd, const float *tau, f
        B*(i, k) = sum over j of keep_velocity(i, j, k) c1(i, j, k)  +  damping(i, k)
        tau = H qdd + C qd + g - f
 
-   H is M; C(i, k) and g(i) are sums over the links.
+   v is what a task asks for, H is M; C(i, k) and g(i) are sums over the links.
    Weights are 1 for what is kept, 0 for what is not, or anything; those off a link's path are not looked at. */
 typedef struct {
     const float *keep_inertia; /* (JOINTS, LINKS, JOINTS), or NULL: all of c2 is kept */
@@ -420,7 +420,7 @@ int torso_partial_impedancef(const float *q, const float *qd, const torso_impeda
        M_e = keep_inertia L + inertia        B_e = keep_velocity mu + damping
 
    x being the rotation vector that leads from pose_d to the frame, and the point's place from that of the same point there,
-   in the world's axes, and E x's rates by nu - nu_d, were only the frame to turn. */
+   in the world's axes, and E, cut to these rows, what takes nu to the rates of x. */
 typedef struct {
     int frame; /* one of the constants above */
     const float *point; /* (3) in the frame's axes, or NULL: its origin */

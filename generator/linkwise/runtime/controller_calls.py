@@ -44,7 +44,8 @@ class ControllerCalls:
         kept as part of the inertia, beside the links; else they are as if not there, which is right only
         where the description has none. An inertia that is given as a sum is the whole, armature included.
 
-        Tensors among the targets are taken anew at each call, so that gains can be learned.
+        Tensors among the targets are taken anew at each call, so that gains can be learned, and are refused
+        there where they are positive no more.
 
         Raises ValueError for names or shapes that are not there, and for a target that is not positive: an
         inertia that is not positive definite or not symmetric, a stiffness or a damping that gives energy

@@ -91,7 +91,8 @@ class PartialImpedance(Generic[Array]):
         for any of joints.
 
         It does where inertia and damping keep the same share of each link, all that is added and the
-        stiffness being positive; then inertia times rate of change is what the kept c1 take up.
+        stiffness being positive: the kept c1 take up what the inertia changes by. Not so for a frame that is
+        stiff about one or two of the three axes, as the angle about one changes by turns about the others.
         """
         return bool(self._answers.dissipative)
 

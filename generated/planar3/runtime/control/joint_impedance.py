@@ -99,7 +99,9 @@ class JointImpedance:
         pull = self.pull(state, errors, like)
         if errors.force is not None:
             pull = pull + errors.force
-        what = "the wanted inertia" if self.targets.positive else "what is left of the mass matrix"
+        what = "what is left of the mass matrix is singular"
+        if self.targets.positive:
+            what = "the wanted inertia is not positive"
         names, natural, positive = self._robot.joint_names, state.inertia, self.targets.positive
         solved = solved_wanted(what, state.wanted_inertia, pull[..., None], natural, names, positive)
         moved = solved[..., 0]

@@ -18,6 +18,7 @@ def solved_wanted(
 ) -> Any:
     """a (..., r, X) of M* (..., r, r) and forces (..., r, X).
 
+    what: is wrong where it cannot be, as the message says
     natural: matrix (..., r, r) whose diagonal says how large each row is, so that kilograms and square metres
     go together; positive: whether M* must be positive (its symmetric part, that is), else regular
 
@@ -49,10 +50,10 @@ def _check(what: str, scaled: NDArray[Any], names: Sequence[str], positive: bool
         except np.linalg.LinAlgError:
             pass
         values, vectors = np.linalg.eigh(symmetric)
-        value, vector, wrong = values[..., 0], vectors[..., :, 0], "not positive"
+        value, vector = values[..., 0], vectors[..., :, 0]
     else:
         vectors, values, _ = np.linalg.svd(known)
-        value, vector, wrong = values[..., -1], vectors[..., :, -1], "singular"
+        value, vector = values[..., -1], vectors[..., :, -1]
     bad = value <= least * np.maximum(1.0, np.abs(values).max(-1))
     if not bad.any():
         return
@@ -60,4 +61,4 @@ def _check(what: str, scaled: NDArray[Any], names: Sequence[str], positive: bool
     where = f" at sample {', '.join(map(str, sample))}" if sample else ""
     along = np.abs(vector[sample])
     rows = ", ".join(names[r] for r in np.flatnonzero(along > 0.1 * along.max()).tolist())
-    raise ValueError(f"{what} is {wrong}{where}: along {rows}")
+    raise ValueError(f"{what}{where}: along {rows}")

@@ -156,6 +156,10 @@ class ControlAnswers:
         read = Target(*target) if hasattr(target, "_fields") else Target(q=target)
         if read.q is None and self._joints.targets.stiffness is not None:
             raise ValueError("the joints are stiff, but target has no q; give positions, (..., n)")
+        if self._frame is None and any(a is not None for a in read[3:]):
+            raise ValueError(
+                "target has what a frame shall do, but none is controlled; give frame=FrameImpedance(...)"
+            )
         beside = {"target": read.q, "target.qd": read.qd, "target.qdd": read.qdd, "external": external}
         return read, self._arrays({"q": q, "qd": qd}, beside)
 

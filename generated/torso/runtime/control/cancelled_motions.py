@@ -18,6 +18,10 @@ def cancelled_motions(entries: Iterable[Any], structure: Structure) -> tuple[Ent
     Raises ValueError for what is not there, what is always zero, and what is named twice.
     """
     found: dict[Entry, None] = {}
+    if isinstance(entries, str) or not isinstance(entries, Iterable):
+        raise TypeError(
+            f"{short(entries)} is to be cancelled; give a set of (joint, link, coordinate, order)"
+        )
     for entry in entries:
         if not isinstance(entry, tuple) or len(entry) != 4:
             raise ValueError(f"{short(entry)} is to be cancelled; give (joint, link, coordinate, order)")

@@ -14,12 +14,14 @@ approach for motion and force control of robot manipulators, 1987.
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..chosen_names import short
 from ..controllers import ROWS, FrameImpedance
 from ..kinematics.named_frames import frame_index
 from ..sums.namespace import namespace
 from .frame_rotation import rates_of_turning, rotation_vector
-from .gains import Gain, check_positive
+from .gains import Gain, is_natural
 from .joint_impedance import JointState, times
 from .wanted_solve import solved_wanted
 
@@ -64,19 +66,35 @@ class FrameTargets:
 
     def __init__(self, robot: Any, asked: FrameImpedance) -> None:
         """Raises ValueError and TypeError as `Dynamics.partial_impedance` does."""
+        if not hasattr(asked, "rows"):
+            raise TypeError(f"frame is {short(asked)}; give FrameImpedance({short(asked)}, ...)")
         self._robot, self.rows, self.names = robot, _chosen(asked.rows), tuple(asked.rows)
-        self.frame, self.point = asked.frame, np.asarray(asked.point, float)
-        frame_index(asked.frame, robot.kinematics.frames, robot.link_names)
+        self.frame, self.point = asked.frame, _point(asked.point)
+        self._check_movable(frame_index(asked.frame, robot.kinematics.frames, robot.link_names))
         self.inertia = self._part("frame.inertia", asked.inertia, True)
         self.damping = self._part("frame.damping", asked.damping, False)
         gain = Gain("frame.stiffness", asked.stiffness, self.names)
-        check_positive(gain, False)
-        self.stiffness = gain if gain.numbers.any() else None
+        self.stiffness = gain if gain.numbers.any() or gain.learned else None
 
     @property
     def dissipative(self) -> bool:
-        """Whether the natural inertia and velocity forces are kept alike."""
-        return self.inertia.kept == self.damping.kept
+        """Whether natural inertia and velocity forces are kept alike, and turns are held in all ways or none.
+
+        The angle about one axis changes by turns about the others, too.
+        """
+        turns = sum(row < 3 for row in self.rows)
+        return self.inertia.kept == self.damping.kept and (turns in (0, 3) or self.stiffness is None)
+
+    def _check_movable(self, frame: int) -> None:
+        """Raise ValueError for rows that no joints can move, wherever they are."""
+        tree = self._robot.backend.tree
+        moving = tree.chain(tree.frames[frame].joint)
+        joints = {tree.joints[f].coordinate for f in moving}
+        if len(joints) < len(self.rows):
+            raise ValueError(
+                f"frame {self.frame!r} cannot move along {len(self.rows)} rows, each by itself: "
+                f"{len(joints)} joint{'s' * (len(joints) != 1)} move it; choose rows, such as rows=('x', 'y')"
+            )
 
     def state(self, joints: JointState, q: Any, qd: Any, target: Any) -> FrameState:
         """The frame at q and qd, by `target` of `controllers.Target`."""
@@ -92,13 +110,17 @@ class FrameTargets:
         compliance = j @ moved
         ones = side.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
         inertia = solved_wanted(
-            f"the mobility of frame {self.frame!r}", compliance, ones, compliance, self.names
+            f"frame {self.frame!r} cannot move along rows each by itself",
+            compliance,
+            ones,
+            compliance,
+            self.names,
         )
         dual = moved @ inertia
         natural = (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.coriolis - rate)) @ dual
         place, turning = self._place(side, q, target)
         velocity, wanted = (
-            None if a is None else side.weights(name, a, q)[..., rows]
+            None if a is None else _six(name, side.weights(name, a, q))[..., rows]
             for name, a in (
                 ("target.velocity", target.velocity),
                 ("target.acceleration", target.acceleration),
@@ -126,7 +148,7 @@ class FrameTargets:
             pull = pull - times(xp.swapaxes(state.turning, -1, -2), self._pull(state.place))
         if external is not None:
             pull = pull + times(xp.swapaxes(state.dual, -1, -2), external)
-        what = f"the wanted inertia of frame {self.frame!r}"
+        what = f"the wanted inertia of frame {self.frame!r} is not positive"
         moved = solved_wanted(what, state.wanted_inertia, pull[..., None], state.inertia, self.names)[..., 0]
         if state.wanted is not None:
             moved = moved + state.wanted
@@ -173,17 +195,32 @@ class FrameTargets:
         return xp.concat([theta, moved], -1)[..., rows], turning[..., rows, :][..., rows]
 
     def _part(self, name: str, given: Any, definite: bool) -> FramePart:
-        if hasattr(given, "scale") and hasattr(given, "plus"):
+        if is_natural(given):
             if isinstance(given.scale, bool) or not isinstance(given.scale, int | float) or given.scale < 0.0:
                 raise ValueError(f"{name}.scale is {given.scale!r}; give a number, 0 or above")
             if given.plus is None:
                 return FramePart(float(given.scale), None)
-            gain = Gain(f"{name}.plus", given.plus, self.names)
-            check_positive(gain, False, symmetric=definite)
+            gain = Gain(f"{name}.plus", given.plus, self.names, symmetric=definite)
             return FramePart(float(given.scale), gain)
-        gain = Gain(name, given, self.names)
-        check_positive(gain, definite, symmetric=definite)
-        return FramePart(0.0, gain)
+        return FramePart(0.0, Gain(name, given, self.names, None, definite, symmetric=definite))
+
+
+def _point(given: Any) -> NDArray[Any]:
+    """Raises ValueError for what is not three finite numbers."""
+    point = np.array(given, float)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise ValueError(f"frame.point is {short(given)}; give x, y, z in the frame, in m")
+    return point
+
+
+def _six(name: str, given: Any) -> Any:
+    """Raises ValueError for other than the six of a frame and its point."""
+    if not given.ndim or given.shape[-1] != 6:
+        raise ValueError(
+            f"{name} has shape {tuple(given.shape)}; its last axis must be 6, turns about and moves along "
+            "the world's x, y, z, whichever rows are controlled"
+        )
+    return given
 
 
 def _chosen(rows: Any) -> tuple[int, ...]:

@@ -3,17 +3,21 @@
 import math
 from typing import Any
 
+import numpy as np
+
 from ..sums.namespace import hidden, namespace
 
 SMALL = 1e-2
 """Radians below which series serve: their errors are some 1e-17."""
 HALF_TURN = math.pi - 1e-6
+SKEWED = 1e-4
+"""By so much a pose of float32, or of a file, may not be a rotation."""
 
 
 def rotation_vector(turn: Any, wanted: Any) -> Any:
     """theta (..., 3), in rad, with turn = exp([theta]) wanted, of matrices (..., 3, 3).
 
-    Raises ValueError at half a turn, which has no direction.
+    Raises ValueError at half a turn, which has no direction, and for what turns nothing.
     """
     xp = namespace(turn)
     relative = turn @ xp.swapaxes(wanted, -1, -2)
@@ -25,9 +29,14 @@ def rotation_vector(turn: Any, wanted: Any) -> Any:
     near = (square < SMALL * SMALL) & (cosine > 0.0)
     sine = xp.where(near, xp.ones_like(square), square) ** 0.5
     angle = xp.arctan2(sine, cosine)
-    if not hidden(turn) and bool((~near & (angle > HALF_TURN)).any()):
-        raise ValueError(
-            "the frame is half a turn from its target, which has no direction; take steps between"
+    if not hidden(turn):
+        _refuse(
+            "target.pose is no rotation", abs(wanted @ xp.swapaxes(wanted, -1, -2) - _ones(wanted)) > SKEWED
+        )
+        far = ~near & (angle > HALF_TURN)
+        _refuse(
+            "the frame is half a turn from its target, which has no direction; take steps between",
+            far[..., None, None],
         )
     # arcsin(s) / s, and theta / sin(theta)
     series = 1.0 + square * (
@@ -55,10 +64,19 @@ def rates_of_turning(theta: Any) -> Any:
     none = xp.zeros_like(x)
     cross = xp.stack([xp.stack(row, -1) for row in ((none, -z, y), (z, none, -x), (-y, x, none))], -2)
     product = cross @ cross
-    ones = xp.zeros_like(cross) + xp.eye(3, dtype=theta.dtype, **_on(theta))
-    return ones - cross / 2.0 + c[..., None, None] * product
+    return _ones(cross) - cross / 2.0 + c[..., None, None] * product
 
 
-def _on(values: Any) -> dict[str, Any]:
-    device = getattr(values, "device", None)
-    return {} if device is None or isinstance(device, str) else {"device": device}
+def _ones(like: Any) -> Any:
+    """The matrix that turns nothing, (..., 3, 3)."""
+    xp, device = namespace(like), getattr(like, "device", None)
+    on = {} if xp is np else {"device": device}
+    return xp.zeros_like(like) + xp.eye(3, dtype=like.dtype, **on)
+
+
+def _refuse(what: str, wrong: Any) -> None:
+    """Raise ValueError for the first sample of (..., 3, 3) or (..., 1, 1) where anything is wrong."""
+    if bool(wrong.any()):
+        found = np.asarray(wrong if isinstance(wrong, np.ndarray) else wrong.detach().cpu()).any((-2, -1))
+        sample = np.argwhere(found)[0].tolist()
+        raise ValueError(f"{what}{' at sample ' + ', '.join(map(str, sample)) if sample else ''}")

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import as_weights, has_tensors
+from ..arguments import has_tensors
 from ..chosen_names import short
 from ..structure import Structure
-from .gains import Gain, check_positive
+from .gains import Gain, is_natural, numbers_of
 
 
 class WantedShares(NamedTuple):
@@ -51,16 +51,15 @@ def wanted(name: str, given: Any, structure: Structure, definite: bool) -> Wante
     definite: whether a sum that is given must be positive definite and symmetric, as inertia must
     """
     names = structure.joint_names
-    if hasattr(given, "scale") and hasattr(given, "plus"):
-        added = None if given.plus is None else Gain(f"{name}.plus", given.plus, names)
-        if added is not None:
-            check_positive(added, False, symmetric=definite)
+    if is_natural(given):
+        plus = f"{name}.plus"
+        added = None if given.plus is None else Gain(plus, given.plus, names, symmetric=definite)
         return WantedShares(*_scaled(f"{name}.scale", given.scale, structure), added, False, True)
     if isinstance(given, Mapping):
         kept, values = entries_apart(name, given, structure)
-        return WantedShares(kept, None, Gain(name, values, names), False, False)
-    added = Gain(name, given, names, structure.N)
-    check_positive(added, definite, symmetric=definite)
+        return WantedShares(kept, None, Gain(name, values, names, any_sign=True), False, False)
+    added = Gain(name, given, names, structure.N, definite, symmetric=definite)
+    check_paths(name, given, structure)
     whole = np.ndim(given.detach() if has_tensors([given]) else given) < 3
     return WantedShares(0.0, np.zeros(structure.N), added, whole, True)
 
@@ -69,9 +68,23 @@ def stiffness_of(given: Any, structure: Structure) -> Gain | None:
     """K*, None for none; raises ValueError for what is not symmetric or not positive."""
     if isinstance(given, Mapping):
         given = entries_apart("stiffness", given, structure)[1]
+    elif is_natural(given):
+        raise TypeError(
+            "stiffness is Natural, but a position loads nothing by itself, and gravity is compensated; give "
+            "numbers in N m/rad or N/m"
+        )
     gain = Gain("stiffness", given, structure.joint_names, structure.N)
-    check_positive(gain, False)
+    check_paths("stiffness", given, structure)
     return gain if has_tensors([given]) or gain.numbers.any() else None
+
+
+def check_paths(name: str, given: Any, structure: Structure) -> None:
+    """Raise ValueError for an entry (n, N, n) of a joint that does not move the link."""
+    if np.ndim(given.detach() if has_tensors([given]) else given) != 3:
+        return
+    numbers = np.asarray(given.detach().cpu() if has_tensors([given]) else given, float)
+    for place in np.argwhere(numbers):
+        entry_of(name, tuple(place.tolist()), structure)
 
 
 def entries_apart(
@@ -86,10 +99,8 @@ def entries_apart(
         i, j, k = entry_of(name, key, structure)
         if not kept[i, j, k]:
             raise ValueError(f"{name} has the entry {short(key)} twice, by name and by number")
-        if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
-            raise TypeError(f"{name} of {short(key)} is {short(value)}; give a number")
         kept[i, j, k] = 0.0
-        values[i, k] += value
+        values[i, k] += _number(name, key, value)
     return kept, values
 
 
@@ -107,11 +118,19 @@ def entry_of(name: str, key: tuple[Any, ...], structure: Structure) -> tuple[int
     return i, j, k
 
 
+def _number(name: str, key: Any, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
+        raise TypeError(
+            f"{name} of {short(key)} is {short(value)}; give a number, or a whole tensor to learn"
+        )
+    return float(value)
+
+
 def _scaled(name: str, scale: Any, structure: Structure) -> tuple[Any, NDArray[Any] | None]:
     """w and, where it is one number for each link, these numbers."""
     if isinstance(scale, Mapping):
         scale = _by_names(name, scale, structure)
-    read = as_weights(name, scale)
+    read = numbers_of(name, scale)
     numbers = np.asarray(read.detach().cpu() if has_tensors([read]) else read, float)
     if numbers.shape not in ((), (structure.n, structure.N)):
         raise ValueError(
@@ -126,7 +145,6 @@ def _scaled(name: str, scale: Any, structure: Structure) -> tuple[Any, NDArray[A
     if not numbers.ndim:
         kept: Any = read if has_tensors([read]) else float(numbers)
         return kept, np.full(structure.N, float(numbers))
-    # arrays are copied, tensors are taken as they are at each call
     kept = read if has_tensors([read]) else numbers.copy()
     return kept[..., None], _alike(numbers, structure)
 
@@ -145,7 +163,7 @@ def _by_names(name: str, given: Mapping[Any, Any], structure: Structure) -> NDAr
             if len(key) != 2:
                 raise ValueError(f"{name} has the key {short(key)}; keys are link or (joint, link)")
             i, j, _ = entry_of(name, (*key, key[0]), structure)
-            scale[i, j] = value
+            scale[i, j] = _number(name, key, value)
         else:
-            scale[:, structure.link_index(key, f"{name}: link")] = value
+            scale[:, structure.link_index(key, f"{name}: link")] = _number(name, key, value)
     return scale
