@@ -44,12 +44,16 @@ def test_what_control_needs_is_pinocchios(robot: str, tmp_path: Path) -> None:
     oracle = WithFrames(path, system, OPTIONS[robot])
     errors: dict[str, float] = {}
 
-    def held(call: str, expected: Any, *given: Any, known: float = 1.0) -> None:
+    def close(what: str, found: Any, expected: Any, known: float = 1.0) -> None:
+        error = float(np.abs(found - expected).max() / max(1.0, np.abs(expected).max()))
+        errors[what] = max(errors.get(what, 0.0), error / known)
+
+    def held(call: str, expected: Any, *given: Any, known: float = 1.0) -> Any:
         found = np.full(expected.shape, np.nan)
         pointers = [a if isinstance(a, int) else ctypes.c_void_p(a.ctypes.data) for a in (*given, found)]
         getattr(library, f"robot_{call}")(*pointers)
-        error = float(np.abs(found - expected).max() / max(1.0, np.abs(expected).max()))
-        errors[call] = max(errors.get(call, 0.0), error / known)
+        close(call, found, expected, known)
+        return found
 
     assert tree is not None
     origin = np.zeros(3)
@@ -64,9 +68,11 @@ def test_what_control_needs_is_pinocchios(robot: str, tmp_path: Path) -> None:
         mass = oracle.mass(q)
         held("mass_matrix", mass, q)
         if "allow_unphysical" not in OPTIONS[robot]:
-            # accelerations are known as well as the matrix lets them be, Pinocchio's too
+            # the last digit of M moves accelerations by its condition, Pinocchio's too, but not what M makes of them
             known = max(1.0, 1e-6 * np.linalg.cond(mass))
-            held("forward_dynamics", oracle.acceleration(q, qd, tau), q, qd, tau, known=known)
+            moved = held("forward_dynamics", oracle.acceleration(q, qd, tau), q, qd, tau, known=known)
+            taken = float((np.abs(mass) @ np.abs(moved)).max())
+            close("torques of accelerations", oracle.torque(q, qd, moved), tau, max(1.0, taken))
     assert max(errors.values()) <= LARGEST_ERROR, errors
 
 
