@@ -68,7 +68,7 @@ def test_what_control_needs_is_pinocchios(robot: str, tmp_path: Path) -> None:
         mass = oracle.mass(q)
         held("mass_matrix", mass, q)
         if "allow_unphysical" not in OPTIONS[robot]:
-            # the last digit of M moves accelerations by its condition, Pinocchio's too, but not what M makes of them
+            # the last digit of M moves accelerations by its condition, but not the torques that they take
             known = max(1.0, 1e-6 * np.linalg.cond(mass))
             moved = held("forward_dynamics", oracle.acceleration(q, qd, tau), q, qd, tau, known=known)
             taken = float((np.abs(mass) @ np.abs(moved)).max())
