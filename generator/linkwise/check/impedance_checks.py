@@ -37,12 +37,15 @@ def _shaped(
 ) -> Iterator[Entries]:
     """M* qdd + B* qd + K* e = f of the acceleration, and the torque that the plant takes for it.
 
-    How much of each link is kept differs where links are bodies; of a user's energies it may not.
+    How much of each link is kept differs where no link has an inertia that is negative anywhere, which those
+    of a user's energies, and of negative masses, may have.
     """
     n, links = len(model.joint_names), len(model.link_names)
     q, qd, _ = reference.states.at(rows).motion
-    kept = np.linspace(0.5, 1.5, links) if model.backend.tree is not None else np.full(links, 0.7)
     mass, scale = (source["c2"][rows] for source in (reference.values, reference.scales))
+    each = np.moveaxis(mass, 2, 1)
+    bodies = model.backend.tree is not None and np.linalg.eigvalsh(each).min() >= -1e-9 * np.abs(each).max()
+    kept = np.linspace(0.5, 1.5, links) if bodies else np.full(links, 0.7)
     coriolis, size = (source["c1"][rows] for source in (reference.values, reference.scales))
     own = float(np.abs(mass.sum(2)).max())
     more, stiffness, at = own * np.linspace(0.1, 0.3, n), own * np.linspace(1.0, 3.0, n), 0.9 * q
