@@ -61,13 +61,13 @@ def own_modules(before: Iterable[str]) -> Iterator[str]:
 
 
 def _record(distribution: str) -> Iterator[str]:
-    """METADATA of an installed package; nothing of one that was never installed."""
-    try:
-        files = metadata.files(distribution) or []
-    except metadata.PackageNotFoundError:
-        return
-    records = (file for file in files if file.name == "METADATA" and len(file.parts) == 2)
-    yield from (Path(str(file.locate())).as_posix() for file in records)
+    """METADATA of an installed package; nothing of one that was never installed.
+
+    Beside the record there may be what setuptools leaves in a source tree, which has none.
+    """
+    for found in metadata.distributions(name=distribution):
+        records = (file for file in found.files or [] if file.name == "METADATA" and len(file.parts) == 2)
+        yield from (Path(str(found.locate_file(file))).as_posix() for file in records)
 
 
 def _spoken(name: str) -> str:
