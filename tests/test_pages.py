@@ -1,0 +1,67 @@
+"""README.md and docs/ run as printed, lead to what is there, and build without a warning."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pages
+import pytest
+
+ROOT = pages.ROOT
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("page", [p for p in pages.PAGES if any(b.runs for b in pages.blocks(p))], ids=name_of)
+def test_a_page_runs_as_printed(page: Path, tmp_path: Path) -> None:
+    if lacking := pages.missing(page):
+        pytest.skip(f"needs {', '.join(lacking)}")
+    # Each in a process of its own: their packages have the same names.
+    script = f"import pages, pathlib; pages.run_page(pathlib.Path({str(page)!r}), pathlib.Path({str(tmp_path)!r}))"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script],
+        cwd=ROOT / "tests",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    for made, shown in pages.pictures(page):
+        assert (tmp_path / made).is_file()
+        assert shown.is_file()
+
+
+@pytest.mark.parametrize("page", pages.PAGES, ids=name_of)
+def test_every_block_of_a_page_is_run_written_or_an_excerpt(page: Path) -> None:
+    for block in pages.blocks(page):
+        place = f"{page.name}, line {block.line}"
+        assert block.language, f"{place}: an indented block; say its language"
+        excerpt = block.language == "text" and block.word in ("", "printed")
+        assert block.runs or block.word or excerpt, f"{place}: neither run nor written to a file"
+        if excerpt and not block.word:
+            assert not re.match(r"(\.venv/bin/)?(linkwise|python|pip|make) ", block.text), f"{place}: a command"
+
+
+@pytest.mark.parametrize("page", pages.PAGES, ids=name_of)
+def test_a_page_leads_to_what_is_there(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        path, _, anchor = target.partition("#")
+        if re.match(r"\w+:", target):
+            continue
+        to = (page.parent / path).resolve() if path else page
+        assert to.exists(), f"{page.name}: {target}"
+        if anchor and to.suffix == ".md":
+            heads = re.findall(r"^#+ (.+)$", to.read_text(encoding="utf-8"), flags=re.MULTILINE)
+            slugs = {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+            assert anchor in slugs, f"{page.name}: {target}"
+
+
+def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going", "docs", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "index.html").is_file()
