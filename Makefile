@@ -3,7 +3,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean
+.PHONY: docs pictures demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -26,6 +26,15 @@ generate: $(READY)
 	$(BIN)/linkwise generate planar3 --out generated
 	$(BIN)/linkwise generate puma560 --out generated
 	$(BIN)/linkwise generate torso --out generated
+
+# The documentation as a site: out/docs/index.html. A warning fails it.
+docs: $(READY)
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going docs out/docs
+
+# What the pages of the documentation show, run; their pictures drawn anew.
+pictures: $(READY)
+	$(BIN)/python tests/pages.py
+	$(BIN)/python docs/pictures/draw.py
 
 # The figure and the tables of docs/control.md: what is cancelled at the root, and what a loop at 1 kHz keeps.
 control: $(READY)

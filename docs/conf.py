@@ -1,8 +1,12 @@
 """How Sphinx makes the documentation: `make docs`."""
 
 import re
+import sys
+from pathlib import Path
 
 from linkwise.version import VERSION
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # for generated.planar3
 
 project = "linkwise"
 release = version = VERSION
@@ -32,17 +36,21 @@ python_maximum_signature_line_length = 88
 add_module_names = False
 
 
-def _argument_lines(app: object, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Set lines such as `tau: torques (..., n)` of a docstring as a list of arguments."""
+def _as_they_stand(app: object, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Set `tau: torques (..., n)` of a docstring as a list of arguments, and what is indented as it stands."""
     told: list[str] = []
+    indented = False
     for line in lines:
-        if found := re.match(r"(\w+(?:(?:,| and) \w+)*): (?=\S)", line):
-            told += ["", f"**{found[1]}**: {line[found.end() :]}"]
-        else:
-            told.append(line)
+        if line.startswith("    ") and not indented:
+            told += ["", "::", ""]
+        elif indented and line and not line.startswith("    "):
+            told.append("")
+        indented = line.startswith("    ") or (indented and not line)
+        found = re.match(r"(\w+(?:(?:,| and) \w+)*): (?=\S)", line)
+        told += ["", f"**{found[1]}**: {line[found.end() :]}"] if found else [line]
     lines[:] = told
 
 
 def setup(app: object) -> None:
     """Called by Sphinx."""
-    app.connect("autodoc-process-docstring", _argument_lines)  # type: ignore[attr-defined]
+    app.connect("autodoc-process-docstring", _as_they_stand)  # type: ignore[attr-defined]

@@ -143,7 +143,7 @@ def main() -> None:
     print(write(rows, arguments.out))
     counts = {key: len(files) for key, files in sorted_out(rows).items()}
     if not arguments.only and counts != COUNTS:
-        sys.exit(f"the README says {COUNTS}, here it is {counts}")
+        sys.exit(f"docs/robots.md says {COUNTS}, here it is {counts}")
 
 
 if __name__ == "__main__":

@@ -142,7 +142,9 @@ def _shell(block: Block, place: str) -> str:
 
 def _compare(shown: str, printed: str, place: str) -> None:
     """Hold what the page shows to what was printed; blanks at the ends of lines do not count."""
-    lines = [".*" if line.strip() == "..." else re.escape(line.rstrip()) for line in shown.rstrip().splitlines()]
+    lines = [
+        ".*" if line.strip() == "..." else re.escape(line.rstrip()) for line in shown.rstrip().splitlines()
+    ]
     found = "\n".join(line.rstrip() for line in printed.rstrip().splitlines())
     assert re.fullmatch("\n".join(lines), found, re.DOTALL), f"{place}: printed was\n{found}"
 

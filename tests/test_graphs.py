@@ -415,7 +415,7 @@ def test_a_package_without_autograd_is_told_how_to_get_it(command: Command, tmp_
     assert "generate it with --backend autograd" in said
 
 
-README = " ".join((Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8").split())
+REPORTS = " ".join((Path(__file__).parents[1] / "docs/reports.md").read_text(encoding="utf-8").split())
 
 
 def test_the_reduction_in_nodes_of_the_graph() -> None:
@@ -425,7 +425,7 @@ def test_the_reduction_in_nodes_of_the_graph() -> None:
     assert (pairs[0].total, pairs[0].kept) == (4, 1)
     stated = re.search(
         r"at 10 joints the part saves (\d+) % of the nodes of autograd's graph, .* tends to ([\d.]+) %",
-        README,
+        REPORTS,
     )
     assert stated is not None
     assert round(100 * pairs[9].reduction) == int(stated[1])

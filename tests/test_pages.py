@@ -15,12 +15,16 @@ def name_of(page: Path) -> str:
     return str(page.relative_to(ROOT))
 
 
-@pytest.mark.parametrize("page", [p for p in pages.PAGES if any(b.runs for b in pages.blocks(p))], ids=name_of)
+@pytest.mark.parametrize(
+    "page", [p for p in pages.PAGES if any(b.runs for b in pages.blocks(p))], ids=name_of
+)
 def test_a_page_runs_as_printed(page: Path, tmp_path: Path) -> None:
     if lacking := pages.missing(page):
         pytest.skip(f"needs {', '.join(lacking)}")
     # Each in a process of its own: their packages have the same names.
-    script = f"import pages, pathlib; pages.run_page(pathlib.Path({str(page)!r}), pathlib.Path({str(tmp_path)!r}))"
+    script = (
+        f"import pages, pathlib; pages.run_page(pathlib.Path({str(page)!r}), pathlib.Path({str(tmp_path)!r}))"
+    )
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", script],
         cwd=ROOT / "tests",
@@ -42,7 +46,9 @@ def test_every_block_of_a_page_is_run_written_or_an_excerpt(page: Path) -> None:
         excerpt = block.language == "text" and block.word in ("", "printed")
         assert block.runs or block.word or excerpt, f"{place}: neither run nor written to a file"
         if excerpt and not block.word:
-            assert not re.match(r"(\.venv/bin/)?(linkwise|python|pip|make) ", block.text), f"{place}: a command"
+            assert not re.match(r"(\.venv/bin/)?(linkwise|python|pip|make) ", block.text), (
+                f"{place}: a command"
+            )
 
 
 @pytest.mark.parametrize("page", pages.PAGES, ids=name_of)
@@ -61,7 +67,27 @@ def test_a_page_leads_to_what_is_there(page: Path) -> None:
 
 
 def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going", "docs", str(tmp_path)]
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "--quiet",
+        "--fail-on-warning",
+        "--keep-going",
+        "docs",
+        str(tmp_path),
+    ]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "index.html").is_file()
+
+
+def test_every_command_has_a_page_and_a_line_in_the_readme() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "linkwise", "--help"], capture_output=True, text=True, check=True
+    )
+    names = re.findall(r"^│ (\w+) ", done.stdout, flags=re.MULTILINE)
+    assert {"generate", "check", "inspect"} <= set(names)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for name in names:
+        assert f"[`linkwise {name}`](docs/commands/{name}.md)" in text, name

@@ -66,7 +66,9 @@ def _loads(axis: Any, throw: Any, now: int) -> None:
         ends = {1: 0.0, -1: 0.0}
         for value, colour, hatch, label in _parts(throw, now, row):
             side = 1 if value > 0 else -1
-            axis.barh(row, value, 0.36, ends[side], color=colour, hatch=hatch, edgecolor="white", linewidth=0.6)
+            axis.barh(
+                row, value, 0.36, ends[side], color=colour, hatch=hatch, edgecolor="white", linewidth=0.6
+            )
             if abs(value) > 1.9:
                 middle = ends[side] + value / 2
                 axis.annotate(label, (middle, row + 0.2), ha="center", va="top", color=colour, fontsize=7.5)

@@ -90,12 +90,13 @@ def differences(files: Mapping[str, str], directory: Path) -> dict[str, str]:
     return found | dict.fromkeys(sorted(gone), "is not written any more")
 
 
-def write_package(files: Mapping[str, str], directory: Path, replace: bool = False) -> bool:
+def write_package(files: Mapping[str, str], directory: str | Path, replace: bool = False) -> bool:
     """Write files below `directory`, replacing an earlier package there, which a failure leaves as it was.
 
     With `replace` that may be of another robot. Returns whether anything differed. Raises LinkwiseError when
     the place is not writable or holds something else, see `check_target`.
     """
+    directory = Path(directory)
     robot = None if replace else json.loads(files[FILE])["robot"]
     if os.path.lexists(directory):
         check_target(directory, robot)

@@ -1,4 +1,4 @@
-"""The README's figures are those of the code; docs/trust.md says where those that take long are held."""
+"""Figures of README.md and docs/ are those of the code; docs/trust.md says where those that take long are held."""
 
 import json
 import re
@@ -14,14 +14,15 @@ from linkwise.progress import silent
 from linkwise.report import CurvePoint, curve
 from linkwise.robot import Options, read_robot
 from linkwise.symbolic.system import rigid_system
+from pages import PAGES
 
-README = " ".join((Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8").split())
+TEXT = " ".join(" ".join(page.read_text(encoding="utf-8").split()) for page in PAGES)
 
 
 def stated(pattern: str) -> tuple[float, ...]:
-    """The numbers of the one sentence of the README that matches."""
-    found = re.findall(pattern, README)
-    assert len(found) == 1, f"{pattern}: {len(found)} times in the README"
+    """The numbers of the one sentence that matches."""
+    found = re.findall(pattern, TEXT)
+    assert len(found) == 1, f"{pattern}: {len(found)} times in README.md and docs/"
     groups = found[0] if isinstance(found[0], tuple) else (found[0],)
     return tuple(float(number.replace(",", "")) for number in groups)
 
