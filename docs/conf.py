@@ -37,7 +37,7 @@ add_module_names = False
 
 
 def _as_they_stand(app: object, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Set `tau: torques (..., n)` of a docstring as a list of arguments, and what is indented as it stands."""
+    """Set lines such as `tau: torques (..., n)` as a list of arguments, and what is indented as it stands."""
     told: list[str] = []
     indented = False
     for line in lines:
@@ -46,7 +46,7 @@ def _as_they_stand(app: object, what: str, name: str, obj: object, options: obje
         elif indented and line and not line.startswith("    "):
             told.append("")
         indented = line.startswith("    ") or (indented and not line)
-        found = re.match(r"(\w+(?:(?:,| and) \w+)*): (?=\S)", line)
+        found = re.match(r"(\w+(?:, \w+)*): (?=\S)", line)
         told += ["", f"**{found[1]}**: {line[found.end() :]}"] if found else [line]
     lines[:] = told
 

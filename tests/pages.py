@@ -41,7 +41,7 @@ GIVEN = {
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block: its language, the word behind it, its text, and the line of the page that it starts on."""
+    """A fenced block: its language, the word behind it, its text, and the page's line that it starts on."""
 
     language: str
     word: str

@@ -1,6 +1,6 @@
 """Pictures that explain: `python docs/pictures/draw.py` draws them anew, beside this file.
 
-who-loads-whom   the throw of docs/tutorial-robot.md at one instant: the arm, and what loads each of its joints
+who-loads-whom   the throw of docs/tutorial-robot.md at one instant: the arm, and what loads its joints
 indices          joint i, link j and coordinate k of a partial torque
 """
 
@@ -62,7 +62,7 @@ def _arm(axis: Any, throw: Any, now: int) -> None:
 
 
 def _loads(axis: Any, throw: Any, now: int) -> None:
-    for row, (joint, _) in enumerate(COLOUR_OF.items()):
+    for row in range(len(COLOUR_OF)):
         ends = {1: 0.0, -1: 0.0}
         for value, colour, hatch, label in _parts(throw, now, row):
             side = 1 if value > 0 else -1
@@ -121,7 +121,7 @@ def indices() -> Any:
                 words, place, text, color=colour, ha="center", weight="bold", parse_math=True,
                 arrowprops={"arrowstyle": "-", "color": colour},
             )  # fmt: skip
-        formula = r"$\tau_{13} \;=\; \cdots \;+\; c2_{132}\,\ddot q_2 \;+\; c1_{132}\,\dot q_2 \;+\; \cdots \;+\; g_{13}$"
+        formula = r"$\tau_{13} = \cdots + c2_{132}\,\ddot q_2 + c1_{132}\,\dot q_2 + \cdots + g_{13}$"
         axis.text(2.2, -0.55, formula, ha="center", fontsize=13, parse_math=True)
         axis.set_aspect("equal")
         axis.set_xlim(-0.7, 5.0)
