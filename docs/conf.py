@@ -21,6 +21,8 @@ html_theme = "furo"
 html_title = f"linkwise {VERSION}"
 html_show_sphinx = False
 html_copy_source = False
+html_static_path = ["_static"]
+html_css_files = ["width.css"]
 
 myst_heading_anchors = 3
 myst_links_external_new_tab = False

@@ -1,4 +1,4 @@
-"""Figures of README.md and docs/ are those of the code; docs/trust.md says what holds those that take long."""
+"""Figures of README.md and docs/ are those of the code; docs/trust.md says where others are held."""
 
 import json
 import re
