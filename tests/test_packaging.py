@@ -5,7 +5,6 @@ import os
 import re
 import shutil
 import tarfile
-import time
 import zipfile
 from pathlib import Path, PurePosixPath
 
@@ -99,13 +98,15 @@ def test_first_commands_run_in_a_clean_environment(clean: Environment, tmp_path:
 
 def test_help_comes_within_half_a_second(clean: Environment, tmp_path: Path) -> None:
     seconds = []
-    for _ in range(8):  # the fastest: others may keep this machine busy
-        start = time.perf_counter()
+    for _ in range(8):  # of the processor, and the fewest: others may keep this machine busy
+        before = os.times()
         assert "generate" in clean.run("linkwise", "--help", folder=tmp_path)
-        seconds.append(time.perf_counter() - start)
+        after = os.times()
+        used = (after.children_user - before.children_user, after.children_system - before.children_system)
+        seconds.append(sum(used))
         if seconds[-1] <= HELP_SECONDS:
             break
-    assert min(seconds) <= HELP_SECONDS
+    assert 0 < min(seconds) <= HELP_SECONDS
 
 
 def test_the_core_alone_is_small(clean: Environment) -> None:
