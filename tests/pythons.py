@@ -1,6 +1,6 @@
 """Run the tests with the other Pythons that are here: `make pythons`.
 
-Each has an environment of its own in out/pythons, with what constraints.txt pins, and runs all tests, or some.
+Each has an environment of its own in out/pythons, with what constraints.txt pins, and runs the tests there.
 """
 
 import argparse
