@@ -4,6 +4,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .PHONY: docs pictures demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean
+.PHONY: pythons licences
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -83,6 +84,14 @@ fuzz: $(READY)
 # The same bytes whatever the surroundings, one change at a time: minutes.
 same: $(READY)
 	$(BIN)/python tests/same_bytes.py
+
+# The tests in Python 3.12, 3.13 and 3.14, where these are: an hour, and gigabytes where torch comes with what GPUs need.
+pythons: $(READY)
+	$(BIN)/python tests/pythons.py
+
+# The tables of docs/licences.md.
+licences: $(READY)
+	$(BIN)/python tests/licences.py
 
 # Speed beside Pinocchio and CasADi, reports and motions at length: minutes, on a quiet machine.
 bench: $(READY)

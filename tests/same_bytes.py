@@ -15,10 +15,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from pythons import NEWER, environment
 
 ROOT = Path(__file__).parents[1]
 OPTIONAL = ("torch", "mujoco", "scipy", "pyarrow", "matplotlib", "plotly")
-NEWER = ("3.12", "3.13", "3.14")
 
 
 @dataclass(frozen=True)
@@ -107,29 +107,6 @@ def make_locales(place: Path) -> Path:
     return place
 
 
-def python_of(version: str, place: Path) -> str | None:
-    """A Python with linkwise and without extras; None where this version is not to be had."""
-    found = shutil.which(f"python{version}")
-    pyenv = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))
-    for candidate in [*([found] if found else []), *map(str, pyenv)]:
-        if subprocess.run([candidate, "-c", ""], capture_output=True, check=False).returncode:
-            continue
-        subprocess.run([candidate, "-m", "venv", str(place / version)], check=True)
-        python = str(place / version / "bin" / "python")
-        install = [
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--constraint",
-            str(ROOT / "constraints.txt"),
-            "--editable",
-        ]
-        subprocess.run([python, *install, str(ROOT)], check=True)
-        return python
-    return None
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare every change with the plain run; exit status 1 where bytes differ."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -144,7 +121,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name in wanted:
             surroundings = CHANGES.get(name)
             if surroundings is None:
-                python = python_of(name, place)
+                python = environment(name, place)
                 if python is None:
                     print(f"{name}: no such Python here, not compared")
                     continue

@@ -95,8 +95,8 @@ class Project:
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
 
-    def answer(self, program: str) -> list[float]:
-        done = subprocess.run([self.build / program], capture_output=True, text=True, check=True)
+    def answer(self, program: str, *emulator: str) -> list[float]:
+        done = subprocess.run([*emulator, self.build / program], capture_output=True, text=True, check=True)
         return [float(word) for word in done.stdout.split()]
 
     def times(self) -> dict[str, int]:

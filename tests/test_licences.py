@@ -1,0 +1,22 @@
+"""docs/licences.md has every package that linkwise brings, with the licence that its metadata say."""
+
+import re
+
+import pytest
+from licences import DEVELOPERS, MARK, PAGE, USERS, licence, packages_of
+
+TEXT = PAGE.read_text(encoding="utf-8")
+LISTED = dict(re.findall(r"^\| ([\w-]+) \| (.+?) \| [\w-]+ \|$", TEXT.partition(MARK)[2], re.MULTILINE))
+
+
+@pytest.mark.parametrize("extra", [*USERS, *DEVELOPERS])
+def test_every_package_is_listed_as_its_metadata_say(extra: str) -> None:
+    brought = packages_of([extra])
+    assert brought
+    assert {name: licence(package) for name, package in brought.items()} == {
+        name: LISTED.get(name) for name in brought
+    }
+
+
+def test_users_are_brought_no_licence_that_binds_their_own_programs() -> None:
+    assert not [name for name in packages_of(USERS) if re.search(r"\bA?GPL", LISTED[name])]

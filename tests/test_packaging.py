@@ -1,0 +1,191 @@
+"""The archives of linkwise, and what they are worth in an environment of their own with the core alone."""
+
+import json
+import os
+import re
+import shutil
+import tarfile
+import zipfile
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from installation import ROOT, Environment, archive_of_sources, copied, empty_environment, wheel_of
+from linkwise.version import VERSION
+from test_readme import blocks
+
+CORE_MEGABYTES = 200
+HELP_SECONDS = 0.5
+MOTION = ([0.3, -0.7], [1.0, 0.5], [2.0, -3.0])
+
+
+@pytest.fixture(scope="session")
+def archives(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The archive of sources, made in a clean copy, and the wheel that is built from it."""
+    folder = tmp_path_factory.mktemp("archives")
+    sources = archive_of_sources(copied(folder / "checkout"), folder / "sources")
+    return sources, wheel_of(sources, folder / "wheel")
+
+
+@pytest.fixture(scope="session")
+def clean(archives: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Environment:
+    """The wheel installed outside the checkout, with what it needs and no extra."""
+    environment = empty_environment(tmp_path_factory.mktemp("installed") / "venv")
+    environment.link(["linkwise"])
+    assert not list(environment.packages.glob("*linkwise*"))
+    environment.install(archives[1])
+    return environment
+
+
+@pytest.fixture(scope="session")
+def builder(archives: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Environment:
+    """An environment of projects that generate their robot as they are built."""
+    environment = empty_environment(tmp_path_factory.mktemp("builder") / "venv")
+    environment.link(["linkwise", "setuptools", "scikit-build-core"])
+    environment.install(archives[1])
+    return environment
+
+
+def files_below(folder: Path) -> set[str]:
+    found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+    return {path.as_posix() for path in found if path.suffix != ".pyc" and ".egg-info" not in str(path)}
+
+
+def test_the_archive_of_sources_is_the_checkout(archives: tuple[Path, Path], tmp_path: Path) -> None:
+    with tarfile.open(archives[0]) as archive:
+        packed = {name.partition("/")[2] for name in archive.getnames() if archive.getmember(name).isfile()}
+    own = {name for name in packed if ".egg-info/" in name} | {"PKG-INFO", "setup.cfg"}
+    assert packed - own == files_below(copied(tmp_path / "checkout"))
+
+
+def test_the_wheel_has_the_generator_its_templates_and_licence_and_nothing_else(
+    archives: tuple[Path, Path],
+) -> None:
+    with zipfile.ZipFile(archives[1]) as wheel:
+        record = f"linkwise-{VERSION}.dist-info"
+        parts = {name for name in wheel.namelist() if not name.startswith(f"{record}/")}
+        assert wheel.read(f"{record}/licenses/LICENSE") == (ROOT / "LICENSE").read_bytes()
+        metadata = wheel.read(f"{record}/METADATA").decode()
+    assert "License-Expression: Apache-2.0\n" in metadata
+    generator = {name for name in files_below(ROOT / "generator") if "__pycache__" not in name}
+    templates = {f"linkwise/templates/{name}" for name in files_below(ROOT / "templates")}
+    assert parts == generator | templates
+    assert {PurePosixPath(name).suffix for name in parts} == {
+        *(".py", ".typed", ".cmake", ".toml", ".h", ".c", ".j2")
+    }
+
+
+def test_first_commands_run_in_a_clean_environment(clean: Environment, tmp_path: Path) -> None:
+    assert clean.run("linkwise", "--version", folder=tmp_path) == f"linkwise {VERSION}\n"
+    asked = "from importlib.util import find_spec as f; print(f('linkwise').origin, f('torch'), f('pytest'))"
+    where, *absent = clean.run("python", "-c", asked, folder=tmp_path).split()
+    assert Path(where).is_relative_to(clean.packages)
+    assert absent == ["None", "None"]
+    clean.run("linkwise", "generate", "planar3", "--out", "generated", folder=tmp_path)
+    manifest = json.loads((tmp_path / "generated/planar3/manifest.json").read_text())
+    assert manifest["generator"]["linkwise"] == VERSION
+    said = clean.run("python", "-c", blocks("python")[0], folder=tmp_path)
+    assert re.match(r"joint 1 carries -?\d+\.\d+ N m", said)
+    cache = str(tmp_path / "cache")
+    proved = clean.run("linkwise", "check", "generated/planar3", folder=tmp_path, LINKWISE_CACHE=cache)
+    assert "torch" in proved
+    assert "joint1" in clean.run("linkwise", "inspect", "planar3", folder=tmp_path)
+    assert "| τ_1,3 |" in clean.run("linkwise", "report", "terms", "planar3", folder=tmp_path)
+    module = clean.run("linkwise", "--cmake-dir", folder=tmp_path).strip()
+    assert Path(module) == clean.packages / "linkwise/cmake"
+
+
+def test_help_comes_within_half_a_second(clean: Environment, tmp_path: Path) -> None:
+    seconds = []
+    for _ in range(8):  # of the processor, and the fewest: others may keep this machine busy
+        before = os.times()
+        assert "generate" in clean.run("linkwise", "--help", folder=tmp_path)
+        after = os.times()
+        used = (after.children_user - before.children_user, after.children_system - before.children_system)
+        seconds.append(sum(used))
+        if seconds[-1] <= HELP_SECONDS:
+            break
+    assert 0 < min(seconds) <= HELP_SECONDS
+
+
+def test_the_core_alone_is_small(clean: Environment) -> None:
+    held = 0
+    for folder, _, files in os.walk(clean.packages, followlinks=True):
+        # `python -O` leaves files of its own beside what pip compiles.
+        held += sum(os.stat(Path(folder, file)).st_size for file in files if ".opt-" not in file)
+    assert 20e6 < held <= CORE_MEGABYTES * 1e6
+
+
+def test_the_version_is_written_once(tmp_path: Path) -> None:
+    history = {"CHANGELOG.md", "docs/speed.md", "generator/linkwise/version.py"}
+    literal = re.compile(rf"(?<![\d.]){re.escape(VERSION)}(?![\d.])".encode())
+    folder = copied(tmp_path / "checkout")
+    found = {name for name in files_below(folder) if literal.search((folder / name).read_bytes())}
+    assert {name for name in found if not name.startswith("generated/")} == history
+
+
+def test_the_changelog_begins_with_this_version() -> None:
+    headings = re.findall(r"^## \[?([\w.]+)\]?", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert headings[0] in (VERSION, "Unreleased")
+    assert VERSION in headings
+
+
+def torques_by_pinocchio(robot: Path) -> np.ndarray:
+    """Of each joint through each link, by models in which that link alone has mass."""
+    model = pin.buildModelFromUrdf(str(robot))
+    links = range(1, model.njoints)
+    columns = []
+    for link in links:
+        alone = model.copy()
+        for other in links:
+            if other != link:
+                alone.inertias[other] = pin.Inertia.Zero()
+        columns.append(pin.rnea(alone, alone.createData(), *map(np.array, MOTION)).copy())
+    return np.array(columns).T
+
+
+def example(name: str, folder: Path) -> Path:
+    return shutil.copytree(ROOT / "examples" / name, folder / name)
+
+
+def test_a_wheel_of_setuptools_has_its_robot(builder: Environment, tmp_path: Path) -> None:
+    project = example("setuptools", tmp_path)
+    sources = archive_of_sources(project, tmp_path / "sources", builder.python)
+    wheel = wheel_of(sources, tmp_path / "wheel", builder.python)
+    user = empty_environment(tmp_path / "user")
+    user.link(["numpy"])
+    user.install(wheel)
+    program = f"import arm_report; print(*arm_report.shares(*{MOTION}).values())"
+    shares = np.array(user.run("python", "-c", program, folder=tmp_path).split(), float)
+    assert shares == pytest.approx(torques_by_pinocchio(project / "arm.urdf").ravel(), rel=1e-12)
+
+
+def test_an_editable_install_of_setuptools_has_its_robot_beside_the_sources(
+    builder: Environment, tmp_path: Path
+) -> None:
+    project = example("setuptools", tmp_path)
+    builder.install(project, "--no-build-isolation", "--editable")
+    program = "import arm_report.arm as arm; print(arm.__file__)"
+    assert Path(builder.run("python", "-c", program, folder=tmp_path).strip()).is_relative_to(project)
+
+
+@pytest.mark.skipif(not all(map(shutil.which, ("cmake", "ninja", "cc"))), reason="needs cmake, ninja and cc")
+def test_a_wheel_of_scikit_build_core_has_its_robot(builder: Environment, tmp_path: Path) -> None:
+    project = example("scikit-build-core", tmp_path)
+    user = empty_environment(tmp_path / "user")
+    user.install(wheel_of(project, tmp_path / "wheel", builder.python))
+    program = f"""from array import array
+from arm_control import JOINTS, inverse_dynamics
+tau = array("d", [0.0] * JOINTS)
+inverse_dynamics(*(array("d", row) for row in {MOTION}), tau)
+print(*tau)
+try:
+    inverse_dynamics(*(array("f", [0.0] * 2 * JOINTS) for _ in range(4)))
+except ValueError as error:
+    print(error)
+"""
+    numbers, refused = user.run("python", "-c", program, folder=tmp_path).splitlines()
+    expected = torques_by_pinocchio(project / "arm.urdf").sum(axis=1)
+    assert np.array(numbers.split(), float) == pytest.approx(expected, rel=1e-12)
+    assert refused == "q, qd, qdd and tau must be equally many doubles, 2 a sample"
