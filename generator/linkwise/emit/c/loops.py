@@ -8,7 +8,7 @@ from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
 from linkwise.emit.c.loop_costs import decomposition_cost, gradient_cost, torque_cost
 from linkwise.emit.c.prototypes import at_position, pointers, under_torque
-from linkwise.emit.c.robot_files import free, given, header_view, path_fields, totals
+from linkwise.emit.c.robot_files import free, given, header_view, path_fields, rows_from_s, totals
 from linkwise.emit.c.robot_tables import path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
 from linkwise.emit.c.stack import loops_stack
@@ -19,11 +19,13 @@ from linkwise.version import VERSION
 
 FIXED = (
     "angles.h",
+    "arrays.h",
     "block_rows.h",
     "blocks.h",
     "calls.h",
     "dense.h",
     "dense_rows.h",
+    "destinations.h",
     "elimination.h",
     "frame_impedance.h",
     "frame_rotation.h",
@@ -35,6 +37,7 @@ FIXED = (
     "mass.h",
     "moving_links.h",
     "numbers.h",
+    "one_by_one.h",
     "one_motion.h",
     "one_sample.h",
     "packed_rows.h",
@@ -44,6 +47,7 @@ FIXED = (
     "rule.h",
     "shares.h",
     "sines.h",
+    "small_cubes.h",
     "stream.h",
     "tree.h",
     "vectors.h",
@@ -89,6 +93,7 @@ def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
         "parameters": list(enumerate(parameter_names(system).values())),
         "inputs": pointers("const real", motion),
         "passed": ", ".join(motion),
+        "rows_from_s": rows_from_s(motion),
         "inputs_at_rest": pointers("const real", (array for array in motion if array != "qdd")),
         "passed_at_rest": ", ".join("qd" if array == "qdd" else array for array in motion),
         "inputs_at_position": pointers("const real", at_position(motion)),

@@ -27,15 +27,19 @@ from linkwise.symbolic.system import RigidSystem, System
 from linkwise.version import VERSION
 
 FIXED = (
+    "arrays.h",
     "calls.h",
     "dense.h",
     "dense_rows.h",
+    "destinations.h",
     "elimination.h",
     "impedance.h",
     "numbers.h",
+    "one_by_one.h",
     "passive.h",
     "rows.h",
     "sines.h",
+    "small_cubes.h",
     "stream.h",
 )
 """Files that are the same in every package."""

@@ -55,7 +55,7 @@ static inline void answer(const struct sample *s, const real *acceleration, cons
         load[f].z = add_cross(add(load[f].z, moment), subtract(l->com, m->place[f]), force);
         load[f].s = add(load[f].s, force);
     }
-    memset(torque, 0, N * sizeof(real));
+    clear(N, torque);
     for (int f = FRAMES; f; --f) {
         const screw axis = own_axis(m, f);
         const int up = joints[f - 1].parent;
@@ -79,8 +79,8 @@ static inline void keep(const struct sample *s, const real *inertia, const real 
     real *kept, real *torque)
 {
     if (inertia) {
-        memset(mass, 0, (size_t)N * N * sizeof(real));
-        memset(kept, 0, (size_t)N * N * sizeof(real));
+        clear((size_t)N * N, mass);
+        clear((size_t)N * N, kept);
     }
     for (int j = 0; j < LINKS; ++j) {
         const short *const joint = path + path_start[j];
@@ -124,6 +124,6 @@ int API(forward_dynamics)(UNDER_TORQUE, real *qdd)
     }
     const int singular = eliminate(0, N, 1, size, mass, force);
     if (!singular)
-        memcpy(qdd, force, sizeof force);
+        copy(N, force, qdd);
     return singular;
 }
