@@ -1,8 +1,9 @@
-"""The emitted C on a Cortex-M that QEMU plays: what it answers, how much stack it takes, and how many instructions.
+"""The emitted C on a Cortex-M that QEMU plays: what it answers, its stack, and its instructions.
 
     python tests/cortex_m.py
 
-prints the table of docs/embedded.md. QEMU counts instructions; how many cycles each takes is the processor's affair.
+prints the table of docs/embedded.md. QEMU counts instructions; how many cycles these take is the
+processor's affair.
 """
 
 import re
@@ -15,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from compiled import name_of
-from linkwise.package.load import import_package
 
 HERE = Path(__file__).parent / "embedded"
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
@@ -50,7 +50,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Call:
-    """A function to try: its call, with NAME, F for the f of float, `out` and sample s; and values it writes."""
+    """A function to try: its call, with NAME, F for float's f, `out` and sample s; and values it writes."""
 
     text: str
     values: int
@@ -86,8 +86,9 @@ def program(name: str, real: str, motion: Any, functions: dict[str, Call]) -> st
     )
     inertia = ", ".join(str(0.5 * (e % (n + 1) == 0)) for e in range(n * n))
     bodies = "".join(
-        f"static void run_{key}(int s)\n{{\n    {call.text.replace('NAME', name).replace('F(', suffix + '(')};\n}}\n"
+        f"static void run_{key}(int s)\n{{\n    {text};\n}}\n"
         for key, call in functions.items()
+        for text in [call.text.replace("NAME", name).replace("F(", f"{suffix}(")]
     )
     tries = "".join(f'    try("{key}", run_{key}, {call.values});\n' for key, call in functions.items())
     return f"""#include "{name}.h"
@@ -183,7 +184,7 @@ def missing() -> str:
 def main() -> None:
     """Print the table."""
     from answers import random_states
-    from conftest import PANDA, LOCKED_FINGERS
+    from conftest import LOCKED_FINGERS, PANDA
     from linkwise import Options, generate, read_system, write_package
 
     print("| robot, kernel | processor, type | flash, all | function | stack | instructions |")

@@ -135,7 +135,7 @@ def call(
     into: Mapping[str, str],
     start: EntryCounts | None = None,
 ) -> str:
-    """Call of a kernel for one sample, a block, or whichever the file is at; outputs may begin `start` entries on."""
+    """Call of a kernel for one sample, a block, or, without width, as SIZED says; outputs may begin later."""
     reads = [f"{motion}{array}" for array in function.reads]
     writes = [_at(into[array], start.of(array) if start else 0) for array in function.writes]
     name = f"{function.name}_{width}" if width else f"SIZED({function.name})"

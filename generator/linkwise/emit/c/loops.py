@@ -11,7 +11,7 @@ from linkwise.emit.c.prototypes import at_position, pointers, under_torque
 from linkwise.emit.c.robot_files import free, given, header_view, path_fields, rows_from_s, totals
 from linkwise.emit.c.robot_tables import path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
-from linkwise.emit.c.stack import loops_stack
+from linkwise.emit.c.stack import loops_stack, small_stack
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.system import RigidSystem
@@ -74,6 +74,7 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
         "torque_cost": torque_cost(system),
         "gradient_cost": gradient_cost(system),
         "stack": f"{loops_stack(system):,}",
+        "small": small_stack(system, links, 0),
     }
     yield f"c/{name}.h", render("c/robot.h.j2", names | header_view(system, links, name) | costs)
     tables = {"tables": list(header.index_tables(system, links))}

@@ -108,6 +108,12 @@ def costs(kernels: Sequence[LinkKernels]) -> dict[str, int]:
     }
 
 
+def most_kept(kernels: Sequence[LinkKernels]) -> int:
+    """Return how many values a kernel keeps at a time, at most: a fourth of those that it computes."""
+    functions = (f for k in kernels for f in (k.decomposition, k.torque, k.position_gradient))
+    return max(len(f.inputs) + len(f.statements) // 4 for f in functions)
+
+
 def given(system: System) -> tuple[str, ...]:
     """Arrays that every function takes."""
     return ("q", "qd", "qdd", "p") if system.parameters else ("q", "qd", "qdd")

@@ -89,12 +89,13 @@ static inline int frame_acceleration(const struct sample *s, const API(frame_imp
 {
     const int rows = wanted->rows;
     const real still[N] = {0};
-    real inertia[36], moment[6], force[6], change[6], share[6] = {0}, joint[N], torque[N];
+    real inertia[36], force[6], share[6] = {0};
     clear(6, out);
     resist(rows, wanted->damping, velocity, out);
     if (wanted->stiffness && pull(s, wanted, target, at, out))
         return -7;
     if (wanted->keep_velocity != 0) {
+        real moment[6], change[6], joint[N], torque[N];
         times(6, 6, frame->inertia, velocity, moment);
         times(N, 6, frame->moved, moment, joint);
         answer(s, still, joint, 0, torque);

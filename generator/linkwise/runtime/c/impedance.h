@@ -51,7 +51,7 @@ static inline void resist(int n, const real *a, const real *x, real *force)
    which it is not positive, or not regular where this is enough. */
 INLINE int solve(int regular, int n, const real *natural, const real *wanted, real *force)
 {
-    real size[LARGEST], part[LARGEST * LARGEST];
+    real size[LARGEST];
     int symmetric = 1;
     for (int i = 0; i < n; ++i) {
         const real own = natural[i * n + i], asked = F(fabs)(wanted[i * n + i]);
@@ -60,6 +60,7 @@ INLINE int solve(int regular, int n, const real *natural, const real *wanted, re
             symmetric &= wanted[i * n + k] == wanted[k * n + i];
     }
     if (!regular && !symmetric) {
+        real part[LARGEST * LARGEST];
         for (int i = 0; i < n; ++i)
             for (int k = 0; k < n; ++k)
                 part[i * n + k] = R(0.5) * (wanted[i * n + k] + wanted[k * n + i]);
