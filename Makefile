@@ -3,7 +3,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean
+.PHONY: demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean embedded
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -83,6 +83,10 @@ bench: $(READY)
 	$(BIN)/python tests/benchmarks/bench_report.py
 	$(BIN)/python tests/benchmarks/bench_motion.py million out/planar3
 	$(BIN)/python tests/benchmarks/bench_motion.py ten-hours generated/torso
+
+# The table of docs/embedded.md: stack and instructions on a Cortex-M that QEMU plays.
+embedded: $(READY)
+	$(BIN)/python tests/cortex_m.py
 
 clean:
 	rm -rf out $(VENV)

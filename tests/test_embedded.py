@@ -1,8 +1,11 @@
 """The emitted C where there is no operating system: what it calls, its stack, its size, and on a Cortex-M."""
 
+import json
+import os
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -16,6 +19,8 @@ from call_graph import deepest
 from compiled import Compiled, compile_library, name_of
 from conftest import DATA, PANDA, needs_compiler
 from impedance_in_c import formula
+from linkwise import generate, read_system
+from linkwise.package.manifest import Manifest
 
 pytestmark = needs_compiler
 CRANE, TURNTABLE, FOURBAR = str(DATA / "crane.urdf"), str(DATA / "turntable.py"), str(DATA / "fourbar.toml")
@@ -227,3 +232,73 @@ def pinocchio_says(motion: Any) -> Any:
     model = pin.buildReducedModel(whole, fingers, pin.neutral(whole))
     data = model.createData()
     return np.array([pin.rnea(model, data, q, qd, qdd) for q, qd, qdd in motion.swapaxes(0, 1)])
+
+
+@pytest.mark.skipif(shutil.which("arm-none-eabi-gcc") is None, reason="no arm-none-eabi-gcc")
+@pytest.mark.parametrize("robot", [*KINDS.values(), "puma560 loops", "torso", "planar10"])
+def test_the_manifests_size_is_what_the_compiler_makes_to_a_fifth(
+    robot: str, directory_of: Callable[[str], Path]
+) -> None:
+    size = Manifest.read(directory_of(robot)).code_size
+    assert size is not None
+    flags = ("-Os", SMALL)
+    double = cortex_m.flash(directory_of(robot), "double", cortex_m.BOARDS["M7"], flags)
+    single = cortex_m.flash(directory_of(robot), "float", cortex_m.BOARDS["M4F"], flags)
+    assert size.float64 == pytest.approx(double, rel=0.2)
+    assert size.float32 == pytest.approx(single, rel=0.2)
+
+
+def test_without_c_there_is_no_size() -> None:
+    files = generate(read_system("planar2"), ["numpy"])
+    assert json.loads(files["manifest.json"])["code_size"] is None
+
+
+TIDY = "-*,clang-analyzer-*,bugprone-*,cert-*,-bugprone-easily-swappable-parameters"
+WIDENING = "-bugprone-implicit-widening-of-multiplication-result"
+"""Off: products of indices, which no robot is large enough for to pass an int."""
+ANALYSERS = {
+    "cppcheck": (
+        *(
+            "cppcheck",
+            "-q",
+            "--std=c99",
+            "--error-exitcode=1",
+            "--enable=warning,style,performance,portability",
+        ),
+        *("--suppress=unusedStructMember", "--suppress=missingIncludeSystem", SMALL),
+    ),
+    "clang-tidy": ("clang-tidy", "--quiet", f"-checks={TIDY},{WIDENING}", "-warnings-as-errors=*"),
+}
+
+
+@pytest.mark.parametrize("tool", ANALYSERS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_analysers_find_nothing(kind: str, tool: str, directory_of: Callable[[str], Path]) -> None:
+    if shutil.which(tool) is None:
+        pytest.skip(f"no {tool}")
+    tail = ("--", "-std=c99", SMALL) if tool == "clang-tidy" else ()
+    for source in sources(directory_of(KINDS[kind])):
+        command = [*ANALYSERS[tool], str(source), *tail]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_example_of_the_docs_runs(package_of: Callable[[str], ModuleType], tmp_path: Path) -> None:
+    text = (Path(__file__).parents[1] / "docs" / "embedded.md").read_text(encoding="utf-8")
+    [main] = re.findall(r"```c main.c\n(.*?)```", text, flags=re.DOTALL)
+    (tmp_path / "main.c").write_text(main, encoding="utf-8")
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    for command in re.findall(r"```sh\n(.*?)```", text, flags=re.DOTALL):
+        done = subprocess.run(
+            ["sh", "-e", "-c", command],
+            cwd=tmp_path,
+            env=os.environ | {"PATH": path},
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+    holds, springs = map(float, re.findall(r"-?\d+\.\d+", done.stdout))
+    model = package_of("puma560").load("numpy")
+    q = np.array([0.1, -0.5, 0.8, 0.0, 0.3, 0.0])
+    assert holds == pytest.approx(model.gravity_torque(q)[1], abs=0.01)
+    assert springs == pytest.approx(-40 * -0.5, abs=0.01)
