@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .PHONY: docs pictures demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean
-.PHONY: pythons licences
+.PHONY: pythons licences embedded
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -101,6 +101,10 @@ bench: $(READY)
 	$(BIN)/python tests/benchmarks/bench_report.py
 	$(BIN)/python tests/benchmarks/bench_motion.py million out/planar3
 	$(BIN)/python tests/benchmarks/bench_motion.py ten-hours generated/torso
+
+# The table of docs/embedded.md: stack and instructions on a Cortex-M that QEMU plays.
+embedded: $(READY)
+	$(BIN)/python tests/cortex_m.py
 
 clean:
 	rm -rf out $(VENV)

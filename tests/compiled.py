@@ -44,7 +44,9 @@ def _library(directory: Path) -> ctypes.CDLL:
 class Compiled:
     """The compiled functions of a package, on arrays (samples, n) of float64 or float32."""
 
-    def __init__(self, directory: Path, parameters: Sequence[float] = ()) -> None:
+    def __init__(
+        self, directory: Path, parameters: Sequence[float] = (), library: Path | None = None
+    ) -> None:
         self.parameters = list(parameters)
         self.name = name_of(directory)
         header = (directory / "c" / f"{self.name}.h").read_text()
@@ -53,7 +55,7 @@ class Compiled:
         }
         totals = {"tau": "G"}
         self.sizes = {array: self.numbers.get(totals.get(array, array.upper()), 0) for array in FIELDS}
-        self.library = _library(directory)
+        self.library = ctypes.CDLL(str(library)) if library else _library(directory)
 
     def _call(self, function: str, count: int | None, motion: Sequence[Any], lengths: list[int]) -> list[Any]:
         """Arrays of the given lengths that a function fills; those of length 0 it does not have."""

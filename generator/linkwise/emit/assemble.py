@@ -14,6 +14,7 @@ from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
 from linkwise.emit.c import loop_costs
+from linkwise.emit.c.flash import code_size
 from linkwise.emit.definition import energies, joint_entries, rigid_tree
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.shared_texts import init_text, names_text
@@ -146,6 +147,7 @@ def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
             for j, (name, cost) in enumerate(zip(system.link_names, costs, strict=True))
         ),
         operations,
+        code_size(derivation.package, files),
         {s.name: float(v) for s, v in system.parameters.items()},
         rigid_tree(system),
         energies(system),

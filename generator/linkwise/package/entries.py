@@ -46,6 +46,14 @@ class LinkEntry:
 
 
 @dataclass(frozen=True)
+class CodeSize:
+    """Bytes of code and constants of a package's C on a microcontroller, in double and float: an estimate."""
+
+    float64: int
+    float32: int
+
+
+@dataclass(frozen=True)
 class BodyEntry:
     """A moving frame on its parent's, as `linkwise.robot.robot.Joint` places it, and the mass it carries.
 

@@ -14,6 +14,7 @@ from linkwise.output import sweep
 from linkwise.package.decode import decoded, parsed, require
 from linkwise.package.entries import (
     BodyEntry,
+    CodeSize,
     CouplingEntry,
     EnergyEntry,
     FrameEntry,
@@ -26,12 +27,13 @@ from linkwise.package.entries import (
     check_tree,
 )
 
-SCHEMA = 9
+SCHEMA = 10
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [
     "FILE",
     "BodyEntry",
+    "CodeSize",
     "CouplingEntry",
     "EnergyEntry",
     "FrameEntry",
@@ -56,6 +58,8 @@ CONVENTIONS = {
     "limits": "of joints: lower and upper of the position, velocity and effort either way, as the robot's "
     "file has them; null for none",
     "operations": "additions, multiplications and divisions for one sample; sines and the like apart",
+    "code_size": "bytes of code and constants of all functions of a number type, those of math.h apart, as "
+    "gcc -Os -DLINKWISE_SMALL makes them for a Cortex-M with a unit for that type: an estimate, to a fifth",
 }
 
 
@@ -66,6 +70,7 @@ class Manifest:
     request: the options of `generate`; kernel: which kind its C is
     files: the SHA-256 of every other file, by its path in the package
     operations: those of a full decomposition
+    code_size: an estimate for C on a microcontroller; None without C
     """
 
     name: str
@@ -76,6 +81,7 @@ class Manifest:
     joints: tuple[JointEntry, ...]
     links: tuple[LinkEntry, ...]
     operations: int
+    code_size: CodeSize | None
     parameters: Mapping[str, float]
     tree: RigidTree | None
     energies: tuple[EnergyEntry, ...] | None

@@ -99,7 +99,7 @@ def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
         call(kernels.decomposition, "one", "m.", arrays),
         call(kernels.decomposition, "one", "m.", arrays, link.start),
         call(kernels.torque, "one", "m.", {"tau": "tau"}, link.start),
-        call(kernels.position_gradient, "block", "m[t].", {"c0": "c0_block"}),
+        call(kernels.position_gradient, "", "m[t].", {"c0": "c0_block"}),
         _moves("c0", link).scatter,
         _counted_from_0(link),
         f"to_dense_one({link.first - 1}, &m, &r, to)",
@@ -135,10 +135,11 @@ def call(
     into: Mapping[str, str],
     start: EntryCounts | None = None,
 ) -> str:
-    """Call of a kernel for one sample or a block; outputs begin at their pointers, or `start` entries on."""
+    """Call of a kernel for one sample, a block, or, without width, as SIZED says; outputs may begin later."""
     reads = [f"{motion}{array}" for array in function.reads]
     writes = [_at(into[array], start.of(array) if start else 0) for array in function.writes]
-    return f"{function.name}_{width}({', '.join([*reads, *writes])})"
+    name = f"{function.name}_{width}" if width else f"SIZED({function.name})"
+    return f"{name}({', '.join([*reads, *writes])})"
 
 
 def unread(calls: Sequence[str]) -> tuple[str, ...]:

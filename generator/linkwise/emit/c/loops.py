@@ -8,10 +8,10 @@ from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
 from linkwise.emit.c.loop_costs import decomposition_cost, gradient_cost, torque_cost
 from linkwise.emit.c.prototypes import at_position, pointers, under_torque
-from linkwise.emit.c.robot_files import free, given, header_view, path_fields, totals
+from linkwise.emit.c.robot_files import free, given, header_view, path_fields, rows_from_s, totals
 from linkwise.emit.c.robot_tables import path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
-from linkwise.emit.c.stack import loops_stack
+from linkwise.emit.c.stack import loops_stack, small_stack
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.system import RigidSystem
@@ -19,11 +19,13 @@ from linkwise.version import VERSION
 
 FIXED = (
     "angles.h",
+    "arrays.h",
     "block_rows.h",
     "blocks.h",
     "calls.h",
     "dense.h",
     "dense_rows.h",
+    "destinations.h",
     "elimination.h",
     "frame_impedance.h",
     "frame_rotation.h",
@@ -35,6 +37,7 @@ FIXED = (
     "mass.h",
     "moving_links.h",
     "numbers.h",
+    "one_by_one.h",
     "one_motion.h",
     "one_sample.h",
     "packed_rows.h",
@@ -44,6 +47,7 @@ FIXED = (
     "rule.h",
     "shares.h",
     "sines.h",
+    "small_cubes.h",
     "stream.h",
     "tree.h",
     "vectors.h",
@@ -70,6 +74,7 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
         "torque_cost": torque_cost(system),
         "gradient_cost": gradient_cost(system),
         "stack": f"{loops_stack(system):,}",
+        "small": small_stack(system, links, 0),
     }
     yield f"c/{name}.h", render("c/robot.h.j2", names | header_view(system, links, name) | costs)
     tables = {"tables": list(header.index_tables(system, links))}
@@ -89,6 +94,7 @@ def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
         "parameters": list(enumerate(parameter_names(system).values())),
         "inputs": pointers("const real", motion),
         "passed": ", ".join(motion),
+        "rows_from_s": rows_from_s(motion),
         "inputs_at_rest": pointers("const real", (array for array in motion if array != "qdd")),
         "passed_at_rest": ", ".join("qd" if array == "qdd" else array for array in motion),
         "inputs_at_position": pointers("const real", at_position(motion)),

@@ -38,7 +38,8 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
         "pointers": ", ".join(f"*{array}" for array in arrays),
         "passed": ", ".join((*motion, *arrays)),
         "passed_motion": ", ".join(motion),
-        "rows_from_s": ", ".join(array if array == "p" else f"{array} + s * N" for array in motion),
+        "rows_from_s": rows_from_s(motion),
+        "results_from_s": ", ".join(f"{array} + s * {total(array)}" for array in arrays),
         "inputs_at_rest": pointers("const real", (array for array in motion if array != "qdd")),
         "passed_at_rest": ", ".join("qd" if array == "qdd" else array for array in motion),
         "inputs_at_position": pointers("const real", at_position(motion)),
@@ -107,9 +108,20 @@ def costs(kernels: Sequence[LinkKernels]) -> dict[str, int]:
     }
 
 
+def most_kept(kernels: Sequence[LinkKernels]) -> int:
+    """Return how many values a kernel keeps at a time, at most: a fourth of those that it computes."""
+    functions = (f for k in kernels for f in (k.decomposition, k.torque, k.position_gradient))
+    return max(len(f.inputs) + len(f.statements) // 4 for f in functions)
+
+
 def given(system: System) -> tuple[str, ...]:
     """Arrays that every function takes."""
     return ("q", "qd", "qdd", "p") if system.parameters else ("q", "qd", "qdd")
+
+
+def rows_from_s(inputs: Sequence[str]) -> str:
+    """Return those arrays from row s on; run-time parameters are the same for all rows."""
+    return ", ".join(array if array == "p" else f"{array} + s * N" for array in inputs)
 
 
 def free(system: System) -> bool:

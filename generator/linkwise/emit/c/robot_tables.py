@@ -129,14 +129,14 @@ def _placings(system: RigidSystem) -> Iterator[str]:
     for link in system.robot.links:
         joint = link.joint
         turn = _row(entry for row in joint.rotation for entry in row)
-        yield f"{{{turn}, {_row(_values(system, joint.translation))}, {joint.ratio!r}}}"
+        yield f"{{{turn}, {_row(_values(system, joint.translation))}, {_number(joint.ratio)}}}"
 
 
 def _bodies(system: RigidSystem) -> Iterator[str]:
     for link in system.links:
         [mass] = _values(system, (link.mass,))
         inertia = _values(system, (link.inertia[i][k] for i, k in PRODUCTS))
-        yield f"{{{mass!r}, {_row(_values(system, link.com))}, {_row(inertia)}}}"
+        yield f"{{{_number(mass)}, {_row(_values(system, link.com))}, {_row(inertia)}}}"
 
 
 def _passive(system: RigidSystem) -> Iterator[str]:
@@ -185,4 +185,8 @@ def _values(system: RigidSystem, scalars: Iterable[Scalar]) -> list[float]:
 
 
 def _row(values: Iterable[float]) -> str:
-    return f"{{{', '.join(map(repr, map(float, values)))}}}"
+    return f"{{{', '.join(map(_number, values))}}}"
+
+
+def _number(value: float) -> str:
+    return f"R({float(value)!r})"

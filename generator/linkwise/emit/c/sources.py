@@ -16,10 +16,10 @@ from linkwise.emit.c.kernel_function import (
     kernel_function,
     outputs,
 )
-from linkwise.emit.c.robot_files import costs, header_view, robot_view
+from linkwise.emit.c.robot_files import costs, header_view, most_kept, robot_view
 from linkwise.emit.c.robot_tables import table_view
 from linkwise.emit.c.sizes import link_spans
-from linkwise.emit.c.stack import straight_stack
+from linkwise.emit.c.stack import small_stack, straight_stack
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.escape import c_comment
@@ -27,15 +27,19 @@ from linkwise.symbolic.system import RigidSystem, System
 from linkwise.version import VERSION
 
 FIXED = (
+    "arrays.h",
     "calls.h",
     "dense.h",
     "dense_rows.h",
+    "destinations.h",
     "elimination.h",
     "impedance.h",
     "numbers.h",
+    "one_by_one.h",
     "passive.h",
     "rows.h",
     "sines.h",
+    "small_cubes.h",
     "stream.h",
 )
 """Files that are the same in every package."""
@@ -76,6 +80,7 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     names = common | {"upper": name.upper()}
     about = header_view(system, links, name) | costs(kernels)
     about["stack"] = f"{straight_stack(system, links):,}"
+    about["small"] = small_stack(system, links, most_kept(kernels))
     yield f"c/{name}.h", render("c/robot.h.j2", names | about)
     tables = {"tables": list(header.index_tables(system, links))}
     yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)

@@ -5,9 +5,10 @@ bytes, 8 samples in double or 16 in float. Beside them a kernel keeps some kB of
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from linkwise.emit.c.robot_tables import columns, path_spans
-from linkwise.emit.c.sizes import Span, tile, waiting_counts, whole
+from linkwise.emit.c.sizes import Span, most_counts, tile, waiting_counts, whole
 from linkwise.symbolic.system import RigidSystem, System
 
 VALUE = 64
@@ -15,6 +16,9 @@ VALUE = 64
 
 OWN = 8_000
 """Bytes for what functions keep beside their arrays."""
+
+OWN_SMALL = 1_500
+"""Bytes of that where samples are computed one by one."""
 
 MOST_STACK = 5_000_000
 """Bytes of stack that a function may take: a thread has 8 MiB as a rule, and its callers need some."""
@@ -26,11 +30,55 @@ MOST_INT = 2**31 - 1
 """Entries that C counts in an int."""
 
 
+@dataclass(frozen=True)
+class SmallStack:
+    """Bytes that functions take at most with LINKWISE_SMALL, calls among them included, as text.
+
+    motion: those of torques, coefficients, gradients and regressors, in double and in float
+    control: all of them
+    """
+
+    motion: tuple[str, str]
+    control: tuple[str, str]
+
+
+def small_stack(system: System, links: tuple[Span, ...], kept: int) -> SmallStack:
+    """Bytes that functions take where samples are computed one by one.
+
+    `links` are results, and `kept` numbers that a kernel of closed forms may have to keep.
+    """
+    motion = _motion_values(system, links, kept)
+    control = max(motion, _control_values(system, links))
+    return SmallStack(_small(motion), _small(control))
+
+
+def _small(values: int) -> tuple[str, str]:
+    return f"{8 * values + OWN_SMALL:,}", f"{4 * values + OWN_SMALL:,}"
+
+
+def _motion_values(system: System, links: tuple[Span, ...], kept: int) -> int:
+    """Numbers that torques, coefficients, gradients and regressors of one sample keep."""
+    n, one = len(system.coordinates), most_counts([link.size for link in links])
+    values = 7 * n + one.total + kept
+    if not isinstance(system, RigidSystem):
+        return values
+    frames, longest = len(system.robot.links), _longest(system)
+    moved = _moved(system) + 6 * (frames + 1) + 34 + 18 * longest
+    return moved + max(values, 12 * longest + 30) + 2 * _numbers(system)
+
+
+def _moved(system: RigidSystem) -> int:
+    """Numbers of the motion of all frames, and of what it is made from."""
+    frames = len(system.robot.links)
+    columned = frames + len(columns(system).sums)
+    return 24 * (frames + 1) + 12 * columned + 3 * len(system.coordinates) + 3 * frames
+
+
 def loops_stack(system: RigidSystem) -> int:
     """Bytes that the functions of a kernel in loops take at most."""
     n, frames, longest = len(system.coordinates), len(system.robot.links), _longest(system)
     # motion: frames with 24 numbers each, and columns; wrenches; q, qd, qdd and angles, sines, cosines.
-    moved = 24 * (frames + 1) + 12 * (frames + len(columns(system).sums)) + 3 * n + 3 * frames
+    moved = _moved(system)
     wrenches = 18 * longest
     cubes = _cubes(n, len(system.links), longest)
     square = longest * longest
@@ -44,17 +92,19 @@ def loops_stack(system: RigidSystem) -> int:
 
 
 def control_stack(system: System, links: tuple[Span, ...]) -> int:
-    """Bytes that what control needs of one sample takes at most: motion, bodies, matrices of n rows."""
+    """Bytes that what control needs of one sample takes at most."""
+    return 8 * _control_values(system, links) + OWN
+
+
+def _control_values(system: System, links: tuple[Span, ...]) -> int:
+    """Numbers that it keeps: motion, bodies, matrices of n rows; of energies, the results of all `links`."""
     n = len(system.coordinates)
     matrices = 2 * n * n + 3 * max(n, 6) ** 2 + 60 * n + 250
     if not isinstance(system, RigidSystem):
-        whole_robot = whole(links).size
-        return 8 * (whole_robot.total + matrices) + OWN
-    frames = len(system.robot.links)
-    moved = 24 * (frames + 1) + 12 * (frames + len(columns(system).sums)) + 3 * n + 3 * frames
-    bodies = 34 * len(system.links) + 31 * (frames + 1) + 18 * _longest(system)
+        return whole(links).size.total + matrices
+    bodies = 34 * len(system.links) + 31 * (len(system.robot.links) + 1) + 18 * _longest(system)
     offsets = 3 * len(system.robot.named_frames)
-    return 8 * (moved + bodies + matrices + _numbers(system) + offsets) + OWN
+    return _moved(system) + bodies + matrices + _numbers(system) + offsets
 
 
 def straight_stack(system: System, links: tuple[Span, ...]) -> int:

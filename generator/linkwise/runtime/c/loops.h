@@ -12,7 +12,7 @@ SHARED void API(torque_one)(INPUTS, real *tau);
 /* Where results with their zeros go: see dense.h. */
 struct dense;
 SHARED void API(dense_one)(INPUTS, const struct dense *to);
-SHARED void API(dense_torque_one)(INPUTS, int sums, real *torque);
+SHARED void API(dense_torque_one)(INPUTS, int summed, real *torque);
 
 /* No link of rigid bodies has h1. */
 #if PART(ONE_SAMPLE) || PART(BLOCKS) || PART(POSITION_GRADIENT)
@@ -23,7 +23,11 @@ static const char linear[LINKS] = {0};
 #include "one_sample.h"
 #endif
 
-#if PART(BLOCKS) || PART(POSITION_GRADIENT)
+#ifdef LINKWISE_SMALL
+#include "one_by_one.h"
+#include "blocks.h"
+#include "small_cubes.h"
+#elif PART(BLOCKS) || PART(POSITION_GRADIENT)
 #include "blocks.h"
 
 #include "dense.h"
@@ -31,7 +35,7 @@ static const char linear[LINKS] = {0};
 #include "dense_rows.h"
 #endif
 
-#if PART(BLOCKS)
+#if PART(BLOCKS) && !defined(LINKWISE_SMALL)
 #include "shares.h"
 #include "block_rows.h"
 #include "packed_rows.h"
@@ -149,7 +153,7 @@ static void torque_rows(size_t count, INPUTS, enum torques kind, real *tau)
         rows_moved(x, samples, q + s * N, qd + s * N, qdd + s * N, m);
         begin_waiting(&packed, samples, G, rows);
         if (kind != PACKED)
-            memset(rows, 0, samples * row * sizeof(real));
+            clear(samples * row, rows);
         for (int j = 0; j < LINKS; ++j) {
             const int length = path_start[j + 1] - path_start[j];
             if (kind == PACKED) {
@@ -185,7 +189,7 @@ static void dense_rows(size_t count, INPUTS, const struct dense *to)
         rows_moved(x, samples, q + s * N, qd + s * N, qdd + s * N, m);
         gather(samples, N, qd + s * N, velocity);
         gather(samples, N, qdd + s * N, acceleration);
-        memset(to->gravity + s * SQUARE, 0, samples * SQUARE * sizeof(real));
+        clear(samples * SQUARE, to->gravity + s * SQUARE);
         for (int j = 0; j < LINKS; ++j) {
             results_of_link(x, m, j, 0, c2, c1, g, tau);
             if (to->slopes)
@@ -237,13 +241,13 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
         rows_moved(x, samples, q + s * N, qd + s * N, qdd + s * N, m);
         for (int part = 0; part < BLOCK_PARTS; ++part)
-            second_changes_block(&m[part], x->gravity, second[part]);
+            KERNEL(second_changes)(&m[part], x->gravity, second[part]);
         for (int j = 0; j < LINKS; ++j) {
             const int length = path_start[j + 1] - path_start[j], joints_of_j = frames_of(j, frames, places);
-            memset(block, 0, (size_t)length * (size_t)length * BLOCK * sizeof(real));
+            clear((size_t)length * (size_t)length * BLOCK, block);
             for (int part = 0; part < BLOCK_PARTS; ++part) {
-                const moving_link l = link_at_block(&m[part], links[j].frame, &x->bodies[j], x->gravity);
-                gradient_block(&m[part], second[part], &l, joints_of_j, frames, places, length, block + part * LANES);
+                const moving_link l = KERNEL(link_at)(&m[part], links[j].frame, &x->bodies[j], x->gravity);
+                KERNEL(gradient)(&m[part], second[part], &l, joints_of_j, frames, places, length, block + part * LANES);
             }
             if (dense)
                 to_cubes(j, j + 1, 0, block, wait.ones, samples, &wait, c0 + s * row);

@@ -63,9 +63,9 @@ SHARED void API(dense_one)(INPUTS, const struct dense *to)
     moved_one(x, q, qd, qdd, NULL, &m);
     for (int k = 0; k < N; ++k)
         ones[k] = 1;
-    memset(to->acceleration, 0, CUBE * sizeof(real));
-    memset(to->velocity, 0, CUBE * sizeof(real));
-    memset(to->gravity, 0, SQUARE * sizeof(real));
+    clear(CUBE, to->acceleration);
+    clear(CUBE, to->velocity);
+    clear(SQUARE, to->gravity);
     for (int j = 0; j < LINKS; ++j) {
         const size_t at = (size_t)j * N;
         link_one(x, j, &m, c2, c1, g, tau);

@@ -1,6 +1,6 @@
 /* Links of any energies, and what they answer with to accelerations: sums over the links. The same in every package of
    linkwise. The file that includes this one has `struct sample`, whose c2, c1 and g are packed, and `observe`. */
-#include <string.h>
+#include "arrays.h"
 
 #define SAMPLE(s) \
     struct sample s; \
@@ -10,7 +10,7 @@
 static inline void answer(const struct sample *s, const real *acceleration, const real *velocity, int weighs, real *torque)
 {
     const real *c2 = s->c2, *c1 = s->c1, *g = s->g;
-    memset(torque, 0, N * sizeof(real));
+    clear(N, torque);
     for (int j = 0; j < LINKS; ++j)
         for (int a = path_start[j]; a < path_start[j + 1]; ++a) {
             const int i = path[a];
@@ -30,7 +30,7 @@ static inline void answer(const struct sample *s, const real *acceleration, cons
 static inline void sum_inertia(const struct sample *s, const real *w, real *mass)
 {
     const real *c2 = s->c2;
-    memset(mass, 0, (size_t)N * N * sizeof(real));
+    clear((size_t)N * N, mass);
     for (int j = 0; j < LINKS; ++j)
         for (int a = path_start[j]; a < path_start[j + 1]; ++a)
             for (int b = a; b < path_start[j + 1]; ++b, ++c2) {
