@@ -4,16 +4,20 @@ import ctypes
 import errno
 import os
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
 from linkwise.output.workplace import OLD, REST
+from linkwise.runtime.native.native_system import system_here
 
 AT_CWD = -100  # AT_FDCWD of Linux
 SWAP = ctypes.c_uint(2)  # RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS
 TRIES = 100
+STEP = 0.05
+"""Seconds between two tries of a rename that open files hold up."""
 TAKEN = (errno.ENOTEMPTY, errno.EEXIST)
 
 
@@ -24,7 +28,7 @@ def put(draft: Path, target: Path) -> bool:
     """
     for _ in range(TRIES):  # another writer may put its own there, or be between its two renames
         with _tried(*TAKEN):
-            draft.rename(target)  # over nothing or an empty folder
+            moved(draft.rename, target)  # over nothing or, where it can be, an empty folder
             return False
         with _tried(errno.ENOENT, *TAKEN):
             exchange(draft, target)
@@ -46,7 +50,7 @@ def exchange(draft: Path, target: Path) -> None:
     done: list[tuple[Path, Path]] = []
     try:
         for here, there in steps:
-            here.rename(there)
+            moved(here.rename, there)
             done.append((here, there))
     except OSError:
         _undo(done, former)
@@ -66,22 +70,25 @@ def _undo(done: list[tuple[Path, Path]], former: Path) -> None:
                 former.rename(tempfile.mkdtemp(dir=rest))
 
 
+def moved(move: Callable[[Path], object], there: Path) -> None:
+    """Rename or replace; once more for a while where the system has files, open to a scanner say, stay."""
+    end = time.monotonic() + system_here().patience
+    while True:
+        try:
+            move(there)
+            return
+        except PermissionError:
+            if time.monotonic() >= end:
+                raise
+            time.sleep(STEP)
+
+
 def flush(folder: Path) -> None:
     """Have the disk hold all that is in `folder`, so that a power cut after the exchange loses neither."""
     for place, _, names in os.walk(folder):
         for name in names:
-            flush_one(Path(place, name))
-        flush_one(Path(place))
-
-
-def flush_one(path: Path) -> None:
-    """The same for one file, or for the list of a folder's entries."""
-    opened = os.open(path, os.O_RDONLY)
-    try:
-        with _tried(errno.EINVAL):  # a file system that has nothing to flush
-            os.fsync(opened)
-    finally:
-        os.close(opened)
+            system_here().flush(Path(place, name))
+        system_here().flush(Path(place))
 
 
 def _swapped(one: Path, other: Path) -> bool:
