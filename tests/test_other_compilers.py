@@ -3,11 +3,13 @@
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 
+import linkwise
 import numpy as np
 import pytest
 from answers import random_states, relative_error
@@ -17,6 +19,8 @@ from linkwise.runtime.native.native_build import PARTS
 from linkwise.runtime.native.native_compiler import FLAGS, MinGW
 
 PROGRAM = Path(__file__).with_name("answers.c")
+CMAKE = Path(linkwise.__file__).parent / "cmake"
+LINKWISE = Path(sys.executable).with_name("linkwise")
 SAMPLES = 37
 MINGW = "x86_64-w64-mingw32-gcc"
 WINE = shutil.which("wine64", path=os.pathsep.join([os.environ["PATH"], "/usr/lib/wine"]))
@@ -178,6 +182,30 @@ def test_the_library_that_native_would_make_on_windows_says_what_numpy_says(
     robot.command(*compiler.linking([f"{part}.o" for part in parts], "native.dll"))
     robot.command(MINGW, *STRICT, *robot.main())
     robot.command(MINGW, "main.o", "native.dll", "-static", "-o", "main.exe")
+    robot.says_what_numpy_says("main.exe")
+
+
+LISTS = """cmake_minimum_required(VERSION 3.20)
+project(controller LANGUAGES C)
+find_package(linkwise CONFIG REQUIRED)
+linkwise_add_robot(planar3 ROBOT planar3 SHARED)
+add_executable(main answers.c)
+target_compile_options(main PRIVATE {defined})
+target_link_libraries(main PRIVATE planar3)
+"""
+
+
+@needs_mingw
+@pytest.mark.skipif(not all(map(shutil.which, ("cmake", "ninja"))), reason="needs cmake and ninja")
+def test_cmake_makes_a_library_and_a_program_for_windows(robot_of: Make, wine: dict[str, object]) -> None:
+    robot = robot_of("planar3", **wine)
+    shutil.copy(PROGRAM, robot.folder)
+    defined = " ".join(f"[==[{word}]==]" for word in robot.main() if word.startswith("-D"))
+    (robot.folder / "CMakeLists.txt").write_text(LISTS.format(defined=defined), encoding="utf-8")
+    toolchain = ("-DCMAKE_SYSTEM_NAME=Windows", f"-DCMAKE_C_COMPILER={MINGW}")
+    linkwise = (f"-Dlinkwise_DIR={CMAKE}", f"-DLINKWISE_EXECUTABLE={LINKWISE}")
+    robot.command("cmake", "-G", "Ninja", "-S", ".", "-B", ".", *toolchain, *linkwise)
+    robot.command("cmake", "--build", ".")
     robot.says_what_numpy_says("main.exe")
 
 

@@ -4,7 +4,6 @@ import ctypes
 import errno
 import os
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -16,8 +15,6 @@ from linkwise.runtime.native.native_system import system_here
 AT_CWD = -100  # AT_FDCWD of Linux
 SWAP = ctypes.c_uint(2)  # RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS
 TRIES = 100
-STEP = 0.05
-"""Seconds between two tries of a rename that open files hold up."""
 TAKEN = (errno.ENOTEMPTY, errno.EEXIST)
 
 
@@ -28,7 +25,7 @@ def put(draft: Path, target: Path) -> bool:
     """
     for _ in range(TRIES):  # another writer may put its own there, or be between its two renames
         with _tried(*TAKEN):
-            moved(draft.rename, target)  # over nothing or, where it can be, an empty folder
+            system_here().moved(draft.rename, target)  # over nothing or, where it can be, an empty folder
             return False
         with _tried(errno.ENOENT, *TAKEN):
             exchange(draft, target)
@@ -50,7 +47,7 @@ def exchange(draft: Path, target: Path) -> None:
     done: list[tuple[Path, Path]] = []
     try:
         for here, there in steps:
-            moved(here.rename, there)
+            system_here().moved(here.rename, there)
             done.append((here, there))
     except OSError:
         _undo(done, former)
@@ -68,19 +65,6 @@ def _undo(done: list[tuple[Path, Path]], former: Path) -> None:
             rest.mkdir(exist_ok=True)
             if there == former and os.path.lexists(here):
                 former.rename(tempfile.mkdtemp(dir=rest))
-
-
-def moved(move: Callable[[Path], object], there: Path) -> None:
-    """Rename or replace; once more for a while where the system has files, open to a scanner say, stay."""
-    end = time.monotonic() + system_here().patience
-    while True:
-        try:
-            move(there)
-            return
-        except PermissionError:
-            if time.monotonic() >= end:
-                raise
-            time.sleep(STEP)
 
 
 def flush(folder: Path) -> None:

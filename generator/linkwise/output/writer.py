@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from linkwise.errors import LinkwiseError
-from linkwise.output.exchange import exchange, flush, moved, put
+from linkwise.output.exchange import exchange, flush, put
 from linkwise.output.workplace import ENDING, NEW, REST, sweep, workplace
 from linkwise.runtime.native.native_system import system_here
 
@@ -91,11 +91,11 @@ def _replace_files(work: Path, targets: tuple[Path, ...], former: set[Path]) -> 
     try:
         for target in targets:
             done.append(target)
-            moved((work / NEW / target.name).replace, target)
+            system_here().moved((work / NEW / target.name).replace, target)
     except BaseException:
         for target in done:
             if target in former:
-                moved((work / REST / target.name).replace, target)
+                system_here().moved((work / REST / target.name).replace, target)
             else:
                 target.unlink(missing_ok=True)
         raise

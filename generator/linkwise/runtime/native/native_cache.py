@@ -69,8 +69,8 @@ def keep(made: Path, library: Path) -> None:
         digest.write_text(hashlib.file_digest(file, "sha256").hexdigest(), encoding="ascii")
     made.chmod(0o644)
     # Whoever looks between the two finds a hash that does not fit, waits for the lock, and looks again.
-    os.replace(digest, _digest_of(library))
-    os.replace(made, library)
+    system_here().moved(digest.replace, _digest_of(library))
+    system_here().moved(made.replace, library)
 
 
 @contextmanager

@@ -11,12 +11,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar
 
 STEP = 0.1
-"""Seconds between two tries of a lock, where the system cannot wait for it."""
+"""Seconds between two tries of what the system cannot wait for."""
 
 
 class OperatingSystem:
@@ -79,6 +80,18 @@ class OperatingSystem:
                 raise
         finally:
             os.close(descriptor)
+
+    def moved(self, move: Callable[[Path], object], there: Path) -> None:
+        """Rename or replace; once more for a while where open files, a scanner's say, hold it up."""
+        end = time.monotonic() + self.patience
+        while True:
+            try:
+                move(there)
+                return
+            except PermissionError:
+                if time.monotonic() >= end:
+                    raise
+                time.sleep(STEP)
 
     def words(self, command: str) -> list[str]:
         """Words of a command line; raises ValueError where a quotation mark is missing."""
