@@ -1,6 +1,7 @@
 """The emitted C needs no compiler's extension; compiled for Windows it says under Wine what NumPy says."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -22,13 +23,13 @@ PROGRAM = Path(__file__).with_name("answers.c")
 CMAKE = Path(linkwise.__file__).parent / "cmake"
 LINKWISE = Path(sys.executable).with_name("linkwise")
 SAMPLES = 37
-MINGW = "x86_64-w64-mingw32-gcc"
+MINGW, OBJDUMP = (f"x86_64-w64-mingw32-{tool}" for tool in ("gcc", "objdump"))
 WINE = shutil.which("wine64", path=os.pathsep.join([os.environ["PATH"], "/usr/lib/wine"]))
 STRICT = ("-std=c99", "-pedantic-errors", "-Wall", "-Wextra", "-Werror", "-O1")
 needs_mingw = pytest.mark.skipif(
     shutil.which(MINGW) is None or WINE is None, reason="needs gcc of MinGW-w64, and Wine"
 )
-ROBOTS = ("puma560", "puma560 loops")
+ROBOTS = ("planar3", "puma560 loops")
 
 PLAIN = {
     "math.h": """
@@ -96,7 +97,8 @@ class Robot:
             "main.o",
         ]
 
-    def command(self, *command: str) -> None:
+    def command(self, *command: str) -> str:
+        """What a command prints; fails where it does."""
         done = subprocess.run(
             command,
             cwd=self.folder,
@@ -106,6 +108,7 @@ class Robot:
             check=False,
         )
         assert done.returncode == 0, (command, done.stderr, done.stdout)
+        return done.stdout
 
     def says_what_numpy_says(self, program: str) -> None:
         """Run a program of answers.c, and hold all that it answers against NumPy."""
@@ -180,6 +183,8 @@ def test_the_library_that_native_would_make_on_windows_says_what_numpy_says(
     for part in parts:
         robot.command(*compiler.compiling(robot.source, part, f"{part}.o"), "-Werror")
     robot.command(*compiler.linking([f"{part}.o" for part in parts], "native.dll"))
+    needed = set(re.findall(r"DLL Name: (\S+)", robot.command(OBJDUMP, "-p", "native.dll")))
+    assert needed <= {"KERNEL32.dll", "msvcrt.dll"}  # Python looks for no others beside it
     robot.command(MINGW, *STRICT, *robot.main())
     robot.command(MINGW, "main.o", "native.dll", "-static", "-o", "main.exe")
     robot.says_what_numpy_says("main.exe")
