@@ -47,6 +47,7 @@ CHANGES = {
     "threads": Surroundings({"OMP_NUM_THREADS": "7", "OPENBLAS_NUM_THREADS": "7"}),
     "SymPy without cache": Surroundings({"SYMPY_USE_CACHE": "no"}),
 }
+SYSTEMS = ("windows", "macos")
 ALL_AT_ONCE = Surroundings(
     {"PYTHONHASHSEED": "4711", "LC_ALL": "tr_TR.UTF-8", "TZ": "Asia/Kathmandu", "OMP_NUM_THREADS": "7"}
     | {"SYMPY_USE_CACHE": "no", "PYTHONUTF8": "0"},
@@ -55,6 +56,13 @@ ALL_AT_ONCE = Surroundings(
     ("torch", "mujoco"),
     0o077,
 )
+
+
+def on_another_system(system: str) -> Surroundings:
+    """As far as `other_system` makes it one, without a compiler, and on a console of few letters."""
+    python = (sys.executable, str(ROOT / "tests/other_system.py"), system)
+    few = {"PATH": "/nowhere", "PYTHONUTF8": "0", "PYTHONIOENCODING": "cp1252", "LC_ALL": "de_DE.ISO-8859-1"}
+    return Surroundings(few, python)
 
 
 def files(surroundings: Surroundings, place: Path, locales: Path) -> dict[str, bytes]:
@@ -110,8 +118,10 @@ def make_locales(place: Path) -> Path:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare every change with the plain run; exit status 1 where bytes differ."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", choices=[*CHANGES, *NEWER], action="append", help="may be repeated")
-    wanted = parser.parse_args(arguments).only or [*CHANGES, *NEWER]
+    parser.add_argument(
+        "--only", choices=[*CHANGES, *SYSTEMS, *NEWER], action="append", help="may be repeated"
+    )
+    wanted = parser.parse_args(arguments).only or [*CHANGES, *SYSTEMS, *NEWER]
     different = 0
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -119,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         plain = files(PLAIN, place / "plain", locales)
         print(f"plain: {len(plain)} files")
         for name in wanted:
-            surroundings = CHANGES.get(name)
+            surroundings = on_another_system(name) if name in SYSTEMS else CHANGES.get(name)
             if surroundings is None:
                 python = environment(name, place)
                 if python is None:

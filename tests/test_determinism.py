@@ -9,16 +9,27 @@ from typing import Any
 import pytest
 from conftest import DATA
 from linkwise import Options, generate, read_system
-from same_bytes import ALL_AT_ONCE, PLAIN, differing, files, make_locales
+from same_bytes import ALL_AT_ONCE, PLAIN, Surroundings, differing, files, make_locales, on_another_system
 
 
-def test_the_surroundings_leave_no_trace_in_any_file(tmp_path: Path) -> None:
-    locales = make_locales(tmp_path / "locales")
-    plain = files(PLAIN, tmp_path / "plain", locales)
-    other = files(ALL_AT_ONCE, tmp_path / "other", locales)
+@pytest.fixture(scope="module")
+def locales(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_locales(tmp_path_factory.mktemp("locales"))
+
+
+@pytest.fixture(scope="module")
+def plain(locales: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    return files(PLAIN, tmp_path_factory.mktemp("plain"), locales)
+
+
+@pytest.mark.parametrize("other", [ALL_AT_ONCE, on_another_system("windows")], ids=["Linux", "Windows"])
+def test_the_surroundings_leave_no_trace_in_any_file(
+    other: Surroundings, plain: dict[str, bytes], locales: Path, tmp_path: Path
+) -> None:
+    found = files(other, tmp_path, locales)
     assert len(plain) > 150
-    assert plain.keys() == other.keys()
-    assert not differing(plain, other)
+    assert plain.keys() == found.keys()
+    assert not differing(plain, found)
 
 
 def test_the_way_that_a_python_sums_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:

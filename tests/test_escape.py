@@ -310,3 +310,12 @@ def test_a_string_of_c_has_the_bytes_of_the_name_and_nothing_that_ends_it() -> N
     assert to.c_string("left/knee") == '"left/knee"'
     assert to.c_string('a"b\\c??/*/') == r'"a\042b\134c\077\077\057*\057"'
     assert to.c_string("größe\n") == r'"gr\303\266\303\237e\012"'
+
+
+def test_names_of_files_that_differ_by_case_alone_are_numbered() -> None:
+    assert to.file_names(["shares-A", "shares-a", "shares-a-2", "SHARES-A"]) == [
+        "shares-A",
+        "shares-a-2",
+        "shares-a-2-2",
+        "SHARES-A-3",
+    ]

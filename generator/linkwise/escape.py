@@ -142,6 +142,20 @@ def file_name(text: str) -> str:
     return f"{safe[:LONGEST_NAME]}-{hashlib.sha256(safe.encode()).hexdigest()[:8]}"
 
 
+def file_names(names: Iterable[str]) -> list[str]:
+    """The same names, numbered where one would be another's on a file system that takes A for a."""
+    used: set[str] = set()
+    made = []
+    for name in names:
+        number, found = 1, name
+        while found.lower() in used:
+            number += 1
+            found = f"{name}-{number}"
+        used.add(found.lower())
+        made.append(found)
+    return made
+
+
 def _escape(character: str) -> str:
     """As Python writes it in a string."""
     return character.encode("unicode_escape").decode("ascii")

@@ -1,5 +1,6 @@
 """A file that a user names, before it is opened: one that is there, and that has an end."""
 
+import os
 import stat
 from pathlib import Path
 
@@ -39,3 +40,17 @@ def is_file(path: Path) -> bool:
     except LinkwiseError:
         return False
     return True
+
+
+def is_inside(path: Path, folder: Path) -> bool:
+    """Whether `path` lies somewhere in `folder`, whatever either is called: by links, or in other letters."""
+    parents = Path(os.path.realpath(path)).parents
+    if folder.exists():
+        return any(parent.exists() and parent.samefile(folder) for parent in parents)
+    return Path(os.path.realpath(folder)) in parents
+
+
+def is_same(path: Path, other: Path) -> bool:
+    """Whether two paths are of one file, or will be."""
+    there = path.exists() and other.exists()
+    return path.samefile(other) if there else path.resolve() == other.resolve()

@@ -113,6 +113,7 @@ ROOMS: dict[str, Room] = {
         (
             "tests/test_native.py",
             "tests/test_native_cache.py",
+            "tests/test_other_systems.py",
             "tests/test_package_calls.py",
             "tests/test_runtime.py",
         ),

@@ -1,7 +1,6 @@
 """`analyze`: from a log and a robot to arrays in memory, or to a directory of files."""
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,7 +16,8 @@ from linkwise.analysis.show.page import NUMBERS, SAMPLES, numbers_on_page, repor
 from linkwise.analysis.stream import KeptSamples, stride_for
 from linkwise.analysis.tables import open_table
 from linkwise.errors import LinkwiseError
-from linkwise.escape import file_name, json_text
+from linkwise.escape import file_name, file_names, json_text
+from linkwise.input_file import is_inside
 from linkwise.output import whole_directory
 from linkwise.package.load import Array
 from linkwise.package.write import refuse_inside_package
@@ -81,7 +81,7 @@ def analyze_to(
         check_figure(name, robot, wanted.induced)
     refuse_inside_package(out)
     for file in (log, *loads.paths, *contacts.measured.paths):
-        if os.path.realpath(file).startswith(os.path.join(os.path.realpath(out), "")):
+        if is_inside(file, out):
             raise LinkwiseError(f"--out {out} is to be replaced and holds the log {file}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
         job = prepared(log, robot, reading, processing, loads, contacts, progress, wanted, draft)
@@ -103,15 +103,14 @@ def analyze_to(
 
 def _write_beside_table(draft: Path, analysis: Analysis, wanted: Wanted) -> None:
     """Write the record, the figures and the page."""
-    for name in wanted.figures:
-        file = draft / f"{'-'.join(map(file_name, name.split(':', 1)))}.png"
-        file.write_bytes(figure_png(analysis, name))
+    files = file_names("-".join(map(file_name, name.split(":", 1))) for name in wanted.figures)
+    for file, name in zip(files, wanted.figures, strict=True):
+        (draft / f"{file}.png").write_bytes(figure_png(analysis, name))
     if wanted.page:
-        (draft / "report.html").write_text(report(analysis), encoding="utf-8")
+        (draft / "report.html").write_bytes(report(analysis).encode())
     files = sorted([RECORD, *(file.name for file in draft.iterdir())])
     record = {**analysis.record(), "files": files}
-    text = json_text(record, indent=1)
-    (draft / RECORD).write_text(text + "\n", encoding="utf-8")
+    (draft / RECORD).write_bytes(f"{json_text(record, indent=1)}\n".encode())
 
 
 def _refuse_unless_result(target: Path) -> None:

@@ -15,6 +15,7 @@ from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.package.load import Array
 from linkwise.progress import Progress
+from linkwise.runtime.native.native_system import system_here
 
 SLOW = 5.0
 """Hz; hardly any movement is recorded so slowly, and milliseconds taken for seconds look like it."""
@@ -46,7 +47,7 @@ def read_samples(
     """Read, convert to SI and check a log.
 
     joint_units: one for each joint, "rad" or "m"
-    buffer: a directory in which a disk buffer keeps the samples; None keeps them in memory
+    buffer: a directory on whose disk, as a rule, a buffer keeps the samples; None keeps them in memory
     beside: columns that something else reads
     Raises LinkwiseError that names file, row and column for what cannot be analysed.
     """
@@ -102,8 +103,10 @@ def collected(blocks: Iterator[Array], width: int, directory: Path | None) -> Ar
     """All rows of blocks (any, width) as one writable array, in memory or in a file in `directory`."""
     if directory is None:
         return np.concatenate([np.empty((0, width)), *blocks])
-    # The file has no name from the start: the system removes it with its last user, however that ends.
-    with tempfile.TemporaryFile(dir=directory) as file:
+    # The file has no name from the start: the system removes it with its last user, however that ends. Where
+    # an open file keeps a name, that must not be among results.
+    place = None if system_here().keeps_open_files else directory
+    with tempfile.TemporaryFile(dir=place) as file:
         for block in blocks:
             file.write(np.ascontiguousarray(block).tobytes())
         file.flush()

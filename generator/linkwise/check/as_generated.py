@@ -83,7 +83,7 @@ def _own(path: str) -> bytes | None:
     folder, _, name = path.partition("/")
     places = {"runtime": files("linkwise.runtime"), "c": files("linkwise.runtime").joinpath("c")}
     if folder in places and (file := places[folder].joinpath(name)).is_file():
-        return file.read_bytes()
+        return file.read_text(encoding="utf-8").encode()  # as it was written, whatever ends lines here
     return None
 
 

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from linkwise.errors import LinkwiseError
 from linkwise.runtime.native.native_compiler import Compiler, find_compiler
 from linkwise.runtime.native.native_process import run_all
+from linkwise.runtime.native.native_system import system_here
 
 Numbers = NDArray[Any]
 
-FLAGS = ("-std=c99", "-O0", "-fPIC", "-shared")
+FLAGS = ("-std=c99", "-O0")
 """As quick to compile as can be; the native back end, held against the same, has its own."""
 
 GUARD = 4096
@@ -73,8 +74,9 @@ class CompiledPackage:
         self.header = (directory / f"{name}.h").read_text(encoding="utf-8")
         self.name = name
         self.constants = _constants(name, self.header)
-        with tempfile.TemporaryDirectory() as folder:
-            library = Path(folder) / "checked.so"
+        # Some systems keep a library, and its folder, for as long as it is loaded.
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+            library = Path(folder) / f"checked{system_here().library}"
             sources = [directory / f"{name}.c", directory / f"{name}f.c"]
             _compile(find_compiler(), sources, library, large)
             self.library = ctypes.CDLL(str(library))
@@ -138,13 +140,13 @@ def declared(name: str, header: str) -> dict[str, str]:
 
 def _compile(compiler: Compiler, sources: Sequence[Path], library: Path, large: int) -> None:
     """Both number types side by side, then one library of them."""
-    tuning = [flag for flag in compiler.flags if flag.startswith("-m")]
+    flags = (*FLAGS, *compiler.tuning, *compiler.anywhere)
     objects = [library.with_name(f"{source.name}.o") for source in sources]
     commands = [
-        [*compiler.command, *FLAGS[:-1], *tuning, f"-DLARGE={large}", "-c", str(source), "-o", str(made)]
+        [*compiler.command, *flags, f"-DLARGE={large}", "-c", str(source), "-o", str(made)]
         for source, made in zip(sources, objects, strict=True)
     ]
-    linking = [*compiler.command, *FLAGS, *map(str, objects), "-lm", "-o", str(library)]
+    linking = compiler.linking([*map(str, objects)], str(library))
     try:
         run_all(commands, lambda _: None)
         run_all([linking], lambda _: None)

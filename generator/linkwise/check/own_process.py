@@ -8,6 +8,8 @@ import warnings
 from collections.abc import Callable
 from typing import TypeVar
 
+from linkwise.runtime.native.native_system import system_here
+
 T = TypeVar("T")
 
 
@@ -18,9 +20,9 @@ class Ended(Exception):
 def in_own_process(work: Callable[[], T]) -> T:
     """Answer of `work`, from a fork of this process; raises Ended where a signal ends that one.
 
-    What `work` raises comes back too. Where processes cannot be forked, it is done in this one.
+    What `work` raises comes back too. Where a fork cannot compute, it is done in this process.
     """
-    if not hasattr(os, "fork"):
+    if not system_here().forks:
         return work()
     reader, writer = os.pipe()
     with warnings.catch_warnings():  # `work` computes with NumPy alone, which forks well beside threads

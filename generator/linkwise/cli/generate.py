@@ -23,7 +23,7 @@ from linkwise.emit.backend import BACKENDS, backends_of, chosen_backends
 from linkwise.emit.kernel_choice import chosen_kernel
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.input_file import is_file
+from linkwise.input_file import is_file, is_inside, is_same
 from linkwise.output import require_writable, sweep, write_files
 from linkwise.package.manifest import FILE
 from linkwise.package.write import check_target, differences, refuse_inside_package, write_package
@@ -205,10 +205,14 @@ def _check_side_files(orders: Sequence[Order], places: Iterable[Path], options: 
     """Raise LinkwiseError for a depfile or a stamp in the place of an input or inside a package."""
     for place in places:
         refuse_inside_package(place.parent)
-        here = place.resolve()
         for order in orders:
-            inputs = {path.resolve() for path in robot_files(order.robot, options)}
-            if here in inputs or here.is_relative_to(order.directory.resolve()) or here.is_dir():
+            inputs = any(is_same(place, path) for path in robot_files(order.robot, options))
+            if (
+                inputs
+                or place.is_dir()
+                or is_inside(place, order.directory)
+                or is_same(place, order.directory)
+            ):
                 raise LinkwiseError(
                     f"{place} cannot be a depfile or a stamp: {order.robot} is read from it, or it is a "
                     "folder or in a package; choose another name"

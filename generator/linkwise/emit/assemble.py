@@ -48,7 +48,9 @@ SHARED_RUNTIME = (
     "sum_calls.py",
 )
 """Files of linkwise/runtime that every package has."""
-TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names}
+DEVICES = {"aux", "con", "nul", "prn", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
+"""What no file of Windows may be called, whatever follows behind a dot."""
+TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names, *DEVICES}
 
 
 def package_files(
@@ -97,7 +99,11 @@ def _fault_of_name(name: str) -> str:
         return f"begins with the digit {name[0]!r}"
     if name != name.strip("_"):
         return "begins or ends with '_'"
-    return "is a word of Python's or a module's name"
+    return (
+        "is what a device of Windows is called"
+        if name in DEVICES
+        else "is a word of Python's or a module's name"
+    )
 
 
 def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iterator[tuple[str, str]]:

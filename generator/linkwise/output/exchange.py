@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from linkwise.output.workplace import OLD, REST
+from linkwise.runtime.native.native_system import system_here
 
 AT_CWD = -100  # AT_FDCWD of Linux
 SWAP = ctypes.c_uint(2)  # RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS
@@ -24,7 +25,7 @@ def put(draft: Path, target: Path) -> bool:
     """
     for _ in range(TRIES):  # another writer may put its own there, or be between its two renames
         with _tried(*TAKEN):
-            draft.rename(target)  # over nothing or an empty folder
+            system_here().moved(draft.rename, target)  # over nothing or, where it can be, an empty folder
             return False
         with _tried(errno.ENOENT, *TAKEN):
             exchange(draft, target)
@@ -46,7 +47,7 @@ def exchange(draft: Path, target: Path) -> None:
     done: list[tuple[Path, Path]] = []
     try:
         for here, there in steps:
-            here.rename(there)
+            system_here().moved(here.rename, there)
             done.append((here, there))
     except OSError:
         _undo(done, former)
@@ -70,18 +71,8 @@ def flush(folder: Path) -> None:
     """Have the disk hold all that is in `folder`, so that a power cut after the exchange loses neither."""
     for place, _, names in os.walk(folder):
         for name in names:
-            flush_one(Path(place, name))
-        flush_one(Path(place))
-
-
-def flush_one(path: Path) -> None:
-    """The same for one file, or for the list of a folder's entries."""
-    opened = os.open(path, os.O_RDONLY)
-    try:
-        with _tried(errno.EINVAL):  # a file system that has nothing to flush
-            os.fsync(opened)
-    finally:
-        os.close(opened)
+            system_here().flush(Path(place, name))
+        system_here().flush(Path(place))
 
 
 def _swapped(one: Path, other: Path) -> bool:

@@ -1,6 +1,6 @@
 """A writer's own folder beside its target: `.linkwise-XXXXXXXX`, locked for as long as the writer lives.
 
-    lock        held by `flock`, which the system lets go with the process, on whatever machine it ran
+    lock        held locked, which the system lets go with the process, on whatever machine it ran
     new         what is being written
     old/NAME    the target, where the file system cannot exchange two folders in one step, between the two
     rest        what is about to be removed
@@ -18,10 +18,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from linkwise.runtime.native.native_system import system_here
+
 PREFIX = ".linkwise-"
 RANDOM = 8
 """Letters that `mkdtemp` appends."""
 LOCK, NEW, OLD, REST = "lock", "new", "old", "rest"
+ENDING = [int(getattr(signal, name)) for name in ("SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
+"""Signals that end a program, beside that of Ctrl-C; each system has some of them."""
 
 
 @contextmanager
@@ -43,14 +47,14 @@ def workplace(parent: Path) -> Iterator[Path]:
             _cleared(work)
             raise
         finally:
-            os.close(lock)
+            _left(work, lock)
 
 
 def _hold_signals() -> set[int] | None:
     """Let signals wait, where the system can; returns what `_release_signals` needs."""
     if not hasattr(signal, "pthread_sigmask"):
         return None
-    return signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
+    return signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, *ENDING})
 
 
 def _release_signals(mask: set[int] | None) -> None:
@@ -74,7 +78,7 @@ def sweep(parent: Path) -> None:
             lock = _held(work, os.O_RDWR)
             if lock is not None:
                 _cleared(work)
-                os.close(lock)
+                _left(work, lock)
                 continue
             with suppress(OSError):
                 work.rmdir()  # empty: its writer died before the lock was there, or after it went
@@ -82,7 +86,7 @@ def sweep(parent: Path) -> None:
 
 def _own(entry: "os.DirEntry[str]") -> bool:
     """Whether this user made it: in a folder that many write to, another's could be a trap."""
-    return entry.stat(follow_symlinks=False).st_uid == os.geteuid()
+    return entry.stat(follow_symlinks=False).st_uid == system_here().user()
 
 
 def _made(parent: Path) -> tuple[Path, int]:
@@ -122,14 +126,9 @@ def _held(work: Path, flags: int) -> int | None:
 def _locked(lock: int, otherwise: bool) -> bool:
     """Lock an open file; False where another has it, `otherwise` where the file system knows no locks."""
     try:
-        import fcntl
-
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
+        return system_here().lock(lock)
     except (ImportError, OSError):
         return otherwise
-    return True
 
 
 def _is_at(lock: int, path: Path) -> bool:
@@ -156,4 +155,13 @@ def _cleared(work: Path) -> None:
             shutil.rmtree(work / name, ignore_errors=True)
         if os.listdir(work) in ([LOCK], []):
             (work / LOCK).unlink(missing_ok=True)
+            work.rmdir()
+
+
+def _left(work: Path, lock: int) -> None:
+    """Let go of the lock, and of a workplace that stands for its sake, where what is open keeps its name."""
+    os.close(lock)
+    with suppress(OSError):
+        if os.listdir(work) == [LOCK]:
+            (work / LOCK).unlink()
             work.rmdir()

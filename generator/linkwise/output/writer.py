@@ -12,8 +12,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from linkwise.errors import LinkwiseError
-from linkwise.output.exchange import exchange, flush, flush_one, put
-from linkwise.output.workplace import NEW, REST, sweep, workplace
+from linkwise.output.exchange import exchange, flush, put
+from linkwise.output.workplace import ENDING, NEW, REST, sweep, workplace
+from linkwise.runtime.native.native_system import system_here
 
 
 @contextmanager
@@ -78,7 +79,7 @@ def _replace(draft: Path, target: Path, refuse: Callable[[Path], None]) -> None:
         return
     try:
         refuse(draft)
-        flush_one(target.parent)
+        system_here().flush(target.parent)
     except (LinkwiseError, OSError):
         exchange(draft, target)
         refuse(target)  # the same, said of the right place
@@ -90,11 +91,11 @@ def _replace_files(work: Path, targets: tuple[Path, ...], former: set[Path]) -> 
     try:
         for target in targets:
             done.append(target)
-            os.replace(work / NEW / target.name, target)
+            system_here().moved((work / NEW / target.name).replace, target)
     except BaseException:
         for target in done:
             if target in former:
-                os.replace(work / REST / target.name, target)
+                system_here().moved((work / REST / target.name).replace, target)
             else:
                 target.unlink(missing_ok=True)
         raise
@@ -126,7 +127,9 @@ def _told(place: Path) -> Iterator[None]:
             place, reason = blocker, "it is not a folder"
         elif isinstance(error, FileExistsError) and error.filename:
             place = error.filename
-        raise LinkwiseError(f"{place}: nothing was written: {reason}; choose another place") from error
+        held = isinstance(error, PermissionError) and system_here().keeps_open_files
+        mend = "close the programs that have files there open, or " if held else ""
+        raise LinkwiseError(f"{place}: nothing was written: {reason}; {mend}choose another place") from error
 
 
 def _blocker(place: Path) -> Path | None:
@@ -137,8 +140,8 @@ def _blocker(place: Path) -> Path | None:
 
 @contextmanager
 def _ended_by_signal() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP end the work as an error does: what is half written goes."""
-    numbers = [signal.SIGTERM, signal.SIGHUP]
+    """Let signals that end a program end the work as an error does: what is half written goes."""
+    numbers = ENDING
     if threading.current_thread() is not threading.main_thread():
         numbers = []  # only the main thread may set handlers
     former = {number: signal.getsignal(number) for number in numbers}

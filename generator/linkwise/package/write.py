@@ -107,7 +107,7 @@ def write_package(files: Mapping[str, str], directory: str | Path, replace: bool
         for path, text in files.items():
             target = draft / path
             target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_text(text, encoding="utf-8")
+            target.write_bytes(text.encode())
             if path not in differing:
                 _keep_times(directory / path, target)
     return True
