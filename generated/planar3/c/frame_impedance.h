@@ -17,24 +17,24 @@ struct frame_motion {
     real jacobian[6 * N], rate[6 * N], moved[6 * N], inertia[36];
 };
 
-/* a x of a matrix (rows, columns), and a' y. */
-INLINE void times(int rows, int columns, const real *a, const real *x, real *product)
+/* a x of a matrix (rows, length), and a' y. */
+INLINE void times(int rows, int length, const real *a, const real *x, real *product)
 {
     for (int r = 0; r < rows; ++r) {
         real sum = 0;
-        for (int k = 0; k < columns; ++k)
-            sum += a[r * columns + k] * x[k];
+        for (int k = 0; k < length; ++k)
+            sum += a[r * length + k] * x[k];
         product[r] = sum;
     }
 }
 
-INLINE void transposed_times(int rows, int columns, const real *a, const real *y, real *product)
+INLINE void transposed_times(int rows, int length, const real *a, const real *y, real *product)
 {
     real sum[LARGEST] = {0};
     for (int r = 0; r < rows; ++r)
-        for (int k = 0; k < columns; ++k)
-            sum[k] += a[r * columns + k] * y[r];
-    memcpy(product, sum, (size_t)columns * sizeof(real));
+        for (int k = 0; k < length; ++k)
+            sum[k] += a[r * length + k] * y[r];
+    copy((size_t)length, sum, product);
 }
 
 /* Returns 0, the joint at which H is not positive, or - the row along which the frame cannot move, both from 1. Rows of turns
@@ -54,10 +54,12 @@ static inline int frame_moved(const struct sample *s, const API(frame_impedance)
         reach[0] += turn / size[k];
         reach[1] += (move + turn * distance) / size[k];
     }
-    memset(out, 0, sizeof *out);
+    clear(6 * N, out->jacobian);
+    clear(6 * N, out->rate);
+    clear(36, out->inertia);
     for (int r = 0; r < wanted->rows; ++r) {
-        memcpy(out->jacobian + r * N, j + wanted->row[r] * N, N * sizeof(real));
-        memcpy(out->rate + r * N, rate + wanted->row[r] * N, N * sizeof(real));
+        copy(N, j + wanted->row[r] * N, out->jacobian + r * N);
+        copy(N, rate + wanted->row[r] * N, out->rate + r * N);
     }
     for (int k = 0; k < N; ++k)
         for (int r = 0; r < 6; ++r)
@@ -87,12 +89,13 @@ static inline int frame_acceleration(const struct sample *s, const API(frame_imp
 {
     const int rows = wanted->rows;
     const real still[N] = {0};
-    real inertia[36], moment[6], force[6], change[6], share[6] = {0}, joint[N], torque[N];
-    memset(out, 0, 6 * sizeof(real));
+    real inertia[36], force[6], share[6] = {0};
+    clear(6, out);
     resist(rows, wanted->damping, velocity, out);
     if (wanted->stiffness && pull(s, wanted, target, at, out))
         return -7;
     if (wanted->keep_velocity != 0) {
+        real moment[6], change[6], joint[N], torque[N];
         times(6, 6, frame->inertia, velocity, moment);
         times(N, 6, frame->moved, moment, joint);
         answer(s, still, joint, 0, torque);

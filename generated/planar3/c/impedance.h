@@ -24,7 +24,7 @@ struct deviation {
 static inline void deviate(const real *q, const real *qd, const real *q_d, const real *qd_d, const real *qdd_d,
     struct deviation *from)
 {
-    memset(from->still, 0, sizeof from->still);
+    clear(N, from->still);
     from->qd_d = qd_d ? qd_d : from->still;
     from->qdd_d = qdd_d ? qdd_d : from->still;
     for (int i = 0; i < N; ++i) {
@@ -51,7 +51,7 @@ static inline void resist(int n, const real *a, const real *x, real *force)
    which it is not positive, or not regular where this is enough. */
 INLINE int solve(int regular, int n, const real *natural, const real *wanted, real *force)
 {
-    real size[LARGEST], part[LARGEST * LARGEST];
+    real size[LARGEST];
     int symmetric = 1;
     for (int i = 0; i < n; ++i) {
         const real own = natural[i * n + i], asked = F(fabs)(wanted[i * n + i]);
@@ -60,6 +60,7 @@ INLINE int solve(int regular, int n, const real *natural, const real *wanted, re
             symmetric &= wanted[i * n + k] == wanted[k * n + i];
     }
     if (!regular && !symmetric) {
+        real part[LARGEST * LARGEST];
         for (int i = 0; i < n; ++i)
             for (int k = 0; k < n; ++k)
                 part[i * n + k] = R(0.5) * (wanted[i * n + k] + wanted[k * n + i]);
@@ -74,7 +75,7 @@ INLINE int solve(int regular, int n, const real *natural, const real *wanted, re
 static inline void wish(const struct sample *s, const API(impedance) * wanted, const struct deviation *from, int inertia,
     real *mass, real *kept, real *force)
 {
-    memset(force, 0, N * sizeof(real));
+    clear(N, force);
     if (wanted->keep_inertia || wanted->keep_velocity)
         keep(s, wanted->keep_inertia, wanted->keep_velocity, from->velocity, mass, kept, force);
     resist(N, wanted->damping, from->velocity, force);
@@ -83,7 +84,7 @@ static inline void wish(const struct sample *s, const API(impedance) * wanted, c
         return;
     if (!wanted->keep_inertia) {
         natural_inertia(s, mass);
-        memcpy(kept, mass, (size_t)N * N * sizeof(real));
+        copy((size_t)N * N, mass, kept);
     }
     add_armature(mass);
     add_armature(kept);
@@ -97,7 +98,7 @@ static inline int command(const real *torque, real *tau)
     for (int i = 0; i < N; ++i)
         if (!(torque[i] - torque[i] == 0))
             return i + 1;
-    memcpy(tau, torque, N * sizeof(real));
+    copy(N, torque, tau);
     return 0;
 }
 

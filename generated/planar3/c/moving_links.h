@@ -33,8 +33,8 @@ static inline void answer(const struct sample *s, const real *acceleration, cons
     const motion *const m = &s->m;
     const vector none = m->place[0];
     const screw rest = {none, none};
-    screw twist[FRAMES + 1], rate[FRAMES + 1], load[FRAMES + 1];
-    twist[0] = rate[0] = load[0] = rest;
+    screw twist[FRAMES + 1], rate[FRAMES + 1], borne[FRAMES + 1];
+    twist[0] = rate[0] = borne[0] = rest;
     if (weighs)
         rate[0].s = s->links[0].weight;
     for (int f = 1; f <= FRAMES; ++f) {
@@ -44,7 +44,7 @@ static inline void answer(const struct sample *s, const real *acceleration, cons
         twist[f].s = add(twist[up].s, scale(velocity[k], axis.s));
         rate[f].z = add(rate[up].z, add(scale(acceleration[k], axis.z), scale(velocity[k], change.z)));
         rate[f].s = add(rate[up].s, add(scale(acceleration[k], axis.s), scale(velocity[k], change.s)));
-        load[f] = rest;
+        borne[f] = rest;
     }
     for (int j = 0; j < LINKS; ++j) {
         const moving_link *const l = &s->links[j];
@@ -52,16 +52,16 @@ static inline void answer(const struct sample *s, const real *acceleration, cons
         const vector acceleration_of_com = add_cross(add_cross(rate[f].s, rate[f].z, l->com), twist[f].z, l->velocity);
         const vector force = scale(l->mass, acceleration_of_com);
         const vector moment = add_applied(apply(l->inertia, rate[f].z), l->turning, twist[f].z);
-        load[f].z = add_cross(add(load[f].z, moment), subtract(l->com, m->place[f]), force);
-        load[f].s = add(load[f].s, force);
+        borne[f].z = add_cross(add(borne[f].z, moment), subtract(l->com, m->place[f]), force);
+        borne[f].s = add(borne[f].s, force);
     }
-    memset(torque, 0, N * sizeof(real));
+    clear(N, torque);
     for (int f = FRAMES; f; --f) {
         const screw axis = own_axis(m, f);
         const int up = joints[f - 1].parent;
-        torque[joints[f - 1].coordinate] += along(&axis, &load[f]);
-        load[up].z = add_cross(add(load[up].z, load[f].z), subtract(m->place[f], m->place[up]), load[f].s);
-        load[up].s = add(load[up].s, load[f].s);
+        torque[joints[f - 1].coordinate] += along(&axis, &borne[f]);
+        borne[up].z = add_cross(add(borne[up].z, borne[f].z), subtract(m->place[f], m->place[up]), borne[f].s);
+        borne[up].s = add(borne[up].s, borne[f].s);
     }
 }
 
@@ -79,8 +79,8 @@ static inline void keep(const struct sample *s, const real *inertia, const real 
     real *kept, real *torque)
 {
     if (inertia) {
-        memset(mass, 0, (size_t)N * N * sizeof(real));
-        memset(kept, 0, (size_t)N * N * sizeof(real));
+        clear((size_t)N * N, mass);
+        clear((size_t)N * N, kept);
     }
     for (int j = 0; j < LINKS; ++j) {
         const short *const joint = path + path_start[j];
@@ -124,6 +124,6 @@ int API(forward_dynamics)(UNDER_TORQUE, real *qdd)
     }
     const int singular = eliminate(0, N, 1, size, mass, force);
     if (!singular)
-        memcpy(qdd, force, sizeof force);
+        copy(N, force, qdd);
     return singular;
 }

@@ -102,7 +102,7 @@ void API(regressor)(size_t count, INPUTS, real *regressor)
     ALIGNED carried l[BLOCK_PARTS];
     ALIGNED real y10[INERTIAL * BLOCK];
     const size_t all = (size_t)N * LINKS * INERTIAL;
-    memset(regressor, 0, count * all * sizeof(real));
+    clear(count * all, regressor);
     for (size_t s = 0; s < count; s += BLOCK) {
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
         rows_moved(x, samples, q + s * N, qd + s * N, qdd + s * N, m);
@@ -149,9 +149,9 @@ void API(coefficient_regressors)(size_t count, AT_REST, real *acceleration, real
     ALIGNED motion m[BLOCK_PARTS];
     ALIGNED carried l[BLOCK_PARTS];
     const size_t squares = (size_t)N * LINKS * INERTIAL, cubes = squares * N;
-    memset(acceleration, 0, count * cubes * sizeof(real));
-    memset(velocity, 0, count * cubes * sizeof(real));
-    memset(gravity, 0, count * squares * sizeof(real));
+    clear(count * cubes, acceleration);
+    clear(count * cubes, velocity);
+    clear(count * squares, gravity);
     for (size_t s = 0; s < count; s += BLOCK) {
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
         rows_moved(x, samples, q + s * N, qd + s * N, qd + s * N, m); /* any qdd: they don't depend on it */

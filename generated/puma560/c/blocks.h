@@ -6,7 +6,19 @@
 #include "lanes.h"
 #include "rows.h"
 
-#include <string.h>
+#ifdef LINKWISE_SMALL
+#include "one_motion.h"
+
+enum { BLOCK_PARTS = 1 };
+
+/* A row is a block, and its motion that of one sample. */
+static inline void rows_moved(const struct numbers *x, size_t samples, const real *q, const real *qd, const real *qdd,
+    motion *m)
+{
+    (void)samples;
+    moved_one(x, q, qd, qdd, NULL, m);
+}
+#else
 
 #define W BLOCK
 #define number lanes
@@ -49,5 +61,6 @@ static inline void rows_moved(const struct numbers *x, size_t samples, const rea
     gather(samples, N, qdd, block[2]);
     moved_block(x, block[0], block[1], block[2], m);
 }
+#endif
 
 #endif

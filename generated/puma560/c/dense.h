@@ -8,24 +8,17 @@
 #ifndef LINKWISE_DENSE_H
 #define LINKWISE_DENSE_H
 
-#include <string.h>
-
-enum { SQUARE = N * LINKS, CUBE = SQUARE * N };
-
-/* Where cubes and squares of samples in rows go; whether cubes are coefficients or these times the motion; and whether
-   c1 is in them as it is, which sums to tau, or as slopes, d(tau)/d(qd). */
-struct dense {
-    real *acceleration, *velocity, *gravity;
-    int torques, slopes;
-};
+#include "arrays.h"
+#include "destinations.h"
 #endif
 
-/* Links into a cube that `links` share, the first one's entries at its start: each times `by` of joint k. c has all
+/* Links into a cube that `sharing` links have in common, the first one's entries at its start: each times `by` of joint k. c has all
    (i, k), or `half` of them, i <= k, where (k, i) is the same. The cube has rows for every i, or, of a link by itself,
    for those on its `path_only`. Returns where the next link's begin. */
-APART const real *SIZED(place)(int first, int last, int half, const real *RESTRICT c, const real *RESTRICT by, int links,
+APART const real *SIZED(place)(int first, int last, int half, const real *RESTRICT c, const real *RESTRICT by, int sharing,
     int path_only, real *RESTRICT cube)
 {
+    const size_t step = (size_t)sharing * N;
     for (int j = first; j < last; ++j) {
         const short *const joint = path + path_start[j];
         const int length = path_start[j + 1] - path_start[j];
@@ -34,11 +27,11 @@ APART const real *SIZED(place)(int first, int last, int half, const real *RESTRI
             const int i = joint[x], row = path_only ? x : i;
             for (int y = half ? x : 0; y < length; ++y, c += W) {
                 const int k = joint[y], mirror = path_only ? y : k;
-                real *const to = mine + ((size_t)row * links * N + k) * W;
+                real *const to = mine + ((size_t)row * step + (size_t)k) * W;
                 for (int b = 0; b < W; ++b)
                     to[b] = c[b] * by[k * W + b];
                 if (half) {
-                    real *const mirrored = mine + ((size_t)mirror * links * N + i) * W;
+                    real *const mirrored = mine + ((size_t)mirror * step + (size_t)i) * W;
                     for (int b = 0; b < W; ++b)
                         mirrored[b] = c[b] * by[i * W + b];
                 }
@@ -75,10 +68,10 @@ static inline void SIZED(to_squares)(int first, int last, const real *g, size_t 
 }
 
 /* Torques of links, added to the sums of each joint, which are in rows. */
-static inline void SIZED(to_sums)(int first, int last, const real *tau, size_t samples, real *sums)
+static inline void SIZED(to_sums)(int first, int last, const real *tau, size_t samples, real *rows)
 {
     for (int j = first; j < last; ++j)
         for (int x = path_start[j]; x < path_start[j + 1]; ++x, tau += W)
             for (size_t b = 0; b < samples; ++b)
-                sums[b * N + (size_t)path[x]] += tau[b];
+                rows[b * N + (size_t)path[x]] += tau[b];
 }

@@ -1,8 +1,5 @@
 /* Results of blocks to rows with their zeros. The same in every package of linkwise. It needs dense.h and stream.h. */
 
-/* Torques alone: packed, with their zeros, or their sums over the links. */
-enum torques { PACKED, DENSE, SUMS };
-
 /* Links whose cubes wait in a block at a time, as many as a usual second-level cache holds beside their rows, and whether
    that is all of them. Of a link by itself only the rows of its path wait, and one of zeros for all others. */
 enum {
@@ -23,7 +20,7 @@ struct waiting_cubes {
 /* Zeros stay where no link has values, as long as all links come at once. Coefficients are theirs times one. */
 static inline void begin_cubes(struct waiting_cubes *wait, size_t count, size_t bytes)
 {
-    memset(wait->block, 0, sizeof wait->block);
+    clear(CUBES * BLOCK, wait->block);
     for (int e = 0; e < N * BLOCK; ++e)
         wait->ones[e] = 1;
     wait->large = WHOLE && count > LARGE / bytes;
@@ -36,7 +33,7 @@ static inline const real *to_cubes_by_itself(int j, int half, const real *c, con
     const short *const joint = path + path_start[j];
     const int length = path_start[j + 1] - path_start[j];
     const real *const zeros = wait->block + (size_t)length * N * BLOCK;
-    memset(wait->block, 0, (size_t)(length + 1) * N * BLOCK * sizeof(real));
+    clear((size_t)(length + 1) * N * BLOCK, wait->block);
     c = place_block(j, j + 1, half, c, by, 1, 1, wait->block);
     for (int i = 0, x = 0; i < N; ++i) {
         const int moves = x < length && joint[x] == i;
@@ -65,10 +62,10 @@ static inline void to_cubes(int first, int last, int half, const real *c, const 
     }
     for (int j = first; j < last; j += AT_ONCE) {
         const int end = j + AT_ONCE < last ? j + AT_ONCE : last, entries = (end - j) * N;
-        memset(wait->block, 0, (size_t)entries * N * BLOCK * sizeof(real));
+        clear((size_t)entries * N * BLOCK, wait->block);
         c = place_block(j, end, half, c, by, end - j, 0, wait->block);
         for (int i = 0; i < N; ++i)
-            scatter(samples, (size_t)entries, CUBE, wait->block + (size_t)i * entries * BLOCK,
+            scatter(samples, (size_t)entries, CUBE, wait->block + (size_t)(i * entries) * BLOCK,
                 cubes + (size_t)(i * LINKS + j) * N);
     }
 }

@@ -3,7 +3,7 @@
 #define LINKWISE_ELIMINATION_H
 
 #include <float.h>
-#include <string.h>
+#include "arrays.h"
 
 /* Rows of the largest matrix, of joints or of a frame; and numbers to which a row is filled up with zeros, so that rows are
    subtracted in whole vectors. */
@@ -19,21 +19,21 @@ static inline int largest_row(int n, int width, int c, const real *scale, const 
     return row;
 }
 
-/* x of a x = b: a (n, n), b (n, columns), which turns into x, of up to six columns. Where a is `regular` and not known to be
+/* x of a x = b: a (n, n), b (n, sides), which turns into x, of up to six sides. Where a is `regular` and not known to be
    positive, rows are taken in another order. Entry (i, k) is large or small beside the root of size[i] size[k]. Where a pivot
    is rounding beside that, or of a positive matrix negative, or not a number, its column is the answer, counted from 1, and b
    is as it was; otherwise the answer is 0. */
-INLINE int eliminate(int regular, int n, int columns, const real *size, const real *a, real *b)
+INLINE int eliminate(int regular, int n, int sides, const real *size, const real *a, real *b)
 {
-    const real least = 4 * n * (sizeof(real) == sizeof(float) ? (real)FLT_EPSILON : (real)DBL_EPSILON);
-    const int width = (n + columns + FILLED - 1) / FILLED * FILLED;
+    const real least = 4 * (real)n * (sizeof(real) == sizeof(float) ? (real)FLT_EPSILON : (real)DBL_EPSILON);
+    const int width = (n + sides + FILLED - 1) / FILLED * FILLED;
     real rows[LARGEST * (LARGEST + 6 + FILLED)], scale[LARGEST];
     for (int r = 0; r < n; ++r) {
         for (int k = 0; k < n; ++k)
             rows[r * width + k] = a[r * n + k];
-        for (int k = 0; k < columns; ++k)
-            rows[r * width + n + k] = b[r * columns + k];
-        for (int k = n + columns; k < width; ++k)
+        for (int k = 0; k < sides; ++k)
+            rows[r * width + n + k] = b[r * sides + k];
+        for (int k = n + sides; k < width; ++k)
             rows[r * width + k] = 0;
         scale[r] = regular ? 1 / F(sqrt)(size[r]) : 1;
     }
@@ -61,9 +61,9 @@ INLINE int eliminate(int regular, int n, int columns, const real *size, const re
         row[c] = inverse;
     }
     for (int c = n; c--;)
-        for (int k = 0; k < columns; ++k) {
+        for (int k = 0; k < sides; ++k) {
             const real x = rows[c * width + n + k] * rows[c * width + c];
-            b[c * columns + k] = x;
+            b[c * sides + k] = x;
             for (int r = 0; r < c; ++r)
                 rows[r * width + n + k] -= rows[r * width + c] * x;
         }

@@ -10,7 +10,7 @@
    The file that includes this one says by AT_POSITION what functions are given that take q alone. */
 #include "one_motion.h"
 
-#include <string.h>
+#include "arrays.h"
 
 /* m, h and I. */
 typedef struct {
@@ -77,7 +77,7 @@ static inline screw own_axis(const motion *m, int f)
 /* M; joints that follow one coordinate add up. */
 static inline void masses(const motion *m, const composite *bodies, real *mass)
 {
-    memset(mass, 0, (size_t)N * N * sizeof(real));
+    clear((size_t)N * N, mass);
     for (int f = 1; f <= FRAMES; ++f) {
         const screw axis = own_axis(m, f);
         const composite *const b = &bodies[f];
@@ -88,9 +88,9 @@ static inline void masses(const motion *m, const composite *bodies, real *mass)
             const screw other = own_axis(m, at);
             const int i = joints[at - 1].coordinate, up = joints[at - 1].parent;
             const real entry = along(&other, &momentum);
-            mass[(size_t)i * N + k] += entry;
+            mass[i * N + k] += entry;
             if (at != f)
-                mass[(size_t)k * N + i] += entry;
+                mass[k * N + i] += entry;
             if (up)
                 momentum.z = add_cross(momentum.z, subtract(m->place[at], m->place[up]), momentum.s);
             at = up;

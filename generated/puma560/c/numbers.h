@@ -37,8 +37,13 @@ typedef double real;
 #define F(function) function
 #endif
 
-/* Samples in a block: one cache line of each quantity. */
+/* Samples in a block: one cache line of each quantity. Where stack and code are to be small, as on microcontrollers, a build
+   says so by -DLINKWISE_SMALL: samples are then computed one by one. */
+#ifdef LINKWISE_SMALL
+#define BLOCK 1
+#else
 #define BLOCK (64 / (int)sizeof(real))
+#endif
 
 /* No two arrays of a kernel overlap; C++ has no word of its own for that. */
 #if defined(__GNUC__) || defined(_MSC_VER)
@@ -51,7 +56,7 @@ typedef double real;
 
 /* Blocks start on a cache line, so that no vector straddles two. What is APART stays a function of its own: a kernel
    over blocks, put into its caller, would lose what RESTRICT says. */
-#if defined(__GNUC__)
+#if defined(__GNUC__) && !defined(LINKWISE_SMALL)
 #define ALIGNED __attribute__((aligned(64)))
 #define APART __attribute__((noinline)) static
 #else
@@ -60,7 +65,7 @@ typedef double real;
 #endif
 
 /* What is INLINE costs no call, not even without optimization: its vectors stay in registers. */
-#if defined(__GNUC__)
+#if defined(__GNUC__) && !defined(LINKWISE_SMALL)
 #define INLINE __attribute__((always_inline)) static inline
 #else
 #define INLINE static inline
@@ -75,6 +80,9 @@ typedef double real;
 #define POSITION_GRADIENT 4
 #define REGRESSORS 5
 #define CONTROL 6
+#if defined(LINKWISE_PART) && defined(LINKWISE_SMALL)
+#error "LINKWISE_SMALL is for a robot's file as a whole: leave LINKWISE_PART away"
+#endif
 #ifndef LINKWISE_PART
 #define PART(part) 1
 #define SHARED static

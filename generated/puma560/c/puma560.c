@@ -3,11 +3,11 @@
 
    The arithmetic is in the kernels of link_1.h to link_6.h. Here they become functions of one sample,
    of blocks of samples, and of rows of samples, which pass through blocks. */
-#include "puma560.h"
-
 #define API(function) F(puma560_##function)
 #include "numbers.h"
 #include "sines.h"
+
+#include "puma560.h"
 
 enum { N = 6, LINKS = 6, LONGEST = 6, C2 = 56, C1 = 91, G = 21 };
 
@@ -28,6 +28,15 @@ static const int path_start[] = {0, 1, 3, 6, 10, 15, 21};
 static const char linear[] = {0, 0, 0, 0, 0, 0};
 #endif
 
+/* What functions are given, and how that is handed on, of row s too; and the same of what a decomposition writes. */
+#define INPUTS const real *q, const real *qd, const real *qdd
+#define PASSED q, qd, qdd
+#define PASSED_ROW q + s * N, qd + s * N, qdd + s * N
+#define AT_REST const real *q, const real *qd
+#define PASSED_AT_REST q, qd, qd
+#define RESULTS real *c2, real *c1, real *g, real *tau
+#define RESULTS_ROW c2 + s * C2, c1 + s * C1, g + s * G, tau + s * G
+
 /* What kernels read. */
 struct inputs {
     const real *q, *qd, *qdd, *sine, *cosine;
@@ -45,7 +54,7 @@ SHARED void API(decomposition_one)(const real *q, const real *qd, const real *qd
     real *c2, real *c1, real *g, real *tau);
 SHARED void API(torque_one)(const real *q, const real *qd, const real *qdd, real *tau);
 SHARED void API(dense_one)(const real *q, const real *qd, const real *qdd, const struct dense *to);
-SHARED void API(dense_torque_one)(const real *q, const real *qd, const real *qdd, int sums, real *torque);
+SHARED void API(dense_torque_one)(const real *q, const real *qd, const real *qdd, int summed, real *torque);
 
 /* ---- One sample ---- */
 #if PART(ONE_SAMPLE)
@@ -169,9 +178,9 @@ SHARED void API(dense_one)(const real *q, const real *qd, const real *qdd, const
     real tau[6];
     const struct results r = {c2, c1, g, tau};
     API(sines)(N, m.q, sine, cosine);
-    memset(to->acceleration, 0, CUBE * sizeof(real));
-    memset(to->velocity, 0, CUBE * sizeof(real));
-    memset(to->gravity, 0, SQUARE * sizeof(real));
+    clear(CUBE, to->acceleration);
+    clear(CUBE, to->velocity);
+    clear(SQUARE, to->gravity);
     link_1_decomposition_one(m.qdd, c2, c1, g, tau);
     to_dense_one(0, &m, &r, to);
     link_2_decomposition_one(m.qd, m.qdd, m.sine, m.cosine, c2, c1, g, tau);
@@ -195,15 +204,24 @@ SHARED void API(dense_one)(const real *q, const real *qd, const real *qdd, const
 #if PART(BLOCKS) || PART(POSITION_GRADIENT)
 #include "rows.h"
 
+/* Blocks in a tile: each kernel works on all of them before the next one does, so that its code stays in the cache. */
+#ifdef LINKWISE_SMALL
+enum { TILE = 1 };
+
+#define W 1
+#define SIZED(name) name##_one
+#define KERNEL(name) static void SIZED(name)
+#include "small_cubes.h"
+#else
+enum { TILE = 8 };
+
 #define W BLOCK
 #define SIZED(name) name##_block
 #define KERNEL(name) APART void SIZED(name)
 #include "dense.h"
 #include "stream.h"
 #include "dense_rows.h"
-
-/* Blocks in a tile: each kernel works on all of them before the next one does, so that its code stays in the cache. */
-enum { TILE = 8 };
+#endif
 
 struct block {
     ALIGNED real q[N * BLOCK], qd[N * BLOCK], qdd[N * BLOCK], sine[N * BLOCK], cosine[N * BLOCK];
@@ -242,7 +260,9 @@ static size_t load(size_t count, const real *q, const real *qd, const real *qdd,
 }
 #endif
 
-#if PART(BLOCKS)
+#ifdef LINKWISE_SMALL
+#include "one_by_one.h"
+#elif PART(BLOCKS)
 #define WANT_DECOMPOSITION
 #define WANT_TORQUE
 #include "link_1.h"
@@ -390,7 +410,7 @@ static void torque_rows(size_t count, const real *q, const real *qd, const real 
     for (size_t s = 0; s < count; s += TILE * BLOCK) {
         const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
         if (kind != PACKED)
-            memset(tau + s * row, 0, tile_of(count - s) * row * sizeof(real));
+            clear(tile_of(count - s) * row, tau + s * row);
         links_1_to_6_torque(blocks, m, r);
         for (size_t t = 0; t < blocks; ++t) {
             const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
@@ -430,7 +450,7 @@ static void dense_rows(size_t count, const real *q, const real *qd, const real *
     begin_cubes(&wait, count, (2 * CUBE + SQUARE) * sizeof(real));
     for (size_t s = 0; s < count; s += TILE * BLOCK) {
         const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
-        memset(to->gravity + s * SQUARE, 0, tile_of(count - s) * SQUARE * sizeof(real));
+        clear(tile_of(count - s) * SQUARE, to->gravity + s * SQUARE);
         links_1_to_6(blocks, m, r);
         for (size_t t = 0; t < blocks; ++t)
             to_dense(0, 6, &m[t], &r[t], s + t * BLOCK, samples_of(count - s, t), &wait, to);
@@ -462,7 +482,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
         const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
         for (size_t t = 0; t < blocks; ++t) {
             const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
-            link_1_position_gradient_block(c0_block);
+            SIZED(link_1_position_gradient)(c0_block);
             if (dense)
                 to_cubes(0, 1, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
             else
@@ -470,7 +490,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
         }
         for (size_t t = 0; t < blocks; ++t) {
             const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
-            link_2_position_gradient_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
+            SIZED(link_2_position_gradient)(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
             if (dense)
                 to_cubes(1, 2, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
             else
@@ -478,7 +498,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
         }
         for (size_t t = 0; t < blocks; ++t) {
             const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
-            link_3_position_gradient_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
+            SIZED(link_3_position_gradient)(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
             if (dense)
                 to_cubes(2, 3, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
             else
@@ -486,7 +506,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
         }
         for (size_t t = 0; t < blocks; ++t) {
             const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
-            link_4_position_gradient_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
+            SIZED(link_4_position_gradient)(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
             if (dense)
                 to_cubes(3, 4, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
             else
@@ -494,7 +514,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
         }
         for (size_t t = 0; t < blocks; ++t) {
             const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
-            link_5_position_gradient_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
+            SIZED(link_5_position_gradient)(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
             if (dense)
                 to_cubes(4, 5, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
             else
@@ -502,7 +522,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
         }
         for (size_t t = 0; t < blocks; ++t) {
             const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
-            link_6_position_gradient_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
+            SIZED(link_6_position_gradient)(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c0_block);
             if (dense)
                 to_cubes(5, 6, 0, c0_block, wait.ones, samples, &wait, c0 + at * CUBE);
             else
@@ -512,10 +532,6 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 }
 #endif
 
-#define INPUTS const real *q, const real *qd, const real *qdd
-#define PASSED q, qd, qdd
-#define AT_REST const real *q, const real *qd
-#define PASSED_AT_REST q, qd, qd
 #include "calls.h"
 
 /* ---- In loops over links and joints: regressors of rows; of one sample, frames and the mass matrix ---- */

@@ -4,6 +4,23 @@
 #ifndef LINKWISE_ROWS_H
 #define LINKWISE_ROWS_H
 
+#ifdef LINKWISE_SMALL
+#include "arrays.h"
+
+/* A block of one sample is a row. */
+static inline void gather(size_t samples, size_t entries, const real *rows, real *block)
+{
+    (void)samples;
+    copy(entries, rows, block);
+}
+
+static inline void scatter(size_t samples, size_t entries, size_t stride, const real *block, real *rows)
+{
+    (void)samples, (void)stride;
+    copy(entries, block, rows);
+}
+#else
+
 /* Rows of `entries` values to a block; the last sample fills it up. */
 static void gather(size_t samples, size_t entries, const real *RESTRICT rows, real *RESTRICT block)
 {
@@ -109,5 +126,6 @@ APART void scatter(size_t samples, size_t entries, size_t stride, const real *RE
         for (size_t e = 0; e < entries; ++e)
             rows[b * stride + e] = block[e * BLOCK + b];
 }
+#endif
 
 #endif

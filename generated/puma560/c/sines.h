@@ -3,7 +3,8 @@
    With gcc and glibc, as C, these loops call the vector functions of the library libmvec, which -lm brings along.
    glibc declares them under -ffast-math only, hence the options, which hold for this file alone, and hence <math.h>
    here: nothing may include it before. Other compilers and C++ take one angle after another. */
-#if defined(__GNUC__) && !defined(__clang__) && !defined(__cplusplus)
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__cplusplus) && defined(__gnu_linux__) && !defined(LINKWISE_SMALL)
+#define VECTOR_SINES
 #pragma GCC push_options
 #pragma GCC optimize("O3,fast-math")
 #endif
@@ -22,6 +23,6 @@ SHARED void API(sines)(size_t count, const real *RESTRICT angle, real *RESTRICT 
 }
 #endif
 
-#if defined(__GNUC__) && !defined(__clang__) && !defined(__cplusplus)
+#ifdef VECTOR_SINES
 #pragma GCC pop_options
 #endif

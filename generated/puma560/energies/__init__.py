@@ -14,7 +14,7 @@ What may be changed: the methods `kinetic` and `potential` of link_k.py, to try 
 The autograd back end alone follows: closed forms and C were derived from the energies as generated, and stay as they
 are. `linkwise check` then names the changed file under `hashes` and fails, as the package is no longer what its
 manifest describes. For energies of your own that all back ends follow and `linkwise check` proves, write them in a
-Python file, as in the README, and generate a package from it: linkwise generate FILE.py.
+Python file, as linkwise's documentation shows, and generate a package from it: linkwise generate FILE.py.
 """
 
 from ..runtime.lagrangians.partial_lagrangian import PartialLagrangian

@@ -3,14 +3,16 @@
    The file that includes it has torque_rows, dense_rows and gradient_rows, which compute rows of results by its kernel. It
    says by INPUTS what functions are given, by PASSED how that is handed on, and by AT_REST and PASSED_AT_REST the same of
    those that take no qdd. */
+#include "arrays.h"
+#include "destinations.h"
 
 #if PART(ONE_SAMPLE)
-SHARED void API(dense_torque_one)(INPUTS, int sums, real *torque)
+SHARED void API(dense_torque_one)(INPUTS, int summed, real *torque)
 {
     real tau[G];
     API(torque_one)(PASSED, tau);
-    memset(torque, 0, (sums ? (size_t)N : (size_t)SQUARE) * sizeof(real));
-    if (sums)
+    clear(summed ? (size_t)N : (size_t)SQUARE, torque);
+    if (summed)
         to_sums_one(0, LINKS, tau, 1, torque);
     else
         to_squares_one(0, LINKS, tau, 1, torque);

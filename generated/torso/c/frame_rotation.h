@@ -83,7 +83,8 @@ static inline int rotation_of(const real *quaternion, real *v, real *e)
 /* -E' K_e x, by the chosen rows, added to `force`; returns -7 at half a turn, and otherwise 0. */
 static inline int pull(const struct sample *s, const API(frame_impedance) * wanted, const real *target, vector at, real *force)
 {
-    real x[6], e[9], chosen[6], pulled[6] = {0}, quaternion[4], place[3] = {at.x, at.y, at.z};
+    const real place[3] = {at.x, at.y, at.z};
+    real x[6], e[9], chosen[6], pulled[6] = {0}, quaternion[4];
     int turns = 0;
     turn_from(s, wanted->frame, target, quaternion);
     const int opposite = rotation_of(quaternion, x, e);

@@ -10,7 +10,7 @@
        dJ/dt of k:  (zd, sd + zd x x + z x xd) */
 #include "one_motion.h"
 
-#include <string.h>
+#include "arrays.h"
 
 /* The frame's matrix is that in its joint's frame, taken to the parent's, and so on to the base. */
 void API(pose)(int frame, AT_POSITION, real *pose)
@@ -20,7 +20,7 @@ void API(pose)(int frame, AT_POSITION, real *pose)
     const struct named_frame *const named = &named_frames[frame];
     real t[3][4];
     for (int r = 0; r < 3; ++r) {
-        memcpy(t[r], named->turn + 3 * r, 3 * sizeof(real));
+        copy(3, named->turn + 3 * r, t[r]);
         t[r][3] = o->place[frame][r];
     }
     for (int f = named->frame; f; f = joints[f - 1].parent) {
@@ -37,7 +37,8 @@ void API(pose)(int frame, AT_POSITION, real *pose)
         for (int r = 0; r < 3; ++r)
             t[r][3] += here->place[r];
     }
-    memcpy(pose, t, sizeof t);
+    for (int r = 0; r < 3; ++r)
+        copy(4, t[r], pose + 4 * r);
     pose[12] = pose[13] = pose[14] = 0;
     pose[15] = 1;
 }
@@ -77,7 +78,7 @@ static inline void add_column(int k, vector z, vector s, real *rows)
 /* Rows of the Jacobian of a point `at` that frame f carries, and of how it changes. */
 static inline void jacobian_rows(const motion *m, int f, vector at, real *rows)
 {
-    memset(rows, 0, 6 * N * sizeof(real));
+    clear(6 * N, rows);
     for (; f; f = joints[f - 1].parent) {
         const screw axis = m->axis[f - 1];
         add_column(joints[f - 1].coordinate, axis.z, add_cross(axis.s, axis.z, at), rows);
@@ -87,11 +88,11 @@ static inline void jacobian_rows(const motion *m, int f, vector at, real *rows)
 static inline void rate_rows(const motion *m, int f, vector at, real *rows)
 {
     const vector velocity = add_cross(m->twist[f].s, m->twist[f].z, at);
-    memset(rows, 0, 6 * N * sizeof(real));
+    clear(6 * N, rows);
     for (; f; f = joints[f - 1].parent) {
         const screw axis = m->axis[f - 1], change = m->change[f - 1];
-        const vector linear = add_cross(add_cross(change.s, change.z, at), axis.z, velocity);
-        add_column(joints[f - 1].coordinate, change.z, linear, rows);
+        const vector moved = add_cross(add_cross(change.s, change.z, at), axis.z, velocity);
+        add_column(joints[f - 1].coordinate, change.z, moved, rows);
     }
 }
 

@@ -6,7 +6,7 @@
 #ifndef LINKWISE_LANES_H
 #define LINKWISE_LANES_H
 
-#if defined(__GNUC__)
+#if defined(__GNUC__) && !defined(LINKWISE_SMALL)
 #if defined(__AVX512F__)
 #define LANES (64 / (int)sizeof(real))
 #elif defined(__AVX__)

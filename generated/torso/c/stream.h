@@ -1,6 +1,6 @@
 /* Results that no cache holds go past it: memory is then written without being read first. The same in every package
    of linkwise. It needs rows.h. */
-#include <string.h>
+#include "arrays.h"
 
 /* Above this many bytes, results are better not kept in the cache: where they are read back at once, writing and reading
    took the same time either way at 20 MB, with a last-level cache of 32 MB. */
@@ -44,12 +44,12 @@ static void stream(size_t count, const real *from, real *to)
 #if defined(STREAM)
     const size_t before = (64 - (size_t)to % 64) % 64 / sizeof(real), head = before < count ? before : count;
     const size_t end = head + (count - head) / BLOCK * BLOCK;
-    memcpy(to, from, head * sizeof(real));
+    copy(head, from, to);
     for (size_t at = head; at < end; at += BLOCK)
         stream_line(from + at, to + at);
-    memcpy(to + end, from + end, (count - end) * sizeof(real));
+    copy(count - end, from + end, to + end);
 #else
-    memcpy(to, from, count * sizeof(real));
+    copy(count, from, to);
 #endif
 }
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from .native_cache import ELSEWHERE, cache_directory, is_whole, keep, locked
 from .native_compiler import Compiler, find_compiler, processor
 from .native_process import Tell, run_all, told
+from .native_system import system_here
 
 PARTS = {
     "decomposition": ("BLOCKS", "ONE_SAMPLE", "SINES"),
@@ -25,7 +26,8 @@ PARTS = {
 }
 """Parts of a robot's file (see numbers.h) in its libraries; what nobody asks for is not compiled."""
 
-MADE = "library.so"
+MADE = "library"
+"""Name of what is being made, but for its end."""
 
 Commands = Callable[[Path], Sequence[Sequence[Sequence[str]]]]
 """Command lines that make a library in a folder: those that run side by side, then those after them."""
@@ -77,7 +79,7 @@ def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
         compiling = [
             compiler.compiling(source, part, made) for part, made in zip(parts, objects, strict=True)
         ]
-        return [compiling, [compiler.linking(objects, str(folder / MADE))]]
+        return [compiling, [compiler.linking(objects, str(_made(folder)))]]
 
     name = f"{sources.name}-{what}-{real}-{_fingerprint(digest, compiler)}"
     return _kept(name, f"{sources.name} ({what}, {real})", compiler, commands, check)
@@ -89,9 +91,11 @@ def extension(source: Path, headers: Sequence[str], versions: Sequence[str]) -> 
     versions: what it depends on beside its text and the compiler
     """
     compiler = find_compiler()
+    if not compiler.makes_modules:
+        raise RuntimeError(f"{compiler.command[0]} makes no modules for Python here")
 
     def commands(folder: Path) -> list[list[list[str]]]:
-        return [[compiler.extending(source, headers, str(folder / MADE))]]
+        return [[compiler.extending(source, headers, str(_made(folder)))]]
 
     place = (
         compiler.command,
@@ -105,13 +109,17 @@ def extension(source: Path, headers: Sequence[str], versions: Sequence[str]) -> 
 
 def _kept(name: str, what: str, compiler: Compiler, commands: Commands, check: Callable[[], None]) -> Path:
     """Path of a library in the cache, made there if need be; `check` raises for what is not to be kept."""
-    target = cache_directory() / f"{name}.so"
+    target = cache_directory() / f"{name}{system_here().library}"
     if not is_whole(target):
         lock = target.with_suffix(".lock")
         with told(f"compiling {what}, once") as tell, locked(lock, tell):
             if not is_whole(target):
                 _build(compiler, commands, target, tell, check)
     return target
+
+
+def _made(folder: Path) -> Path:
+    return folder / f"{MADE}{system_here().library}"
 
 
 def digest_of(directory: Path) -> str:
@@ -139,7 +147,7 @@ def _build(
     try:
         shutil.rmtree(folder, ignore_errors=True)  # of a process that was killed: this one holds the lock
         folder.mkdir(mode=0o700)
-        made = folder / MADE
+        made = _made(folder)
         try:
             first, *last = commands(folder)
             run_all(first, tell)

@@ -1,8 +1,9 @@
 """The directory that keeps compiled libraries: who may write there, and whether a library is still whole.
 
 Code that another user may change would run as this one, and a library cut short ends the interpreter that
-calls it. So the directory must belong to this user, or to root, and be closed to the others; beside each
-library lies the hash of its bytes, which are read and compared before they are loaded.
+calls it. So the directory must belong to this user, or to root, and be closed to the others, as far as the
+system tells; beside each library lies the hash of its bytes, which are read and compared before they are
+loaded.
 """
 
 import errno
@@ -14,8 +15,11 @@ from contextlib import ExitStack, contextmanager
 from io import BufferedReader
 from pathlib import Path
 
+from .native_system import system_here
+
 ELSEWHERE = "set LINKWISE_CACHE to another directory"
-OTHERS = stat.S_IWGRP | stat.S_IWOTH
+SAFELY = sum(getattr(os, flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
+"""How a file is opened that somebody may have planted: as far as the system can, no link is followed."""
 NOT_OWN = "it is not a plain file of your own; remove it"
 
 
@@ -33,19 +37,17 @@ def cache_directory() -> Path:
         raise RuntimeError(f"cannot make the cache {path}: {error.strerror}; {ELSEWHERE}") from None
     if found.st_uid not in _trusted():
         raise RuntimeError(f"the cache {path} belongs to another user; {ELSEWHERE}, one of your own")
-    if found.st_mode & OTHERS:
+    if system_here().others_may_write(found.st_mode):
         raise RuntimeError(f"other users may write to the cache {path}; chmod go-w it, or {ELSEWHERE}")
     return path
 
 
 def _chosen_directory() -> Path:
-    given, shared = os.environ.get("LINKWISE_CACHE"), os.environ.get("XDG_CACHE_HOME", "")
+    given = os.environ.get("LINKWISE_CACHE")
     if given:
         return Path(given).absolute()
-    if os.path.isabs(shared):  # a relative one is void, by the rules that XDG stands for
-        return Path(shared) / "linkwise"
     try:
-        return Path.home() / ".cache/linkwise"
+        return system_here().cache_home() / "linkwise"
     except RuntimeError:
         raise RuntimeError("no home directory to keep compiled code in; set LINKWISE_CACHE") from None
 
@@ -54,7 +56,7 @@ def is_whole(library: Path) -> bool:
     """Whether a library is a file that no other user may change, with the bytes that its hash is of."""
     try:
         with _opened(library) as file, _opened(_digest_of(library)) as digest:
-            closed = not os.fstat(file.fileno()).st_mode & OTHERS
+            closed = not system_here().others_may_write(os.fstat(file.fileno()).st_mode)
             return closed and hashlib.file_digest(file, "sha256").hexdigest().encode() == digest.read(65)
     except OSError:
         return False
@@ -67,8 +69,8 @@ def keep(made: Path, library: Path) -> None:
         digest.write_text(hashlib.file_digest(file, "sha256").hexdigest(), encoding="ascii")
     made.chmod(0o644)
     # Whoever looks between the two finds a hash that does not fit, waits for the lock, and looks again.
-    os.replace(digest, _digest_of(library))
-    os.replace(made, library)
+    system_here().moved(digest.replace, _digest_of(library))
+    system_here().moved(made.replace, library)
 
 
 @contextmanager
@@ -77,16 +79,13 @@ def locked(path: Path, tell: Callable[[str], None]) -> Iterator[None]:
 
     `tell` is called where another one holds it. Raises RuntimeError if there can be no lock.
     """
-    import fcntl
-
+    system = system_here()
     with ExitStack() as held:
         try:
             file = held.enter_context(_opened(path, os.O_RDWR | os.O_CREAT))
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
+            if not system.lock(file.fileno()):
                 tell("another process is at it")
-                fcntl.flock(file, fcntl.LOCK_EX)
+                system.lock(file.fileno(), wait=True)
         except OSError as error:
             raise RuntimeError(f"cannot lock {path}: {error.strerror}; {ELSEWHERE}") from None
         yield
@@ -95,7 +94,7 @@ def locked(path: Path, tell: Callable[[str], None]) -> Iterator[None]:
 def _opened(path: Path, flags: int = os.O_RDONLY) -> BufferedReader:
     """A plain file of a trusted user; raises OSError for another user's, for links and for pipes."""
     try:
-        descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o600)
+        descriptor = os.open(path, flags | SAFELY, 0o600)
     except OSError as error:
         raise (OSError(error.errno, NOT_OWN) if error.errno == errno.ELOOP else error) from None
     found = os.fstat(descriptor)
@@ -111,4 +110,4 @@ def _digest_of(library: Path) -> Path:
 
 def _trusted() -> tuple[int, int]:
     """Numbers of the users whose files are taken: this one's own, and root's, who can do anything anyway."""
-    return os.geteuid(), 0
+    return system_here().user(), 0

@@ -20,6 +20,10 @@ LARGE = 1 << 20
 MOST = 1 << 29
 """Bytes of blocks that are kept while nobody needs them."""
 PAGE = 1 << 21
+APART: dict[str, Any] = (
+    {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
+)
+"""Has a fork have memory of its own, where there are forks."""
 
 _shared = sys.modules.setdefault(
     "_linkwise_blocks", ModuleType("_linkwise_blocks", "Blocks of all packages.")
@@ -62,7 +66,7 @@ def lasting(count: int) -> NDArray[Any]:
 
 def _new(size: int) -> mmap.mmap:
     try:
-        block = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)  # a fork has its own
+        block = mmap.mmap(-1, size, **APART)
     except (OSError, OverflowError):
         raise MemoryError(f"no memory for results of {size} bytes") from None
     if hasattr(mmap, "MADV_HUGEPAGE"):

@@ -1,6 +1,5 @@
 """Running a compiler: several at a time, never for ever, and a terminal is told of the wait."""
 
-import os
 import re
 import signal
 import subprocess
@@ -10,6 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
+
+from .native_system import system_here
 
 PATIENCE = 3600.0
 """Seconds after which a compiler counts as hung; the largest robots take minutes."""
@@ -88,35 +89,36 @@ class _Running:
     def has_ended(self) -> bool:
         """Whether it has; what it has said so far is in `said`."""
         ended = self.process.poll() is not None  # first: what it said before its end is there to be read
-        self.said.extend(self.stream.read() or b"")
+        system_here().hear(self.stream, self.said, ended)
         return ended
 
     def close(self) -> None:
         """End it, with whatever it has started, if it goes on."""
         if self.process.poll() is None:
-            with suppress(ProcessLookupError):
-                os.killpg(self.process.pid, signal.SIGKILL)
+            system_here().stop(self.process)
             self.process.wait()
         self.stream.close()
 
 
 def _started(command: Sequence[str], listened: str) -> _Running:
     """Start a command and listen to its stdout or its stderr."""
+    system = system_here()
     try:
+        outlet = system.outlet()
         process = subprocess.Popen(
             command,
             bufsize=0,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE if listened == "stdout" else subprocess.DEVNULL,
-            stderr=subprocess.PIPE if listened == "stderr" else subprocess.DEVNULL,
+            stdout=outlet if listened == "stdout" else subprocess.DEVNULL,
+            stderr=outlet if listened == "stderr" else subprocess.DEVNULL,
             start_new_session=True,
         )
     except OSError as error:
         raise RuntimeError(
             f"{command[0]} cannot be run: {error.strerror}; point CC to a C compiler"
         ) from None
-    stream = getattr(process, listened)
-    os.set_blocking(stream.fileno(), False)
+    stream = getattr(process, listened) or outlet
+    system.listen(stream)
     return _Running(process, stream, bytearray())
 
 
