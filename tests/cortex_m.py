@@ -10,12 +10,16 @@ import re
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from answers import random_states
 from compiled import name_of
+from conftest import LOCKED_FINGERS, PANDA
+from linkwise import Options, generate, read_system, write_package
 
 HERE = Path(__file__).parent / "embedded"
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
@@ -181,36 +185,36 @@ def missing() -> str:
     return ", ".join(tool for tool in TOOLS if shutil.which(tool) is None)
 
 
+SHOWN = ("inverse_dynamics", "propagation", "forward_dynamics", "partial_impedance")
+
+
+def rows(spec: str, options: Options, kernel: str) -> Iterator[tuple[str, ...]]:
+    """Rows of the table for one robot."""
+    system = read_system(spec, options)
+    n, links = len(system.coordinates), len(system.links)
+    functions = {name: call for name, call in calls(n, links).items() if name in SHOWN}
+    motion = np.stack(random_states(n, SAMPLES))
+    with tempfile.TemporaryDirectory() as folder:
+        directory = Path(folder) / system.name
+        write_package(generate(system, ["c"], kernel=kernel), directory)
+        for processor, real in (("M4F", "float"), ("M7", "double")):
+            found = run(directory, BOARDS[processor], real, motion, functions)
+            cells = (f"{found[name].stack:,} B, {found[name].instructions:,}" for name in SHOWN)
+            size = flash(directory, real, BOARDS[processor])
+            yield f"{system.name}, {kernel}", f"{processor}, {real}", f"{size:,} B", *cells
+
+
 def main() -> None:
     """Print the table."""
-    from answers import random_states
-    from conftest import LOCKED_FINGERS, PANDA
-    from linkwise import Options, generate, read_system, write_package
-
-    print("| robot, kernel | processor, type | flash, all | function | stack | instructions |")
-    print("|---|---|---|---|---|---|")
-    robots = [
-        ("planar3", Options(), "straight"),
-        ("puma560", Options(), "straight"),
-        ("puma560", Options(), "loops"),
-    ]
+    head = ("robot, kernel", "processor, type", "flash", *(f"`{name}`" for name in SHOWN))
+    print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
+    robots = [("planar3", Options(), "straight")]
+    robots += [("puma560", Options(), kernel) for kernel in ("straight", "loops")]
     if PANDA.is_file():
-        robots.append((str(PANDA), Options(lock=LOCKED_FINGERS), "loops"))
-    for spec, options, kernel in robots:
-        system = read_system(spec, options)
-        with tempfile.TemporaryDirectory() as folder:
-            directory = Path(folder) / system.name
-            write_package(generate(system, ["c", "numpy"], kernel=kernel), directory)
-            n, links = len(system.coordinates), len(system.links)
-            motion = np.stack(random_states(n, SAMPLES))
-            for processor, real in (("M4F", "float"), ("M7", "float"), ("M7", "double")):
-                board = BOARDS[processor]
-                size = flash(directory, real, board)
-                for function, m in run(directory, board, real, motion, calls(n, links)).items():
-                    print(
-                        f"| {system.name}, {kernel} | {processor}, {real} | {size:,} | `{function}` "
-                        f"| {m.stack:,} | {m.instructions:,} |"
-                    )
+        robots += [(str(PANDA), Options(lock=LOCKED_FINGERS), kernel) for kernel in ("straight", "loops")]
+    for robot in robots:
+        for row in rows(*robot):
+            print(f"| {' | '.join(row)} |")
 
 
 if __name__ == "__main__":
