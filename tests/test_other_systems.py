@@ -16,7 +16,7 @@ import urdf_text
 from linkwise import LinkwiseError, generate, read_system
 from linkwise.cli.depfile import depfile_text
 from linkwise.emit.assemble import DEVICES, checked_identifier
-from linkwise.runtime.native.native_build import Sources, library
+from linkwise.runtime.native.native_build import STACK, Sources, library, require_stack
 from linkwise.runtime.native.native_cache import cache_directory, is_whole, locked
 from linkwise.runtime.native.native_compiler import FLAGS, AppleCompiler, find_compiler
 from linkwise.runtime.native.native_process import answer
@@ -167,6 +167,19 @@ def test_native_is_built_on_windows_by_gcc_there(
     with pytest.raises(RuntimeError, match=r"mingw32-gcc failed: \S*tiny.c:1:1: error: unknown type"):
         library(tiny, "double")
     assert not list(made.parent.glob("*.build"))
+
+
+def test_c_that_takes_more_stack_than_a_thread_has_is_left_to_the_other_back_ends(
+    directory_of: Callable[[str], Path], on: Callable[[str], None], tmp_path: Path
+) -> None:
+    header = (directory_of("planar3") / "c/planar3.h").read_text(encoding="utf-8")
+    (said,) = STACK.findall(header)
+    (tmp_path / "planar3.h").write_text(header.replace(said, "1,500,001"), encoding="utf-8")
+    require_stack("planar3", tmp_path)
+    on("win32")
+    require_stack("planar3", directory_of("planar3") / "c")
+    with pytest.raises(RuntimeError, match="takes 1,500,001 bytes of stack, and 1,500,000 are the most"):
+        require_stack("planar3", tmp_path)
 
 
 def test_a_program_of_windows_that_does_not_end_is_ended(on: Callable[[str], None], tmp_path: Path) -> None:

@@ -104,11 +104,11 @@ def _load(package: Package) -> tuple[dict[Way, Model], list[Result]]:
 
 
 def _lacks(error: Exception) -> bool:
-    """Whether a library, the compiler or a place to compile is missing here: not the package's fault."""
+    """Whether a library, a compiler, a place to compile or stack is missing here: not the package's fault."""
     if isinstance(error, ImportError):
         library = (error.name or "").partition(".")[0]
         return library in OPTIONAL and find_spec(library) is None
-    here = any(word in str(error) for word in ("install", "LINKWISE_CACHE"))
+    here = any(word in str(error) for word in ("install", "LINKWISE_CACHE", "stack"))
     return isinstance(error, RuntimeError) and here and " failed: " not in str(error)
 
 

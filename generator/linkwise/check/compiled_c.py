@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError
+from linkwise.runtime.native.native_build import require_stack
 from linkwise.runtime.native.native_compiler import Compiler, find_compiler
 from linkwise.runtime.native.native_process import run_all
 from linkwise.runtime.native.native_system import system_here
@@ -70,7 +71,8 @@ class CompiledPackage:
     """
 
     def __init__(self, name: str, directory: Path, large: int) -> None:
-        """Raise LinkwiseError where the sources do not compile, RuntimeError where there is no compiler."""
+        """Raise LinkwiseError for sources that do not compile, RuntimeError where none do or none can run."""
+        require_stack(name, directory)
         self.header = (directory / f"{name}.h").read_text(encoding="utf-8")
         self.name = name
         self.constants = _constants(name, self.header)
