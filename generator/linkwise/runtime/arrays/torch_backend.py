@@ -18,6 +18,7 @@ from ..rule.tree_arrays import checked_bodies
 from ..structure import Structure
 from .array_backend import ArrayBackend
 from .array_kernels import Crossing, known_kernel, operations
+from .call_module import CallModule
 
 FLOATS = ({torch.float32}, {torch.float64})
 CROSSINGS = {
@@ -60,11 +61,11 @@ class TorchBackend(ArrayBackend):
         self.rule = rule
         self.tree = tree or (rule.tree if rule else None)
         self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
-        self.parameters: dict[str, Any] = {
+        self.parameters: Any = {
             k: v if torch.is_tensor(v) else torch.as_tensor(v, dtype=torch.float64)
             for k, v in parameters.items()
         }
-        self.bodies = None if bodies is None else checked_bodies(bodies, structure.N, _tensor)
+        self.bodies: Any = None if bodies is None else checked_bodies(bodies, structure.N, _tensor)
         if self.rule and self.kernel != "straight":  # torch.compile would trace how tables are made
             for dtype in (torch.float32, torch.float64):
                 self.rule.tables(self, torch.empty(0, dtype=dtype))
@@ -134,6 +135,10 @@ class TorchBackend(ArrayBackend):
         """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
         assert self.rule is not None  # Answers has seen to it
         return self.rule.coefficient_regressors(self, (q, qd, qdd), self._values(q))
+
+    def module(self, robot: Any, call: str, fixed: Mapping[str, Any]) -> CallModule:
+        """One call of a robot on this back end as a torch module."""
+        return CallModule(robot, call, fixed)
 
     def constant(self, values: Any, like: Tensor) -> Tensor:
         """A table of numbers, to compute with `like`."""
