@@ -48,16 +48,13 @@ def calls_of(robot: Any, q: Any, qd: Any, tau: Any) -> dict[str, Callable[..., A
     }
 
 
-@pytest.mark.parametrize(
-    ("backend", "robot"),
-    [
-        (backend, robot)
-        for backend in BACKENDS
-        for robot in (TREE, str(DATA / "turntable.py"))
-        if robot == TREE or not backend.endswith("rule")  # of rigid links alone
-    ],
-)
+@pytest.mark.parametrize("robot", [TREE, str(DATA / "turntable.py")])
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_sums_are_those_of_the_shares(backend: str, robot: str, package_of: Packages) -> None:
+    if robot != TREE and backend.endswith("rule"):
+        with pytest.raises(ValueError, match="this package is of energies, which have closed forms alone"):
+            loaded(package_of(robot), backend)
+        return
     model = loaded(package_of(robot), backend)
     n, links = model.n, model.N
     q, qd, tau = motion_of(model, 2, 3)
