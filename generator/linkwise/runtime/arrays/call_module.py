@@ -60,6 +60,7 @@ class CallModule(torch.nn.Module):
         if not isinstance(self.robot, torch.nn.Module):
             self.robot.backend.parameters = self.values
             self.robot.backend.bodies = self.bodies
+        attrgetter(self.call)(self.robot)  # so that torch.compile finds what a first call makes
 
 
 class BodyTensors(torch.nn.Module):

@@ -66,7 +66,9 @@ class TorchBackend(ArrayBackend):
             for k, v in parameters.items()
         }
         self.bodies: Any = None if bodies is None else checked_bodies(bodies, structure.N, _tensor)
-        if self.rule and self.kernel != "straight":  # torch.compile would trace how tables are made
+        # What torch.compile would trace otherwise: how numbers are summed up, and how tables are made.
+        _ = structure.passive_sums
+        if self.rule and self.kernel != "straight":
             for dtype in (torch.float32, torch.float64):
                 self.rule.tables(self, torch.empty(0, dtype=dtype))
 
@@ -206,7 +208,9 @@ def _kept(values: Any, dtype: torch.dtype, device: torch.device) -> Tensor:
     if torch.compiler.is_dynamo_compiling():
         return torch.as_tensor(values, dtype=dtype, device=device)
     with torch.inference_mode(False), disable_proxy_modes_tracing(), unset_fake_temporarily():
-        return torch.as_tensor(values, dtype=dtype, device=device)
+        # In memory of its own, and side by side: torch.export.save warns of anything else.
+        kept = torch.as_tensor(values, dtype=dtype, device=device)
+        return kept.clone(memory_format=torch.contiguous_format)
 
 
 def _watched() -> bool:
