@@ -5,8 +5,8 @@ import os
 # Before NumPy and torch: two files run at a time, and threads that wait for a busy core cost torch ten times.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import shutil
 import sysconfig
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -14,6 +14,7 @@ from types import ModuleType
 import pytest
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
+from needed import needs
 
 DATA = Path(__file__).parent / "data"
 PANDA = (
@@ -25,7 +26,7 @@ OPTIONS = {
     str(PANDA): Options(lock=LOCKED_FINGERS),
     "planar3 symbolic": Options("symbolic"),
 }
-needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+needs_compiler = needs("gcc")
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -59,3 +60,14 @@ def directory_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Pa
 def package_of(directory_of: Callable[[str], Path]) -> Callable[[str], ModuleType]:
     """Imported package of a robot."""
     return lambda robot: import_package(directory_of(robot))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """What was skipped, a line for each reason: how many tests, of which files."""
+    files: dict[str, Counter[str]] = {}
+    for report in terminalreporter.getreports("skipped"):
+        where, _, reason = report.longrepr if isinstance(report.longrepr, tuple) else ("", 0, "")
+        of_reason = files.setdefault(reason.removeprefix("Skipped: "), Counter())
+        of_reason[Path(report.nodeid.split("::")[0] or where).name] += 1
+    for reason, counts in sorted(files.items()):
+        terminalreporter.write_line(f"skipped {counts.total()} of {', '.join(counts)}: {reason}")

@@ -14,7 +14,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from functools import partial
 from pathlib import Path
 
-from faults import NO_EXCHANGE, Fault, command, faults, missing, suffer
+from faults import NO_EXCHANGE, Fault, command, faults, suffer, untraceable
 from linkwise.output import sweep
 
 EARLIER = {
@@ -100,8 +100,8 @@ def tried(job: str, home: Path, way: str, what: str) -> int:
 
 
 def main() -> int:
-    if missing():
-        print(f"nothing was tried: {missing()}")
+    if untraceable():
+        print(f"nothing was tried: {untraceable()}")
         return 1
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from linkwise.errors import LinkwiseError
 from linkwise.output import whole_directory
+from needed import missing
 
 WHEN = {"write": 40, "generate": 150, "analyze": 150}
 """More calls of each kind than a job makes."""
@@ -64,13 +65,13 @@ class End:
     said: str
 
 
-def missing() -> str:
+def untraceable() -> str:
     """Why there is no fault injection here; empty where there is."""
-    if shutil.which("strace") is None:
-        return "needs strace"
+    if absent := missing("strace"):
+        return absent
     probe = ["strace", "-qq", "-e", "inject=fsync:error=EIO", "true"]
     tried = subprocess.run(probe, capture_output=True, check=False)
-    return "" if tried.returncode == 0 else "strace may not trace here"
+    return "" if tried.returncode == 0 else "needs ptrace, which is not allowed here"
 
 
 def faults(job: str, where: Path, prepare: Callable[[Path], None], options: Sequence[str]) -> list[Fault]:

@@ -27,6 +27,7 @@ from linkwise.analysis.term_rows import term_rows
 from linkwise.analysis.work import Work
 from linkwise.progress import silent
 from motion_logs import LEG, PLANAR3, smooth, write_csv
+from needed import missing
 from selenium.webdriver.support.wait import WebDriverWait
 
 pytestmark = pytest.mark.browser
@@ -34,11 +35,11 @@ pytestmark = pytest.mark.browser
 
 @pytest.fixture(scope="module")
 def driver():
-    webdriver = pytest.importorskip("selenium.webdriver", reason="no selenium here")
-    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    webdriver = pytest.importorskip("selenium.webdriver", reason="needs selenium: pip install selenium")
+    browser = shutil.which("chromium-browser") or shutil.which("chromium")
     service = shutil.which("chromedriver")
-    if browser is None or service is None:
-        pytest.skip("no chromium with chromedriver here: apt-get install chromium-driver")
+    if absent := missing(*(["chromium"] if browser is None else []), "chromedriver"):
+        pytest.skip(absent)
     options = webdriver.ChromeOptions()
     options.binary_location = browser
     for flag in ("headless=new", "no-sandbox", "disable-gpu", "disable-background-networking"):

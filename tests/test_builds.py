@@ -13,14 +13,11 @@ import urdf_text
 from command_line import run_linkwise
 from linkwise import LinkwiseError
 from linkwise.cli.depfile import depfile_text
+from needed import needs
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 C = ("--out", "out", "--backend", "c")
 HOUSE = Path(__file__).parents[1] / "generator/linkwise"
-
-
-def needs(program: str) -> pytest.MarkDecorator:
-    return pytest.mark.skipif(shutil.which(program) is None, reason=f"needs {program}")
 
 
 @pytest.fixture

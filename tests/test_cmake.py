@@ -15,18 +15,15 @@ import urdf_text
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise.version import VERSION
+from needed import needs
 
-MISSING = [program for program in ("cmake", "cc", "c++") if shutil.which(program) is None]
-pytestmark = pytest.mark.skipif(bool(MISSING), reason=f"needs {', '.join(MISSING)}")
+pytestmark = needs("cmake", "cc", "c++")
 GENERATORS = {"ninja": "Ninja", "make": "Unix Makefiles"}
 each_generator = pytest.mark.parametrize(
     "tool",
-    [
-        pytest.param(t, marks=pytest.mark.skipif(shutil.which(t) is None, reason=f"needs {t}"))
-        for t in GENERATORS
-    ],
+    [pytest.param(tool, marks=needs(tool)) for tool in GENERATORS],
 )
-needs_ninja = pytest.mark.skipif(shutil.which("ninja") is None, reason="needs ninja")
+needs_ninja = needs("ninja")
 MODULE = Path(__file__).parents[1] / "generator/linkwise/cmake"
 PROGRAM = Path(sys.executable).parent / "linkwise"
 

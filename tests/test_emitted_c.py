@@ -20,6 +20,7 @@ from linkwise import Coordinate, LinkEnergy, energy_system, generate, read_syste
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
+from needed import missing
 
 pytestmark = needs_compiler
 TURNTABLE = str(DATA / "turntable.py")
@@ -27,7 +28,9 @@ LEG = str(DATA / "leg.toml")
 WEIGHTS = str(DATA / "weights.py")
 ROBOTS = ["planar3", "planar3 symbolic", "puma560", TURNTABLE, LEG, WEIGHTS]
 SEVEN_JOINTS = pytest.param(
-    str(PANDA), marks=pytest.mark.skipif(not PANDA.is_file(), reason="no Panda"), id="panda"
+    str(PANDA),
+    marks=pytest.mark.skipif(not PANDA.is_file(), reason="needs real robots: pip install example-robot-data"),
+    id="panda",
 )
 COMPILERS = {
     "gcc": ("gcc", "-std=c99"),
@@ -39,8 +42,8 @@ PARTS = ("SINES", "ONE_SAMPLE", "BLOCKS", "POSITION_GRADIENT", "CONTROL")
 
 
 def strict(compiler: str) -> tuple[str, ...]:
-    if shutil.which(compiler) is None:
-        pytest.skip(f"no {compiler}")
+    if absent := missing(compiler):
+        pytest.skip(absent)
     return COMPILERS[compiler]
 
 

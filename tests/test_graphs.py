@@ -3,7 +3,6 @@
 import json
 import pickle
 import re
-import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -27,10 +26,11 @@ from linkwise.report import count_polynomial, reduction_json, reduction_markdown
 from linkwise.report.recorded_operations import recorded_operations
 from linkwise.robot import read_robot
 from linkwise.symbolic.system import rigid_system
+from needed import needs
 from test_names import HOSTILE, chain
 
 Packages = Callable[[str], ModuleType]
-needs_graphviz = pytest.mark.skipif(shutil.which("dot") is None, reason="needs Graphviz")
+needs_graphviz = needs("dot")
 TURNTABLE = str(DATA / "turntable.py")
 
 

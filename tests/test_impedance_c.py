@@ -22,7 +22,9 @@ DOCS = Path(__file__).parents[1] / "docs"
 GENERATED = Path(__file__).parents[1] / "generated"
 TURNTABLE, CRANE = str(DATA / "turntable.py"), str(DATA / "crane.urdf")
 ARM = pytest.param(
-    str(PANDA), marks=pytest.mark.skipif(not PANDA.is_file(), reason="no Panda"), id="redundant"
+    str(PANDA),
+    marks=pytest.mark.skipif(not PANDA.is_file(), reason="needs real robots: pip install example-robot-data"),
+    id="redundant",
 )
 ROBOTS = [
     pytest.param("planar3 symbolic", id="parameters"),
@@ -298,5 +300,5 @@ def test_the_control_loop_of_the_docs_runs_without_a_system_call(compiler: str, 
     assert "a control step takes" in said[-1]
     sealed = subprocess.run([made, "--sealed"], check=False, capture_output=True, text=True)
     if sealed.returncode == 2:
-        pytest.skip("this Linux does not let a program be sealed")
+        pytest.skip("needs a Linux that lets programs be sealed by seccomp")
     assert (sealed.returncode, sealed.stdout) == (0, "a million steps, and no system call\n")

@@ -21,6 +21,7 @@ from linkwise.cli.app import app
 from linkwise.emit.kernel_choice import check_size, chosen_kernel
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
+from needed import needs
 from test_emitted_c import COMPILERS, PARTS, aligned, counting, strict
 from typer.testing import CliRunner
 from urdf_text import joint, link, robot
@@ -142,7 +143,7 @@ def test_it_compiles_without_a_warning_whole_and_in_parts(
     subprocess.run(linked, check=True)
 
 
-@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+@needs_compiler
 @pytest.mark.parametrize("behind", [0, 16], ids=["on a line", "off a line"])
 def test_large_blocks_go_past_the_cache_where_lines_are_whole(
     behind: int, directory_of: Callable[[str], Path], tmp_path: Path
@@ -184,7 +185,7 @@ def test_its_code_does_not_grow_with_the_robot(directory_of: Callable[[str], Pat
     assert instructions("planar20") < 1.1 * instructions("planar3")
 
 
-@pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
+@needs("g++")
 @pytest.mark.parametrize("robot", [CRANE, "puma560"], ids=["crane", "arm"])
 def test_the_header_counts_its_operations(
     robot: str, directory_of: Callable[[str], Path], tmp_path: Path
@@ -277,7 +278,7 @@ def test_a_robot_too_large_is_refused_before_any_work() -> None:
         generate(read_system("planar400"), progress=lambda *at: pytest.fail(f"at work: {at}"))
 
 
-@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+@needs_compiler
 @pytest.mark.parametrize(
     ("robot", "kernel"), [("planar40", "loops"), ("puma560", "straight")], ids=["loops", "straight"]
 )

@@ -235,7 +235,7 @@ def test_a_cache_that_others_may_write_to_is_refused(mode: int, tiny: Sources, t
     assert str(tmp_path / "cache") in one_line(error)
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a directory away")
+@pytest.mark.skipif(os.geteuid() != 0, reason="needs root, who alone can give a directory away")
 def test_another_users_cache_is_refused(tiny: Sources, tmp_path: Path) -> None:
     os.chown(tmp_path / "cache", 12345, -1)
     with pytest.raises(RuntimeError, match="belongs to another user; set LINKWISE_CACHE") as error:

@@ -59,7 +59,7 @@ def parts(answer: Any) -> tuple[np.ndarray, ...]:
 def planar3(package_of: Callable[[str], ModuleType]) -> ModuleType:
     package = package_of("planar3")
     if not module_of(package).headers():
-        pytest.skip("no headers of Python")
+        pytest.skip("needs headers of Python: apt-get install python3-dev")
     return package
 
 

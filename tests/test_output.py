@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
-from faults import NAMES, NO_EXCHANGE, faults, missing, suffer
+from faults import NAMES, NO_EXCHANGE, faults, suffer, untraceable
 from linkwise import LinkwiseError
 from linkwise.output import exchange, require_writable, sweep, whole_directory, workplace, write_files
 
 WAYS: dict[str, tuple[str, ...]] = {"exchange": (), "renames": (NO_EXCHANGE,)}
 
-injects = pytest.mark.skipif(missing() != "", reason=missing())
+injects = pytest.mark.skipif(untraceable() != "", reason=untraceable())
 each_way = pytest.mark.parametrize("way", WAYS)
 
 

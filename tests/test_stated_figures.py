@@ -48,7 +48,7 @@ def test_numbers_and_operations_of_panda(
     directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
 ) -> None:
     if not PANDA.is_file():
-        pytest.skip("needs the package example-robot-data")
+        pytest.skip("needs real robots: pip install example-robot-data")
     manifest = json.loads((directory_of(str(PANDA)) / "manifest.json").read_text())
     (operations,) = stated(r"The full decomposition costs ([\d,]+) additions and multiplications")
     assert manifest["operations"] == operations

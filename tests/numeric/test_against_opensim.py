@@ -10,7 +10,9 @@ from fuzz.valid_robots import JointData, LinkData, RobotData
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
 
-pytest.importorskip("opensim", reason="opensim has no wheel for this system")
+pytest.importorskip(
+    "opensim", reason="needs opensim, which has wheels for Linux on x86-64: pip install opensim"
+)
 pytest.importorskip("pinocchio")  # of whose models `loops` is made
 
 import opensim as osim

@@ -16,7 +16,7 @@ pytest.importorskip("pinocchio")
 from numeric.pinocchio_model import PinocchioModel
 
 if not ROBOTS.is_dir():
-    pytest.skip("needs the package example-robot-data", allow_module_level=True)
+    pytest.skip("needs real robots: pip install example-robot-data", allow_module_level=True)
 
 RANK = 1e-8
 ROBOT: dict[str, tuple[Options, int]] = {

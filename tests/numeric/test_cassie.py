@@ -20,7 +20,7 @@ from corpus import ROBOTS
 
 FILE = ROBOTS / "cassie_description/robots/cassie_v2.sdf"
 if not FILE.is_file():
-    pytest.skip("needs the package example-robot-data", allow_module_level=True)
+    pytest.skip("needs real robots: pip install example-robot-data", allow_module_level=True)
 
 ROUNDED = 1e-4
 """The file's poses are rounded, so that the rods that move the feet close to some micrometres only."""

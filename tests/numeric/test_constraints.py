@@ -222,7 +222,7 @@ FEET = {
 }
 
 
-@pytest.mark.skipif(not ROBOTS.is_dir(), reason="needs the package example-robot-data")
+@pytest.mark.skipif(not ROBOTS.is_dir(), reason="needs real robots: pip install example-robot-data")
 @pytest.mark.parametrize("name", FEET)
 def test_a_floating_robot_with_feet_on_the_ground_moves_as_pinocchios(name: str, tmp_path: Path) -> None:
     path = next(ROBOTS.rglob(f"{name}.urdf"))

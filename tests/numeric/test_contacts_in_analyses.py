@@ -29,7 +29,7 @@ def solo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, PinocchioModel
     """A quadruped on a floating base, and a log of it that has a column of when its first foot stands."""
     path = next(ROBOTS.rglob("solo12.urdf"), None) if ROBOTS.is_dir() else None
     if path is None:
-        pytest.skip("needs the package example-robot-data")
+        pytest.skip("needs real robots: pip install example-robot-data")
     folder = tmp_path_factory.mktemp("solo")
     system = read_system(path, Options(base="floating"))
     write_package(generate(system, ["numpy"], kernel="loops"), folder / "robot")

@@ -10,7 +10,7 @@ from corpus import ROBOTS, study
 from corpus_report import LIMIT
 
 if not ROBOTS.is_dir():
-    pytest.skip("needs the package example-robot-data", allow_module_level=True)
+    pytest.skip("needs real robots: pip install example-robot-data", allow_module_level=True)
 
 ROBOT: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "kinova": ({}, {"joints": 6, "links": 6, "merged": 6}),

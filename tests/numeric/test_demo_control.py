@@ -17,7 +17,7 @@ from numeric.mujoco_plant import PANDA_AT_WORK, panda_model
 
 pytestmark = [
     needs_compiler,
-    pytest.mark.skipif(not PANDA.is_file(), reason="needs the package example-robot-data"),
+    pytest.mark.skipif(not PANDA.is_file(), reason="needs real robots: pip install example-robot-data"),
 ]
 
 

@@ -25,7 +25,9 @@ from numeric.mujoco_plant import (
 )
 
 pytestmark = needs_compiler
-needs_panda = pytest.mark.skipif(not PANDA.is_file(), reason="needs the package example-robot-data")
+needs_panda = pytest.mark.skipif(
+    not PANDA.is_file(), reason="needs real robots: pip install example-robot-data"
+)
 ENOUGH = 0.02
 """What a measured impedance may differ by from what was asked for."""
 DT = 1e-3

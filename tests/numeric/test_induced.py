@@ -17,7 +17,7 @@ from corpus import ROBOTS
 from numeric.pinocchio_model import PinocchioModel
 
 if not ROBOTS.is_dir():
-    pytest.skip("needs the package example-robot-data", allow_module_level=True)
+    pytest.skip("needs real robots: pip install example-robot-data", allow_module_level=True)
 
 LARGEST_ERROR = 1e-10
 ROBOT_OPTIONS = {

@@ -23,7 +23,7 @@ integrate = pytest.importorskip("scipy.integrate")
 linalg = pytest.importorskip("scipy.linalg")
 
 if not ROBOTS.is_dir():
-    pytest.skip("needs the package example-robot-data", allow_module_level=True)
+    pytest.skip("needs real robots: pip install example-robot-data", allow_module_level=True)
 
 LARGEST_ERROR = 1e-9
 UR5 = next(ROBOTS.rglob("ur5_robot.urdf"))

@@ -16,7 +16,7 @@ from corpus import ROBOTS
 from numeric.pinocchio_model import PinocchioModel
 
 if not ROBOTS.is_dir():
-    pytest.skip("needs the package example-robot-data", allow_module_level=True)
+    pytest.skip("needs real robots: pip install example-robot-data", allow_module_level=True)
 
 
 def test_an_arm_under_feedback_moves_as_pinocchio_says(tmp_path: Path) -> None:

@@ -116,6 +116,9 @@ def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
     return formula_files(d)
 
 
+TORCH = ("arrays/call_module.py", "arrays/run_time_values.py", "arrays/torch_backend.py")
+"""Of linkwise/runtime: what computes with tensors."""
+
 RULE = (
     "arrays/__init__.py",
     "arrays/array_backend.py",
@@ -152,7 +155,7 @@ BACKENDS: dict[str, BackendFiles] = {
             "torch",
             "closed forms, or the vectorised rule, on torch tensors",
             emits=(_forms, _tree),
-            runtime=("arrays/torch_backend.py", *RULE),
+            runtime=(*TORCH, *RULE),
             loading=Loading(
                 "arrays.torch_backend",
                 "TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
@@ -167,7 +170,7 @@ BACKENDS: dict[str, BackendFiles] = {
             "autograd",
             "each link's Lagrangian, differentiated by torch",
             emits=(_energies, _tree),
-            runtime=("arrays/torch_backend.py", "lagrangians", "recorded", *RULE),
+            runtime=(*TORCH, "lagrangians", "recorded", *RULE),
             loading=Loading(
                 "lagrangians.dynamics_module",
                 "backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad, RULE)",
@@ -182,7 +185,7 @@ BACKENDS: dict[str, BackendFiles] = {
             "native",
             "the C code, compiled by this system's compiler",
             emits=(_tree,),
-            runtime=("arrays/numpy_backend.py", "arrays/torch_backend.py", "native", *RULE),
+            runtime=("arrays/numpy_backend.py", *TORCH, "native", *RULE),
             loading=Loading(
                 "native.native_backend",
                 'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values, RULE)',
