@@ -3,7 +3,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean
+.PHONY: demo demo-control test lint generate control bench corpus exports crash random fuzz same mutate report clean
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -58,6 +58,10 @@ report: $(READY)
 corpus: $(READY)
 	$(BIN)/python tests/corpus.py --out out/corpus
 	$(BIN)/python tests/corpus.py --kernel loops --out out/corpus-loops
+
+# Every call of docs/exports.md compiled, exported and under onnxruntime: some ten minutes.
+exports: $(READY)
+	$(BIN)/python tests/exports.py --out out/exports
 
 # `generate` and `analyze` killed at each system call that touches files; needs strace: minutes.
 crash: $(READY)
