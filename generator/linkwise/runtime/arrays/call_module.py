@@ -67,10 +67,11 @@ class CallModule(torch.nn.Module):
 
     def _make_tables(self) -> None:
         """Call with no samples: torch.compile cannot trace what a first call makes, and finds it made."""
-        needed = [name for name, p in self._left.parameters.items() if p.default is p.empty]
+        needed = [name for name, p in self._left.parameters.items() if p.default is p.empty or name == "tau"]
         if MOTION.issuperset(needed):
             for dtype in (torch.float32, torch.float64):
-                self.forward(*(torch.zeros(0, self.robot.n, dtype=dtype) for _ in needed))
+                with contextlib.suppress(TypeError, ValueError):  # which a call of the user's will raise
+                    self.forward(*(torch.zeros(0, self.robot.n, dtype=dtype) for _ in needed))
 
 
 class BodyTensors(torch.nn.Module):
