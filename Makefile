@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .PHONY: docs pictures demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean
-.PHONY: pythons licences embedded
+.PHONY: pythons licences embedded exports
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -68,6 +68,10 @@ report: $(READY)
 corpus: $(READY)
 	$(BIN)/python tests/corpus.py --out out/corpus
 	$(BIN)/python tests/corpus.py --kernel loops --out out/corpus-loops
+
+# Every call of docs/exports.md compiled, exported and under onnxruntime: some ten minutes.
+exports: $(READY)
+	$(BIN)/python tests/exports.py --out out/exports
 
 # `generate` and `analyze` killed at each system call that touches files; needs strace: minutes.
 crash: $(READY)

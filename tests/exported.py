@@ -48,7 +48,8 @@ def error(found: Any, expected: Any) -> float:
     """Largest difference in a ratio to the largest magnitude of each result."""
     pairs = list(zip(results(found), results(expected), strict=True))
     assert all(a.shape == b.shape and a.dtype == b.dtype for a, b in pairs)
-    return max(float((a - b).abs().max() / b.abs().max().clamp(min=1e-9)) for a, b in pairs if b.numel())
+    errors = (float((a - b).abs().max() / b.abs().max().clamp(min=1e-9)) for a, b in pairs if b.numel())
+    return max(errors, default=0.0)
 
 
 def any_samples(count: int) -> tuple[Any, ...]:
