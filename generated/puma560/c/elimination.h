@@ -5,6 +5,12 @@
 #include <float.h>
 #include "arrays.h"
 
+#ifdef LINKWISE_FLOAT
+#define EPSILON FLT_EPSILON
+#else
+#define EPSILON DBL_EPSILON
+#endif
+
 /* Rows of the largest matrix, of joints or of a frame; and numbers to which a row is filled up with zeros, so that rows are
    subtracted in whole vectors. */
 enum { LARGEST = N > 6 ? N : 6, FILLED = 8 };
@@ -25,7 +31,7 @@ static inline int largest_row(int n, int width, int c, const real *scale, const 
    is as it was; otherwise the answer is 0. */
 INLINE int eliminate(int regular, int n, int sides, const real *size, const real *a, real *b)
 {
-    const real least = 4 * (real)n * (sizeof(real) == sizeof(float) ? (real)FLT_EPSILON : (real)DBL_EPSILON);
+    const real least = 4 * (real)n * EPSILON;
     const int width = (n + sides + FILLED - 1) / FILLED * FILLED;
     real rows[LARGEST * (LARGEST + 6 + FILLED)], scale[LARGEST];
     for (int r = 0; r < n; ++r) {

@@ -100,6 +100,9 @@ class Backend(Protocol[Kind]):
     def constraints(self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any) -> Any:
         """The calls of `Constraints` on a robot with this back end; raises as `Dynamics.constrained` does."""
 
+    def module(self, robot: Any, call: str, fixed: Mapping[str, Any]) -> Any:
+        """One call of a robot on this back end as a torch module; raises as `Dynamics.module` does."""
+
     def simulated(self, robot: Any, *given: Any) -> Any:
         """The motion of a robot on this back end over time, a `Trajectory`."""
 

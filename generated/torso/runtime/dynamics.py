@@ -130,6 +130,18 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         """
         return Constraints(self.backend.constraints(self, independent, contacts, at, tolerance))
 
+    def module(self, call: str, **fixed: Any) -> Any:
+        """One call as a torch.nn.Module, such as torch.export, ONNX and containers take.
+
+        call: its name, such as "partial_torque" or "kinematics.jacobian"
+        fixed: what every call is given besides: frame="tool", passive=True
+
+        The module takes the rest by the call's own names, and answers with a dict by name where there are
+        several results. Run-time parameters, and bodies that were given, are in its state_dict. For torch and
+        autograd; raises TypeError on another back end, ValueError for a call or argument that is not there.
+        """
+        return self.backend.module(self, call, fixed)
+
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}
         parts = [f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items() if count]

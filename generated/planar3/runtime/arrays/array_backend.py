@@ -1,6 +1,6 @@
 """What back ends of arrays and of tensors do alike: they make the calls, and give a tree's numbers."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
 
 from ..constraints.chosen_constraints import ChosenConstraints
@@ -19,6 +19,7 @@ from ..sums.sum_answers import SumAnswers
 class ArrayBackend:
     """Base of the back ends that answer in Python; `xp` is the array namespace."""
 
+    name: ClassVar[str]
     xp: ClassVar[Any]
     structure: Structure
     tree: JointTree | None
@@ -65,6 +66,10 @@ class ArrayBackend:
     def simulated(self, robot: Any, *given: Any) -> Any:
         """The motion of a robot on this back end over time; see `MotionCalls.simulate`."""
         return simulated(robot, *given)
+
+    def module(self, robot: Any, call: str, fixed: Mapping[str, Any]) -> Any:
+        """One call of a robot on this back end as a torch module; raises TypeError without any."""
+        raise TypeError(f"{self.name} has no torch modules; load torch or autograd")
 
     def side(self, like: Any) -> Any:
         """What computes with `like`, an array or a tensor."""

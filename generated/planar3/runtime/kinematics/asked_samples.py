@@ -3,8 +3,6 @@
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..rule.tree_arrays import TreeArrays
 from .frame_arrays import Carried, carried, moving, point_at
 
@@ -81,8 +79,8 @@ def with_vectors(own: Any, motion: Sequence[Any], beside: dict[str, Any]) -> tup
         if a.ndim == 0 or a.shape[-1] != 3:
             raise ValueError(f"{name} has shape {tuple(a.shape)}; its last axis must be 3: {VECTORS[name]}")
         try:
-            batch = np.broadcast_shapes(batch, tuple(a.shape[:-1]))
-        except ValueError:
+            batch = own.xp.broadcast_shapes(batch, tuple(a.shape[:-1]))
+        except (ValueError, RuntimeError):  # of NumPy, of torch
             raise ValueError(
                 f"{name} has shape {tuple(a.shape)}, the motion has samples of shape {samples}; "
                 f"give one {name}, or one for each sample"

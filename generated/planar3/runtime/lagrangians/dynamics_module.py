@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
+from ..arrays.run_time_values import RunTimeValues
 from ..dynamics import Dynamics
 from ..interface import Backend
 from ..rule.rule_calls import RigidRule
@@ -13,7 +14,6 @@ from ..structure import Structure
 from .autograd_backend import AutogradBackend
 from .link_modules import LinkModules, links_and_values
 from .partial_lagrangian import PartialLagrangian
-from .run_time_values import RunTimeValues
 
 MADE_ANEW = ("structure", "backend", "layout", "_load", "_asked", "_answers", "kinematics", "constraints")
 """What a copy does not take over: it has its own."""

@@ -7,6 +7,7 @@ another cache directory, CC another compiler.
 
 import hashlib
 import platform
+import re
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -28,6 +29,9 @@ PARTS = {
 
 MADE = "library"
 """Name of what is being made, but for its end."""
+
+STACK = re.compile(r"none\s+takes\s+more\s+than\s+([\d,]+)\s+bytes")
+"""How NAME.h says what its functions take."""
 
 Commands = Callable[[Path], Sequence[Sequence[Sequence[str]]]]
 """Command lines that make a library in a folder: those that run side by side, then those after them."""
@@ -70,6 +74,7 @@ def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
             )
 
     check()
+    require_stack(sources.name, sources.directory)
     compiler = find_compiler()
 
     def commands(folder: Path) -> list[list[list[str]]]:
@@ -83,6 +88,18 @@ def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
 
     name = f"{sources.name}-{what}-{real}-{_fingerprint(digest, compiler)}"
     return _kept(name, f"{sources.name} ({what}, {real})", compiler, commands, check)
+
+
+def require_stack(name: str, directory: Path) -> None:
+    """Raise RuntimeError for a robot whose C takes more stack, as NAME.h has it, than a thread has here."""
+    header = directory / f"{name}.h"
+    text = header.read_text(encoding="utf-8") if header.is_file() else ""
+    told, most = STACK.search(text), system_here().stack
+    if told is not None and int(told[1].replace(",", "")) > most:
+        raise RuntimeError(
+            f"the C of {name} takes {told[1]} bytes of stack, and {most:,} are the most that are safe on "
+            "this system; use the other back ends, which need none"
+        )
 
 
 def extension(source: Path, headers: Sequence[str], versions: Sequence[str]) -> Path:

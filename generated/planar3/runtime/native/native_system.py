@@ -33,6 +33,8 @@ class OperatingSystem:
     """How the names of shared libraries end."""
     keeps_open_files: ClassVar[bool] = False
     """Whether a file, and the folder that it is in, keeps its name for as long as somebody has it open."""
+    stack: ClassVar[int] = 5_000_000
+    """Bytes of a thread's stack that C may take; linkwise makes none that takes more."""
     patience: ClassVar[float] = 0.0
     """Seconds for which a rename that an open file holds up is tried again."""
 
@@ -150,6 +152,7 @@ class Windows(OperatingSystem):
     )
     library = ".dll"
     keeps_open_files = True
+    stack = 1_500_000
     patience = 1.0
     forks = False
 

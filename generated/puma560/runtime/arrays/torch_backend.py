@@ -18,6 +18,7 @@ from ..rule.tree_arrays import checked_bodies
 from ..structure import Structure
 from .array_backend import ArrayBackend
 from .array_kernels import Crossing, known_kernel, operations
+from .call_module import CallModule
 
 FLOATS = ({torch.float32}, {torch.float64})
 CROSSINGS = {
@@ -60,12 +61,14 @@ class TorchBackend(ArrayBackend):
         self.rule = rule
         self.tree = tree or (rule.tree if rule else None)
         self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
-        self.parameters: dict[str, Any] = {
+        self.parameters: Any = {
             k: v if torch.is_tensor(v) else torch.as_tensor(v, dtype=torch.float64)
             for k, v in parameters.items()
         }
-        self.bodies = None if bodies is None else checked_bodies(bodies, structure.N, _tensor)
-        if self.rule and self.kernel != "straight":  # torch.compile would trace how tables are made
+        self.bodies: Any = None if bodies is None else checked_bodies(bodies, structure.N, _tensor)
+        # What torch.compile would trace otherwise: how numbers are summed up, and how tables are made.
+        _ = structure.passive_sums
+        if self.rule and self.kernel != "straight":
             for dtype in (torch.float32, torch.float64):
                 self.rule.tables(self, torch.empty(0, dtype=dtype))
 
@@ -135,6 +138,10 @@ class TorchBackend(ArrayBackend):
         assert self.rule is not None  # Answers has seen to it
         return self.rule.coefficient_regressors(self, (q, qd, qdd), self._values(q))
 
+    def module(self, robot: Any, call: str, fixed: Mapping[str, Any]) -> CallModule:
+        """One call of a robot on this back end as a torch module."""
+        return CallModule(robot, call, fixed)
+
     def constant(self, values: Any, like: Tensor) -> Tensor:
         """A table of numbers, to compute with `like`."""
         return _kept(values, like.dtype, like.device)
@@ -201,7 +208,9 @@ def _kept(values: Any, dtype: torch.dtype, device: torch.device) -> Tensor:
     if torch.compiler.is_dynamo_compiling():
         return torch.as_tensor(values, dtype=dtype, device=device)
     with torch.inference_mode(False), disable_proxy_modes_tracing(), unset_fake_temporarily():
-        return torch.as_tensor(values, dtype=dtype, device=device)
+        # In memory of its own, and side by side: torch.export.save warns of anything else.
+        kept = torch.as_tensor(values, dtype=dtype, device=device)
+        return kept.clone(memory_format=torch.contiguous_format)
 
 
 def _watched() -> bool:

@@ -5,11 +5,11 @@ from typing import Any, cast
 
 import torch
 
+from ..arrays.run_time_values import RunTimeValues, attribute_names
 from ..chosen_names import choice, position_of, short
 from ..structure import Structure
 from .partial_lagrangian import PartialLagrangian
 from .rigid_lagrangian import RigidLagrangian
-from .run_time_values import RunTimeValues, attribute_names
 
 KINDS = ("mass", "com", "inertia", "place")
 """Constants of rigid links."""

@@ -6,12 +6,12 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
+from ..arrays.run_time_values import RunTimeValues
 from ..quantities import Coefficients
 from ..structure import Structure
 from .autograd_backend import AutogradBackend
 from .energy_interface import Parameters, Values
 from .functional_sweeps import lagrangians
-from .run_time_values import RunTimeValues
 
 
 class PartialLagrangian(torch.nn.Module):

@@ -3,10 +3,10 @@
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, ClassVar
 
+from ..arrays.run_time_values import RunTimeValues, hold
 from ..structure import Structure
 from .energy_interface import Parameters
 from .partial_lagrangian import PartialLagrangian
-from .run_time_values import RunTimeValues, hold
 
 
 class RigidLagrangian(PartialLagrangian):

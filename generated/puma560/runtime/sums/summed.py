@@ -11,7 +11,7 @@ from ..passive_joints import passive_torques
 from ..structure import Structure
 from .inertia_solve import solved
 from .joint_matrices import JointMatrices
-from .namespace import namespace
+from .namespace import hidden, namespace
 
 AT_ONCE = 1 << 22
 """Packed numbers of one chunk of samples, each at n unit velocities."""
@@ -92,8 +92,8 @@ class Summed:
     def _christoffel(self, q: Any, made: Callable[[Any], Any]) -> tuple[Any, ...]:
         n, batch = self._structure.n, tuple(q.shape[:-1])
         flat, most = q.reshape(-1, n), max(1, AT_ONCE // (n * max(1, sum(self._structure.sizes))))
-        starts = range(0, max(1, len(flat)), most)
-        parts = [self._of_units(flat[at : at + most], made) for at in starts]
+        starts = [0] if hidden(flat) else range(0, max(1, len(flat)), most)
+        parts = [self._of_units(flat if hidden(flat) else flat[at : at + most], made) for at in starts]
         whole = parts[0] if len(parts) == 1 else namespace(q).concat(parts, 0)
         return (whole.reshape(*batch, *whole.shape[1:]),)
 

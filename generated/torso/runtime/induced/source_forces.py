@@ -62,7 +62,7 @@ def with_actuators(forces: SourceForces, tau: Any, identity: Any) -> SourceForce
 def beside(parts: Sequence[Any]) -> Any:
     """Columns (..., n, X) side by side, of samples in one shape."""
     xp = namespace(parts[0])
-    batch = np.broadcast_shapes(*(tuple(part.shape[:-2]) for part in parts))
+    batch = xp.broadcast_shapes(*(tuple(part.shape[:-2]) for part in parts))
     return xp.concat([xp.broadcast_to(part, (*batch, *part.shape[-2:])) for part in parts], -1)
 
 

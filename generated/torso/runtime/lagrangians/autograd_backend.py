@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
+from ..arrays.run_time_values import RunTimeValues
 from ..arrays.torch_backend import TorchBackend
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays
@@ -15,7 +16,6 @@ from .energy_interface import Energies, Parameters, numbers_of
 from .functional_sweeps import decomposition_followed, energies, position_gradient_followed, torque_followed
 from .graph_calls import graph_of, graph_parts_of
 from .recording import transformed
-from .run_time_values import RunTimeValues
 from .sweeps import decomposition, position_gradient, torque
 
 Call = Callable[..., Any]
