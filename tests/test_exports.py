@@ -37,24 +37,6 @@ def planar2(package_of: Packages) -> Any:
     return package_of("planar2").load("torch")
 
 
-def test_the_page_runs_as_printed(tmp_path: Path) -> None:
-    text = exported.PAGE.read_text(encoding="utf-8")
-    shell, *programs = (
-        "\n".join(re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)) for language in ("sh", "python")
-    )
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    env = os.environ | {"PATH": path}
-    subprocess.run(["sh", "-e", "-c", shell], cwd=tmp_path, env=env, check=True, capture_output=True)
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", *programs],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-
-
 def test_the_page_has_every_call_in_its_table(planar2: Any) -> None:
     """But for those of constraints, and one that is for these alone."""
     calls = {
