@@ -6,13 +6,8 @@ the page says does not work.
 
 import copy
 import inspect
-import os
 import pickle
-import re
-import subprocess
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
