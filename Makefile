@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .PHONY: docs pictures demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean
-.PHONY: pythons licences embedded exports
+.PHONY: ship pythons licences embedded exports
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -48,7 +48,11 @@ demo-control: $(READY)
 
 # Two files of tests at a time.
 test: $(READY)
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not ship"
+
+# What leaves the house, as others get it: wheels, CMake's projects, exports, other processors and systems; minutes.
+ship: $(READY)
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m ship
 
 # What could be wrong without a test, or without `linkwise check`, noticing: an hour. ONLY="dynamics emit" takes rooms.
 mutate: $(READY)

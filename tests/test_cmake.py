@@ -17,7 +17,7 @@ from linkwise.package.load import import_package
 from linkwise.version import VERSION
 from needed import needs
 
-pytestmark = needs("cmake", "cc", "c++")
+pytestmark = [pytest.mark.ship, needs("cmake", "cc", "c++")]
 GENERATORS = {"ninja": "Ninja", "make": "Unix Makefiles"}
 each_generator = pytest.mark.parametrize(
     "tool",

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from test_cmake import LISTS, Project, expected, write_project
 
+pytestmark = pytest.mark.ship
+
 TOOLCHAIN = """set(CMAKE_SYSTEM_NAME {system})
 set(CMAKE_SYSTEM_PROCESSOR {processor})
 set(CMAKE_C_COMPILER {prefix}-gcc)

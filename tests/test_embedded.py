@@ -22,7 +22,7 @@ from impedance_in_c import formula
 from linkwise import generate, read_system
 from linkwise.package.manifest import Manifest
 
-pytestmark = needs_compiler
+pytestmark = [pytest.mark.ship, needs_compiler]
 CRANE, TURNTABLE, FOURBAR = str(DATA / "crane.urdf"), str(DATA / "turntable.py"), str(DATA / "fourbar.toml")
 KINDS = {
     "straight": "puma560",

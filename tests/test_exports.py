@@ -21,6 +21,7 @@ torch = pytest.importorskip("torch", reason="needs torch: pip install torch")
 exported = pytest.importorskip("exported", reason="needs onnxruntime: pip install 'linkwise[onnx]'")
 
 pytestmark = [
+    pytest.mark.ship,
     pytest.mark.filterwarnings("ignore:.torch.jit:DeprecationWarning"),
     pytest.mark.filterwarnings("ignore:.isinstance.treespec, LeafSpec:FutureWarning"),  # torch's own
 ]
@@ -173,6 +174,10 @@ def test_christoffel_and_shares_of_accelerations_take_any_number_of_samples(
     assert (
         exported.error(dict(enumerate(exported.results(program.module()(*given)))), module(*given)) <= 1e-13
     )
+    if call == "induced_accelerations":
+        with pytest.raises(torch.onnx.OnnxExporterError) as refused:
+            exported.in_onnx(program)
+        assert "linalg_solve" in str(refused.value.__cause__)
 
 
 def test_what_looks_at_numbers_is_neither_compiled_whole_nor_exported(package_of: Packages) -> None:

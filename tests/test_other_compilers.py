@@ -19,6 +19,8 @@ from conftest import needs_compiler
 from linkwise.runtime.native.native_build import PARTS
 from linkwise.runtime.native.native_compiler import FLAGS, MinGW
 
+pytestmark = pytest.mark.ship
+
 PROGRAM = Path(__file__).with_name("answers.c")
 CMAKE = Path(linkwise.__file__).parent / "cmake"
 LINKWISE = Path(sys.executable).with_name("linkwise")

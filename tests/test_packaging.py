@@ -15,6 +15,7 @@ from installation import ROOT, Environment, archive_of_sources, copied, empty_en
 from linkwise.version import VERSION
 from test_readme import blocks
 
+pytestmark = pytest.mark.ship
 CORE_MEGABYTES = 200
 HELP_SECONDS = 0.5
 MOTION = ([0.3, -0.7], [1.0, 0.5], [2.0, -3.0])
