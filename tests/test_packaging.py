@@ -13,7 +13,7 @@ import pinocchio as pin
 import pytest
 from installation import ROOT, Environment, archive_of_sources, copied, empty_environment, wheel_of
 from linkwise.version import VERSION
-from test_readme import blocks
+from pages import PAGES, blocks
 
 pytestmark = pytest.mark.ship
 CORE_MEGABYTES = 200
@@ -86,7 +86,8 @@ def test_first_commands_run_in_a_clean_environment(clean: Environment, tmp_path:
     clean.run("linkwise", "generate", "planar3", "--out", "generated", folder=tmp_path)
     manifest = json.loads((tmp_path / "generated/planar3/manifest.json").read_text())
     assert manifest["generator"]["linkwise"] == VERSION
-    said = clean.run("python", "-c", blocks("python")[0], folder=tmp_path)
+    example = next(block.text for block in blocks(PAGES[0]) if block.language == "python")
+    said = clean.run("python", "-c", example, folder=tmp_path)
     assert re.match(r"joint 1 carries -?\d+\.\d+ N m", said)
     cache = str(tmp_path / "cache")
     proved = clean.run("linkwise", "check", "generated/planar3", folder=tmp_path, LINKWISE_CACHE=cache)
