@@ -5,12 +5,14 @@ import shutil
 import pytest
 
 PACKAGES = {
+    "arm-none-eabi-gcc": "gcc-arm-none-eabi",
     "c++": "g++",
     "cc": "gcc",
     "chromedriver": "chromium-driver",
     "clang++": "clang",
     "dot": "graphviz",
     "ninja": "ninja-build",
+    "qemu-system-arm": "qemu-system-arm libnewlib-arm-none-eabi",
 }
 """Debian's package of a program, where it is not named after it."""
 

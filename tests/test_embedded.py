@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -21,6 +20,7 @@ from conftest import DATA, PANDA, needs_compiler
 from impedance_in_c import formula
 from linkwise import generate, read_system
 from linkwise.package.manifest import Manifest
+from needed import missing, needs
 
 pytestmark = [pytest.mark.ship, needs_compiler]
 CRANE, TURNTABLE, FOURBAR = str(DATA / "crane.urdf"), str(DATA / "turntable.py"), str(DATA / "fourbar.toml")
@@ -64,8 +64,8 @@ def test_it_calls_the_functions_of_math_alone_and_converts_nothing_by_accident(
     kind: str, compiler: str, directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:
     """Compilers make memcpy and memset of copies and zeros: clang always, gcc not with these flags."""
-    if shutil.which(compiler) is None:
-        pytest.skip(f"no {compiler}")
+    if lacking := missing(compiler):
+        pytest.skip(lacking)
     prototypes = ("-Wstrict-prototypes", "-Wmissing-prototypes")
     own = "|mem(cpy|set|move)" if compiler == "clang" else ""
     for source in sources(directory_of(KINDS[kind])):
@@ -83,8 +83,8 @@ def test_it_calls_the_functions_of_math_alone_and_converts_nothing_by_accident(
 def test_as_cpp_it_converts_nothing_by_accident(
     kind: str, compiler: str, directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    if shutil.which(compiler) is None:
-        pytest.skip(f"no {compiler}")
+    if lacking := missing(compiler):
+        pytest.skip(lacking)
     for source in sources(directory_of(KINDS[kind])):
         needed([compiler, "-x", "c++", "-std=c++17", *WARNINGS, "-O0", SMALL], source, tmp_path / "made.o")
 
@@ -159,8 +159,8 @@ ARM = ("arm-none-eabi-gcc", "-std=c99", "-mthumb", "-mfloat-abi=hard", "-mcpu=co
 def test_no_path_of_calls_takes_more_stack_than_the_header_says(
     kind: str, compiler: tuple[str, ...], directory_of: Callable[[str], Path]
 ) -> None:
-    if shutil.which(compiler[0]) is None:
-        pytest.skip(f"no {compiler[0]}")
+    if lacking := missing(compiler[0]):
+        pytest.skip(lacking)
     directory = directory_of(KINDS[kind])
     header = (directory / "c" / f"{name_of(directory)}.h").read_text(encoding="utf-8")
     every, motions = told(header)
@@ -174,7 +174,7 @@ def test_no_path_of_calls_takes_more_stack_than_the_header_says(
     assert max(deepest([*compiler, "-O2"], sources(directory)[0]).values()) <= blocks
 
 
-needs_board = pytest.mark.skipif(bool(cortex_m.missing()), reason=f"no {cortex_m.missing()}")
+needs_board = needs(*cortex_m.TOOLS)
 
 
 @needs_board
@@ -188,7 +188,7 @@ def test_on_a_cortex_m_it_says_what_pinocchio_and_numpy_say(
     package_of: Callable[[str], ModuleType],
 ) -> None:
     if robot == str(PANDA) and not PANDA.is_file():
-        pytest.skip("no Panda")
+        pytest.skip("needs the package example-robot-data")
     kind = f"{robot} loops" if robot == str(PANDA) else robot
     directory, model = directory_of(kind), package_of(kind).load("numpy")
     near, dtype = (1e-5, np.float32) if real == "float" else (1e-12, np.float64)
@@ -226,7 +226,7 @@ def test_on_a_cortex_m_it_says_what_pinocchio_and_numpy_say(
 
 def pinocchio_says(motion: Any) -> Any:
     """Torques of Panda with its fingers held."""
-    pin = pytest.importorskip("pinocchio")
+    pin = pytest.importorskip("pinocchio", reason="needs pinocchio: pip install pin")
     whole = pin.buildModelFromUrdf(str(PANDA))
     fingers = [whole.getJointId(f"panda_finger_joint{k}") for k in (1, 2)]
     model = pin.buildReducedModel(whole, fingers, pin.neutral(whole))
@@ -234,7 +234,7 @@ def pinocchio_says(motion: Any) -> Any:
     return np.array([pin.rnea(model, data, q, qd, qdd) for q, qd, qdd in motion.swapaxes(0, 1)])
 
 
-@pytest.mark.skipif(shutil.which("arm-none-eabi-gcc") is None, reason="no arm-none-eabi-gcc")
+@needs("arm-none-eabi-gcc")
 @pytest.mark.parametrize("robot", [*KINDS.values(), "puma560 loops", "torso", "planar10"])
 def test_the_manifests_size_is_what_the_compiler_makes_to_a_fifth(
     robot: str, directory_of: Callable[[str], Path]
@@ -274,8 +274,8 @@ ANALYSERS = {
 @pytest.mark.parametrize("tool", ANALYSERS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_analysers_find_nothing(kind: str, tool: str, directory_of: Callable[[str], Path]) -> None:
-    if shutil.which(tool) is None:
-        pytest.skip(f"no {tool}")
+    if lacking := missing(tool):
+        pytest.skip(lacking)
     source = str(sources(directory_of(KINDS[kind]))[0])
     for defined in ((), ("-DLINKWISE_FLOAT",)):
         tail = ("--", "-std=c99", SMALL, *defined) if tool == "clang-tidy" else defined

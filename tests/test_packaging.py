@@ -13,6 +13,7 @@ import pinocchio as pin
 import pytest
 from installation import ROOT, Environment, archive_of_sources, copied, empty_environment, wheel_of
 from linkwise.version import VERSION
+from needed import needs
 from pages import PAGES, blocks
 
 pytestmark = pytest.mark.ship
@@ -172,7 +173,7 @@ def test_an_editable_install_of_setuptools_has_its_robot_beside_the_sources(
     assert Path(builder.run("python", "-c", program, folder=tmp_path).strip()).is_relative_to(project)
 
 
-@pytest.mark.skipif(not all(map(shutil.which, ("cmake", "ninja", "cc"))), reason="needs cmake, ninja and cc")
+@needs("cmake", "ninja", "cc")
 def test_a_wheel_of_scikit_build_core_has_its_robot(builder: Environment, tmp_path: Path) -> None:
     project = example("scikit-build-core", tmp_path)
     user = empty_environment(tmp_path / "user")
