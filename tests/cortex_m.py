@@ -7,8 +7,8 @@ processor's affair.
 """
 
 import re
-import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,6 +20,7 @@ from answers import random_states
 from compiled import name_of
 from conftest import LOCKED_FINGERS, PANDA
 from linkwise import Options, generate, read_system, write_package
+from needed import missing
 
 HERE = Path(__file__).parent / "embedded"
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
@@ -180,11 +181,6 @@ def flash(directory: Path, real: str, board: Board, flags: Any = SMALL) -> int:
     return sum(int(size) for size in re.findall(r"^\.(?:text|rodata)\S* +(\d+)", sizes.stdout, re.M))
 
 
-def missing() -> str:
-    """Which tool is not here; nothing if all are."""
-    return ", ".join(tool for tool in TOOLS if shutil.which(tool) is None)
-
-
 SHOWN = ("inverse_dynamics", "propagation", "forward_dynamics", "partial_impedance")
 
 
@@ -206,6 +202,8 @@ def rows(spec: str, options: Options, kernel: str) -> Iterator[tuple[str, ...]]:
 
 def main() -> None:
     """Print the table."""
+    if absent := missing(*TOOLS):
+        sys.exit(absent)
     head = ("robot, kernel", "processor, type", "flash", *(f"`{name}`" for name in SHOWN))
     print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
     robots = [("planar3", Options(), "straight")]

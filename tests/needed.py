@@ -5,6 +5,9 @@ import shutil
 import pytest
 
 PACKAGES = {
+    "aarch64-linux-gnu-g++": "g++-aarch64-linux-gnu",
+    "aarch64-linux-gnu-gcc": "gcc-aarch64-linux-gnu",
+    "arm-none-eabi-g++": "gcc-arm-none-eabi",
     "arm-none-eabi-gcc": "gcc-arm-none-eabi",
     "c++": "g++",
     "cc": "gcc",
@@ -12,6 +15,8 @@ PACKAGES = {
     "clang++": "clang",
     "dot": "graphviz",
     "ninja": "ninja-build",
+    "node": "nodejs",
+    "qemu-aarch64": "qemu-user",
     "qemu-system-arm": "qemu-system-arm libnewlib-arm-none-eabi",
 }
 """Debian's package of a program, where it is not named after it."""

@@ -27,6 +27,7 @@ from pathlib import Path
 
 from conftest import PANDA
 from markdown_it import MarkdownIt
+from needed import missing
 
 ROOT = Path(__file__).parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
@@ -80,10 +81,12 @@ def words(page: Path, key: str) -> list[str]:
     return " ".join(found).split()
 
 
-def missing(page: Path) -> list[str]:
-    """Programs and files that the page needs and that are not here."""
-    tools = [tool for tool in words(page, "needs") if shutil.which(tool) is None]
-    return tools + [name for name in words(page, "given") if name in GIVEN and not GIVEN[name].is_file()]
+def lacking(page: Path) -> str:
+    """Why the page cannot be run here, and what helps; empty where it can."""
+    if absent := missing(*words(page, "needs")):
+        return absent
+    there = all(GIVEN[name].is_file() for name in words(page, "given") if name in GIVEN)
+    return "" if there else "needs real robots: pip install example-robot-data"
 
 
 def _give(page: Path, folder: Path) -> None:

@@ -1,9 +1,9 @@
 """linkwise_add_robot for other machines: a toolchain file is all that their builds have more."""
 
-import shutil
 from pathlib import Path
 
 import pytest
+from needed import needs
 from test_cmake import LISTS, Project, expected, write_project
 
 pytestmark = pytest.mark.ship
@@ -18,13 +18,9 @@ set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
 set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
 set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
 """
+TOOLS = ("cmake", "ninja")
 ARM, AARCH64 = 40, 183
 """Machines, as ELF files number them."""
-
-
-def needs(*programs: str) -> pytest.MarkDecorator:
-    missing = [program for program in ("cmake", "ninja", *programs) if shutil.which(program) is None]
-    return pytest.mark.skipif(bool(missing), reason=f"needs {', '.join(missing)}")
 
 
 def configured(project: Project, toolchain: str) -> Project:
@@ -41,7 +37,7 @@ def machines(library: Path) -> set[int]:
     return {int.from_bytes(part[14:16], "little") for part in parts}
 
 
-@needs("aarch64-linux-gnu-gcc", "aarch64-linux-gnu-g++", "qemu-aarch64")
+@needs(*TOOLS, "aarch64-linux-gnu-gcc", "aarch64-linux-gnu-g++", "qemu-aarch64")
 def test_programs_for_aarch64_say_what_python_does(tmp_path: Path) -> None:
     project = Project("ninja", tmp_path / "for aarch64")
     shared = "linkwise_add_robot(arm_shared"
@@ -56,7 +52,7 @@ def test_programs_for_aarch64_say_what_python_does(tmp_path: Path) -> None:
         assert answer == pytest.approx(tau, rel=accuracy, abs=accuracy), program
 
 
-@needs("arm-none-eabi-gcc", "arm-none-eabi-g++")
+@needs(*TOOLS, "arm-none-eabi-gcc", "arm-none-eabi-g++")
 def test_a_library_for_a_microcontroller_is_made_by_its_toolchain(tmp_path: Path) -> None:
     project = Project("ninja", tmp_path / "for cortex-m")
     robot = 'linkwise_add_robot(arm ROBOT "arm one.urdf" FLOAT)\n'

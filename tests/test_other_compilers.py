@@ -18,6 +18,7 @@ from compiled import name_of
 from conftest import needs_compiler
 from linkwise.runtime.native.native_build import PARTS
 from linkwise.runtime.native.native_compiler import FLAGS, MinGW
+from needed import needs
 
 pytestmark = pytest.mark.ship
 
@@ -203,7 +204,7 @@ target_link_libraries(main PRIVATE planar3)
 
 
 @needs_mingw
-@pytest.mark.skipif(not all(map(shutil.which, ("cmake", "ninja"))), reason="needs cmake and ninja")
+@needs("cmake", "ninja")
 def test_cmake_makes_a_library_and_a_program_for_windows(robot_of: Make, wine: dict[str, object]) -> None:
     robot = robot_of("planar3", **wine)
     shutil.copy(PROGRAM, robot.folder)
@@ -224,10 +225,6 @@ def plain(tmp_path: Path) -> Path:
     for name, text in PLAIN.items():
         (folder / name).write_text(text, encoding="ascii")
     return folder
-
-
-def needs(program: str) -> pytest.MarkDecorator:
-    return pytest.mark.skipif(shutil.which(program) is None, reason=f"needs {program}")
 
 
 @needs_compiler

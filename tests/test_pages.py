@@ -19,8 +19,8 @@ def name_of(page: Path) -> str:
     "page", [p for p in pages.PAGES if any(b.runs for b in pages.blocks(p))], ids=name_of
 )
 def test_a_page_runs_as_printed(page: Path, tmp_path: Path) -> None:
-    if lacking := pages.missing(page):
-        pytest.skip(f"needs {', '.join(lacking)}")
+    if reason := pages.lacking(page):
+        pytest.skip(reason)
     # Each in a process of its own: their packages have the same names.
     script = (
         f"import pages, pathlib; pages.run_page(pathlib.Path({str(page)!r}), pathlib.Path({str(tmp_path)!r}))"

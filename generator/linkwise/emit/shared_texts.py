@@ -10,10 +10,10 @@ from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.render import render
 from linkwise.escape import python_docstring, python_literal
 from linkwise.package.entries import JointEntry, KernelKind, PassiveEntry
+from linkwise.robot.robot import LIMITS
 from linkwise.version import VERSION
 
 LINE = 100
-LIMITS = ("lower", "upper", "velocity", "effort")
 
 
 @dataclass(frozen=True)

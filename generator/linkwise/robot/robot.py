@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Literal, TypeAlias
 
 import sympy as sp
@@ -111,6 +111,8 @@ class Limits:
 
 
 UNLIMITED = Limits()
+LIMITS = tuple(asdict(UNLIMITED))
+"""Kinds of limits, by name."""
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,11 @@ from linkwise.robot.description import Body, Connection, Description, Mimic
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.readers.toml_constraints import with_constraints
 from linkwise.robot.readers.toml_table import TomlTable, named_parameters, tables, toml_data
-from linkwise.robot.robot import Limits, Mat3, Passive
+from linkwise.robot.robot import LIMITS, Limits, Mat3, Passive
 
 TOP = {"schema", "name", "gravity", "base", "parameters", "link", "joint", "constraint", "independent"}
 LINK = {"name", "mass", "com", "inertia", "allow_unphysical"}
 PASSIVE = ("stiffness", "rest", "damping", "friction", "armature")
-LIMITS = ("lower", "upper", "velocity", "effort")
 JOINT = {"name", "type", "parent", "child", "xyz", "rpy", "axis", "mimic", *PASSIVE, *LIMITS}
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
