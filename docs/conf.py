@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from linkwise.version import VERSION
+from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for generated.planar3
 
@@ -53,6 +54,6 @@ def _as_they_stand(app: object, what: str, name: str, obj: object, options: obje
     lines[:] = told
 
 
-def setup(app: object) -> None:
+def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
-    app.connect("autodoc-process-docstring", _as_they_stand)  # type: ignore[attr-defined]
+    app.connect("autodoc-process-docstring", _as_they_stand)
