@@ -10,7 +10,7 @@ from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.render import render
 from linkwise.escape import python_docstring, python_literal
 from linkwise.package.entries import JointEntry, KernelKind, PassiveEntry
-from linkwise.robot.robot import LIMITS
+from linkwise.runtime.structure import JointLimits
 from linkwise.version import VERSION
 
 LINE = 100
@@ -102,7 +102,7 @@ def names_text(
         "name": repr(package),
         "joints": [python_literal(joint.name) for joint in joints],
         "units": [repr(joint.unit) for joint in joints],
-        "limits": [(what, _limit_text(what, joints)) for what in LIMITS],
+        "limits": [(what, _limit_text(what, joints)) for what in JointLimits._fields],
         "links": [python_literal(name) for name in links],
         "paths": [repr(tuple(path)) for path in links.values()],
         "linear": repr(tuple(sorted(linear))),
