@@ -169,7 +169,7 @@ def test_notes_say_what_was_done(tmp_path: Path) -> None:
     found = {(note.kind, note.subject, note.detail) for note in notes}
     assert found == {
         ("snapped", "ab", "rotation entries within 1e-12 of -1, 0, 1"),
-        ("ignored", "limit", "3 ×"),
+        ("ignored", "limit", "1 ×"),
         ("ignored", "transmission", "2 ×"),
         ("ignored", "visual", "1 ×"),
         ("locked", "cd", "at 0.2 rad"),

@@ -14,7 +14,7 @@ USED = {
     "link": {"inertial"},
     "joint": {"parent", "child", "origin", "axis", "mimic", "dynamics"},
 }
-"""What the dynamics use of each element; every other kind of child is noted as ignored."""
+"""What is read of each element, beside limits; every other kind of child is noted as ignored."""
 
 LOSSES = ("damping", "friction")
 """Attributes of <dynamics>."""
@@ -38,7 +38,7 @@ def ignored(elements: list[Element]) -> tuple[Note, ...]:
     So it does for numbers of <dynamics> that the format does not have: who wrote them knows what they mean.
     """
     counts = Counter(
-        str(child.tag) for element in elements for child in element if child.tag not in USED[element.tag]
+        str(child.tag) for element in elements for child in element if child.tag not in _used(element)
     )
     counts.update(
         f"{key} of <dynamics>"
@@ -48,6 +48,11 @@ def ignored(elements: list[Element]) -> tuple[Note, ...]:
         if key not in LOSSES
     )
     return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()))
+
+
+def _used(element: Element) -> set[str]:
+    """What is read of an element; limits are those of a joint of one axis."""
+    return USED[element.tag] | ({"limit"} if element.get("type") in SINGLE else set())
 
 
 def omissions(robot: Element) -> Iterator[Omission]:
