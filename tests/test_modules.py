@@ -1,6 +1,7 @@
 """`load("autograd")` and its links as torch modules: what they own, and what torch's tools make of them."""
 
 import copy
+import importlib
 import io
 import pickle
 from collections.abc import Callable, Iterator
@@ -291,10 +292,14 @@ class Torques(torch.utils.data.Dataset[Any]):
         return self.robot(*(torch.full((2,), value * at, dtype=torch.float64) for value in (0.1, 0.2, 0.3)))
 
 
-def test_workers_of_a_data_loader_compute_with_it(planar2: ModuleType) -> None:
-    data = Torques(planar2.load("autograd"))
+def test_workers_of_a_data_loader_compute_with_it(
+    directory_of: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Spawned, as everywhere but on Linux before Python 3.14, a worker imports the package by itself.
+    monkeypatch.syspath_prepend(directory_of("planar2").parent)
+    data = Torques(importlib.import_module("planar2").load("autograd"))
     expected = torch.stack([data[at] for at in range(6)])
-    loader = torch.utils.data.DataLoader(data, batch_size=3, num_workers=2)
+    loader = torch.utils.data.DataLoader(data, batch_size=3, num_workers=1, multiprocessing_context="spawn")
     assert torch.equal(torch.cat(list(loader)), expected)
 
 
