@@ -13,7 +13,10 @@ from typing import Any
 
 import numpy as np
 
-STRICT = ("-Wall", "-Wextra", "-Werror", "-pedantic", "-O1", "-fPIC")
+WARNED = ("-Wall", "-Wextra", "-Werror", "-pedantic", "-fPIC")
+STRICT = (*WARNED, "-O1")
+PARTS = ("SINES", "ONE_SAMPLE", "BLOCKS", "POSITION_GRADIENT", "CONTROL")
+"""Parts of the C that may be compiled apart."""
 FIELDS = {"c2": "acceleration", "c1": "velocity", "g": "gravity", "tau": "torque", "h1": "linear"}
 """What the Python API calls the arrays of the header."""
 
@@ -25,15 +28,36 @@ def name_of(directory: Path) -> str:
 
 def compile_library(directory: Path, target: Path, compiler: Sequence[str] = ("gcc", "-std=c99")) -> None:
     """Compile the package's double and float to a shared library, as its header says; any warning fails."""
+    _run([*compiler, *STRICT, "-shared", "-o", str(target), *sources(directory), "-lm"])
+
+
+def check_syntax(directory: Path, compiler: Sequence[str]) -> None:
+    """Read the package's double and float; a warning that needs no optimisation fails: clang has no other."""
+    for source in sources(directory):
+        _run([*compiler, *WARNED, "-fsyntax-only", source])
+
+
+def link_parts(directory: Path, compiler: Sequence[str], folder: Path) -> None:
+    """Compile the package's double part by part, without optimisation, and link them; any warning fails."""
+    objects = [str(folder / f"{part}.o") for part in PARTS]
+    for part, made in zip(PARTS, objects, strict=True):
+        _run([*compiler, *WARNED, "-O0", f"-DLINKWISE_PART={part}", "-c", sources(directory)[0], "-o", made])
+    _run([compiler[0], "-shared", "-Wl,--no-undefined", *objects, "-lm", "-o", str(folder / "all.so")])
+
+
+def sources(directory: Path) -> list[str]:
+    """Files of a package that are compiled, in double and in float."""
     name = name_of(directory)
-    sources = [str(directory / "c" / file) for file in (f"{name}.c", f"{name}f.c")]
-    command = [*compiler, *STRICT, "-shared", "-o", str(target), *sources, "-lm"]
+    return [str(directory / "c" / file) for file in (f"{name}.c", f"{name}f.c")]
+
+
+def _run(command: Sequence[str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
 
 @cache
-def _library(directory: Path) -> ctypes.CDLL:
+def library_of(directory: Path) -> ctypes.CDLL:
     """Of a package that no test changes: compiled once, however many ask."""
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / f"{name_of(directory)}.so"
@@ -55,7 +79,7 @@ class Compiled:
         }
         totals = {"tau": "G"}
         self.sizes = {array: self.numbers.get(totals.get(array, array.upper()), 0) for array in FIELDS}
-        self.library = ctypes.CDLL(str(library)) if library else _library(directory)
+        self.library = ctypes.CDLL(str(library)) if library else library_of(directory)
 
     def _call(self, function: str, count: int | None, motion: Sequence[Any], lengths: list[int]) -> list[Any]:
         """Arrays of the given lengths that a function fills; those of length 0 it does not have."""

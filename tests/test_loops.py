@@ -13,7 +13,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from answers import random_states, relative_error
-from compiled import STRICT, Compiled, compile_library, name_of
+from compiled import Compiled, check_syntax, compile_library, library_of, link_parts, name_of
 from conftest import DATA, needs_compiler
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
 from linkwise.check import check_package
@@ -22,7 +22,7 @@ from linkwise.emit.kernel_choice import check_size, chosen_kernel
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 from needed import needs
-from test_emitted_c import COMPILERS, PARTS, aligned, counting, strict
+from test_emitted_c import COMPILERS, aligned, counting, strict
 from typer.testing import CliRunner
 from urdf_text import joint, link, robot
 
@@ -134,13 +134,11 @@ def test_it_compiles_without_a_warning_whole_and_in_parts(
     compiler: str, directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:
     directory = directory_of("planar3 symbolic loops")
-    compile_library(directory, tmp_path / "library.so", strict(compiler))
-    command, source = (*strict(compiler), *STRICT), directory / "c" / "planar3.c"
-    objects = [str(tmp_path / f"{part}.o") for part in PARTS]
-    for part, made in zip(PARTS, objects, strict=True):
-        subprocess.run([*command, f"-DLINKWISE_PART={part}", "-c", str(source), "-o", made], check=True)
-    linked = [compiler, "-shared", "-Wl,--no-undefined", *objects, "-lm", "-o", str(tmp_path / "all.so")]
-    subprocess.run(linked, check=True)
+    if compiler == "gcc":
+        library_of(directory)
+    else:
+        check_syntax(directory, strict(compiler))
+    link_parts(directory, strict(compiler), tmp_path)
 
 
 @needs_compiler
