@@ -50,7 +50,7 @@ demo-control: $(READY)
 test: $(READY)
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not ship"
 
-# What leaves the house, as others get it: wheels, CMake's projects, exports, other processors and systems; minutes.
+# What leaves the house, as others get it: pages, wheels, CMake's projects, exports, other processors and systems; minutes.
 ship: $(READY)
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m ship
 

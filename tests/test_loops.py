@@ -32,7 +32,7 @@ FIELDS = ("acceleration", "velocity", "gravity", "torque")
 
 def crane(folder: Path, options: Options) -> Path:
     """Package of a tree with slides, a part without mass, and joints that follow another."""
-    write_package(generate(read_system(CRANE, options), kernel="loops"), folder / "crane")
+    write_package(generate(read_system(CRANE, options), ["numpy", "c"], kernel="loops"), folder / "crane")
     return folder / "crane"
 
 

@@ -15,6 +15,7 @@ def name_of(page: Path) -> str:
     return str(page.relative_to(ROOT))
 
 
+@pytest.mark.ship
 @pytest.mark.parametrize(
     "page", [p for p in pages.PAGES if any(b.runs for b in pages.blocks(p))], ids=name_of
 )
