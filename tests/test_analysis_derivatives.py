@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from linkwise.analysis.derivatives import FIRST, SECOND, derivatives
-from linkwise.analysis.filtering import lowpass
+from linkwise.analysis.filtering import lowpass, padding_length
 from linkwise.analysis.settings import Lowpass, Processing
 from linkwise.errors import LinkwiseError
 from motion_logs import smooth
@@ -61,9 +61,17 @@ def test_lowpass_is_sosfiltfilt(padding, order, rows):
     q += np.random.default_rng(0).normal(scale=0.01, size=q.shape)
     sos = signal.butter(order, 6.0, fs=100.0, output="sos")
     kind = None if padding == "none" else padding
-    expected = signal.sosfiltfilt(sos, q, axis=0, padtype=kind)
+    expected = signal.sosfiltfilt(sos, q, axis=0, padtype=kind, padlen=padding_length(sos, len(q)))
     lowpass(q, 100.0, Lowpass(6.0, order, padding), rows)
     np.testing.assert_allclose(q, expected, atol=1e-13)
+
+
+@pytest.mark.parametrize(("cutoff", "rate"), [(6.0, 100.0), (6.0, 1000.0), (1.0, 60.0)])
+def test_a_straight_ramp_passes_to_its_ends(cutoff, rate):
+    ramp = 1.3 * np.arange(601)[:, None] / rate
+    q = ramp.copy()
+    lowpass(q, rate, Lowpass(cutoff))
+    np.testing.assert_allclose(q, ramp, atol=1e-6 * 1.3)
 
 
 def test_lowpass_refuses_what_it_cannot():

@@ -3,7 +3,13 @@
 `scipy.signal.sosfiltfilt` wants the whole log at once. Here its two passes, forwards and backwards,
 go over blocks and carry the filter's state from one to the next: memory stays flat, and the result
 is sosfiltfilt's, sample for sample, for every block length.
+
+The log is continued past its ends until the filter has forgotten how it started. SciPy's own padding, three
+times the taps, is shorter: at 6 Hz and 100 Hz it leaves a straight ramp of 1.3 m/s an acceleration of 4 m/s²
+at its ends.
 """
+
+import math
 
 import numpy as np
 
@@ -11,6 +17,9 @@ from linkwise.analysis.settings import Lowpass
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
 from linkwise.package.load import Array
+
+FORGOTTEN = 1e-6
+"""What is left of a filter's start behind the padding, in parts of it."""
 
 
 def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: str = "--cutoff") -> None:
@@ -25,19 +34,15 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: s
             f"{flag} {settings.cutoff:g} Hz is not below half the sampling rate of {rate:g} Hz; lower it"
         )
     sos = signal.butter(settings.order, settings.cutoff, fs=rate, output="sos")
-    pad = padding_length(sos) if settings.padding != "none" else 0
-    if len(q) <= pad:
-        raise LinkwiseError(
-            f"{len(q)} samples are too few for the filter's padding of {pad}; lower --filter-order"
-        )
-    front = _extension(q[: pad + 1], settings.padding)
-    back = _extension(q[-1 : -pad - 2 : -1], settings.padding)[::-1]
     try:
         rest = signal.sosfilt_zi(sos)[:, :, None]
     except np.linalg.LinAlgError:  # its poles round to 1
         raise LinkwiseError(
             f"{flag} {settings.cutoff:g} Hz is too low for a sampling rate of {rate:g} Hz; raise it"
         ) from None
+    pad = padding_length(sos, len(q)) if settings.padding != "none" else 0
+    front = _extension(q[: pad + 1], settings.padding)
+    back = _extension(q[-1 : -pad - 2 : -1], settings.padding)[::-1]
     blocks = [(at, min(at + rows, len(q))) for at in range(0, len(q), rows)]
 
     state = rest * (front[0] if pad else q[0])
@@ -53,10 +58,20 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: s
         q[start:stop] = backwards[::-1]
 
 
-def padding_length(sos: Array) -> int:
-    """Samples of padding that sosfiltfilt takes: three times the taps not at the origin."""
+def padding_length(sos: Array, samples: int) -> int:
+    """Samples of padding: until what the filter started with is gone, all but one of the log at most.
+
+    Raises LinkwiseError where not even three times the taps not at the origin, as SciPy takes, are there.
+    """
     taps = 2 * len(sos) + 1 - min((sos[:, 2] == 0).sum(), (sos[:, 5] == 0).sum())
-    return int(3 * taps)
+    least = int(3 * taps)
+    if samples <= least:
+        raise LinkwiseError(
+            f"{samples} samples are too few for the filter's padding of {least}; lower --filter-order"
+        )
+    slowest = max(abs(np.roots(section[3:])).max() for section in sos)
+    decay = math.ceil(math.log(FORGOTTEN) / math.log(slowest)) if slowest < 1.0 else samples
+    return min(max(least, decay), samples - 1)
 
 
 def _passed(sos: Array, x: Array, state: Array) -> tuple[Array, Array]:
