@@ -309,8 +309,9 @@ def test_a_package_and_its_user_are_typed_strictly(tmp_path: Path) -> None:
     write_package(generate(read_system("planar2"), ["numpy", "torch", "autograd"]), tmp_path / "planar2")
     assert (tmp_path / "planar2/py.typed").is_file()
     (tmp_path / "user.py").write_text(USER)
-    # The project's own cache, so that NumPy and torch are read once; the package is read anew.
-    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(ROOT / ".mypy_cache")]
+    # The project's own settings and cache, so that NumPy and torch are read once, by `make lint` say.
+    shared = ("--config-file", str(ROOT / "pyproject.toml"), "--cache-dir", str(ROOT / ".mypy_cache"))
+    command = [sys.executable, "-m", "mypy", "--strict", *shared]
     environment = os.environ | {"MYPYPATH": str(tmp_path)}
     done = subprocess.run(
         [*command, "user.py", "planar2"],
