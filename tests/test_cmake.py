@@ -118,7 +118,9 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Project]:
         if shutil.which(tool):
             project = Project(tool, tmp_path_factory.mktemp(tool) / "my project")
             write_project(project.source)
-            done = project.configure("-DCMAKE_C_FLAGS=-Wall -Wextra -Werror", "-DCMAKE_BUILD_TYPE=Debug")
+            hidden = "-DCMAKE_C_VISIBILITY_PRESET=hidden"  # of what the project exports, not of its robots
+            flags = "-DCMAKE_C_FLAGS=-Wall -Wextra -Werror"
+            done = project.configure(flags, hidden, "-DCMAKE_BUILD_TYPE=Debug")
             assert done.returncode == 0, done.stderr
             project.make("--parallel", "8")
             projects[tool] = project
@@ -270,7 +272,8 @@ def test_a_project_of_cpp_alone_and_one_for_another_machine(tmp_path: Path) -> N
         f'{lists}linkwise_add_robot(arm ROBOT "arm one.urdf")\nadd_executable(in_cpp main.cpp)\n'
         "target_link_libraries(in_cpp PRIVATE arm)\n",
     )
-    assert project.configure("-DBUILD_SHARED_LIBS=ON").returncode == 0
+    hidden = "-DCMAKE_CXX_VISIBILITY_PRESET=hidden"
+    assert project.configure("-DBUILD_SHARED_LIBS=ON", hidden).returncode == 0
     assert "Building CXX object CMakeFiles/arm.dir" in project.make()
     assert len(project.answer("in_cpp")) == 2
 

@@ -162,6 +162,8 @@ function(linkwise_add_robot target)
         PROPERTIES
             POSITION_INDEPENDENT_CODE ON
             WINDOWS_EXPORT_ALL_SYMBOLS ON
+            C_VISIBILITY_PRESET default
+            CXX_VISIBILITY_PRESET default
             LINKER_LANGUAGE ${language}
             PUBLIC_HEADER "${header}"
     )
