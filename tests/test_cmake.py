@@ -253,12 +253,22 @@ def test_an_interrupted_build_leaves_nothing_broken(
 
 
 @each_generator
-def test_the_robots_own_name_may_change(tool: str, tmp_path: Path) -> None:
+def test_a_robot_that_another_folder_makes_may_change_even_its_name(tool: str, tmp_path: Path) -> None:
     project = Project(tool, tmp_path / "renamed")
     lists = LISTS.partition("linkwise_add_robot")[0]
-    write_project(project.source, f'{lists}linkwise_add_robot(arm ROBOT "arm one.urdf")\n')
+    write_project(
+        project.source,
+        f'{lists}add_subdirectory(made)\nlinkwise_add_robot(arm ROBOT "${{CMAKE_BINARY_DIR}}/made/arm.urdf")\n'
+        "add_dependencies(arm description)\n",
+    )
+    (project.source / "made").mkdir()
+    (project.source / "made/CMakeLists.txt").write_text(
+        'set(robot "${CMAKE_SOURCE_DIR}/arm one.urdf")\n'
+        'add_custom_command(OUTPUT arm.urdf COMMAND cmake -E copy "${robot}" arm.urdf DEPENDS "${robot}")\n'
+        "add_custom_target(description DEPENDS arm.urdf)\n"
+    )
     assert project.configure().returncode == 0
-    project.make()
+    project.make("--target", "arm")
     project.robot.write_text(urdf().replace('robot name="test"', 'robot name="best"'))
     assert "Generating" in project.make()
 

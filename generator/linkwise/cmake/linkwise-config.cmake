@@ -54,17 +54,25 @@ if(NOT "${_LINKWISE_ASKED}" STREQUAL "${LINKWISE_EXECUTABLE} ${CMAKE_CURRENT_LIS
 endif()
 
 # In `variable`, the path of a file that a build may make itself, or FILE as it is where it names a built-in robot.
+# CMake knows of no file that a command of another folder makes: a path in a folder of builds is taken at its word.
 function(_linkwise_robot_path variable file)
     cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE OUTPUT_VARIABLE source)
     cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}" NORMALIZE OUTPUT_VARIABLE built)
     get_property(source_is_made SOURCE "${source}" PROPERTY GENERATED)
     get_property(built_is_made SOURCE "${built}" PROPERTY GENERATED)
-    if(source_is_made OR (EXISTS "${source}" AND NOT IS_DIRECTORY "${source}"))
+    cmake_path(IS_PREFIX CMAKE_BINARY_DIR "${source}" NORMALIZE in_build)
+    cmake_path(IS_PREFIX PROJECT_BINARY_DIR "${source}" NORMALIZE in_projects_build)
+    if(IS_ABSOLUTE "${file}" AND (in_build OR in_projects_build))
+        set(source_is_made TRUE)
+    endif()
+    if((EXISTS "${source}" OR source_is_made) AND NOT IS_DIRECTORY "${source}")
         set(found "${source}")
     elseif(built_is_made)
         set(found "${built}")
     elseif(file MATCHES "[./\\]")
-        message(FATAL_ERROR "linkwise_add_robot: ROBOT ${file}: no such file, nor one that a command before makes")
+        message(FATAL_ERROR
+            "linkwise_add_robot: ROBOT ${file}: no such file, nor one that a command before makes; give one that a command of another folder makes by its whole path in the build's folder"
+        )
     else()
         set(found "${file}")
     endif()
