@@ -6,12 +6,13 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 import pytest
 import urdf_text
 from command_line import run_linkwise
 from linkwise import LinkwiseError
+from linkwise.cli import depfile
 from linkwise.cli.depfile import depfile_text
 from needed import needs
 
@@ -257,9 +258,18 @@ def test_names_that_make_has_no_way_to_say_are_refused() -> None:
         depfile_text(["a b"], ["c#d", "e$f", "100%"])
         == "a\\ b: \\\n  c\\#d \\\n  e$$f \\\n  100%\nc\\#d:\ne$$f:\n"
     )
-    assert depfile_text(["t"], ["C:/arm"]).startswith("t: \\\n  C:/arm\n")
-    for name in ("a\nb", "it's", "a&b", "a*", "~a", "ab:c", "a\\b", "a(b)"):
+    for name in ("a\nb", "it's", "a&b", "a*", "~a", "ab:c", "a:b", "C:/arm", "a\\b", "a(b)"):
         with pytest.raises(LinkwiseError, match=" in it, which make and ninja cannot read; rename it, or"):
+            depfile_text(["t"], [name])
+        with pytest.raises(LinkwiseError):
+            depfile_text([name], ["t"])
+
+
+def test_the_colon_of_a_drive_is_one_of_windows_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(depfile, "PurePath", PureWindowsPath)
+    assert depfile_text(["D:/t"], ["C:/arm"]) == "D:/t: \\\n  C:/arm\nC:/arm:\n"
+    for name in ("C:arm", "C:/arm:b", "arm:b"):
+        with pytest.raises(LinkwiseError, match="has ':' in it"):
             depfile_text(["t"], [name])
 
 

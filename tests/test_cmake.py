@@ -258,7 +258,8 @@ def test_a_robot_that_another_folder_makes_may_change_even_its_name(tool: str, t
     lists = LISTS.partition("linkwise_add_robot")[0]
     write_project(
         project.source,
-        f'{lists}add_subdirectory(made)\nlinkwise_add_robot(arm ROBOT "${{CMAKE_BINARY_DIR}}/made/arm.urdf")\n'
+        f"{lists}add_subdirectory(made)\n"
+        'linkwise_add_robot(arm ROBOT "${CMAKE_BINARY_DIR}/made/arm.urdf")\n'
         "add_dependencies(arm description)\n",
     )
     (project.source / "made").mkdir()
