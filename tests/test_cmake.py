@@ -208,9 +208,12 @@ def test_what_a_robots_file_includes_builds_it_again(tool: str, tmp_path: Path) 
 def test_constraints_beside_the_robot_build_it_again(tool: str, tmp_path: Path) -> None:
     project = Project(tool, tmp_path / "bars")
     tree, mark, loop = (Path(__file__).parent / "data/fourbar.toml").read_text().partition("[[constraint]]")
-    options = "OPTIONS --constraints loop.toml"
     lists = LISTS.partition("linkwise_add_robot")[0]
-    write_project(project.source, f"{lists}linkwise_add_robot(bars ROBOT bars.toml STATIC {options})\n")
+    write_project(
+        project.source,
+        f"{lists}linkwise_add_robot(bars ROBOT bars.toml OPTIONS --base fixed --constraints loop.toml)\n"
+        "linkwise_add_robot(same ROBOT bars.toml OPTIONS --base fixed --constraints=loop.toml)\n",
+    )
     (project.source / "bars.toml").write_text(tree)
     (project.source / "loop.toml").write_text(f"schema = 1\n{mark}{loop}")
     assert project.configure().returncode == 0
