@@ -39,6 +39,7 @@ add_executable(in_cpp main.cpp)
 target_link_libraries(in_cpp PRIVATE arm_shared)
 add_executable(in_float float.c)
 target_link_libraries(in_float PRIVATE arm_float)
+add_library(m INTERFACE)
 """
 C = """#include "arm.h"
 #include <stdio.h>

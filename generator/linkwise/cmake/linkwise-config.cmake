@@ -184,7 +184,7 @@ function(linkwise_add_robot target)
     _linkwise_compile_options(${target} ${language})
     target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${package}/c>" "$<INSTALL_INTERFACE:include>")
     if(NOT WIN32 AND NOT APPLE)
-        target_link_libraries(${target} PUBLIC m)
+        target_link_libraries(${target} PUBLIC -lm) # a bare m may be a target of the project
     endif()
 endfunction()
 
