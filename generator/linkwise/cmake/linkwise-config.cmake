@@ -176,6 +176,9 @@ function(linkwise_add_robot target)
             LINKER_LANGUAGE ${language}
             PUBLIC_HEADER "${header}"
     )
+    foreach(tool CLANG_TIDY CPPCHECK CPPLINT INCLUDE_WHAT_YOU_USE)
+        set_property(TARGET ${target} PROPERTY ${language}_${tool}) # for the project's own files
+    endforeach()
     if(language STREQUAL "C")
         target_compile_features(${target} PRIVATE c_std_99)
     else()
