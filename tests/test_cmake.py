@@ -280,6 +280,8 @@ def test_a_robot_that_another_folder_makes_may_change_even_its_name(tool: str, t
     )
     assert project.configure().returncode == 0
     project.make("--target", "arm")
+    rules = {"ninja": "build.ninja", "make": "CMakeFiles/arm.dir/flags.make"}[tool]
+    assert "-fPIC" in (project.build / rules).read_text()  # the library may become part of a shared one
     project.robot.write_text(urdf().replace('robot name="test"', 'robot name="best"'))
     assert "Generating" in project.make()
 
@@ -315,6 +317,7 @@ def test_for_another_machine_nothing_of_it_is_run_nor_found_among_its_programs(t
     assert done.returncode == 0, done.stderr
     project.make("--target", "arm")
     assert (project.build / "libarm.a").is_file()
+    assert "-fPIC" not in (project.build / "build.ninja").read_text()
 
 
 MISTAKES = {

@@ -169,13 +169,15 @@ function(linkwise_add_robot target)
     set_target_properties(
         ${target}
         PROPERTIES
-            POSITION_INDEPENDENT_CODE ON
             WINDOWS_EXPORT_ALL_SYMBOLS ON
             C_VISIBILITY_PRESET default
             CXX_VISIBILITY_PRESET default
             LINKER_LANGUAGE ${language}
             PUBLIC_HEADER "${header}"
     )
+    if(NOT CMAKE_SYSTEM_NAME MATCHES "^Generic") # bare metal: no library is loaded, and such code is slower
+        set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    endif()
     foreach(tool CLANG_TIDY CPPCHECK CPPLINT INCLUDE_WHAT_YOU_USE)
         set_property(TARGET ${target} PROPERTY ${language}_${tool}) # for the project's own files
     endforeach()
