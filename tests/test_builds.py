@@ -332,6 +332,8 @@ def test_the_stamp_is_the_target_and_as_new_as_the_last_run(linkwise: Run, tmp_p
     asked = ("generate", "planar1", *C, "--depfile", "arm.d", "--stamp", "made/arm.stamp")
     assert linkwise(*asked).returncode == 0
     assert (tmp_path / "arm.d").read_text().startswith("made/arm.stamp: \\\n")
+    files = {path.relative_to(tmp_path).as_posix() for path in (tmp_path / "out").rglob("*.[hc]")}
+    assert files <= set(inputs_of(tmp_path / "arm.d"))  # one that is gone is made again
     stamp, manifest = tmp_path / "made/arm.stamp", tmp_path / "out/planar1/manifest.json"
     for path in (stamp, manifest):
         os.utime(path, (1_000_000_000, 1_000_000_000))

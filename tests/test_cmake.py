@@ -193,6 +193,23 @@ def test_touching_the_robot_generates_and_compiles_what_differs_only(
 
 
 @each_generator
+def test_a_file_of_the_package_that_is_gone_or_changed_by_hand_is_made_again(
+    tool: str, built: dict[str, Project]
+) -> None:
+    project = built[tool]
+    package = project.build / "linkwise/arm/arm"
+    before = {path: path.read_bytes() for path in package.rglob("*") if path.is_file()}
+    for name in ("arm.h", "mass.h", "arm.c"):
+        (package / "c" / name).unlink()
+    (package / "c/tree.h").write_text("#error changed by hand\n")
+    assert "Generating the dynamics of arm" in project.make()
+    assert {path: path.read_bytes() for path in package.rglob("*") if path.is_file()} == before
+    said = project.make()
+    assert "Generating" not in said
+    assert "Building" not in said
+
+
+@each_generator
 def test_what_a_robots_file_includes_builds_it_again(tool: str, tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     project = Project(tool, tmp_path / "included")

@@ -133,20 +133,23 @@ function(linkwise_add_robot target)
 
     set(out "${CMAKE_CURRENT_BINARY_DIR}/linkwise/${target}")
     set(package "${out}/${arg_NAME}")
-    set(header "${package}/c/${arg_NAME}.h")
-    set(source "${package}/c/${arg_NAME}.c")
+    set(unit "${arg_NAME}.c")
     if(arg_FLOAT)
-        set(source "${package}/c/${arg_NAME}f.c")
+        set(unit "${arg_NAME}f.c")
     endif()
+    # What is compiled is a file that includes the package's: CMake knows of no file in it. So the rule that linkwise
+    # writes can have them all as inputs of the stamp, and one that is removed or changed by hand is made again.
+    set(source "${out}/${unit}")
+    file(CONFIGURE OUTPUT "${source}" CONTENT "#include \"${arg_NAME}/c/${unit}\"\n")
     # Two files stand for the package. The stamp is as new as the last run: make compares times, and what is generated
     # keeps its own where nothing differs. The copy of the manifest, which has the hash of every file, is as new as the last
-    # difference: by it the library is compiled again, also where only a file differs that CMake does not know of. It is a
-    # copy because an interrupted ninja removes what a command was making.
+    # difference: by it the library is compiled again. It is a copy because an interrupted ninja removes what a command
+    # was making.
     set(stamp "${out}/${arg_NAME}.stamp")
     set(manifest "${out}/${arg_NAME}.manifest.json")
     add_custom_command(
         OUTPUT "${stamp}"
-        BYPRODUCTS "${manifest}" "${header}" "${source}"
+        BYPRODUCTS "${manifest}"
         COMMAND
             "${LINKWISE_EXECUTABLE}" generate "${robot}" --out "${out}" --name "${arg_NAME}" --backend c --replace
             --depfile "${stamp}.d" --stamp "${stamp}" ${options}
@@ -173,7 +176,7 @@ function(linkwise_add_robot target)
             C_VISIBILITY_PRESET default
             CXX_VISIBILITY_PRESET default
             LINKER_LANGUAGE ${language}
-            PUBLIC_HEADER "${header}"
+            PUBLIC_HEADER "${package}/c/${arg_NAME}.h"
     )
     if(NOT CMAKE_SYSTEM_NAME MATCHES "^Generic") # bare metal: no library is loaded, and such code is slower
         set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
