@@ -5,7 +5,7 @@ more than that where nobody watches.
 """
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -227,12 +227,21 @@ def _told_differences(packages: Iterable[tuple[Order, dict[str, str]]], watched:
         if not order.directory.is_dir():
             tell(f"{order.directory} is not there: {counted(len(files), 'file')}")
         elif found:
-            tell(f"{order.directory} is stale: {counted(len(found), 'file')} of {len(files)}")
-            tell(*(f"  {path} {fault}" for path, fault in found.items()))
+            _tell_stale(order.directory, files, found)
         elif watched:
             tell(f"{order.directory} is up to date")
         status = STALE if found else status
     return status
+
+
+def _tell_stale(directory: Path, files: Collection[str], found: dict[str, str]) -> None:
+    kinds: dict[str, list[str]] = {}
+    for path, fault in found.items():
+        kinds.setdefault(fault, []).append(path)
+    gone = len(found.keys() - set(files))
+    more = f", and {gone} that would go" if gone else ""
+    tell(f"{directory} is stale: {counted(len(found) - gone, 'file')} of {len(files)}{more}")
+    tell(*(f"  {fault}: {listed(paths)}" for fault, paths in kinds.items()))
 
 
 def _rule(
