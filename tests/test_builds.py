@@ -7,13 +7,12 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable
 from functools import partial
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 
 import pytest
 import urdf_text
 from command_line import run_linkwise
 from linkwise import LinkwiseError
-from linkwise.cli import depfile
 from linkwise.cli.depfile import depfile_text
 from needed import needs
 
@@ -272,14 +271,6 @@ def test_names_that_make_has_no_way_to_say_are_refused() -> None:
             depfile_text(["t"], [name])
         with pytest.raises(LinkwiseError):
             depfile_text([name], ["t"])
-
-
-def test_the_colon_of_a_drive_is_one_of_windows_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(depfile, "PurePath", PureWindowsPath)
-    assert depfile_text(["D:/t"], ["C:/arm"]) == "D:/t: \\\n  C:/arm\nC:/arm:\n"
-    for name in ("C:arm", "C:/arm:b", "arm:b"):
-        with pytest.raises(LinkwiseError, match="has ':' in it"):
-            depfile_text(["t"], [name])
 
 
 NAMES = ("plain", "two words", "number#1", "cash$", "a$(b)c", "percent%", "größe", "{x},~=@!+")
