@@ -31,14 +31,21 @@ LISTS = """cmake_minimum_required(VERSION 3.20)
 project(robots LANGUAGES C CXX)
 find_package(linkwise CONFIG REQUIRED)
 linkwise_add_robot(arm ROBOT "arm one.urdf" STATIC)
+foreach(tool CLANG_TIDY CPPCHECK CPPLINT INCLUDE_WHAT_YOU_USE)
+    set(CMAKE_C_${tool} false)
+endforeach()
 linkwise_add_robot(arm_shared ROBOT "arm one.urdf" NAME arm SHARED)
 linkwise_add_robot(arm_float ROBOT "arm one.urdf" NAME arm FLOAT)
+foreach(tool CLANG_TIDY CPPCHECK CPPLINT INCLUDE_WHAT_YOU_USE)
+    unset(CMAKE_C_${tool})
+endforeach()
 add_executable(in_c main.c)
 target_link_libraries(in_c PRIVATE arm)
 add_executable(in_cpp main.cpp)
 target_link_libraries(in_cpp PRIVATE arm_shared)
 add_executable(in_float float.c)
 target_link_libraries(in_float PRIVATE arm_float)
+add_library(m INTERFACE)
 """
 C = """#include "arm.h"
 #include <stdio.h>
@@ -118,7 +125,9 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Project]:
         if shutil.which(tool):
             project = Project(tool, tmp_path_factory.mktemp(tool) / "my project")
             write_project(project.source)
-            done = project.configure("-DCMAKE_C_FLAGS=-Wall -Wextra -Werror", "-DCMAKE_BUILD_TYPE=Debug")
+            hidden = "-DCMAKE_C_VISIBILITY_PRESET=hidden"  # of what the project exports, not of its robots
+            flags = "-DCMAKE_C_FLAGS=-Wall -Wextra -Werror"
+            done = project.configure(flags, hidden, "-DCMAKE_BUILD_TYPE=Debug")
             assert done.returncode == 0, done.stderr
             project.make("--parallel", "8")
             projects[tool] = project
@@ -184,6 +193,23 @@ def test_touching_the_robot_generates_and_compiles_what_differs_only(
 
 
 @each_generator
+def test_a_file_of_the_package_that_is_gone_or_changed_by_hand_is_made_again(
+    tool: str, built: dict[str, Project]
+) -> None:
+    project = built[tool]
+    package = project.build / "linkwise/arm/arm"
+    before = {path: path.read_bytes() for path in package.rglob("*") if path.is_file()}
+    for name in ("arm.h", "mass.h", "arm.c"):
+        (package / "c" / name).unlink()
+    (package / "c/tree.h").write_text("#error changed by hand\n")
+    assert "Generating the dynamics of arm" in project.make()
+    assert {path: path.read_bytes() for path in package.rglob("*") if path.is_file()} == before
+    said = project.make()
+    assert "Generating" not in said
+    assert "Building" not in said
+
+
+@each_generator
 def test_what_a_robots_file_includes_builds_it_again(tool: str, tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     project = Project(tool, tmp_path / "included")
@@ -206,9 +232,12 @@ def test_what_a_robots_file_includes_builds_it_again(tool: str, tmp_path: Path) 
 def test_constraints_beside_the_robot_build_it_again(tool: str, tmp_path: Path) -> None:
     project = Project(tool, tmp_path / "bars")
     tree, mark, loop = (Path(__file__).parent / "data/fourbar.toml").read_text().partition("[[constraint]]")
-    options = "OPTIONS --constraints loop.toml"
     lists = LISTS.partition("linkwise_add_robot")[0]
-    write_project(project.source, f"{lists}linkwise_add_robot(bars ROBOT bars.toml STATIC {options})\n")
+    write_project(
+        project.source,
+        f"{lists}linkwise_add_robot(bars ROBOT bars.toml OPTIONS --base fixed --constraints loop.toml)\n"
+        "linkwise_add_robot(same ROBOT bars.toml OPTIONS --base fixed --constraints=loop.toml)\n",
+    )
     (project.source / "bars.toml").write_text(tree)
     (project.source / "loop.toml").write_text(f"schema = 1\n{mark}{loop}")
     assert project.configure().returncode == 0
@@ -251,12 +280,25 @@ def test_an_interrupted_build_leaves_nothing_broken(
 
 
 @each_generator
-def test_the_robots_own_name_may_change(tool: str, tmp_path: Path) -> None:
+def test_a_robot_that_another_folder_makes_may_change_even_its_name(tool: str, tmp_path: Path) -> None:
     project = Project(tool, tmp_path / "renamed")
     lists = LISTS.partition("linkwise_add_robot")[0]
-    write_project(project.source, f'{lists}linkwise_add_robot(arm ROBOT "arm one.urdf")\n')
+    write_project(
+        project.source,
+        f"{lists}add_subdirectory(made)\n"
+        'linkwise_add_robot(arm ROBOT "${CMAKE_BINARY_DIR}/made/arm.urdf")\n'
+        "add_dependencies(arm description)\n",
+    )
+    (project.source / "made").mkdir()
+    (project.source / "made/CMakeLists.txt").write_text(
+        'set(robot "${CMAKE_SOURCE_DIR}/arm one.urdf")\n'
+        'add_custom_command(OUTPUT arm.urdf COMMAND cmake -E copy "${robot}" arm.urdf DEPENDS "${robot}")\n'
+        "add_custom_target(description DEPENDS arm.urdf)\n"
+    )
     assert project.configure().returncode == 0
-    project.make()
+    project.make("--target", "arm")
+    rules = {"ninja": "build.ninja", "make": "CMakeFiles/arm.dir/flags.make"}[tool]
+    assert "-fPIC" in (project.build / rules).read_text()  # the library may become part of a shared one
     project.robot.write_text(urdf().replace('robot name="test"', 'robot name="best"'))
     assert "Generating" in project.make()
 
@@ -270,7 +312,8 @@ def test_a_project_of_cpp_alone_and_one_for_another_machine(tmp_path: Path) -> N
         f'{lists}linkwise_add_robot(arm ROBOT "arm one.urdf")\nadd_executable(in_cpp main.cpp)\n'
         "target_link_libraries(in_cpp PRIVATE arm)\n",
     )
-    assert project.configure("-DBUILD_SHARED_LIBS=ON").returncode == 0
+    hidden = "-DCMAKE_CXX_VISIBILITY_PRESET=hidden"
+    assert project.configure("-DBUILD_SHARED_LIBS=ON", hidden).returncode == 0
     assert "Building CXX object CMakeFiles/arm.dir" in project.make()
     assert len(project.answer("in_cpp")) == 2
 
@@ -291,6 +334,7 @@ def test_for_another_machine_nothing_of_it_is_run_nor_found_among_its_programs(t
     assert done.returncode == 0, done.stderr
     project.make("--target", "arm")
     assert (project.build / "libarm.a").is_file()
+    assert "-fPIC" not in (project.build / "build.ninja").read_text()
 
 
 MISTAKES = {

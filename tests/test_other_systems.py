@@ -14,6 +14,7 @@ from pathlib import Path, PureWindowsPath
 import pytest
 import urdf_text
 from linkwise import LinkwiseError, generate, read_system
+from linkwise.cli import depfile
 from linkwise.cli.depfile import depfile_text
 from linkwise.emit.assemble import DEVICES, checked_identifier
 from linkwise.runtime.native.native_build import STACK, Sources, library, require_stack
@@ -274,12 +275,16 @@ def test_backslashes_and_blanks_of_cc_are_those_of_a_path() -> None:
     assert Windows().words(r'"C:\Program Files\gcc.exe" -m64') == [r"C:\Program Files\gcc.exe", "-m64"]
 
 
-def test_a_depfile_has_slashes_and_drives() -> None:
+def test_a_depfile_has_slashes_and_drives(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(depfile, "PurePath", PureWindowsPath)
     robot = PureWindowsPath(r"C:\my robots\arm.urdf").as_posix()
     assert depfile_text(["C:/made/arm.stamp"], [robot]).splitlines()[:2] == [
         "C:/made/arm.stamp: \\",
         r"  C:/my\ robots/arm.urdf",
     ]
+    for name in ("C:arm", "C:/arm:b", "arm:b"):
+        with pytest.raises(LinkwiseError, match="has ':' in it"):
+            depfile_text(["t"], [name])
 
 
 def test_files_of_packages_can_be_on_every_system() -> None:

@@ -11,7 +11,7 @@ import sys
 import sysconfig
 from collections.abc import Iterable, Iterator
 from importlib import import_module, metadata
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from linkwise.errors import LinkwiseError
 
@@ -20,8 +20,8 @@ HOMES = ("linkwise", "linkwise.templates")
 MAKERS = ("linkwise", "sympy", "mujoco")
 INSTALLED = {"site-packages", "dist-packages"}
 SPOKEN = str.maketrans({" ": "\\ ", "#": "\\#", "$": "$$"})
-UNFIT = re.compile(r"""[\x00-\x1f"&'*;<>?\[\\\]^`|]|^~|(?<!^[A-Za-z]):|\)$""")
-"""What make or ninja has no way to say in a file's name, or each a way of its own; a drive has its colon."""
+UNFIT = re.compile(r"""[\x00-\x1f"&'*;<>?\[\\\]^`|:]|^~|\)$""")
+"""What make or ninja has no way to say in a file's name, or each a way of its own."""
 PATTERN = re.compile("[%=+!]")
 """What makes something else of a line of make that begins with a file's name."""
 
@@ -71,7 +71,9 @@ def _record(distribution: str) -> Iterator[str]:
 
 
 def _spoken(name: str) -> str:
-    wrong = UNFIT.search(name)
+    path = PurePath(name)
+    drive = path.drive if path.is_absolute() else ""  # C:/arm of Windows, where alone make takes its colon
+    wrong = UNFIT.search(name.removeprefix(drive))
     if wrong is not None:
         raise LinkwiseError(
             f"--depfile: {name!r} has {wrong[0]!r} in it, which make and ninja cannot read; rename it, or "

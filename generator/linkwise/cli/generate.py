@@ -5,7 +5,7 @@ more than that where nobody watches.
 """
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -144,7 +144,7 @@ def generate(
         return
     if check:
         raise typer.Exit(_told_differences(packages, watched))
-    rule = "" if depfile is None else _rule(orders, options, stamp, before)
+    rule = "" if depfile is None else _rule(packages, options, stamp, before)
     for order, files in packages:
         written = write_package(files, order.directory, replace)
         for effect in effects(order.system.notes, details):
@@ -227,21 +227,42 @@ def _told_differences(packages: Iterable[tuple[Order, dict[str, str]]], watched:
         if not order.directory.is_dir():
             tell(f"{order.directory} is not there: {counted(len(files), 'file')}")
         elif found:
-            tell(f"{order.directory} is stale: {counted(len(found), 'file')} of {len(files)}")
-            tell(*(f"  {path} {fault}" for path, fault in found.items()))
+            _tell_stale(order.directory, files, found)
         elif watched:
             tell(f"{order.directory} is up to date")
         status = STALE if found else status
     return status
 
 
-def _rule(orders: Iterable[Order], options: Options, stamp: Path | None, before: Iterable[str]) -> str:
-    """Text of the depfile."""
-    inputs = [path.as_posix() for order in orders for path in robot_files(order.robot, options)]
-    manifests = [(order.directory / FILE).as_posix() for order in orders]
-    targets = manifests if stamp is None else [stamp.as_posix()]
+def _tell_stale(directory: Path, files: Collection[str], found: dict[str, str]) -> None:
+    kinds: dict[str, list[str]] = {}
+    for path, fault in found.items():
+        kinds.setdefault(fault, []).append(path)
+    gone = len(found.keys() - set(files))
+    more = f", and {gone} that would go" if gone else ""
+    tell(f"{directory} is stale: {counted(len(found) - gone, 'file')} of {len(files)}{more}")
+    tell(*(f"  {fault}: {listed(paths)}" for fault, paths in kinds.items()))
+
+
+def _rule(
+    packages: Iterable[tuple[Order, dict[str, str]]],
+    options: Options,
+    stamp: Path | None,
+    before: Iterable[str],
+) -> str:
+    """Text of the depfile.
+
+    A stamp stands for the packages: it is older than none of their files, and without one of them it is void.
+    """
+    inputs = [path.as_posix() for order, _ in packages for path in robot_files(order.robot, options)]
     imported = own_modules(before) if any(name.endswith(".py") for name in inputs) else ()
-    return depfile_text(targets, (*inputs, *imported, *generator_files()))
+    made = [order.directory / path for order, files in packages for path in sorted(files)]
+    targets = [path for path in made if path.name == FILE] if stamp is None else [stamp]
+    own = () if stamp is None else made
+    return depfile_text(
+        (path.as_posix() for path in targets),
+        (*inputs, *imported, *(path.as_posix() for path in own), *generator_files()),
+    )
 
 
 def _tell_written(order: Order, files: int, written: bool) -> None:

@@ -54,17 +54,25 @@ if(NOT "${_LINKWISE_ASKED}" STREQUAL "${LINKWISE_EXECUTABLE} ${CMAKE_CURRENT_LIS
 endif()
 
 # In `variable`, the path of a file that a build may make itself, or FILE as it is where it names a built-in robot.
+# CMake knows of no file that a command of another folder makes: a path in a folder of builds is taken at its word.
 function(_linkwise_robot_path variable file)
     cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE OUTPUT_VARIABLE source)
     cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}" NORMALIZE OUTPUT_VARIABLE built)
     get_property(source_is_made SOURCE "${source}" PROPERTY GENERATED)
     get_property(built_is_made SOURCE "${built}" PROPERTY GENERATED)
-    if(source_is_made OR (EXISTS "${source}" AND NOT IS_DIRECTORY "${source}"))
+    cmake_path(IS_PREFIX CMAKE_BINARY_DIR "${source}" NORMALIZE in_build)
+    cmake_path(IS_PREFIX PROJECT_BINARY_DIR "${source}" NORMALIZE in_projects_build)
+    if(IS_ABSOLUTE "${file}" AND (in_build OR in_projects_build))
+        set(source_is_made TRUE)
+    endif()
+    if((EXISTS "${source}" OR source_is_made) AND NOT IS_DIRECTORY "${source}")
         set(found "${source}")
     elseif(built_is_made)
         set(found "${built}")
     elseif(file MATCHES "[./\\]")
-        message(FATAL_ERROR "linkwise_add_robot: ROBOT ${file}: no such file, nor one that a command before makes")
+        message(FATAL_ERROR
+            "linkwise_add_robot: ROBOT ${file}: no such file, nor one that a command before makes; give one that a command of another folder makes by its whole path in the build's folder"
+        )
     else()
         set(found "${file}")
     endif()
@@ -113,7 +121,8 @@ function(linkwise_add_robot target)
     endif()
     set(options)
     set(before)
-    foreach(option IN LISTS arg_OPTIONS)
+    string(REGEX REPLACE "(^|;)--constraints=" "\\1--constraints;" asked "${arg_OPTIONS}")
+    foreach(option IN LISTS asked)
         # The depfile has paths as they were given, and CMake takes them from the folder of the build.
         if(before STREQUAL "--constraints")
             cmake_path(ABSOLUTE_PATH option BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
@@ -124,20 +133,23 @@ function(linkwise_add_robot target)
 
     set(out "${CMAKE_CURRENT_BINARY_DIR}/linkwise/${target}")
     set(package "${out}/${arg_NAME}")
-    set(header "${package}/c/${arg_NAME}.h")
-    set(source "${package}/c/${arg_NAME}.c")
+    set(unit "${arg_NAME}.c")
     if(arg_FLOAT)
-        set(source "${package}/c/${arg_NAME}f.c")
+        set(unit "${arg_NAME}f.c")
     endif()
+    # What is compiled is a file that includes the package's: CMake knows of no file in it. So the rule that linkwise
+    # writes can have them all as inputs of the stamp, and one that is removed or changed by hand is made again.
+    set(source "${out}/${unit}")
+    file(CONFIGURE OUTPUT "${source}" CONTENT "#include \"${arg_NAME}/c/${unit}\"\n")
     # Two files stand for the package. The stamp is as new as the last run: make compares times, and what is generated
     # keeps its own where nothing differs. The copy of the manifest, which has the hash of every file, is as new as the last
-    # difference: by it the library is compiled again, also where only a file differs that CMake does not know of. It is a
-    # copy because an interrupted ninja removes what a command was making.
+    # difference: by it the library is compiled again. It is a copy because an interrupted ninja removes what a command
+    # was making.
     set(stamp "${out}/${arg_NAME}.stamp")
     set(manifest "${out}/${arg_NAME}.manifest.json")
     add_custom_command(
         OUTPUT "${stamp}"
-        BYPRODUCTS "${manifest}" "${header}" "${source}"
+        BYPRODUCTS "${manifest}"
         COMMAND
             "${LINKWISE_EXECUTABLE}" generate "${robot}" --out "${out}" --name "${arg_NAME}" --backend c --replace
             --depfile "${stamp}.d" --stamp "${stamp}" ${options}
@@ -160,11 +172,18 @@ function(linkwise_add_robot target)
     set_target_properties(
         ${target}
         PROPERTIES
-            POSITION_INDEPENDENT_CODE ON
             WINDOWS_EXPORT_ALL_SYMBOLS ON
+            C_VISIBILITY_PRESET default
+            CXX_VISIBILITY_PRESET default
             LINKER_LANGUAGE ${language}
-            PUBLIC_HEADER "${header}"
+            PUBLIC_HEADER "${package}/c/${arg_NAME}.h"
     )
+    if(NOT CMAKE_SYSTEM_NAME MATCHES "^Generic") # bare metal: no library is loaded, and such code is slower
+        set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    endif()
+    foreach(tool CLANG_TIDY CPPCHECK CPPLINT INCLUDE_WHAT_YOU_USE)
+        set_property(TARGET ${target} PROPERTY ${language}_${tool}) # for the project's own files
+    endforeach()
     if(language STREQUAL "C")
         target_compile_features(${target} PRIVATE c_std_99)
     else()
@@ -173,7 +192,7 @@ function(linkwise_add_robot target)
     _linkwise_compile_options(${target} ${language})
     target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${package}/c>" "$<INSTALL_INTERFACE:include>")
     if(NOT WIN32 AND NOT APPLE)
-        target_link_libraries(${target} PUBLIC m)
+        target_link_libraries(${target} PUBLIC -lm) # a bare m may be a target of the project
     endif()
 endfunction()
 
