@@ -1,7 +1,6 @@
 """The page in a real browser: no error, the slider moves the map, the numbers are the file's."""
 
 import json
-import shutil
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -27,27 +26,9 @@ from linkwise.analysis.term_rows import term_rows
 from linkwise.analysis.work import Work
 from linkwise.progress import silent
 from motion_logs import LEG, PLANAR3, smooth, write_csv
-from needed import missing
 from selenium.webdriver.support.wait import WebDriverWait
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def driver():
-    webdriver = pytest.importorskip("selenium.webdriver", reason="needs selenium: pip install selenium")
-    browser = shutil.which("chromium-browser") or shutil.which("chromium")
-    service = shutil.which("chromedriver")
-    if absent := missing(*(["chromium"] if browser is None else []), "chromedriver"):
-        pytest.skip(absent)
-    options = webdriver.ChromeOptions()
-    options.binary_location = browser
-    for flag in ("headless=new", "no-sandbox", "disable-gpu", "disable-background-networking"):
-        options.add_argument(f"--{flag}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options, webdriver.ChromeService(service))
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture(scope="module")
