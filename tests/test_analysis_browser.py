@@ -90,6 +90,20 @@ def test_slider_moves_the_map_to_the_files_numbers(page, result):
     assert seen[0] != seen[1] != seen[2]
 
 
+def test_what_rounding_leaves_is_shown_as_nothing(driver, tmp_path):
+    log = smooth(300, 3)
+    log[:, 2] = 0.3 + 1e-15 * np.sin(40 * log[:, 0])
+    path, robot = write_csv(tmp_path / "log.csv", log), load_robot(PLANAR3)
+    analyze_to(tmp_path / "out", path, robot, Reading(), Processing(), Wanted(), silent)
+    driver.get((tmp_path / "out" / "report.html").as_uri())
+    choose(driver, "slider", 150)
+    _, numbers = shown_map(driver)
+    text = driver.execute_script("return document.getElementById('map').data[0].text")
+    small = {(i, k) for i in range(3) for k in range(6) if abs(numbers[i][k]) < 1e-10}
+    assert {(0, 1), (1, 1), (2, 1)} <= {at for at in small if numbers[at[0]][at[1]] != 0.0}
+    assert {(i, k) for i in range(3) for k in range(6) if text[i][k] == "0"} == small
+
+
 def test_numbers_in_the_table_are_the_files(page, result):
     table = pq.read_table(result / "analysis.parquet")
     choose(page, "slider", 321)
