@@ -56,7 +56,7 @@ def command_of(app: typer.Typer) -> Any:
 
 
 def readable(command: Any) -> Any:
-    """The command with nothing behind a switch, and behind an option that may be repeated its name in capitals.
+    """The command with nothing behind its switches, and names in capitals behind what may be repeated.
 
     Typer itself shows types of Python there, <bool> and <list[str]>.
     """

@@ -30,7 +30,9 @@ def robot_options(
             "zeros, which keeps formulas short"
         ),
     ] = "numeric",
-    lock: Annotated[list[str] | None, _flag(metavar="JOINT=VALUE", help="Hold a joint; may be repeated")] = None,
+    lock: Annotated[
+        list[str] | None, _flag(metavar="JOINT=VALUE", help="Hold a joint; may be repeated")
+    ] = None,
     base: Annotated[Literal["fixed", "floating"], _flag(help="How the root link is held")] = "fixed",
     root: Annotated[str | None, _flag(help="Keep only this link and what it carries")] = None,
     tip: Annotated[str | None, _flag(help="Keep only the chain of links to this one")] = None,
@@ -53,7 +55,7 @@ def robot_options(
         _flag(
             metavar="JOINT",
             help="Joints whose motion gives that of all others under the constraints: A,B; may be repeated, "
-            "as for names with a comma; chosen by pivoting unless given"
+            "as for names with a comma; chosen by pivoting unless given",
         ),
     ] = None,
 ) -> Options:
