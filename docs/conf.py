@@ -4,10 +4,13 @@ import re
 import sys
 from pathlib import Path
 
+import sphinxcontrib.typer
+from linkwise.cli.app import command_of
 from linkwise.version import VERSION
 from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for generated.planar3
+sphinxcontrib.typer.get_typer_command = command_of  # so that pages show options as `--help` does
 
 project = "linkwise"
 release = version = VERSION
@@ -25,6 +28,7 @@ html_copy_source = False
 html_static_path = ["_static"]
 html_css_files = ["width.css"]
 
+smartquotes = False  # they make an en dash of the hyphens of --parameters
 myst_heading_anchors = 3
 myst_links_external_new_tab = False
 suppress_warnings: list[str] = []

@@ -5,16 +5,18 @@ import os
 # Before NumPy and torch: two files run at a time, and threads that wait for a busy core cost torch ten times.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import shutil
 import sysconfig
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
-from needed import needs
+from needed import missing, needs
 
 DATA = Path(__file__).parent / "data"
 PANDA = (
@@ -60,6 +62,24 @@ def directory_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Pa
 def package_of(directory_of: Callable[[str], Path]) -> Callable[[str], ModuleType]:
     """Imported package of a robot."""
     return lambda robot: import_package(directory_of(robot))
+
+
+@pytest.fixture(scope="module")
+def driver() -> Iterator[Any]:
+    """A headless Chromium."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="needs selenium: pip install selenium")
+    browser = shutil.which("chromium-browser") or shutil.which("chromium")
+    service = shutil.which("chromedriver")
+    if absent := missing(*(["chromium"] if browser is None else []), "chromedriver"):
+        pytest.skip(absent)
+    options = webdriver.ChromeOptions()
+    options.binary_location = browser
+    for flag in ("headless=new", "no-sandbox", "disable-gpu", "disable-background-networking"):
+        options.add_argument(f"--{flag}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options, webdriver.ChromeService(service))
+    yield driver
+    driver.quit()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -1,7 +1,6 @@
 """The page in a real browser: no error, the slider moves the map, the numbers are the file's."""
 
 import json
-import shutil
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -27,27 +26,9 @@ from linkwise.analysis.term_rows import term_rows
 from linkwise.analysis.work import Work
 from linkwise.progress import silent
 from motion_logs import LEG, PLANAR3, smooth, write_csv
-from needed import missing
 from selenium.webdriver.support.wait import WebDriverWait
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def driver():
-    webdriver = pytest.importorskip("selenium.webdriver", reason="needs selenium: pip install selenium")
-    browser = shutil.which("chromium-browser") or shutil.which("chromium")
-    service = shutil.which("chromedriver")
-    if absent := missing(*(["chromium"] if browser is None else []), "chromedriver"):
-        pytest.skip(absent)
-    options = webdriver.ChromeOptions()
-    options.binary_location = browser
-    for flag in ("headless=new", "no-sandbox", "disable-gpu", "disable-background-networking"):
-        options.add_argument(f"--{flag}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options, webdriver.ChromeService(service))
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture(scope="module")
@@ -107,6 +88,20 @@ def test_slider_moves_the_map_to_the_files_numbers(page, result):
                     assert numbers[i][column] == pytest.approx(sum(terms), rel=1e-13, abs=1e-300)
         assert page.find_element("id", "now").text == f"{row['time']:.2f} s"
     assert seen[0] != seen[1] != seen[2]
+
+
+def test_what_rounding_leaves_is_shown_as_nothing(driver, tmp_path):
+    log = smooth(300, 3)
+    log[:, 2] = 0.3 + 1e-15 * np.sin(40 * log[:, 0])
+    path, robot = write_csv(tmp_path / "log.csv", log), load_robot(PLANAR3)
+    analyze_to(tmp_path / "out", path, robot, Reading(), Processing(), Wanted(), silent)
+    driver.get((tmp_path / "out" / "report.html").as_uri())
+    choose(driver, "slider", 150)
+    _, numbers = shown_map(driver)
+    text = driver.execute_script("return document.getElementById('map').data[0].text")
+    small = {(i, k) for i in range(3) for k in range(6) if abs(numbers[i][k]) < 1e-10}
+    assert {(0, 1), (1, 1), (2, 1)} <= {at for at in small if numbers[at[0]][at[1]] != 0.0}
+    assert {(i, k) for i in range(3) for k in range(6) if text[i][k] == "0"} == small
 
 
 def test_numbers_in_the_table_are_the_files(page, result):

@@ -99,6 +99,8 @@ def test_check_prints_the_largest_error_of_each(linkwise: Run, planar2: Path) ->
     assert "largest relative error" in done.stdout
     results = json.loads(linkwise("check", planar2, "--samples", 5, "--json").stdout)
     assert all(result["passed"] for result in results)
+    *_, last = done.stdout.splitlines()
+    assert last == f"all {len(results)} checks held"
     assert {"name", "passed", "error", "detail", "mark"} == set(results[0])
 
 

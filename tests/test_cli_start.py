@@ -13,7 +13,7 @@ from pathlib import Path
 import linkwise
 import pytest
 import typer
-from linkwise.cli.app import COMMANDS, REPORTS
+from linkwise.cli.app import COMMANDS, REPORTS, readable
 from linkwise.cli.options import robot_options
 from linkwise.robot import DESCRIPTIONS, Options
 from typer.core import TyperGroup
@@ -87,6 +87,17 @@ def command(name: str) -> typer.core.TyperCommand:
 
 
 FILES = {**COMMANDS, **{f"report_{name}": line for name, line in REPORTS.items()}}
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_help_shows_no_type_of_python_behind_switches_and_repeated_options(file: str) -> None:
+    shown = readable(command(file))
+    options = [*shown.params, shown.get_help_option(typer.Context(shown))]
+    switches = [option for option in options if getattr(option, "is_flag", False)]
+    assert {"help"} <= {option.name for option in switches}
+    assert {option.metavar for option in switches} == {""}
+    repeated = [option.metavar for option in options if getattr(option, "multiple", False)]
+    assert all(re.match("[A-Z]", metavar) for metavar in repeated)
 
 
 @pytest.mark.parametrize("file", FILES)

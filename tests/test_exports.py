@@ -135,6 +135,41 @@ def test_bodies_are_held_by_the_module(package_of: Packages) -> None:
     )
 
 
+# torch says so of index tensors that share memory; what is loaded again is compared.
+@pytest.mark.filterwarnings("ignore:No complete tensor found in the group:UserWarning")
+@pytest.mark.parametrize("call", ["inverse_dynamics", "coefficients"])
+def test_autograd_is_exported_with_its_gradients_and_compiled_but_onnx_rounds_its_numbers(
+    call: str, package_of: Packages
+) -> None:
+    package = package_of("planar2")
+    module, count = exported.module_of(package.load("autograd"), call)
+    oracle = exported.module_of(package.load("torch"), call)[0]
+    example = [a.requires_grad_() for a in exported.motion(module.robot, count, 4)]
+    program = exported.exported(module, example)
+    run, compiled = exported.in_onnx(program), torch.compile(module, fullgraph=True, backend="aot_eager")
+    for samples in (7, 1, 0):
+        given = exported.motion(module.robot, count, samples, seed=samples)
+        expected = oracle(*given)
+        for found in (program.module()(*given), compiled(*given)):
+            assert exported.error(found, expected) <= 1e-12
+        rounded = exported.error(dict(enumerate(run(*given))), expected)
+        assert rounded <= 1e-7 if samples == 0 else 1e-9 < rounded <= 1e-7
+    given = [a.requires_grad_() for a in exported.motion(module.robot, count, 3)]
+    answers = (program.module()(*given), oracle(*given))
+    sums = [sum(a.sum() for a in exported.results(answer)) for answer in answers]
+    for found, wanted in zip(*(torch.autograd.grad(one, given) for one in sums), strict=True):
+        assert relative_error(found, wanted) <= 1e-12
+    with pytest.raises(Exception, match="Dynamo"):
+        torch.export.export(module, exported.motion(module.robot, count, 4), strict=True)
+
+
+def test_an_example_of_one_sample_or_none_fixes_their_number(planar2: Any) -> None:
+    module = planar2.module("energy")
+    for samples in (0, 1):
+        with pytest.raises(Exception, match="Constraints violated"):
+            exported.exported(module, exported.motion(planar2, 2, samples))
+
+
 def test_a_module_of_autograd_learns_the_robots_numbers(package_of: Packages) -> None:
     robot = package_of("planar2").load("autograd", requires_grad="mass")
     module, given = robot.module("coefficients"), exported.motion(robot, 2, 3)

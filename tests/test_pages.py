@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pages
 import pytest
@@ -69,7 +70,10 @@ def test_a_page_leads_to_what_is_there(page: Path) -> None:
             assert anchor in slugs, f"{page.name}: {target}"
 
 
-def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The documentation as `make docs` makes it."""
+    folder = tmp_path_factory.mktemp("site")
     command = [
         sys.executable,
         "-m",
@@ -78,11 +82,38 @@ def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
         "--fail-on-warning",
         "--keep-going",
         "docs",
-        str(tmp_path),
+        str(folder),
     ]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "index.html").is_file()
+    return folder
+
+
+def test_the_documentation_builds_without_a_warning(site: Path) -> None:
+    assert (site / "index.html").is_file()
+
+
+TOO_WIDE = """
+const scrolls = (e) => e && !e.matches(".content")
+    && (["auto", "scroll"].includes(getComputedStyle(e).overflowX) || scrolls(e.parentElement));
+const wide = [...document.querySelectorAll(".content, .content *")]
+    .filter((e) => e.getBoundingClientRect().right > innerWidth + 0.5 && !scrolls(e.parentElement));
+const whole = document.documentElement;
+return [...wide, ...(whole.scrollWidth > innerWidth ? [whole] : [])].map((e) => e.outerHTML.slice(0, 80));
+"""
+"""What of a page ends right of its window, but for what scrolls by itself; the whole where its drawers do."""
+
+
+@pytest.mark.browser
+def test_no_page_is_wider_than_its_window(site: Path, driver: Any) -> None:
+    for page in sorted(site.rglob("*.html")):
+        if "_static" in page.relative_to(site).parts:
+            continue
+        driver.get(page.as_uri())
+        for width in (400, 1100, 1366):
+            size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+            driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+            assert driver.execute_script(TOO_WIDE) == [], f"{page.name} at {width}"
 
 
 def test_every_command_has_a_page_and_a_line_in_the_readme() -> None:

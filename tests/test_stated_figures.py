@@ -56,6 +56,13 @@ def test_numbers_and_operations_of_panda(
     assert sum(map(len, package_of(str(PANDA)).load("numpy").layout)) == numbers
 
 
+def test_the_readme_says_of_accuracy_what_the_table_of_promises_says() -> None:
+    pinocchio, others = stated(r"link by link, about ([\de-]+) of the largest apart; .*? within ([\de-]+) -")
+    assert stated(r"of the largest; about ([\de-]+) is reached") == (pinocchio,)
+    for name in ("mujoco", "sympy", "opensim"):
+        assert stated(rf"`tests/numeric/test_against_{name}\.py`[^|]*\| ([\de-]+)\b") == (others,)
+
+
 def test_counts_of_the_corpus_are_those_that_make_corpus_holds() -> None:
     pattern = r"runs the (\d+) URDFs .*? 1 to 101 joints: (\d+) generate as they are, (\d+) need"
     whole, plain, helped = stated(pattern)

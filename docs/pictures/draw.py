@@ -21,7 +21,8 @@ from pages import run_page  # noqa: E402
 
 LENGTHS = (0.30, 0.26, 0.17)
 COLOUR_OF = {"shoulder": VERMILION, "elbow": BLUE, "wrist": GREEN}
-INSTANT = 0.3
+INSTANT, BEGIN = 0.3, 0.1
+"""In s of the log: what is drawn, and when the shoulder begins to swing."""
 
 
 def places(q: np.ndarray) -> np.ndarray:
@@ -58,7 +59,7 @@ def _arm(axis: Any, throw: Any, now: int) -> None:
     axis.set_aspect("equal")
     axis.set_xlim(-0.42, 0.74)
     axis.axis("off")
-    axis.set_title(f"a throw, {INSTANT:g} s after it began")
+    axis.set_title(f"a throw, {INSTANT - BEGIN:.1g} s after it began")
 
 
 def _loads(axis: Any, throw: Any, now: int) -> None:

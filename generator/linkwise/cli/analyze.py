@@ -74,7 +74,10 @@ ConstantLoads = Annotated[
 ]
 LoadFiles = Annotated[
     list[Path] | None,
-    typer.Option(help="Log of loads, columns BODY/force_x …, or OpenSim's external loads; may be repeated"),
+    typer.Option(
+        metavar="FILE",
+        help="Log of loads, columns BODY/force_x …, or OpenSim's external loads; may be repeated",
+    ),
 ]
 LoadsCutoff = Annotated[
     float | None, typer.Option(help="Zero-phase low-pass for these loads, Hz; no filter if not given")

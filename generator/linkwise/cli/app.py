@@ -44,10 +44,29 @@ class OnDemand(TyperGroup):
         """Put the command itself in place of the entry that `--help` lists."""
         name, command, rest = super().resolve_command(ctx, args)
         if command is None or isinstance(command, TyperGroup):
-            return name, command, rest
+            return name, command and readable(command), rest
         group = f"{self.name}_" if self.name else ""
         module = import_module(f"linkwise.cli.{group}{command.name}")
-        return name, typer.main.get_command(module.app), rest
+        return name, command_of(module.app), rest
+
+
+def command_of(app: typer.Typer) -> Any:
+    """The command of `app`, as `--help` and the documentation show it."""
+    return readable(typer.main.get_command(app))
+
+
+def readable(command: Any) -> Any:
+    """The command with nothing behind its switches, and names in capitals behind what may be repeated.
+
+    Typer itself shows types of Python there, <bool> and <list[str]>.
+    """
+    helps = command.get_help_option(typer.Context(command))
+    for option in filter(None, (*command.params, helps)):
+        if option.metavar is None and getattr(option, "is_flag", False):
+            option.metavar = ""
+        elif option.metavar is None and getattr(option, "multiple", False):
+            option.metavar = option.opts[0].lstrip("-").upper()
+    return command
 
 
 def _group(title: str, commands: dict[str, str], epilog: str | None = None) -> typer.Typer:
@@ -111,7 +130,7 @@ def main() -> None:
         warnings.simplefilter("ignore")  # of libraries, to programmers
     status = 0
     with ended_in_one_line():
-        command = typer.main.get_command(app)
+        command = command_of(app)
         try:
             # Not by calling it, which ends the program at a closed pipe, and at Ctrl-C, in ways of its own.
             called = "python -m linkwise" if sys.argv[0].endswith("__main__.py") else "linkwise"

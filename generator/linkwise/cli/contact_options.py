@@ -34,6 +34,7 @@ Measured = Annotated[
     list[Path] | None,
     typer.Option(
         "--contact-loads",
+        metavar="FILE",
         help="Loads measured at the contacts, read as --loads are: each contact is on while they come to"
         " more than --contact-threshold, and they load nothing; may be repeated",
     ),

@@ -18,7 +18,7 @@ RobotNames = Annotated[list[str], typer.Argument(help=DESCRIPTIONS)]
 PANEL = "Reading the robot"
 
 
-def _flag(*names: str, help: str) -> Any:
+def _flag(*names: str, help: str, metavar: str | None = None) -> Any:
     return typer.Option(*names, help=help, rich_help_panel=PANEL)
 
 
@@ -30,7 +30,9 @@ def robot_options(
             "zeros, which keeps formulas short"
         ),
     ] = "numeric",
-    lock: Annotated[list[str] | None, _flag(help="Hold a joint: JOINT=VALUE; may be repeated")] = None,
+    lock: Annotated[
+        list[str] | None, _flag(metavar="JOINT=VALUE", help="Hold a joint; may be repeated")
+    ] = None,
     base: Annotated[Literal["fixed", "floating"], _flag(help="How the root link is held")] = "fixed",
     root: Annotated[str | None, _flag(help="Keep only this link and what it carries")] = None,
     tip: Annotated[str | None, _flag(help="Keep only the chain of links to this one")] = None,
@@ -51,8 +53,9 @@ def robot_options(
     independent: Annotated[
         list[str] | None,
         _flag(
+            metavar="JOINT",
             help="Joints whose motion gives that of all others under the constraints: A,B; may be repeated, "
-            "as for names with a comma; chosen by pivoting unless given"
+            "as for names with a comma; chosen by pivoting unless given",
         ),
     ] = None,
 ) -> Options:
