@@ -1,5 +1,5 @@
-/* Zeros and copies: the C library's memset and memcpy, which not every microcontroller brings, are not called by name. The
-   same in every package of linkwise. */
+/* Zeros and copies: the C library's memset and memcpy, which not every microcontroller brings, are not called by name;
+   compilers may. The same in every package of linkwise. */
 #ifndef LINKWISE_ARRAYS_H
 #define LINKWISE_ARRAYS_H
 

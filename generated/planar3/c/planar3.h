@@ -40,8 +40,9 @@
    entry e of sample b of a block is at (block * PLANAR3_C2 + e) * PLANAR3_BLOCK + b in c2, and likewise in the other
    arrays, q, qd and qdd among them. It is the fastest, the more so where arrays start on a cache line.
    No function allocates, and none has state: they may run at the same time. Of the C library they call what math.h
-   declares. Results wait on the stack, of which none takes more than 37,760 bytes in either number type, with -O1 or
-   more and what math.h's functions take apart.
+   declares; of copies and zeros, compilers may make calls of memcpy, memmove and memset. Results wait on the stack,
+   of which none takes more than 37,760 bytes in either number type, with -O1 or more and what math.h's functions
+   take apart.
 
    For microcontrollers, -DLINKWISE_SMALL has samples computed one by one: less stack and code, and no function on blocks.
    Then functions take at most 9,484 bytes of stack in double and 5,492 in float, and those of torques,

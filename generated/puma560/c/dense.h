@@ -71,7 +71,9 @@ static inline void SIZED(to_squares)(int first, int last, const real *g, size_t 
 static inline void SIZED(to_sums)(int first, int last, const real *tau, size_t samples, real *rows)
 {
     for (int j = first; j < last; ++j)
-        for (int x = path_start[j]; x < path_start[j + 1]; ++x, tau += W)
+        for (int x = path_start[j]; x < path_start[j + 1]; ++x, tau += W) {
+            const size_t i = (size_t)path[x];
             for (size_t b = 0; b < samples; ++b)
-                rows[b * N + (size_t)path[x]] += tau[b];
+                rows[b * N + i] += tau[b];
+        }
 }

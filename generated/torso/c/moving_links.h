@@ -102,7 +102,8 @@ static inline void keep(const struct sample *s, const real *inertia, const real 
                 kept[k * N + i] += inertia[(k * LINKS + (size_t)j) * N + i] * c2;
             }
             for (int b = 0; damping && b < length; ++b) {
-                const real part = damping[row + (size_t)joint[b]] * velocity[joint[b]];
+                const size_t k = (size_t)joint[b];
+                const real part = damping[row + k] * velocity[k];
                 felt.z = add(felt.z, scale(part, w.c1[b].z));
                 felt.s = add(felt.s, scale(part, w.c1[b].s));
             }

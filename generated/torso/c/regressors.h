@@ -132,7 +132,7 @@ static void coefficients_of_link(const motion *m, const carried *l, int j, size_
         rows_of_block(m, l, OF_G, i, 0, y10);
         scatter(samples, INERTIAL, squares, y10, gravity + square * INERTIAL);
         for (int k = 0; k < length; ++k) {
-            const size_t cube = (square * N + (size_t)joint[k]) * INERTIAL;
+            const size_t other = (size_t)joint[k], cube = (square * N + other) * INERTIAL;
             rows_of_block(m, l, OF_C1, i, k, y10);
             scatter(samples, INERTIAL, cubes, y10, velocity + cube);
             rows_of_block(m, l, OF_C2, i, k, y10);

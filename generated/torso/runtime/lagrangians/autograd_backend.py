@@ -108,6 +108,9 @@ class AutogradBackend(TorchBackend):
     def _of_links(self, calls: tuple[Call, Call], q: Tensor, qd: Tensor, qdd: Tensor) -> Any:
         """What a function of sweeps.py makes of the Lagrangians, or its like where the call is followed."""
         links, (sweep, followed) = tuple(self.modules), calls
+        if torch.compiler.is_exporting():
+            # It records sweeps as they run, for any number of samples, but no torch.func within another.
+            return sweep(links, self.seen_by(q), q, qd, qdd)
         if transformed():
             return followed(links, self.seen_by(q), q, qd, qdd)
         if torch.is_inference_mode_enabled():
