@@ -22,13 +22,8 @@ def plain(locales: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
     return files(PLAIN, tmp_path_factory.mktemp("plain"), locales)
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        pytest.param(ALL_AT_ONCE, id="Linux"),
-        pytest.param(on_another_system("windows"), id="Windows", marks=pytest.mark.ship),
-    ],
-)
+@pytest.mark.ship
+@pytest.mark.parametrize("other", [ALL_AT_ONCE, on_another_system("windows")], ids=["Linux", "Windows"])
 def test_the_surroundings_leave_no_trace_in_any_file(
     other: Surroundings, plain: dict[str, bytes], locales: Path, tmp_path: Path
 ) -> None:

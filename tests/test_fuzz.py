@@ -26,7 +26,7 @@ def client() -> Iterator[Client]:
 def test_broken_input_is_refused_in_one_line_or_answered(kind: str, client: Client) -> None:
     # The same cases each time; making one smaller takes minutes, and the message has all of it.
     @settings(
-        max_examples=25,
+        max_examples=15,
         derandomize=True,
         deadline=None,
         database=None,

@@ -89,6 +89,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.ship
 def test_the_documentation_builds_without_a_warning(site: Path) -> None:
     assert (site / "index.html").is_file()
 
@@ -104,6 +105,7 @@ return [...wide, ...(whole.scrollWidth > innerWidth ? [whole] : [])].map((e) => 
 """What of a page ends right of its window, but for what scrolls by itself; the whole where its drawers do."""
 
 
+@pytest.mark.ship
 @pytest.mark.browser
 def test_no_page_is_wider_than_its_window(site: Path, driver: Any) -> None:
     for page in sorted(site.rglob("*.html")):
