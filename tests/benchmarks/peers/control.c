@@ -2,7 +2,6 @@
    with their inertia natural, with links scaled, and a frame on springs along and about all axes or as many as there are
    joints. Compiled with -DROBOT=name -DUPPER=NAME and the header by -include. Each figure is the least of many short spells.
    Prints "what nanoseconds" lines. */
-#define _GNU_SOURCE
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>

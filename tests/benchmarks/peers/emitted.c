@@ -2,7 +2,6 @@
    Compiled with -DROBOT=name -DUPPER=NAME -DREAL=double -DSUFFIX= (or float, f) and the header by -include.
    Each figure is the least of many short spells, so that other work on the machine falls between them.
    Arguments: seconds for a figure, then batch sizes. Prints "layout batch threads nanoseconds" lines. */
-#define _GNU_SOURCE
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>

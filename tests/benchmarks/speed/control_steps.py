@@ -18,8 +18,8 @@ def measure(package: Package, work: Path) -> list[Figure]:
     flags = commands(name)[0].split()[1:-2]  # as the header says, for a compiler and a file
     run(
         [
-            compiler() or "cc", *flags, f"-DROBOT={name}", f"-DUPPER={name.upper()}", f"-I{c}",
-            "-include", str(c / f"{name}.h"), str(PEERS / "control.c"), str(c / f"{name}.c"),
+            compiler() or "cc", *flags, "-D_GNU_SOURCE", f"-DROBOT={name}", f"-DUPPER={name.upper()}",
+            f"-I{c}", "-include", str(c / f"{name}.h"), str(PEERS / "control.c"), str(c / f"{name}.c"),
             "-lm", "-o", str(made),
         ]
     )  # fmt: skip

@@ -45,7 +45,7 @@ def programs(package: Package, work: Path) -> dict[str, Path]:
         made[dtype] = work / f"{package.name}_{dtype}"
         run(
             [
-                compiler() or "cc", "-std=c99", *build_flags(), f"-DROBOT={package.name}",
+                compiler() or "cc", "-std=c99", "-D_GNU_SOURCE", *build_flags(), f"-DROBOT={package.name}",
                 f"-DUPPER={package.name.upper()}", f"-DREAL={real}", f"-DSUFFIX={suffix}",
                 f"-DWIDTH={suffix.upper()}", "-include", str(package.directory / "c" / f"{package.name}.h"),
                 str(PEERS / "emitted.c"), str(library), f"-Wl,-rpath,{library.parent}",
