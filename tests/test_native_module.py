@@ -225,16 +225,21 @@ def test_nothing_is_leaked_or_freed_twice(planar3: ModuleType) -> None:
         gc.collect()
         return [sys.getrefcount(o) for o in (*motion, *out, out, None, *kinds)]
 
-    before = counts()
-    for _ in range(300):
-        for call in CALLS.values():
-            call(robot, *motion)
-        robot.packed(*motion, out=out)
-        with pytest.raises(ValueError, match="no convention 'half'"):
-            robot.propagation(*motion, "half")
-        with pytest.raises(ValueError, match="qd has shape"):
-            robot.partial_torque(q, qd[:, :2], qdd)
-    assert [abs(a - b) < 50 for a, b in zip(counts(), before, strict=True)] == [True] * len(before)
+    def rise() -> list[int]:
+        before = counts()
+        for _ in range(300):
+            for call in CALLS.values():
+                call(robot, *motion)
+            robot.packed(*motion, out=out)
+            with pytest.raises(ValueError, match="no convention 'half'"):
+                robot.propagation(*motion, "half")
+            with pytest.raises(ValueError, match="qd has shape"):
+                robot.partial_torque(q, qd[:, :2], qdd)
+        return [abs(a - b) for a, b in zip(counts(), before, strict=True)]
+
+    # None is everybody's: another's garbage may fall into one round, a leak of ours shows in each.
+    least = [min(rises) for rises in zip(rise(), rise(), rise(), strict=True)]
+    assert max(least) < 50, least
 
 
 def test_a_robot_that_nobody_holds_is_gone(planar3: ModuleType) -> None:
