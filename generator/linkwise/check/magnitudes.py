@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from linkwise.check.newton_euler import Points
+from linkwise.check.curve_reference import displacement_bound
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
@@ -54,9 +55,8 @@ class Magnitudes:
             while back is not None:
                 upper = self.bodies[back]
                 about = moment + frames[back].reach * force
-                tau[:, upper.coordinate, j] += abs(upper.ratio) * (
-                    about if upper.kind == "revolute" else force
-                )
+                turned = about if upper.kind == "revolute" else force
+                tau[:, upper.coordinate, j] += displacement_bound(upper, q, 1) * turned
                 back = upper.parent
         return tau
 
@@ -106,7 +106,9 @@ class Magnitudes:
         ground = _Sizes(zero, zero, zero, zero, zero + gravity)
         for body in self.bodies:
             up = ground if body.parent is None else frames[body.parent]
-            turn, rate, change = (abs(body.ratio) * x[:, body.coordinate] for x in (q, qd, qdd))
+            turn, slope, bend = (displacement_bound(body, q, derivative) for derivative in range(3))
+            speed, push = qd[:, body.coordinate], qdd[:, body.coordinate]
+            rate, change = slope * speed, slope * push + bend * speed**2
             frames.append(_carried(body, up, turn, rate, change))
         return frames
 

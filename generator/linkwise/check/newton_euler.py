@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from linkwise.check.curve_reference import displacement
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, FrameEntry, Manifest, RigidTree
 
@@ -65,7 +66,7 @@ class NewtonEuler:
                 upper, joint = self.bodies[back], motions[back]
                 lever = motion.com - joint.frame.origin
                 about = moment + np.cross(lever, force) if upper.kind == "revolute" else force
-                tau[:, upper.coordinate, j] += upper.ratio * _dot(joint.axis, about)
+                tau[:, upper.coordinate, j] += displacement(upper, q, 1)[:, 0] * _dot(joint.axis, about)
                 back = upper.parent
         return tau
 
@@ -124,8 +125,10 @@ class NewtonEuler:
         motions: list[_BodyMotion] = []
         for body in self.bodies:
             up = ground if body.parent is None else motions[body.parent].frame
-            k = body.coordinate
-            turn, rate, change = (body.ratio * x[:, k : k + 1] for x in (q, qd, qdd))
+            speed, push = (x[:, body.coordinate : body.coordinate + 1] for x in (qd, qdd))
+            slope = displacement(body, q, 1)
+            turn, rate = displacement(body, q), slope * speed
+            change = slope * push + displacement(body, q, 2) * speed**2
             motions.append(_moved(body, up, turn, rate, change))
         return motions
 

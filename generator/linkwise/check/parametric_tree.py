@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,8 @@ from linkwise.package.load import Array
 from linkwise.runtime.parameter_values import ParametricBody, faults
 
 MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+VARIED = ("translation", "mass", "com", "inertia")
+"""Numbers of a body that may hang on parameters."""
 ROUNDING = 1e-12
 """Of the largest number of a vector or an inertia, which formulas and numbers may differ by."""
 
@@ -22,7 +24,6 @@ def tree_with(tree: RigidTree, values: Mapping[str, float]) -> RigidTree:
     """The tree for other values of the parameters; raises Unreadable where a formula is none."""
     given = parameter_values(values)
     found = {place: float(TextFormula(text).value(given)) for place, text in tree.formulas.items()}
-    data = asdict(tree)
 
     def at(place: str, value: Any) -> Any:
         if isinstance(value, tuple):
@@ -30,8 +31,8 @@ def tree_with(tree: RigidTree, values: Mapping[str, float]) -> RigidTree:
         return found.get(place, value)
 
     bodies = [
-        BodyEntry(**{name: at(f"bodies[{b}].{name}", value) for name, value in body.items()})
-        for b, body in enumerate(data["bodies"])
+        replace(body, **{name: at(f"bodies[{b}].{name}", getattr(body, name)) for name in VARIED})
+        for b, body in enumerate(tree.bodies)
     ]
     frames = [
         replace(frame, translation=at(f"frames[{f}].translation", frame.translation))

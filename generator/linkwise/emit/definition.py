@@ -11,6 +11,7 @@ from linkwise.emit.formula_symbols import motion_symbol, parameter_symbols
 from linkwise.package.manifest import (
     BodyEntry,
     CouplingEntry,
+    CurveEntry,
     EnergyEntry,
     FrameEntry,
     JointEntry,
@@ -63,6 +64,7 @@ def rigid_tree(system: System) -> RigidTree | None:
                 number(link.mass),
                 numbers(link.com),
                 (numbers(link.inertia[0]), numbers(link.inertia[1]), numbers(link.inertia[2])),
+                CurveEntry(link.joint.curve.starts, link.joint.curve.pieces) if link.joint.curve else None,
             )
             for link in robot.links
         ),

@@ -44,6 +44,13 @@ def chosen_kernel(
         raise LinkwiseError("--kernel loops goes over rigid bodies, and here are energies; leave it out")
     if choice == "loops" and derivation == "energy":
         raise LinkwiseError("--kernel loops derives nothing, and --derivation energy does; leave one out")
+    if isinstance(system, RigidSystem) and any(link.joint.curve for link in system.robot.links):
+        if choice == "straight" or derivation == "energy":
+            wanted = "--kernel straight" if choice == "straight" else "--derivation energy"
+            raise LinkwiseError(
+                f"{wanted} derives closed forms, and joints that follow curves have none; leave it out"
+            )
+        return "loops"
     if choice != "auto":
         return "loops" if choice == "loops" else "straight"
     closed = derivation == "energy" or (backends is not None and not set(backends) <= LOOPS.keys())

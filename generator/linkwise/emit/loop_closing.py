@@ -18,6 +18,7 @@ from linkwise.runtime.constraints.singular_positions import open_by
 from linkwise.runtime.rule.joint_tree import (
     JointTree,
     TreeCoupling,
+    TreeCurve,
     TreeFrame,
     TreeJoint,
     TreeLink,
@@ -77,7 +78,16 @@ def joint_tree(tree: RigidTree) -> JointTree:
     return JointTree(
         tree.gravity,
         tuple(
-            TreeJoint(b.parent, b.kind, b.coordinate, b.ratio, b.rotation, b.translation) for b in tree.bodies
+            TreeJoint(
+                b.parent,
+                b.kind,
+                b.coordinate,
+                b.ratio,
+                b.rotation,
+                b.translation,
+                b.curve and TreeCurve(b.curve.starts, b.curve.pieces),
+            )
+            for b in tree.bodies
         ),
         tuple(TreeLink(b.link, at, b.mass, b.com, b.inertia) for at, b in enumerate(tree.bodies)),
         tuple(TreeFrame(f.name, f.body, f.rotation, f.translation) for f in tree.frames),

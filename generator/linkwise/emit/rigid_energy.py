@@ -44,6 +44,7 @@ class Step:
     slides: bool
     position: str
     speed: str
+    curve: Lines
     lines: Lines
     place: str
 
@@ -104,15 +105,18 @@ def _step(system: RigidSystem, joint: Joint, labels: tuple[str, str], place: str
     if place and _hangs(joint.translation):
         lines, text = _inline(system, joint.translation)
     axes = f"AXES_{labels[1].upper()}"
-    turn = f"{axes}.turn(q, {k}" + (")" if ratio == 1.0 else f", {ratio!r})")
+    curve = f"CURVE_{labels[1].upper()}" if joint.curve else ""
+    rest = f", {ratio!r}, {curve})" if curve else ")" if ratio == 1.0 else f", {ratio!r})"
+    turn = f"{axes}.turn(q, {k}{rest}"
     return Step(
         *labels,
         python_literal(joint.name),
         tuple(_vector(row) for row in joint.rotation),
         f"{axes}.slide" if joint.kind == "prismatic" else turn,
         joint.kind == "prismatic",
-        f"{moved}q[{k}]",
-        f"{moved}qd[{k}]",
+        f"{moved}{curve}(q[{k}])" if curve else f"{moved}q[{k}]",
+        f"{moved}{curve}.slope(q[{k}]) * qd[{k}]" if curve else f"{moved}qd[{k}]",
+        tuple(map(repr, (joint.curve.starts, *joint.curve.pieces))) if joint.curve else (),
         lines,
         text,
     )

@@ -49,7 +49,8 @@ def tree_text(tree: RigidTree, links: Sequence[str], parameters: Sequence[str]) 
 def _joint(body: BodyEntry) -> TreeText:
     placed = f"{body.rotation!r}", f"{body.translation!r}"
     moved = f"{body.parent!r}", repr(body.kind), f"{body.coordinate}", f"{body.ratio!r}"
-    return TreeText(python_literal(body.joint), (", ".join(moved), *placed))
+    curve = body.curve and f"TreeCurve({body.curve.starts!r}, {body.curve.pieces!r})"
+    return TreeText(python_literal(body.joint), (", ".join(moved), *placed, *([curve] if curve else [])))
 
 
 def _link(b: int, body: BodyEntry) -> TreeText:
@@ -77,8 +78,9 @@ def _coupling(coupling: CouplingEntry) -> str:
 
 def _records(tree: RigidTree) -> str:
     """What the file needs of joint_tree.py."""
-    constraints = {"TreeCoupling": tree.couplings, "TreeTie": tree.ties}
-    used = [name for name, found in constraints.items() if found]
+    curves = [body.curve for body in tree.bodies if body.curve]
+    optional = {"TreeCoupling": tree.couplings, "TreeTie": tree.ties, "TreeCurve": curves}
+    used = [name for name, found in optional.items() if found]
     return ", ".join(sorted(["JointTree", "TreeFrame", "TreeJoint", "TreeLink", *used]))
 
 

@@ -54,6 +54,14 @@ class CodeSize:
 
 
 @dataclass(frozen=True)
+class CurveEntry:
+    """Polynomials in q − start, each from its start on, as `Curve` in robot.curve says."""
+
+    starts: tuple[float, ...]
+    pieces: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
 class BodyEntry:
     """A moving frame on its parent's, as `linkwise.robot.robot.Joint` places it, and the mass it carries.
 
@@ -72,6 +80,7 @@ class BodyEntry:
     mass: float
     com: Row
     inertia: tuple[Row, Row, Row]
+    curve: CurveEntry | None = None
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from linkwise.package.entries import (
     BodyEntry,
     CodeSize,
     CouplingEntry,
+    CurveEntry,
     EnergyEntry,
     FrameEntry,
     JointEntry,

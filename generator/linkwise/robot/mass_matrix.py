@@ -13,7 +13,7 @@ import numpy as np
 from linkwise.errors import LinkwiseError
 from linkwise.robot.mass import SPECK, principal
 from linkwise.robot.notes import IMPOSSIBLE, Note
-from linkwise.robot.robot import Coordinate, Link
+from linkwise.robot.robot import Coordinate, Joint, Link
 
 Array: TypeAlias = np.ndarray[Any, Any]
 
@@ -116,7 +116,7 @@ def _factor(links: Sequence[Link], q: Array) -> _Factor:
     frames, joints = _frames(links, q), [link.joint for link in links]
     axes = np.array([rotation[:, 2] for rotation, _ in frames])
     places = np.array([place for _, place in frames])
-    ratios = np.array([joint.ratio for joint in joints])[:, None]
+    ratios = np.array([_displacement(joint, q, 1) for joint in joints])[:, None]
     turns = np.array([joint.kind == "revolute" for joint in joints])[:, None]
     coordinates = np.array([joint.coordinate for joint in joints])
     chains: list[Array] = []
@@ -138,6 +138,14 @@ def _factor(links: Sequence[Link], q: Array) -> _Factor:
     return _Factor(np.vstack(blocks), turned)
 
 
+def _displacement(joint: Joint, q: Array, derivative: int = 0) -> float:
+    """What a joint moves by, or the derivative of that by its coordinate."""
+    x = float(q[joint.coordinate])
+    if joint.curve:
+        return joint.ratio * joint.curve(x, derivative)
+    return joint.ratio * (1.0 if derivative else x)
+
+
 def _frames(links: Sequence[Link], q: Array) -> list[tuple[Array, Array]]:
     """Rotation and place of each link's frame in the world, parents first."""
     frames: list[tuple[Array, Array]] = []
@@ -146,7 +154,7 @@ def _frames(links: Sequence[Link], q: Array) -> list[tuple[Array, Array]]:
         rotation, place = (np.eye(3), np.zeros(3)) if link.parent is None else frames[link.parent]
         place = place + rotation @ np.array(joint.translation, dtype=float)
         rotation = rotation @ np.array(joint.rotation)
-        moved = joint.ratio * q[joint.coordinate]
+        moved = _displacement(joint, q)
         if joint.kind == "prismatic":
             place = place + moved * rotation[:, 2]
         else:

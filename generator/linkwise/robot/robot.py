@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 import sympy as sp
 
 from linkwise.errors import LinkwiseError
+from linkwise.robot.curve import Curve
 from linkwise.robot.notes import Note
 
 Scalar: TypeAlias = float | sp.Expr
@@ -59,7 +60,7 @@ class Joint:
 
     The link's frame has its z axis on the joint's axis. With q the coordinate, a revolute joint places it
     at `translation`, turned by `rotation` · Rz(ratio·q); a prismatic one at `translation` + `rotation` z
-    ratio·q.
+    ratio·q. Where the joint follows a curve d, d(q) stands in place of q.
     """
 
     name: str
@@ -71,6 +72,7 @@ class Joint:
     translation: Vec3
     """Of the link's origin, in m, in the parent's axes."""
     ratio: float = 1.0
+    curve: Curve | None = None
 
 
 @dataclass(frozen=True)

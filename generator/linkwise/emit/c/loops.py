@@ -18,7 +18,7 @@ from linkwise.symbolic.system import RigidSystem
 from linkwise.version import VERSION
 
 FIXED = (
-    "angles.h",
+    "curves.h",
     "arrays.h",
     "block_rows.h",
     "blocks.h",

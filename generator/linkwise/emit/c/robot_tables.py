@@ -81,6 +81,7 @@ def table_view(system: RigidSystem) -> dict[str, Any]:
         ],
         "path_columns": [", ".join(map(str, own)) for own in found.of_links],
         "placings": list(_placings(system)),
+        "curves": curve_tables(system),
         "bodies": list(_bodies(system)),
         "gravity": _row(_values(system, robot.gravity)),
         "passive": list(_passive(system)),
@@ -130,6 +131,33 @@ def _placings(system: RigidSystem) -> Iterator[str]:
         joint = link.joint
         turn = _row(entry for row in joint.rotation for entry in row)
         yield f"{{{turn}, {_row(_values(system, joint.translation))}, {_number(joint.ratio)}}}"
+
+
+@dataclass(frozen=True)
+class CurveTables:
+    """The curves that joints follow, as rows of the tables that curves.h reads."""
+
+    powers: int
+    joints: tuple[str, ...]
+    starts: tuple[str, ...]
+    pieces: tuple[str, ...]
+
+
+def curve_tables(system: RigidSystem) -> CurveTables | None:
+    """Tables of a robot; None where no joint follows a curve."""
+    joints = [link.joint for link in system.robot.links]
+    curves = [joint.curve for joint in joints if joint.curve]
+    if not curves:
+        return None
+    powers = max(len(piece) for curve in curves for piece in curve.pieces)
+    rows, first = [], 0
+    for number, joint in enumerate(joints, 1):
+        count = len(joint.curve.pieces) if joint.curve else 0
+        rows.append(f"{{{first}, {count}}}, /* {number}, {c_comment(joint.name)} */")
+        first += count
+    pieces = (_row((*piece, *[0.0] * (powers - len(piece)))) for curve in curves for piece in curve.pieces)
+    starts = (_number(start) for curve in curves for start in curve.starts)
+    return CurveTables(powers, tuple(rows), tuple(starts), tuple(pieces))
 
 
 def _bodies(system: RigidSystem) -> Iterator[str]:

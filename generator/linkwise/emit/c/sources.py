@@ -45,7 +45,7 @@ FIXED = (
 """Files that are the same in every package."""
 
 FIXED_OF_RIGID = (
-    "angles.h",
+    "curves.h",
     "blocks.h",
     "frame_impedance.h",
     "frame_rotation.h",

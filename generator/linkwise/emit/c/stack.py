@@ -71,7 +71,8 @@ def _moved(system: RigidSystem) -> int:
     """Numbers of the motion of all frames, and of what it is made from."""
     frames = len(system.robot.links)
     columned = frames + len(columns(system).sums)
-    return 24 * (frames + 1) + 12 * columned + 3 * len(system.coordinates) + 3 * frames
+    curved = 16 * frames if any(link.joint.curve for link in system.robot.links) else 0
+    return 24 * (frames + 1) + 12 * columned + 3 * len(system.coordinates) + 3 * frames + curved
 
 
 def loops_stack(system: RigidSystem) -> int:

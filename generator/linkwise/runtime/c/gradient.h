@@ -3,7 +3,9 @@
    With the twist V of what carries joint k, its rate A less gravity, the change Sd = V x S, and the wrench F of tau,
        c0(i, j, k) = S_i . (I Sdd + 2 B Sd)                     for i behind k
                    = S_i . (I Sdd + 2 B Sd + S x* F)            for k itself and i before it
-       Sdd = A x S + V x Sd        S x* F = (z x N + s x f, z x f) */
+       Sdd = A x S + V x Sd        S x* F = (z x N + s x f, z x f)
+   Where joints follow curves, Sdd has more, and for a joint itself there is what F does along the change of S by its own
+   coordinate. */
 
 /* Sdd of every joint, by its frame. */
 static inline void KERNEL(second_changes)(const motion *m, const real *gravity, screw *second)
@@ -15,6 +17,10 @@ static inline void KERNEL(second_changes)(const motion *m, const real *gravity, 
         const vector s = add_cross(cross(rate.z, axis.s), subtract(rate.s, g), axis.z);
         second[f].z = add_cross(cross(rate.z, axis.z), twist.z, change.z);
         second[f].s = add_cross(add_cross(s, twist.z, change.s), twist.s, change.z);
+#ifdef CURVED
+        second[f].z = add(second[f].z, m->second[f - 1].z);
+        second[f].s = add(second[f].s, m->second[f - 1].s);
+#endif
     }
 }
 
@@ -38,5 +44,10 @@ static inline void KERNEL(gradient)(const motion *m, const screw *second, const 
             real *entry = c0 + (places[a] * length + places[b]) * W;
             PUT(entry, TAKE(entry) + along(&of, a <= b ? &before : &behind));
         }
+#ifdef CURVED
+        const screw own = KERNEL(moves)(l, &m->bend[f - 1], KERNEL(arm)(l, &m->bend[f - 1]));
+        real *entry = c0 + (places[b] * length + places[b]) * W;
+        PUT(entry, TAKE(entry) + along(&own, &l->wrench));
+#endif
     }
 }

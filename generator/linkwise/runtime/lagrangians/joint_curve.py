@@ -1,0 +1,38 @@
+"""A curve of a coordinate that a joint follows, on tensors."""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+
+class JointCurve:
+    """Polynomials in q - start, each from its start on; the first one holds before its start too.
+
+    pieces: coefficients of powers 0, 1, 2, ... for rad or m
+    """
+
+    def __init__(self, starts: Sequence[float], pieces: Sequence[Sequence[float]]) -> None:
+        size = max(2, *map(len, pieces))
+        self._starts = torch.tensor(starts, dtype=torch.float64)
+        self._pieces = torch.tensor(
+            [(*piece, *[0.0] * (size - len(piece))) for piece in pieces], dtype=torch.float64
+        )
+        self._slopes = (self._pieces * torch.arange(size))[:, 1:]
+
+    def __call__(self, q: Tensor) -> Tensor:
+        """What the joint moves by."""
+        return self._value(q, self._pieces)
+
+    def slope(self, q: Tensor) -> Tensor:
+        """How that changes with q."""
+        return self._value(q, self._slopes)
+
+    def _value(self, q: Tensor, pieces: Tensor) -> Tensor:
+        starts = self._starts.to(q)
+        piece = (q.detach().unsqueeze(-1) >= starts[1:]).sum(-1)
+        at, coefficients = q - starts[piece], pieces.to(q)[piece]
+        value = coefficients[..., -1]
+        for power in range(coefficients.shape[-1] - 2, -1, -1):
+            value = value * at + coefficients[..., power]
+        return value
