@@ -14,11 +14,10 @@ class JointCurve:
 
     def __init__(self, starts: Sequence[float], pieces: Sequence[Sequence[float]]) -> None:
         size = max(2, *map(len, pieces))
+        filled = torch.tensor([(*piece, *[0.0] * (size - len(piece))) for piece in pieces], dtype=torch.float64)
         self._starts = torch.tensor(starts, dtype=torch.float64)
-        self._pieces = torch.tensor(
-            [(*piece, *[0.0] * (size - len(piece))) for piece in pieces], dtype=torch.float64
-        )
-        self._slopes = (self._pieces * torch.arange(size))[:, 1:]
+        self._pieces = torch.cat([self._starts[:, None], filled], 1)
+        self._slopes = torch.cat([self._starts[:, None], (filled * torch.arange(size))[:, 1:]], 1)
 
     def __call__(self, q: Tensor) -> Tensor:
         """What the joint moves by."""
@@ -29,10 +28,10 @@ class JointCurve:
         return self._value(q, self._slopes)
 
     def _value(self, q: Tensor, pieces: Tensor) -> Tensor:
-        starts = self._starts.to(q)
-        piece = (q.detach().unsqueeze(-1) >= starts[1:]).sum(-1)
-        at, coefficients = q - starts[piece], pieces.to(q)[piece]
-        value = coefficients[..., -1]
-        for power in range(coefficients.shape[-1] - 2, -1, -1):
-            value = value * at + coefficients[..., power]
+        """For rows of a start and the coefficients from there on."""
+        piece = (q.detach().unsqueeze(-1) >= self._starts[1:].to(q)).sum(-1)
+        start, *coefficients = torch.nn.functional.embedding(piece, pieces.to(q)).unbind(-1)
+        value = coefficients[-1]
+        for coefficient in reversed(coefficients[:-1]):
+            value = value * (q - start) + coefficient
         return value
