@@ -8,7 +8,7 @@ from linkwise.package.manifest import BodyEntry
 
 
 def displacement(body: BodyEntry, q: Array, derivative: int = 0) -> Array:
-    """Of a body's joint, or a derivative by its coordinate, (samples, 1), for all coordinates (samples, n)."""
+    """Of a body's joint, or a derivative by its coordinate, (samples, 1); q is (samples, n)."""
     x = q[:, body.coordinate : body.coordinate + 1]
     if body.curve is None:
         return body.ratio * (

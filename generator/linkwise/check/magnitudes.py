@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.check.newton_euler import Points
 from linkwise.check.curve_reference import displacement_bound
+from linkwise.check.newton_euler import Points
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 

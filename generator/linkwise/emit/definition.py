@@ -8,10 +8,10 @@ import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from linkwise.emit.formula_symbols import motion_symbol, parameter_symbols
+from linkwise.package.entries import CurveEntry
 from linkwise.package.manifest import (
     BodyEntry,
     CouplingEntry,
-    CurveEntry,
     EnergyEntry,
     FrameEntry,
     JointEntry,

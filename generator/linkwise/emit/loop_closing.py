@@ -85,7 +85,7 @@ def joint_tree(tree: RigidTree) -> JointTree:
                 b.ratio,
                 b.rotation,
                 b.translation,
-                b.curve and TreeCurve(b.curve.starts, b.curve.pieces),
+                TreeCurve(b.curve.starts, b.curve.pieces) if b.curve else None,
             )
             for b in tree.bodies
         ),

@@ -16,7 +16,6 @@ from linkwise.package.entries import (
     BodyEntry,
     CodeSize,
     CouplingEntry,
-    CurveEntry,
     EnergyEntry,
     FrameEntry,
     JointEntry,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
+from linkwise.robot.curve import Curve
 from linkwise.robot.description import Connection, Mimic
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.notes import UNCOUPLED, Note
@@ -13,11 +14,15 @@ from linkwise.robot.robot import Coordinate, unusable
 
 @dataclass(frozen=True)
 class AxisRule:
-    """How an axis moves: ratio · q + offset of a coordinate; without one it stands at the offset."""
+    """How an axis moves: ratio · q + offset of a coordinate, or by a curve of it.
+
+    Without a coordinate it stands at the offset.
+    """
 
     coordinate: int | None
     ratio: float = 1.0
     offset: float = 0.0
+    curve: Curve | None = None
 
 
 @dataclass(frozen=True)
@@ -36,12 +41,23 @@ def movement(
 
     Raises LinkwiseError for two axes of one name, a lock without an axis, and a mimic that cannot be.
     """
-    _check_axes(axes, lock)
+    curved = {c.name: c for connection in connections for c in connection.coordinates}
+    together = {c.name: connection.coordinates for connection in connections for c in connection.coordinates}
+    names = Counter([*(axis.name for axis in axes if axis.follows is None), *curved])
+    _check_axes(axes, names, lock)
     mimics, freed = _mimics(connections, {axis.name for axis in axes}, lock, free_mimic)
     motion: dict[str, AxisRule] = {}
     moving: list[Coordinate] = []
+    places: dict[str, int] = {}
     for axis in axes:
-        if axis.name in lock:
+        if axis.follows is not None:
+            name, curve = axis.follows
+            for c in together.get(name, ()):
+                if c.name not in lock and c.name not in places:
+                    places[c.name] = len(moving)
+                    moving.append(Coordinate(c.name, c.unit))
+            motion[axis.name] = _followed(curve, places.get(name), lock.get(name, 0.0))
+        elif axis.name in lock:
             motion[axis.name] = AxisRule(None, 0.0, lock[axis.name])
         elif axis.name not in mimics:
             motion[axis.name] = AxisRule(len(moving))
@@ -53,6 +69,7 @@ def movement(
         )
     notes = [
         *(Note("locked", a.name, f"at {lock[a.name]:g} {a.unit}") for a in axes if a.name in lock),
+        *(Note("locked", c.name, f"at {lock[c.name]:g} {c.unit}") for c in curved.values() if c.name in lock),
         *(Note("mimic", name, _rule(mimic)) for name, mimic in mimics.items()),
         *(
             Note("ignored", c.name, "the mimic of a fixed joint")
@@ -63,22 +80,33 @@ def movement(
     return Movement(tuple(moving), motion, (*notes, *freed))
 
 
+def _followed(curve: Curve, coordinate: int | None, held: float) -> AxisRule:
+    """The rule of an axis that follows a coordinate by a curve, or stands where that is held."""
+    if coordinate is None:
+        return AxisRule(None, 0.0, curve(held))
+    if curve.line:
+        return AxisRule(coordinate, curve.line[1], curve.line[0])
+    return AxisRule(coordinate, curve=curve)
+
+
 def _rule(mimic: Mimic) -> str:
     ratio = {1.0: "", -1.0: "-"}.get(mimic.ratio, f"{mimic.ratio:g} ")
     offset = f" {'-' if mimic.offset < 0 else '+'} {abs(mimic.offset):g}" if mimic.offset else ""
     return f"= {ratio}{mimic.master}{offset}"
 
 
-def _check_axes(axes: tuple[Axis, ...], lock: dict[str, float]) -> None:
+def _check_axes(axes: tuple[Axis, ...], coordinates: Counter[str], lock: dict[str, float]) -> None:
     counts = Counter(axis.name for axis in axes)
-    for name, count in counts.items():
+    for name, count in (counts | coordinates).items():
         if count > 1:
             raise LinkwiseError(
                 f"{count} joints are named {name!r}, one of them made from a joint's type; rename it"
             )
     for name in lock:
-        if name not in counts:
-            raise LinkwiseError(f"--lock {name!r} is not a moving joint; the joints are {listed(counts)}")
+        if name not in coordinates:
+            raise LinkwiseError(
+                f"--lock {name!r} is not a moving joint; the joints are {listed(coordinates)}"
+            )
         if fault := unusable(lock[name]):
             raise LinkwiseError(f"--lock {name!r} has {fault} for a value; give rad or m")
 

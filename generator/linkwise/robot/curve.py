@@ -74,7 +74,7 @@ def _differentiated(coefficients: Polynomial, times: int) -> Polynomial:
 
 def _composed(outer: Sequence[float], inner: Polynomial) -> Polynomial:
     """Coefficients of outer(inner), by Horner's rule."""
-    value = np.zeros(1)
+    value: Sequence[float] = (0.0,)
     for coefficient in reversed(outer):
         value = polynomial.polyadd(polynomial.polymul(value, inner), (coefficient,))
     return tuple(map(float, value))

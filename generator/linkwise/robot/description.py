@@ -1,7 +1,9 @@
 """What a robot file says, before fixed joints are merged and frames are chosen."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
+from linkwise.robot.curve import Curve
 from linkwise.robot.notes import Note, Omission
 from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Mat3, Passive, Rotation, Scalar, TieKind, Vec3
 
@@ -101,11 +103,37 @@ class Loop:
 
 
 @dataclass(frozen=True)
+class CurvedAxis:
+    """One axis of a `curved` joint: it moves by a curve of a coordinate.
+
+    suffix: what tells it from the joint's other axes; direction: in the child's axes at the place where all
+    axes of the joint stand at 0
+    """
+
+    suffix: str
+    kind: Literal["revolute", "prismatic"]
+    direction: tuple[float, float, float]
+    coordinate: str
+    """Empty where the axis stands still."""
+    curve: Curve
+
+
+@dataclass(frozen=True)
+class CurvedCoordinate:
+    """A coordinate that axes of a joint follow by curves."""
+
+    name: str
+    unit: Literal["rad", "m"]
+    limits: Limits = UNLIMITED
+
+
+@dataclass(frozen=True)
 class Connection:
     """A joint as the file has it: any type, any axis; its place in the parent's frame, its axis in its own.
 
     `snapped` says that entries of the rotation were rounded to −1, 0 or 1; only a joint of one axis has
-    anything `passive`, and limits.
+    anything `passive`, and limits. A `curved` joint has `axes`, from the parent on, and the coordinates that
+    they follow.
     """
 
     name: str
@@ -119,6 +147,8 @@ class Connection:
     snapped: bool = False
     passive: Passive = NOTHING
     limits: Limits = UNLIMITED
+    axes: tuple[CurvedAxis, ...] = ()
+    coordinates: tuple[CurvedCoordinate, ...] = ()
 
 
 @dataclass(frozen=True)

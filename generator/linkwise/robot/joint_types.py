@@ -1,11 +1,12 @@
 """Joint types as chains of revolute and prismatic axes."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
+from linkwise.robot.curve import Curve
 from linkwise.robot.description import Connection
 from linkwise.robot.notes import FLOATS, TURNS, Note
 from linkwise.robot.robot import unusable
@@ -36,6 +37,8 @@ class Axis:
     kind: Kind
     direction: Vector
     last: bool
+    follows: tuple[str, Curve] | None = None
+    """The coordinate, empty for none, and the curve of it, of an axis that has none of its own."""
 
     @property
     def unit(self) -> Literal["rad", "m"]:
@@ -52,6 +55,8 @@ def expand(connection: Connection) -> tuple[Axis, ...]:
     """
     if connection.type == "fixed":
         return ()
+    if connection.type == "curved":
+        return tuple(_curved(connection))
     if connection.type in SINGLE:
         return (Axis(connection.name, "", SINGLE[connection.type], _unit(connection), True),)
     parts = _parts(connection)
@@ -59,6 +64,20 @@ def expand(connection: Connection) -> tuple[Axis, ...]:
         Axis(f"{connection.name}_{suffix}", suffix, kind, direction, index == len(parts) - 1)
         for index, (suffix, kind, direction) in enumerate(parts)
     )
+
+
+def _curved(connection: Connection) -> Iterator[Axis]:
+    """Axes of a curved joint; the first that a coordinate itself moves has the coordinate's name."""
+    own: set[str] = set()
+    for at, axis in enumerate(connection.axes):
+        last = at == len(connection.axes) - 1
+        name = f"{connection.name}_{axis.suffix}"
+        itself = axis.coordinate and axis.curve.line == (0.0, 1.0) and axis.coordinate not in own
+        if itself:
+            own.add(axis.coordinate)
+            name = axis.coordinate
+        follows = axis.coordinate, axis.curve
+        yield Axis(name, axis.suffix, axis.kind, axis.direction, last, follows)
 
 
 def expansion_notes(connections: Iterable[Connection]) -> list[Note]:
@@ -71,7 +90,7 @@ def expansion_notes(connections: Iterable[Connection]) -> list[Note]:
             EFFECTS.get(c.type, ""),
         )
         for c in connections
-        if c.type != "fixed" and c.type not in SINGLE
+        if c.type not in ("fixed", "curved", *SINGLE)
     ]
 
 

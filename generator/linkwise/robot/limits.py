@@ -1,7 +1,7 @@
 """Limits that a robot's file gives its joints, by the coordinates that these became."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple
 
 from linkwise.errors import LinkwiseError
@@ -11,7 +11,7 @@ from linkwise.robot.robot import UNLIMITED, Coordinate, Limits
 
 
 def coordinate_limits(
-    connections: Iterable[Connection], coordinates: Sequence[Coordinate]
+    connections: Sequence[Connection], coordinates: Sequence[Coordinate]
 ) -> tuple[Limits, ...]:
     """Limits of each coordinate: those of the joint of its name, none of one of several axes.
 
@@ -23,5 +23,7 @@ def coordinate_limits(
     for c in own.values():
         if any(map(math.isnan, astuple(c.limits))):
             raise LinkwiseError(f"joint {c.name!r} has NaN for a limit; give a number, or leave it out")
-    found = tuple(own[c.name].limits if c.name in own else UNLIMITED for c in coordinates)
+    known = {name: c.limits for name, c in own.items()}
+    known |= {c.name: c.limits for connection in connections for c in connection.coordinates}
+    found = tuple(known.get(c.name, UNLIMITED) for c in coordinates)
     return found if any(limits != UNLIMITED for limits in found) else ()

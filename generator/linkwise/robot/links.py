@@ -154,7 +154,7 @@ def _pass(
     if place.link is not None:
         parent = moving[place.link]
         rotation, position = transforms.compose(parent.turn, rotation), parent.framed(position)
-    joint = Joint(axis.name, axis.kind, motion.coordinate, rotation, position, motion.ratio)
+    joint = Joint(axis.name, axis.kind, motion.coordinate, rotation, position, motion.ratio, motion.curve)
     name, at = child.name if axis.last else f"{child.name}_{axis.suffix}", len(moving)
     if not own_axes:
         moving.append(_Moving(name, place.link, joint))

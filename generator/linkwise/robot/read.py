@@ -12,6 +12,7 @@ from linkwise.robot.constrained import check_constraints
 from linkwise.robot.description import Description
 from linkwise.robot.parameters import numeric
 from linkwise.robot.readers.mjcf import mjcf_files, read_mjcf
+from linkwise.robot.readers.osim import read_osim
 from linkwise.robot.readers.sdf import read_sdf
 from linkwise.robot.readers.toml import read_toml
 from linkwise.robot.readers.toml_constraints import with_constraint_file
@@ -25,7 +26,14 @@ def read_xml(path: Path) -> Description:
     return {"mujoco": read_mjcf, "sdf": read_sdf}.get(root_tag(path), read_urdf)(path)
 
 
-READERS = {".toml": read_toml, ".urdf": read_urdf, ".sdf": read_sdf, ".xml": read_xml, ".mjcf": read_mjcf}
+READERS = {
+    ".toml": read_toml,
+    ".urdf": read_urdf,
+    ".sdf": read_sdf,
+    ".xml": read_xml,
+    ".mjcf": read_mjcf,
+    ".osim": read_osim,
+}
 """What reads a file, by the end of its name."""
 
 MAX_PLANAR = 1000

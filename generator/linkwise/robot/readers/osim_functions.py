@@ -1,28 +1,97 @@
 """Functions of an OpenSim model as curves."""
 
+from collections.abc import Callable, Sequence
 from itertools import pairwise
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from linkwise.errors import LinkwiseError
 from linkwise.robot.curve import Curve
+from linkwise.robot.readers.osim_elements import numbers_of
+
+IDENTITY = Curve((0.0,), ((0.0, 1.0),))
 
 
-def piecewise_linear(x: list[float], y: list[float]) -> Curve:
+def constant(value: float) -> Curve:
+    """The same everywhere."""
+    return Curve((0.0,), ((value,),))
+
+
+def function_of(owner: Element, tag: str, place: str) -> Curve | None:
+    """The function that an element has by a name: a child of this name, or what that holds; None for none."""
+    for child in owner:
+        if child.get("name") == tag and child.tag in FUNCTIONS:
+            return FUNCTIONS[child.tag](child, place)
+        if child.tag == tag and len(child):
+            (inner, *_) = child
+            return _known(inner, place)
+        if child.get("name") == tag:
+            return _known(child, place)
+    return None
+
+
+def _known(element: Element, place: str) -> Curve:
+    reader = FUNCTIONS.get(element.tag)
+    if reader is None:
+        raise LinkwiseError(
+            f"{place} is a {element.tag}, a function that is not modelled; make it one of "
+            f"{', '.join(FUNCTIONS)}"
+        )
+    return reader(element, place)
+
+
+def _constant(element: Element, place: str) -> Curve:
+    return constant(*numbers_of(element, "value", "0", place, 1))
+
+
+def _linear(element: Element, place: str) -> Curve:
+    slope, value = numbers_of(element, "coefficients", "1 0", place, 2)
+    return Curve((0.0,), ((value, slope),))
+
+
+def _polynomial(element: Element, place: str) -> Curve:
+    """Its coefficients stand the highest power first."""
+    return Curve((0.0,), (numbers_of(element, "coefficients", "0", place)[::-1],))
+
+
+def _multiplied(element: Element, place: str) -> Curve:
+    inner = function_of(element, "function", place)
+    if inner is None:
+        raise LinkwiseError(f"{place}: its <MultiplierFunction> multiplies no function; give it one")
+    return inner.scaled(*numbers_of(element, "scale", "1", place, 1))
+
+
+def _through_points(
+    make: Callable[[Sequence[float], Sequence[float]], Curve],
+) -> Callable[[Element, str], Curve]:
+    def read(element: Element, place: str) -> Curve:
+        x, y = (numbers_of(element, tag, "", place) for tag in "xy")
+        if len(x) != len(y) or len(x) < 2 or any(a >= b for a, b in pairwise(x)):
+            raise LinkwiseError(
+                f"{place}: its <{element.tag}> needs as many <y> as <x>, two or more, and <x> that ascend"
+            )
+        return make(x, y)
+
+    return read
+
+
+def piecewise_linear(x: Sequence[float], y: Sequence[float]) -> Curve:
     """Straight lines between points, and on beyond the ends."""
     slopes = [(d - b) / (c - a) for (a, b), (c, d) in pairwise(zip(x, y, strict=True))]
     return Curve(tuple(x[:-1]), tuple(zip(y, slopes, strict=False)))
 
 
-def simm_spline(x: list[float], y: list[float]) -> Curve:
+def simm_spline(x: Sequence[float], y: Sequence[float]) -> Curve:
     """SIMM's cubic spline, and straight lines beyond its ends.
 
     Its third derivative at an end is that of the cubic through the four points there (G. Forsythe,
     M. Malcolm, C. Moler, Computer Methods for Mathematical Computations, 1977, ch. 4); with three points, 0.
     """
-    h, rise = np.diff(x), np.diff(y) / np.diff(x)
     if len(x) == 2:
         return piecewise_linear(x, y)
-    # Of each point's sigma = y'' / 6: h σ + 2 (h + h') σ' + h' σ'' = the change of the slope.
+    h, rise = np.diff(x), np.diff(y) / np.diff(x)
+    # Of each point's s = y'' / 6: h s + 2 (h + h') s' + h' s'' is the change of the slope.
     system, known = np.zeros((len(x), len(x))), np.zeros(len(x))
     for at in range(1, len(x) - 1):
         system[at, at - 1 : at + 2] = h[at - 1], 2 * (h[at - 1] + h[at]), h[at]
@@ -31,15 +100,15 @@ def simm_spline(x: list[float], y: list[float]) -> Curve:
         system[end, end], system[end, inner] = -sign, sign
         if len(x) > 3:
             known[end] = h[end] * _third_difference(x[points], y[points])
-    sigma = np.linalg.solve(system, known)
-    slopes = rise - h * (sigma[1:] + 2 * sigma[:-1])
-    last = rise[-1] + h[-1] * (sigma[-2] + 2 * sigma[-1])
-    cubics = zip(y[:-1], slopes, 3 * sigma[:-1], np.diff(sigma) / h, strict=True)
+    s = np.linalg.solve(system, known)
+    slopes = rise - h * (s[1:] + 2 * s[:-1])
+    last = rise[-1] + h[-1] * (s[-2] + 2 * s[-1])
+    cubics = zip(y[:-1], slopes, 3 * s[:-1], np.diff(s) / h, strict=True)
     pieces = ((y[0], slopes[0]), *cubics, (y[-1], last))
     return Curve((x[0], *x), tuple(tuple(map(float, piece)) for piece in pieces))
 
 
-def _third_difference(x: list[float], y: list[float]) -> float:
+def _third_difference(x: Sequence[float], y: Sequence[float]) -> float:
     """Divided difference of four points: a sixth of the third derivative of the cubic through them."""
     differences = list(y)
     for order in range(1, 4):
@@ -48,3 +117,16 @@ def _third_difference(x: list[float], y: list[float]) -> float:
             for at, (before, after) in enumerate(pairwise(differences))
         ]
     return differences[0]
+
+
+FUNCTIONS: dict[str, Callable[[Element, str], Curve]] = {
+    "Constant": _constant,
+    "LinearFunction": _linear,
+    "PolynomialFunction": _polynomial,
+    "PiecewiseLinearFunction": _through_points(piecewise_linear),
+    "SimmSpline": _through_points(simm_spline),
+    "NaturalCubicSpline": _through_points(simm_spline),
+    "natCubicSpline": _through_points(simm_spline),
+    "MultiplierFunction": _multiplied,
+}
+"""What is read of OpenSim's functions of one variable; natural splines are old names of the SimmSpline."""

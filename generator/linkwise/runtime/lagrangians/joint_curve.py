@@ -14,7 +14,9 @@ class JointCurve:
 
     def __init__(self, starts: Sequence[float], pieces: Sequence[Sequence[float]]) -> None:
         size = max(2, *map(len, pieces))
-        filled = torch.tensor([(*piece, *[0.0] * (size - len(piece))) for piece in pieces], dtype=torch.float64)
+        filled = torch.tensor(
+            [(*piece, *[0.0] * (size - len(piece))) for piece in pieces], dtype=torch.float64
+        )
         self._starts = torch.tensor(starts, dtype=torch.float64)
         self._pieces = torch.cat([self._starts[:, None], filled], 1)
         self._slopes = torch.cat([self._starts[:, None], (filled * torch.arange(size))[:, 1:]], 1)

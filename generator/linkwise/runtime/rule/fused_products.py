@@ -46,7 +46,7 @@ class FusedMoment(NamedTuple):
         return [self._gathered(kept, self.tables.entries[2])]
 
     def own_bends(self) -> Any:
-        """What tau's wrench does along a screw's change by its own coordinate, packed as tau; None for none."""
+        """What tau's wrench does along how S changes by its own coordinate, packed as tau; or None."""
         bends = self.moved.bends
         return (
             None if bends is None else self._replace(moved=self.moved._replace(screws=bends)).singles((4,))[0]

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .joint_curves import CurveTables, Displacement, curve_tables, displaced
+from .joint_curves import CurveTables, curve_tables, displaced
 from .joint_tree import JointTree
 
 

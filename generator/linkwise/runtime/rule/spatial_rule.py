@@ -74,7 +74,7 @@ class SpatialMoment(NamedTuple):
         return [packed(self.xp, self._products(matrices, columns), self.tables.positions[2])]
 
     def own_bends(self) -> Any:
-        """What tau's wrench does along a screw's change by its own coordinate, packed as tau; None for none."""
+        """What tau's wrench does along how S changes by its own coordinate, packed as tau; or None."""
         return None if self.bends is None else self._replace(screws=self.bends).singles((4,))[0]
 
     def singles(self, fields: Sequence[int]) -> list[Any]:
@@ -159,7 +159,7 @@ def _moved(xp: Any, tables: RuleTables, position: Any) -> Displacement:
 
 
 def _placed(xp: Any, tables: RuleTables, numbers: SpatialNumbers, position: Any) -> Any:
-    """X of all frames into the base's axes, (samples, frames, 6, 6), for what each joint moves by, (samples, frames)."""
+    """X of all frames into the base's axes, (samples, frames, 6, 6); position: (samples, frames)."""
     angle = tables.spatial.turns * position
     x = numbers.frames[0] + numbers.frames[1] * xp.cos(angle)[..., None, None]
     x = x + numbers.frames[2] * xp.sin(angle)[..., None, None]

@@ -1,0 +1,94 @@
+"""Coordinates of an OpenSim model: free, locked, or coupled to another one."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+from linkwise.errors import LinkwiseError
+from linkwise.robot.curve import Curve
+from linkwise.robot.notes import Note
+from linkwise.robot.readers.osim_elements import members, name_of, numbers_of, text_of, yes
+from linkwise.robot.readers.osim_functions import IDENTITY, constant, function_of
+from linkwise.robot.robot import UNLIMITED, Limits
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a coordinate is: a curve of one that is free, or, where its name is empty, a number."""
+
+    free: str
+    curve: Curve
+
+    def of(self, outer: Curve) -> "Rule":
+        """A function of the coordinate."""
+        return Rule(self.free, outer.after(self.curve))
+
+
+def coordinate_rules(
+    coordinates: Iterable[Element], model: Element
+) -> tuple[dict[str, Rule], tuple[Note, ...]]:
+    """What each coordinate is, by name, and notes on those that are not free.
+
+    Raises LinkwiseError for two of one name, and for couplings that are not modelled.
+    """
+    own: dict[str, Rule] = {}
+    notes: list[Note] = []
+    for coordinate in coordinates:
+        name = name_of(coordinate)
+        place = f"coordinate {name!r}"
+        if name in own:
+            raise LinkwiseError(f"2 coordinates are named {name!r}; rename one")
+        (value,) = numbers_of(coordinate, "default_value", "0", place, 1)
+        own[name] = Rule(name, IDENTITY)
+        if yes(coordinate, "locked"):
+            own[name] = Rule("", constant(value))
+            notes.append(Note("locked", name, f"at {value:g}, as the file says"))
+        if yes(coordinate, "prescribed"):
+            notes.append(Note("ignored", name, "that its motion is prescribed: it moves as a log says"))
+    for coupler in members(model, "ConstraintSet"):
+        if coupler.tag == "CoordinateCouplerConstraint" and enforced(coupler):
+            dependent, rule = _coupled(coupler, own)
+            notes.append(Note("mimic", dependent, f"a function of {rule.free}" if rule.free else "held"))
+            own[dependent] = rule
+    return {name: _resolved(name, own) for name in own}, tuple(notes)
+
+
+def enforced(constraint: Element) -> bool:
+    """Whether a constraint holds."""
+    return yes(constraint, "isEnforced", True) and not yes(constraint, "isDisabled")
+
+
+def _coupled(coupler: Element, known: Mapping[str, Rule]) -> tuple[str, Rule]:
+    place = f"constraint {name_of(coupler)!r}"
+    others = text_of(coupler, "independent_coordinate_names").split()
+    dependent = text_of(coupler, "dependent_coordinate_name")
+    if len(others) != 1:
+        raise LinkwiseError(
+            f"{place} couples {dependent!r} to {len(others)} coordinates; only functions of one are modelled"
+        )
+    for name in (*others, dependent):
+        if name not in known:
+            raise LinkwiseError(f"{place} names {name!r}, which is not a coordinate; correct it")
+    curve = function_of(coupler, "coupled_coordinates_function", place)
+    if curve is None:
+        raise LinkwiseError(f"{place} has no <coupled_coordinates_function>; give it one")
+    return dependent, Rule(others[0], curve.scaled(*numbers_of(coupler, "scale_factor", "1", place, 1)))
+
+
+def _resolved(name: str, rules: Mapping[str, Rule]) -> Rule:
+    """The rule by a coordinate that is free itself."""
+    rule, passed = rules[name], {name}
+    while rule.free and rules[rule.free] != Rule(rule.free, IDENTITY):
+        if rule.free in passed:
+            raise LinkwiseError(f"the coupling of coordinate {name!r} leads back to itself; let one go free")
+        passed.add(rule.free)
+        rule = rules[rule.free].of(rule.curve)
+    return rule
+
+
+def limits_of(coordinate: Element) -> Limits:
+    """Range of a coordinate, where it is clamped."""
+    if not yes(coordinate, "clamped"):
+        return UNLIMITED
+    lower, upper = numbers_of(coordinate, "range", "-inf inf", f"coordinate {name_of(coordinate)!r}", 2)
+    return Limits(lower, upper)

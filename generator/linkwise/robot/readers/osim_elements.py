@@ -1,0 +1,40 @@
+"""Values of the elements of an OpenSim file."""
+
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from linkwise.errors import LinkwiseError
+
+
+def text_of(element: Element, tag: str, default: str = "") -> str:
+    """Text of a child, or the default where it is empty or not there."""
+    return (element.findtext(tag) or "").strip() or default
+
+
+def numbers_of(element: Element, tag: str, default: str, place: str, count: int = 0) -> tuple[float, ...]:
+    """Numbers of a child, `count` of them or any; raises LinkwiseError naming the place for others."""
+    text = text_of(element, tag, default)
+    try:
+        values = tuple(map(float, text.split()))
+    except ValueError:
+        values = ()
+    if not values or (count and len(values) != count):
+        wanted = f"{count} numbers" if count > 1 else "a number" if count else "numbers"
+        raise LinkwiseError(f"{place}: <{tag}>{text}</{tag}> needs {wanted}")
+    return values
+
+
+def yes(element: Element, tag: str, default: bool = False) -> bool:
+    """Whether a child says true."""
+    return text_of(element, tag, str(default)).lower() == "true"
+
+
+def name_of(element: Element) -> str:
+    """Name of a component."""
+    return element.get("name", "")
+
+
+def members(model: Element, tag: str) -> Iterator[Element]:
+    """Components of a set, such as BodySet."""
+    found = model.find(f"{tag}/objects")
+    yield from found if found is not None else ()

@@ -1,0 +1,139 @@
+"""Joints of an OpenSim model as chains of axes that follow coordinates, whose axes may be functions of these.
+
+A joint stands in two frames, one on each body. From that on the parent lead first what slides, along axes of
+that frame, then what turns, each axis turned by those before it; a UniversalJoint, say, turns about x and y.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+from xml.etree.ElementTree import Element
+
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+from linkwise.robot import transforms
+from linkwise.robot.description import Connection, CurvedAxis, CurvedCoordinate
+from linkwise.robot.joint_types import X, Y, Z
+from linkwise.robot.readers.osim_coordinates import Rule, limits_of
+from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of
+from linkwise.robot.readers.osim_frames import Placed
+from linkwise.robot.readers.osim_functions import IDENTITY, constant, function_of
+
+Kind = Literal["revolute", "prismatic"]
+Part = tuple[Kind, tuple[float, float, float], int]
+"""An axis, and which of the joint's coordinates moves it."""
+
+TURNING: tuple[Part, ...] = (("revolute", X, 0), ("revolute", Y, 1), ("revolute", Z, 2))
+TYPES: dict[str, tuple[Part, ...]] = {
+    "WeldJoint": (),
+    "PinJoint": (("revolute", Z, 0),),
+    "SliderJoint": (("prismatic", X, 0),),
+    "UniversalJoint": TURNING[:2],
+    "GimbalJoint": TURNING,
+    "BallJoint": TURNING,
+    "FreeJoint": (("prismatic", X, 3), ("prismatic", Y, 4), ("prismatic", Z, 5), *TURNING),
+    "PlanarJoint": (("prismatic", X, 1), ("prismatic", Y, 2), ("revolute", Z, 0)),
+}
+CUSTOM = "CustomJoint"
+SUFFIXES = {"prismatic": "t", "revolute": "r"}
+
+
+@dataclass(frozen=True)
+class OsimJoint:
+    """A joint, its frames on both bodies, and its coordinates' elements."""
+
+    element: Element
+    parent: Placed
+    child: Placed
+    coordinates: tuple[Element, ...]
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return name_of(self.element)
+
+    def connection(self, rules: Mapping[str, Rule]) -> Connection:
+        """The joint, with what its coordinates are."""
+        turn = transforms.transpose(self.child.rotation)
+        rotation = transforms.compose(self.parent.rotation, turn)
+        axes = tuple(
+            CurvedAxis(
+                f"{SUFFIXES[kind]}{number}",
+                kind,
+                transforms.rotate(self.child.rotation, direction),
+                rule.free,
+                rule.curve,
+            )
+            for number, (kind, direction, rule) in enumerate(self._axes(rules), 1)
+        )
+        free = {axis.coordinate for axis in axes}
+        units: dict[str, Kind] = {}
+        for axis in axes:
+            if axis.coordinate and (axis.curve == IDENTITY or axis.coordinate not in units):
+                units[axis.coordinate] = axis.kind
+        return Connection(
+            self.name,
+            "curved" if axes else "fixed",
+            self.parent.body,
+            self.child.body,
+            rotation,
+            self.parent.translation,
+            axes=axes,
+            coordinates=tuple(
+                CurvedCoordinate(name_of(c), "rad" if units[name_of(c)] == "revolute" else "m", limits_of(c))
+                for c in self.coordinates
+                if name_of(c) in free
+            ),
+        )
+
+    def _axes(self, rules: Mapping[str, Rule]) -> Iterator[tuple[Kind, tuple[float, float, float], Rule]]:
+        if self.element.tag == CUSTOM:
+            yield from self._custom(rules)
+            return
+        parts = TYPES.get(self.element.tag)
+        if parts is None:
+            raise LinkwiseError(
+                f"joint {self.name!r} is a {self.element.tag}, which is not modelled; make it one of "
+                f"{listed([*TYPES, CUSTOM])}"
+            )
+        names = [name_of(coordinate) for coordinate in self.coordinates]
+        if len(names) != len(parts):
+            raise LinkwiseError(
+                f"joint {self.name!r} is a {self.element.tag} with {len(names)} coordinates; give it "
+                f"{len(parts)}"
+            )
+        for kind, direction, number in parts:
+            yield kind, direction, rules[names[number]]
+
+    def _custom(self, rules: Mapping[str, Rule]) -> Iterator[tuple[Kind, tuple[float, float, float], Rule]]:
+        """Axes of a SpatialTransform: what slides first, for in the file it stands last."""
+        transform = self.element.find("SpatialTransform")
+        given = {name_of(axis): axis for axis in (transform if transform is not None else ())}
+        kinds: tuple[tuple[Kind, str], ...] = (("prismatic", "translation"), ("revolute", "rotation"))
+        for kind, word in kinds:
+            for number, usual in enumerate((X, Y, Z), 1):
+                axis = given.get(f"{word}{number}")
+                if axis is None:
+                    continue
+                place = f"joint {self.name!r}, {word}{number}"
+                rule = self._displacement(axis, rules, place)
+                direction = transforms.unit(numbers_of(axis, "axis", " ".join(map(str, usual)), place, 3))
+                if rule == Rule("", constant(0.0)):
+                    continue
+                if direction is None:
+                    raise LinkwiseError(f"{place} has a zero axis; give its direction, such as 0 0 1")
+                yield kind, direction, rule
+
+    def _displacement(self, axis: Element, rules: Mapping[str, Rule], place: str) -> Rule:
+        names = text_of(axis, "coordinates").split()
+        if len(names) > 1:
+            raise LinkwiseError(
+                f"{place} is a function of {len(names)} coordinates; only functions of one are modelled"
+            )
+        curve = function_of(axis, "function", place)
+        if not names:
+            return Rule("", constant(curve(0.0) if curve else 0.0))
+        if names[0] not in rules:
+            raise LinkwiseError(f"{place} names {names[0]!r}, which is not a coordinate; correct it")
+        rule = rules[names[0]].of(curve or IDENTITY)
+        return rule if rule.free else Rule("", constant(rule.curve(0.0)))
