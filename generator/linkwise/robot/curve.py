@@ -5,6 +5,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -74,7 +75,7 @@ def _differentiated(coefficients: Polynomial, times: int) -> Polynomial:
 
 def _composed(outer: Sequence[float], inner: Polynomial) -> Polynomial:
     """Coefficients of outer(inner), by Horner's rule."""
-    value: Sequence[float] = (0.0,)
+    value: np.ndarray[tuple[int], np.dtype[np.floating[Any]]] = np.zeros(1)
     for coefficient in reversed(outer):
         value = polynomial.polyadd(polynomial.polymul(value, inner), (coefficient,))
     return tuple(map(float, value))

@@ -106,10 +106,12 @@ class Loop:
 class CurvedAxis:
     """One axis of a `curved` joint: it moves by a curve of a coordinate.
 
-    suffix: what tells it from the joint's other axes; direction: in the child's axes at the place where all
-    axes of the joint stand at 0
+    name: its own; of one axis for each coordinate the coordinate's name
+    suffix: what tells the joint's other axes' bodies from its child; direction: in the child's axes at the
+    place where all axes of the joint stand at 0
     """
 
+    name: str
     suffix: str
     kind: Literal["revolute", "prismatic"]
     direction: tuple[float, float, float]

@@ -1,6 +1,6 @@
 """Joint types as chains of revolute and prismatic axes."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -30,13 +30,12 @@ EFFECTS = {"ball": TURNS, "floating": FLOATS}
 
 @dataclass(frozen=True)
 class Axis:
-    """One degree of freedom of a file's joint; `last` carries the child link."""
+    """One degree of freedom of a file's joint."""
 
     name: str
     suffix: str
     kind: Kind
     direction: Vector
-    last: bool
     follows: tuple[str, Curve] | None = None
     """The coordinate, empty for none, and the curve of it, of an axis that has none of its own."""
 
@@ -56,28 +55,16 @@ def expand(connection: Connection) -> tuple[Axis, ...]:
     if connection.type == "fixed":
         return ()
     if connection.type == "curved":
-        return tuple(_curved(connection))
+        return tuple(
+            Axis(axis.name, axis.suffix, axis.kind, axis.direction, (axis.coordinate, axis.curve))
+            for axis in connection.axes
+        )
     if connection.type in SINGLE:
-        return (Axis(connection.name, "", SINGLE[connection.type], _unit(connection), True),)
-    parts = _parts(connection)
+        return (Axis(connection.name, "", SINGLE[connection.type], _unit(connection)),)
     return tuple(
-        Axis(f"{connection.name}_{suffix}", suffix, kind, direction, index == len(parts) - 1)
-        for index, (suffix, kind, direction) in enumerate(parts)
+        Axis(f"{connection.name}_{suffix}", suffix, kind, direction)
+        for suffix, kind, direction in _parts(connection)
     )
-
-
-def _curved(connection: Connection) -> Iterator[Axis]:
-    """Axes of a curved joint; the first that a coordinate itself moves has the coordinate's name."""
-    own: set[str] = set()
-    for at, axis in enumerate(connection.axes):
-        last = at == len(connection.axes) - 1
-        name = f"{connection.name}_{axis.suffix}"
-        itself = axis.coordinate and axis.curve.line == (0.0, 1.0) and axis.coordinate not in own
-        if itself:
-            own.add(axis.coordinate)
-            name = axis.coordinate
-        follows = axis.coordinate, axis.curve
-        yield Axis(name, axis.suffix, axis.kind, axis.direction, last, follows)
 
 
 def expansion_notes(connections: Iterable[Connection]) -> list[Note]:

@@ -85,8 +85,9 @@ def moving_links(
         turn = transforms.compose(before.rotation, connection.rotation)
         shift = transforms.rotate(before.rotation, start)
         place = _Place(before.link, turn, transforms.add(before.position, shift))
+        last = next((axis for axis in reversed(axes) if motion[axis.name].coordinate is not None), None)
         for axis in axes:
-            place = _pass(place, axis, motion[axis.name], child, moving, naming is not None)
+            place = _pass(place, axis, motion[axis.name], child, axis is last, moving, naming is not None)
             if place.link is not None:
                 between.setdefault(moving[place.link].name, place)
         origin = transforms.rotate(place.rotation, child.origin)
@@ -134,9 +135,15 @@ def _frame(name: str, place: _Place, moving: list[_Moving]) -> Frame:
 
 
 def _pass(
-    place: _Place, axis: Axis, motion: AxisRule, child: Body, moving: list[_Moving], own_axes: bool
+    place: _Place,
+    axis: Axis,
+    motion: AxisRule,
+    child: Body,
+    last: bool,
+    moving: list[_Moving],
+    own_axes: bool,
 ) -> _Place:
-    """Pass one axis: a new moving link, or a fixed displacement when it is locked.
+    """Pass one axis: a new moving link, the child's behind the `last` that moves, or a fixed displacement.
 
     The new link's frame has z on the axis; an offset of the coordinate is folded into the fixed part. What it
     gathers is in that frame, or in the child's `own_axes`.
@@ -155,10 +162,10 @@ def _pass(
         parent = moving[place.link]
         rotation, position = transforms.compose(parent.turn, rotation), parent.framed(position)
     joint = Joint(axis.name, axis.kind, motion.coordinate, rotation, position, motion.ratio, motion.curve)
-    name, at = child.name if axis.last else f"{child.name}_{axis.suffix}", len(moving)
+    name, at = child.name if last else f"{child.name}_{axis.suffix}", len(moving)
     if not own_axes:
         moving.append(_Moving(name, place.link, joint))
         return _Place(at, back)
-    origin = child.origin if axis.last else ZERO3
+    origin = child.origin if last else ZERO3
     moving.append(_Moving(name, place.link, joint, back, origin))
     return _Place(at, IDENTITY, transforms.minus(origin))

@@ -19,14 +19,15 @@ def constant(value: float) -> Curve:
 
 
 def function_of(owner: Element, tag: str, place: str) -> Curve | None:
-    """The function that an element has by a name: a child of this name, or what that holds; None for none."""
+    """The function that an element has; None for none.
+
+    It is a child of its own, with or without the name `tag`, or stands in a child that is called so; no other
+    child of what has functions holds elements.
+    """
     for child in owner:
-        if child.get("name") == tag and child.tag in FUNCTIONS:
-            return FUNCTIONS[child.tag](child, place)
         if child.tag == tag and len(child):
-            (inner, *_) = child
-            return _known(inner, place)
-        if child.get("name") == tag:
+            return _known(child[0], place)
+        if len(child) or child.get("name") == tag:
             return _known(child, place)
     return None
 

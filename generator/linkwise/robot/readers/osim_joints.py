@@ -4,7 +4,7 @@ A joint stands in two frames, one on each body. From that on the parent lead fir
 that frame, then what turns, each axis turned by those before it; a UniversalJoint, say, turns about x and y.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 from xml.etree.ElementTree import Element
@@ -36,6 +36,27 @@ TYPES: dict[str, tuple[Part, ...]] = {
 }
 CUSTOM = "CustomJoint"
 SUFFIXES = {"prismatic": "t", "revolute": "r"}
+UNITS: dict[Kind, Literal["rad", "m"]] = {"prismatic": "m", "revolute": "rad"}
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """An axis, in the joint's frame, and how it moves."""
+
+    kind: Kind
+    direction: tuple[float, float, float]
+    rule: Rule
+
+
+def _carrier(axes: Sequence[_Moved], coordinate: str) -> int | None:
+    """Index of the axis that stands for a coordinate: what it moves itself, or by a line, if any."""
+
+    def remoteness(at: int) -> tuple[bool, bool, bool]:
+        axis = axes[at]
+        return axis.rule.curve != IDENTITY, axis.rule.curve.line is None, axis.kind != "revolute"
+
+    own = (at for at, axis in enumerate(axes) if axis.rule.free == coordinate)
+    return min(own, key=remoteness, default=None)
 
 
 @dataclass(frozen=True)
@@ -55,38 +76,39 @@ class OsimJoint:
     def connection(self, rules: Mapping[str, Rule]) -> Connection:
         """The joint, with what its coordinates are."""
         turn = transforms.transpose(self.child.rotation)
-        rotation = transforms.compose(self.parent.rotation, turn)
-        axes = tuple(
-            CurvedAxis(
-                f"{SUFFIXES[kind]}{number}",
-                kind,
-                transforms.rotate(self.child.rotation, direction),
-                rule.free,
-                rule.curve,
-            )
-            for number, (kind, direction, rule) in enumerate(self._axes(rules), 1)
-        )
-        free = {axis.coordinate for axis in axes}
-        units: dict[str, Kind] = {}
-        for axis in axes:
-            if axis.coordinate and (axis.curve == IDENTITY or axis.coordinate not in units):
-                units[axis.coordinate] = axis.kind
+        axes = tuple(self._axes(rules))
+        free = [name for c in self.coordinates if rules[name := name_of(c)].free == name]
+        carriers = {name: _carrier(axes, name) for name in free}
+        for name, at in carriers.items():
+            if at is None:
+                raise LinkwiseError(f"coordinate {name!r} moves no axis of its joint {self.name!r}; lock it")
+        names = {at: name for name, at in carriers.items()}
         return Connection(
             self.name,
             "curved" if axes else "fixed",
             self.parent.body,
             self.child.body,
-            rotation,
+            transforms.compose(self.parent.rotation, turn),
             self.parent.translation,
-            axes=axes,
+            axes=tuple(
+                CurvedAxis(
+                    names.get(at, f"{self.name}_{SUFFIXES[axis.kind]}{at + 1}"),
+                    f"{SUFFIXES[axis.kind]}{at + 1}",
+                    axis.kind,
+                    transforms.rotate(self.child.rotation, axis.direction),
+                    axis.rule.free,
+                    axis.rule.curve,
+                )
+                for at, axis in enumerate(axes)
+            ),
             coordinates=tuple(
-                CurvedCoordinate(name_of(c), "rad" if units[name_of(c)] == "revolute" else "m", limits_of(c))
+                CurvedCoordinate(name, UNITS[axes[at].kind], limits_of(c))
                 for c in self.coordinates
-                if name_of(c) in free
+                if (at := carriers.get(name := name_of(c))) is not None
             ),
         )
 
-    def _axes(self, rules: Mapping[str, Rule]) -> Iterator[tuple[Kind, tuple[float, float, float], Rule]]:
+    def _axes(self, rules: Mapping[str, Rule]) -> Iterator[_Moved]:
         if self.element.tag == CUSTOM:
             yield from self._custom(rules)
             return
@@ -103,9 +125,9 @@ class OsimJoint:
                 f"{len(parts)}"
             )
         for kind, direction, number in parts:
-            yield kind, direction, rules[names[number]]
+            yield _Moved(kind, direction, rules[names[number]])
 
-    def _custom(self, rules: Mapping[str, Rule]) -> Iterator[tuple[Kind, tuple[float, float, float], Rule]]:
+    def _custom(self, rules: Mapping[str, Rule]) -> Iterator[_Moved]:
         """Axes of a SpatialTransform: what slides first, for in the file it stands last."""
         transform = self.element.find("SpatialTransform")
         given = {name_of(axis): axis for axis in (transform if transform is not None else ())}
@@ -122,7 +144,7 @@ class OsimJoint:
                     continue
                 if direction is None:
                     raise LinkwiseError(f"{place} has a zero axis; give its direction, such as 0 0 1")
-                yield kind, direction, rule
+                yield _Moved(kind, direction, rule)
 
     def _displacement(self, axis: Element, rules: Mapping[str, Rule], place: str) -> Rule:
         names = text_of(axis, "coordinates").split()

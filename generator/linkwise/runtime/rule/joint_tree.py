@@ -17,7 +17,7 @@ Formula = Callable[[Any, Mapping[str, Any]], Any]
 
 
 class TreeCurve(NamedTuple):
-    """A function of a coordinate: polynomials in q - start, each from its start on; the first before it too."""
+    """A function of q: polynomials in q - start, each from its start on, the first before it too."""
 
     starts: tuple[float, ...]
     """Ascending; the first two may be the same."""
