@@ -18,6 +18,7 @@ static real operator+(real a, real b) { return result(a.value + b.value, a, b); 
 static real operator-(real a, real b) { return result(a.value - b.value, a, b); }
 static real operator*(real a, real b) { return result(a.value * b.value, a, b); }
 static real operator-(real a) { return real(-a.value, a.varies); }
+static bool operator>=(real a, real b) { return a.value >= b.value; }
 static real &operator+=(real &a, real b) { return a = a + b; }
 static real &operator-=(real &a, real b) { return a = a - b; }
 static real &operator*=(real &a, real b) { return a = a * b; }

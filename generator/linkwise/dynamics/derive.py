@@ -9,7 +9,7 @@ from linkwise.dynamics.kernel import Kernel, lowering, parameter_nodes
 from linkwise.errors import within
 from linkwise.progress import Progress, silent
 from linkwise.symbolic.link_energy import lineage, link_energies
-from linkwise.symbolic.system import EnergySystem, System
+from linkwise.symbolic.system import EnergySystem, System, refuse_curves
 
 Method = Literal["rule", "energy"]
 """How the closed forms of rigid links are found: by the rigid-link rule, or from their SymPy energies."""
@@ -18,8 +18,10 @@ Method = Literal["rule", "energy"]
 def link_kernel(system: System, link: int, method: Method = "rule") -> Kernel:
     """Closed forms of one link from its own path alone, whatever else the robot has.
 
-    Those of energies that a user wrote come from these in any case.
+    Those of energies that a user wrote come from these in any case. Raises LinkwiseError for joints
+    that follow curves.
     """
+    refuse_curves(system)
     with within(f"link {system.links[link].name!r}"):
         if isinstance(system, EnergySystem) or method == "energy":
             return _energy_kernel(system, link)

@@ -11,7 +11,7 @@ from linkwise.emit.backend import LOOPS, backends_of, chosen_backends
 from linkwise.emit.c.loop_costs import decomposition_cost, link_costs
 from linkwise.errors import LinkwiseError
 from linkwise.package.entries import KernelKind
-from linkwise.symbolic.system import EnergySystem, RigidSystem, System
+from linkwise.symbolic.system import EnergySystem, RigidSystem, System, refuse_curves
 
 CHOICES = ("auto", "straight", "loops")
 
@@ -34,7 +34,7 @@ def chosen_kernel(
     """Kind of kernel for one of CHOICES and the back ends asked for by name, None for all there are.
 
     Raises LinkwiseError for a choice that is not one, and for loops over energies or for a derivation from
-    them.
+    them, and for closed forms of joints that follow curves.
     """
     if derivation not in get_args(Method):
         raise LinkwiseError(f"no derivation {derivation!r}; choose rule or energy")
@@ -44,12 +44,9 @@ def chosen_kernel(
         raise LinkwiseError("--kernel loops goes over rigid bodies, and here are energies; leave it out")
     if choice == "loops" and derivation == "energy":
         raise LinkwiseError("--kernel loops derives nothing, and --derivation energy does; leave one out")
-    if isinstance(system, RigidSystem) and any(link.joint.curve for link in system.robot.links):
+    if isinstance(system, RigidSystem) and system.curved:
         if choice == "straight" or derivation == "energy":
-            wanted = "--kernel straight" if choice == "straight" else "--derivation energy"
-            raise LinkwiseError(
-                f"{wanted} derives closed forms, and joints that follow curves have none; leave it out"
-            )
+            refuse_curves(system)
         return "loops"
     if choice != "auto":
         return "loops" if choice == "loops" else "straight"

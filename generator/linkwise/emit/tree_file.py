@@ -7,7 +7,15 @@ from dataclasses import dataclass
 from linkwise.emit.formula_symbols import parameter_symbols
 from linkwise.emit.render import render
 from linkwise.escape import python_literal
-from linkwise.package.entries import PLACE, BodyEntry, CouplingEntry, FrameEntry, RigidTree, TieEntry
+from linkwise.package.entries import (
+    PLACE,
+    BodyEntry,
+    CouplingEntry,
+    CurveEntry,
+    FrameEntry,
+    RigidTree,
+    TieEntry,
+)
 from linkwise.version import VERSION
 
 WORD = re.compile(r"\b([A-Za-z_]\w*)(\(?)")
@@ -16,10 +24,11 @@ WORD = re.compile(r"\b([A-Za-z_]\w*)(\(?)")
 
 @dataclass(frozen=True)
 class TreeText:
-    """One joint, link or frame: its name, and its other entries as Python expressions."""
+    """One joint, link or frame: its name, its other entries as Python expressions, and a joint's curve."""
 
     name: str
     entries: tuple[str, ...]
+    curve: CurveEntry | None = None
 
 
 def tree_text(tree: RigidTree, links: Sequence[str], parameters: Sequence[str]) -> str:
@@ -31,6 +40,7 @@ def tree_text(tree: RigidTree, links: Sequence[str], parameters: Sequence[str]) 
         "version": VERSION,
         "gravity": repr(tuple(tree.gravity)),
         "joints": [_joint(body) for body in tree.bodies],
+        "curved": any(body.curve for body in tree.bodies),
         "links": [_link(b, tree.bodies[b]) for b in carriers],
         "frames": [_frame(frame) for frame in tree.frames],
         "ties": [_tie(tie, tree) for tie in tree.ties],
@@ -49,8 +59,7 @@ def tree_text(tree: RigidTree, links: Sequence[str], parameters: Sequence[str]) 
 def _joint(body: BodyEntry) -> TreeText:
     placed = f"{body.rotation!r}", f"{body.translation!r}"
     moved = f"{body.parent!r}", repr(body.kind), f"{body.coordinate}", f"{body.ratio!r}"
-    curve = body.curve and f"TreeCurve({body.curve.starts!r}, {body.curve.pieces!r})"
-    return TreeText(python_literal(body.joint), (", ".join(moved), *placed, *([curve] if curve else [])))
+    return TreeText(python_literal(body.joint), (", ".join(moved), *placed), body.curve)
 
 
 def _link(b: int, body: BodyEntry) -> TreeText:

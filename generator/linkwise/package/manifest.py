@@ -11,6 +11,7 @@ from typing import Any
 
 from linkwise.errors import LinkwiseError
 from linkwise.output import sweep
+from linkwise.package.checked_tree import check_tree
 from linkwise.package.decode import decoded, parsed, require
 from linkwise.package.entries import (
     BodyEntry,
@@ -24,10 +25,9 @@ from linkwise.package.entries import (
     PassiveEntry,
     RigidTree,
     TieEntry,
-    check_tree,
 )
 
-SCHEMA = 10
+SCHEMA = 11
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [

@@ -18,7 +18,7 @@ import sympy as sp
 
 from linkwise.robot.robot import Coordinate, Joint, Mat3, Scalar, Vec3
 from linkwise.robot.transforms import total
-from linkwise.symbolic.system import EnergySystem, System
+from linkwise.symbolic.system import EnergySystem, System, refuse_curves
 
 HALF = sp.Rational(1, 2)
 
@@ -87,7 +87,11 @@ class _Namer:
 
 
 def link_energies(system: System) -> tuple[StepwiseEnergy, ...]:
-    """Energy of every link; that of a rigid link continues its parent's steps and does not repeat them."""
+    """Energy of every link; that of a rigid link continues its parent's steps and does not repeat them.
+
+    Raises LinkwiseError for joints that follow curves.
+    """
+    refuse_curves(system)
     if isinstance(system, EnergySystem):
         return tuple(StepwiseEnergy(link.name, link.kinetic, link.potential) for link in system.links)
     robot = system.robot

@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 import sympy as sp
 
+from linkwise.errors import LinkwiseError
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import Coordinate, Joint, Mat3, Robot, Scalar, Vec3
 
@@ -67,6 +68,11 @@ class RigidSystem:
         return {sp.Symbol(p.name, real=True): p.value for p in self.robot.parameters}
 
     @property
+    def curved(self) -> bool:
+        """Whether a joint follows a curve of its coordinate."""
+        return any(link.joint.curve for link in self.robot.links)
+
+    @property
     def link_names(self) -> tuple[str, ...]:
         """Names of the links."""
         return tuple(link.name for link in self.links)
@@ -100,6 +106,16 @@ class EnergySystem:
 
 System: TypeAlias = RigidSystem | EnergySystem
 """All that derivation and emission know of a robot."""
+
+
+def refuse_curves(system: System) -> None:
+    """Raise LinkwiseError where a joint follows a curve: closed forms know only lines."""
+    for link in system.robot.links if isinstance(system, RigidSystem) else ():
+        if link.joint.curve:
+            raise LinkwiseError(
+                f"joint {link.joint.name!r} follows a curve, and no closed forms are derived for that: only "
+                "kernels in loops are to be had"
+            )
 
 
 def rigid_system(robot: Robot) -> RigidSystem:

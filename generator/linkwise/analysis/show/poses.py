@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from linkwise.check.curve_reference import displacement
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry
 
@@ -18,7 +19,7 @@ def poses(bodies: Sequence[BodyEntry], q: Array) -> tuple[Array, Array]:
             turn, origin = np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3))
         else:
             turn, origin = turns[body.parent], origins[body.parent]
-        move = body.ratio * q[:, body.coordinate]
+        move = displacement(body, q)[:, 0]
         shift, rotation = np.broadcast_to(body.translation, (len(q), 3)), np.array(body.rotation)
         if body.kind == "prismatic":
             shift = shift + move[:, None] * rotation[:, 2]

@@ -5,7 +5,7 @@ robot alone, such as half the trace of an inertia, is not counted, nor are sines
 them in the C of one sample.
 """
 
-from linkwise.emit.c.robot_tables import columns, placed
+from linkwise.emit.c.robot_tables import columns, curve_tables, placed
 from linkwise.robot.robot import Joint
 from linkwise.symbolic.system import RigidSystem
 
@@ -27,6 +27,10 @@ SECOND_CHANGE = 69
 """The second change of a joint's axis."""
 GRADIENT = 111
 """The wrenches of a joint's c0."""
+BEND = 78
+"""How a joint's axis changes by its own coordinate, of each where one follows a curve."""
+SHIFT, POWER = 1, 8
+"""A curve at a coordinate: what that is behind the piece's start, and each power with its derivatives."""
 
 
 def link_costs(system: RigidSystem) -> list[int]:
@@ -55,8 +59,10 @@ def torque_cost(system: RigidSystem) -> int:
 def gradient_cost(system: RigidSystem) -> int:
     """Operations of the position gradient."""
     chains = [len(link.chain) for link in system.links]
-    second = SECOND_CHANGE * len(system.robot.links)
-    return _motion(system) + second + sum(LINK + d * GRADIENT + d * d * (MOVES + ALONG + 1) for d in chains)
+    second = (SECOND_CHANGE + 6 * system.curved) * len(system.robot.links)
+    step = MOVES + ALONG + 1
+    own = [LINK + d * (GRADIENT + step * system.curved) + d * d * step for d in chains]
+    return _motion(system) + second + sum(own)
 
 
 def _motion(system: RigidSystem) -> int:
@@ -65,10 +71,12 @@ def _motion(system: RigidSystem) -> int:
 
 def _frames(system: RigidSystem) -> list[int]:
     """Operations of each frame."""
-    links = system.robot.links
-    return [
-        FRAME + _by_kind(link.joint, matters) for link, matters in zip(links, placed(system), strict=True)
-    ]
+    joints, curves = [link.joint for link in system.robot.links], curve_tables(system)
+    costs = [FRAME + _by_kind(joint, matters) for joint, matters in zip(joints, placed(system), strict=True)]
+    if curves:
+        bent = SHIFT + POWER * curves.powers
+        costs = [BEND + cost + bent * bool(j.curve) for cost, j in zip(costs, joints, strict=True)]
+    return costs
 
 
 def _by_kind(joint: Joint, matters: bool) -> int:

@@ -10,9 +10,10 @@ from xml.etree.ElementTree import Element
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
-from linkwise.robot.description import Body, Description, Loop
+from linkwise.robot.description import Body, Description
 from linkwise.robot.notes import Note, Omission
-from linkwise.robot.readers.osim_coordinates import coordinate_rules, enforced
+from linkwise.robot.readers.osim_constraints import ties, unmodelled
+from linkwise.robot.readers.osim_coordinates import coordinate_rules
 from linkwise.robot.readers.osim_elements import members, name_of, numbers_of, text_of, yes
 from linkwise.robot.readers.osim_frames import GROUND, Frames, Placed, offset_of
 from linkwise.robot.readers.osim_joints import OsimJoint
@@ -50,7 +51,8 @@ def read_osim(path: Path) -> Description:
     elements = [body for body in members(model, "BodySet") if name_of(body) != GROUND]
     if not elements:
         raise LinkwiseError(f"the model {name_of(model)!r} has no <Body>; give one that has some")
-    joints = list(_joints(model, elements))
+    frames = Frames(model, {name_of(body) for body in elements})
+    joints = list(_joints(model, elements, frames))
     rules, notes = coordinate_rules((c for joint in joints for c in joint.coordinates), model)
     return Description(
         name_of(model) or path.stem,
@@ -58,16 +60,16 @@ def read_osim(path: Path) -> Description:
         tuple(joint.connection(rules) for joint in joints),
         _vector(numbers_of(model, "gravity", EARTH, "the model", 3)),
         notes=(*notes, *_ignored(model)),
-        loops=tuple(_constraints(model)),
+        loops=tuple(unmodelled(model)),
+        ties=tuple(ties(model, frames)),
         omissions=tuple(_forces(model)),
     )
 
 
-def _joints(model: Element, bodies: list[Element]) -> Iterator[OsimJoint]:
+def _joints(model: Element, bodies: list[Element], frames: Frames) -> Iterator[OsimJoint]:
     if model.find("JointSet") is None:
         yield from _joints_in_bodies(bodies)
         return
-    frames = Frames(model, {name_of(body) for body in bodies})
     for joint in members(model, "JointSet"):
         parent, child = (
             frames.found(text_of(joint, f"socket_{end}_frame"), joint) for end in ("parent", "child")
@@ -119,16 +121,6 @@ def _inertia(element: Element, place: str) -> Mat3:
 def _vector(values: tuple[float, ...]) -> Vec3:
     x, y, z = values
     return x, y, z
-
-
-def _constraints(model: Element) -> Iterator[Loop]:
-    """Constraints that are not modelled."""
-    for constraint in members(model, "ConstraintSet"):
-        if constraint.tag != "CoordinateCouplerConstraint" and enforced(constraint):
-            yield Loop(
-                f"the model has the {constraint.tag} {name_of(constraint)!r}",
-                "remove it, or set its isEnforced to false",
-            )
 
 
 def _forces(model: Element) -> Iterator[Omission]:

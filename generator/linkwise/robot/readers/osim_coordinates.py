@@ -11,6 +11,8 @@ from linkwise.robot.readers.osim_elements import members, name_of, numbers_of, t
 from linkwise.robot.readers.osim_functions import IDENTITY, constant, function_of
 from linkwise.robot.robot import UNLIMITED, Limits
 
+COUPLER = "CoordinateCouplerConstraint"
+
 
 @dataclass(frozen=True)
 class Rule:
@@ -46,7 +48,7 @@ def coordinate_rules(
         if yes(coordinate, "prescribed"):
             notes.append(Note("ignored", name, "that its motion is prescribed: it moves as a log says"))
     for coupler in members(model, "ConstraintSet"):
-        if coupler.tag == "CoordinateCouplerConstraint" and enforced(coupler):
+        if coupler.tag == COUPLER and enforced(coupler):
             dependent, rule = _coupled(coupler, own)
             notes.append(Note("mimic", dependent, f"a function of {rule.free}" if rule.free else "held"))
             own[dependent] = rule

@@ -46,11 +46,10 @@ class Frames:
         for frame in model.iter(OFFSET):
             self._offsets.setdefault(name_of(frame), []).append(frame)
 
-    def found(self, path: str, joint: Element, passed: tuple[str, ...] = ()) -> Placed:
-        """The frame at the end of a path, first among those of a joint; raises LinkwiseError for none."""
+    def found(self, path: str, owner: Element, passed: tuple[str, ...] = ()) -> Placed:
+        """The frame at the end of a path, first among those of its owner; raises LinkwiseError for none."""
         name = path.rstrip("/").rpartition("/")[2]
-        where = f"joint {name_of(joint)!r}"
-        own = [frame for frame in joint.iter(OFFSET) if name_of(frame) == name]
+        own = [frame for frame in owner.iter(OFFSET) if name_of(frame) == name]
         if not own and name == GROUND:
             return Placed(GROUND)
         if not own and name in self._bodies:
@@ -58,8 +57,8 @@ class Frames:
         frames = own or self._offsets.get(name, [])
         if len(frames) != 1 or name in passed:
             raise LinkwiseError(
-                f"{where} stands in the frame {path!r}, of which there are {len(frames)}; name a body, "
+                f"{owner.tag} {name_of(owner)!r} stands in the frame {path!r}, of which there are {len(frames)}; name a body, "
                 "ground or an offset frame of one"
             )
-        carrier = self.found(text_of(frames[0], "socket_parent"), joint, (*passed, name))
+        carrier = self.found(text_of(frames[0], "socket_parent"), owner, (*passed, name))
         return carrier.behind(*offset_of(frames[0], f"frame {name!r}", "translation", "orientation"))
