@@ -12,6 +12,7 @@ HOUSE = Path(__file__).parents[1] / "generator/linkwise"
 
 ROOMS = (
     "cli",
+    "kept_package",
     "pipeline",
     "report",
     "identification",
@@ -30,6 +31,7 @@ ROOMS = (
     "extras",
     "progress",
     "input_file",
+    "makers",
     "errors",
     "escape",
     "version",

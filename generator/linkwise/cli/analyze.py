@@ -8,7 +8,6 @@ import typer
 
 from linkwise.analysis import Analysis
 from linkwise.analysis.job import Wanted
-from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.payload import carrying
 from linkwise.analysis.run import analyze_to
@@ -29,7 +28,6 @@ from linkwise.cli.log_options import (
     Log,
     LoopTolerance,
     Map,
-    Package,
     Pad,
     Resample,
     Time,
@@ -40,6 +38,7 @@ from linkwise.cli.log_options import (
     constant_loads,
     pairs,
 )
+from linkwise.cli.robot_option import RobotOption, opened_robot
 from linkwise.escape import json_text, listed
 from linkwise.progress import progress as shown_progress
 
@@ -98,7 +97,7 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def analyze(
     log: Log,
-    robot: Package,
+    robot: RobotOption,
     out: Out,
     units: AngleUnits = None,
     time: Time = None,
@@ -137,7 +136,8 @@ def analyze(
         derivative, window, degree, chosen_lowpass(cutoff, filter_order, padding), edges, convention
     )
     wanted = Wanted(format, tuple(figure or ()), page, power_terms, tuple(induced or ()))
-    package = load_robot(robot, backend)
+    with shown_progress() as progress:
+        package = opened_robot(robot, backend, progress)
     package = carrying(package, carried(payload or [], package))
     held = chosen_contacts(
         contact or [],

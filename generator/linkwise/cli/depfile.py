@@ -1,23 +1,19 @@
 """What the files of a package depend on, as make and ninja read it.
 
-A package is made of the robot's file and of linkwise. Of linkwise every file counts, for whoever changes one,
-and the record that installers keep of a version, for an upgrade: its path has the version in it, and so is
-gone afterwards, whatever times the new files bring along. The same goes for SymPy, and for MuJoCo where it
-read the robot.
+A package is made of the robot's file, of its own modules where it is one of Python, and of what `makers`
+lists.
 """
 
 import re
 import sys
 import sysconfig
 from collections.abc import Iterable, Iterator
-from importlib import import_module, metadata
+from importlib import import_module
 from pathlib import Path, PurePath
 
 from linkwise.errors import LinkwiseError
+from linkwise.makers import HOMES
 
-SUFFIXES = (".py", ".j2", ".toml", ".h", ".c")
-HOMES = ("linkwise", "linkwise.templates")
-MAKERS = ("linkwise", "sympy", "mujoco")
 INSTALLED = {"site-packages", "dist-packages"}
 SPOKEN = str.maketrans({" ": "\\ ", "#": "\\#", "$": "$$"})
 UNFIT = re.compile(r"""[\x00-\x1f"&'*;<>?\[\\\]^`|:]|^~|\)$""")
@@ -38,17 +34,6 @@ def depfile_text(targets: Iterable[str], inputs: Iterable[str]) -> str:
     return f"{whole}\n{alone}"
 
 
-def generator_files() -> Iterator[str]:
-    """Paths of linkwise's own files, and of the records of what took part."""
-    for home in HOMES:
-        folder = Path(str(import_module(home).__file__)).parent
-        found = (path for path in folder.rglob("*") if path.suffix in SUFFIXES)
-        yield from (path.as_posix() for path in sorted(found))
-    for name in MAKERS:
-        if name in sys.modules:
-            yield from _record(name)
-
-
 def own_modules(before: Iterable[str]) -> Iterator[str]:
     """Files of modules that a file of energies imported since `before`, not Python's own nor installed."""
     places = [Path(sysconfig.get_path("stdlib")), Path(sysconfig.get_path("platstdlib"))]
@@ -58,16 +43,6 @@ def own_modules(before: Iterable[str]) -> Iterator[str]:
         installed = INSTALLED.intersection(path.parts) or any(map(path.is_relative_to, places))
         if path.suffix == ".py" and path.is_file() and not installed:
             yield path.as_posix()
-
-
-def _record(distribution: str) -> Iterator[str]:
-    """METADATA of an installed package; nothing of one that was never installed.
-
-    Beside the record there may be what setuptools leaves in a source tree, which has none.
-    """
-    for found in metadata.distributions(name=distribution):
-        records = (file for file in found.files or [] if file.name == "METADATA" and len(file.parts) == 2)
-        yield from (Path(str(found.locate_file(file))).as_posix() for file in records)
 
 
 def _spoken(name: str) -> str:

@@ -15,7 +15,7 @@ import typer
 
 from linkwise import pipeline
 from linkwise.cli import Details, counted, tell
-from linkwise.cli.depfile import depfile_text, generator_files, own_modules
+from linkwise.cli.depfile import depfile_text, own_modules
 from linkwise.cli.options import RobotNames, reads_robot
 from linkwise.dynamics.derive import Method
 from linkwise.emit.assemble import checked_identifier
@@ -24,6 +24,7 @@ from linkwise.emit.kernel_choice import chosen_kernel
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.input_file import is_file, is_inside, is_same
+from linkwise.makers import generator_files
 from linkwise.output import require_writable, sweep, write_files
 from linkwise.package.manifest import FILE
 from linkwise.package.write import check_target, differences, refuse_inside_package, write_package

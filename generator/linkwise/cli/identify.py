@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.settings import Reading, choices
 from linkwise.cli import Json, tell
 from linkwise.cli.log_options import (
@@ -22,7 +21,6 @@ from linkwise.cli.log_options import (
     Log,
     LoopTolerance,
     Map,
-    Package,
     Pad,
     Resample,
     Time,
@@ -31,13 +29,13 @@ from linkwise.cli.log_options import (
     chosen_processing,
     pairs,
 )
+from linkwise.cli.robot_option import RobotOption, opened_robot
 from linkwise.escape import json_text, listed
 from linkwise.identification import Fitting, Identification
 from linkwise.identification import identify as identified
 from linkwise.identification.identified_files import identified_files, record
 from linkwise.identification.urdf_file import lost_gravity
 from linkwise.output import require_writable, write_files
-from linkwise.package.manifest import Manifest
 from linkwise.package.write import refuse_inside_package
 from linkwise.progress import progress as shown_progress
 
@@ -60,7 +58,7 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def identify(
     log: Log,
-    robot: Package,
+    robot: RobotOption,
     out: Out,
     units: AngleUnits = None,
     time: Time = None,
@@ -88,12 +86,13 @@ def identify(
     processing = chosen_processing(derivative, window, degree, lowpass, "trim")
     without = tuple(unmeasured or [])
     fitting = Fitting(pairs("--torque", torque or []), torque_factor, friction, unseen, without)
-    package = load_robot(robot, backend)
+    with shown_progress() as progress:
+        package = opened_robot(robot, backend, progress)
     refuse_inside_package(out)
     require_writable(out)
     with shown_progress(UNITS) as progress:
         found = identified(log, package, reading, processing, fitting, progress)
-    manifest = Manifest.read(robot)
+    manifest = package.package.manifest
     assert manifest.tree is not None
     if lost := lost_gravity(manifest.tree):
         found = replace(found, warnings=(*found.warnings, lost))

@@ -31,7 +31,6 @@ UNITS = {
 """What progress is counted in."""
 
 Log = Annotated[Path, typer.Argument(help="Motion log: .csv, .mot, .sto or .parquet")]
-Package = Annotated[Path, typer.Option(help="Directory of a generated robot")]
 AngleUnits = Annotated[
     Units | None,
     typer.Option(help="Unit of the angles, lengths are metres; the file's own, else rad, if not given"),

@@ -65,11 +65,20 @@ def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
         return _built(description, options)
 
 
+def is_built_in(spec: str | Path) -> bool:
+    """Whether a name is that of a built-in robot."""
+    return str(spec) in FILES or re.fullmatch(r"planar([1-9][0-9]*)", str(spec)) is not None
+
+
+def is_description(spec: str | Path) -> bool:
+    """Whether a name is that of a built-in robot, or ends as a robot's file does."""
+    return is_built_in(spec) or Path(spec).suffix.lower() in READERS
+
+
 def robot_files(spec: str | Path, options: Options) -> tuple[Path, ...]:
     """Files that a robot is read from, with those that they include; a built-in has none."""
     path = Path(spec)
-    built_in = str(spec) in FILES or re.fullmatch(r"planar([1-9][0-9]*)", str(spec))
-    own: tuple[Path, ...] = () if built_in else (path,)
+    own: tuple[Path, ...] = () if is_built_in(spec) else (path,)
     if own and READERS.get(path.suffix.lower()) is read_xml and root_tag(path) == "mujoco":
         own = tuple(dict.fromkeys((path, *mjcf_files(path))))
     return own if options.constraints is None else (*own, Path(options.constraints))

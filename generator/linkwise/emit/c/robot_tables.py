@@ -134,7 +134,7 @@ def _placings(system: RigidSystem) -> Iterator[str]:
 
 
 @dataclass(frozen=True)
-class CurveTables:
+class CurveRows:
     """The curves that joints follow, as rows of the tables that curves.h reads."""
 
     powers: int
@@ -143,7 +143,7 @@ class CurveTables:
     pieces: tuple[str, ...]
 
 
-def curve_tables(system: RigidSystem) -> CurveTables | None:
+def curve_tables(system: RigidSystem) -> CurveRows | None:
     """Tables of a robot; None where no joint follows a curve."""
     joints = [link.joint for link in system.robot.links]
     curves = [joint.curve for joint in joints if joint.curve]
@@ -157,7 +157,7 @@ def curve_tables(system: RigidSystem) -> CurveTables | None:
         first += count
     pieces = (_row((*piece, *[0.0] * (powers - len(piece)))) for curve in curves for piece in curve.pieces)
     starts = (_number(start) for curve in curves for start in curve.starts)
-    return CurveTables(powers, tuple(rows), tuple(starts), tuple(pieces))
+    return CurveRows(powers, tuple(rows), tuple(starts), tuple(pieces))
 
 
 def _bodies(system: RigidSystem) -> Iterator[str]:

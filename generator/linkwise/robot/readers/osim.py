@@ -21,6 +21,8 @@ from linkwise.robot.readers.xml_file import parse
 from linkwise.robot.robot import Mat3, Vec3
 
 EARTH = "0 -9.80665 0"
+GIVING = ("Muscle", "Actuator")
+"""What the tags of forces end in that give the joints' torques."""
 ACTING = {
     "BushingForce": "bushing",
     "FunctionBasedBushingForce": "bushing",
@@ -33,8 +35,11 @@ ACTING = {
     "HuntCrossleyForce": "contact",
     "ElasticFoundationForce": "contact",
     "SmoothSphereHalfSpaceForce": "contact",
+    "Ligament": "ligament",
+    "Blankevoort1991Ligament": "ligament",
+    "PrescribedForce": "force that a function of time gives",
 }
-"""Forces that load joints by themselves, in words; others of a ForceSet, muscles say, give the torques."""
+"""Forces that load joints by themselves, in words."""
 
 
 def read_osim(path: Path) -> Description:
@@ -124,16 +129,19 @@ def _vector(values: tuple[float, ...]) -> Vec3:
 
 
 def _forces(model: Element) -> Iterator[Omission]:
+    """Forces that act by themselves."""
     for force in members(model, "ForceSet"):
         acts = yes(force, "appliesForce", True) and not yes(force, "isDisabled")
-        if force.tag in ACTING and acts:
+        if acts and not force.tag.endswith(GIVING):
             coordinate = text_of(force, "coordinate")
-            yield Omission(ACTING[force.tag], name_of(force), coordinate and f"on {coordinate}")
+            yield Omission(
+                ACTING.get(force.tag, force.tag), name_of(force), coordinate and f"on {coordinate}"
+            )
 
 
 def _ignored(model: Element) -> tuple[Note, ...]:
     """What of the model has no part in its dynamics, or is what gives the torques."""
-    counts = Counter(str(force.tag) for force in members(model, "ForceSet") if force.tag not in ACTING)
-    counts.update(str(part.tag) for part in members(model, "ContactGeometrySet"))
-    counts.update(str(part.tag) for part in members(model, "MarkerSet"))
+    counts = Counter(force.tag for force in members(model, "ForceSet") if force.tag.endswith(GIVING))
+    counts.update(part.tag for part in members(model, "ContactGeometrySet"))
+    counts.update(part.tag for part in members(model, "MarkerSet"))
     return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()))

@@ -57,8 +57,8 @@ class Frames:
         frames = own or self._offsets.get(name, [])
         if len(frames) != 1 or name in passed:
             raise LinkwiseError(
-                f"{owner.tag} {name_of(owner)!r} stands in the frame {path!r}, of which there are {len(frames)}; name a body, "
-                "ground or an offset frame of one"
+                f"{owner.tag} {name_of(owner)!r} stands in the frame {path!r}, of which there are "
+                f"{len(frames)}; name a body, ground or an offset frame of one"
             )
         carrier = self.found(text_of(frames[0], "socket_parent"), owner, (*passed, name))
         return carrier.behind(*offset_of(frames[0], f"frame {name!r}", "translation", "orientation"))

@@ -1,0 +1,23 @@
+"""The robot of commands that read logs: a package, or a robot's file, of which one is made."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.cli import tell
+from linkwise.kept_package import kept_package
+from linkwise.progress import Progress
+
+RobotOption = Annotated[
+    Path, typer.Option(help="Directory of a generated robot; or a robot's file, of which a package is kept")
+]
+
+
+def opened_robot(robot: Path, backend: str | None, progress: Progress) -> LoadedRobot:
+    """The robot, loaded; says what of a file touches the torques. Raises LinkwiseError."""
+    kept = kept_package(robot, backend, progress)
+    for warning in kept.warnings:
+        tell(f"warning: {warning}", err=True)
+    return load_robot(kept.directory, backend)

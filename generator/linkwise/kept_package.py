@@ -1,0 +1,85 @@
+"""A package of a robot's file, for who has none yet: made once, and kept in the user's cache.
+
+It is made again when the file changes or one that it includes, or linkwise itself.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from linkwise.emit.assemble import checked_identifier
+from linkwise.emit.backend import chosen_backends
+from linkwise.emit.kernel_choice import chosen_kernel
+from linkwise.errors import LinkwiseError
+from linkwise.makers import generator_files
+from linkwise.package.manifest import FILE
+from linkwise.package.write import write_package
+from linkwise.pipeline import generate, read_system
+from linkwise.progress import Progress, silent
+from linkwise.robot import Options, is_description, robot_files
+from linkwise.robot.notes import effects
+from linkwise.runtime.native.native_cache import cache_directory, locked
+
+USUAL = ("numpy", "native")
+"""Back ends that an analysis asks for by itself."""
+WARNINGS = "warnings.json"
+
+
+@dataclass(frozen=True)
+class KeptPackage:
+    """A package, and what touches the torques of the robot that it was made of."""
+
+    directory: Path
+    warnings: tuple[str, ...] = ()
+
+
+def kept_package(robot: str | Path, backend: str | None = None, progress: Progress = silent) -> KeptPackage:
+    """The package itself where `robot` is a directory; else that of the robot's file or built-in robot.
+
+    Made for `backend`, or for those of analyses if not given. Raises LinkwiseError for a file that cannot be
+    read or generated, and for a cache that cannot be written.
+    """
+    if Path(robot).is_dir() or not is_description(robot):
+        return KeptPackage(Path(robot))
+    backends = USUAL if backend is None else (backend,)
+    try:
+        kept = cache_directory() / "packages"
+        kept.mkdir(exist_ok=True)
+        with locked(kept / ".lock", lambda _: None):
+            return _kept(robot, kept / _key(robot, backends), backends, progress)
+    except (RuntimeError, OSError) as error:
+        raise LinkwiseError(f"{robot}: no package of it can be kept: {error}") from error
+
+
+def _kept(robot: str | Path, folder: Path, backends: Sequence[str], progress: Progress) -> KeptPackage:
+    found = next(folder.glob(f"*/{FILE}"), None)
+    if found is None or not (folder / WARNINGS).is_file():
+        system = read_system(robot)
+        package = folder / checked_identifier(None, system.name)
+        kind = chosen_kernel(system, "auto", backends)
+        names = [chosen.name for chosen in chosen_backends(backends, kind)]
+        request = {"robot": Path(robot).name, "backends": names}
+        write_package(generate(system, names, None, request, progress, kind), package)
+        text = json.dumps(effects(system.notes))
+        (folder / WARNINGS).write_text(text, encoding="utf-8")
+        found = package / FILE
+    warnings = json.loads((folder / WARNINGS).read_text(encoding="utf-8"))
+    return KeptPackage(found.parent, tuple(f"{robot}: {warning}" for warning in warnings))
+
+
+def _key(robot: str | Path, backends: Sequence[str]) -> str:
+    """Hash of all that the package depends on."""
+    return hashlib.sha256("\0".join(_parts(robot, backends)).encode()).hexdigest()[:32]
+
+
+def _parts(robot: str | Path, backends: Sequence[str]) -> Iterator[str]:
+    yield str(robot)
+    yield from backends
+    for path in robot_files(robot, Options()):
+        if path.is_file():
+            yield hashlib.sha256(path.read_bytes()).hexdigest()
+    for name in generator_files():
+        found = Path(name).stat()
+        yield f"{name} {found.st_size} {found.st_mtime_ns}"
