@@ -1,6 +1,6 @@
 """OpenSim models for tests, as text: chains of bodies by joints of every kind."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,13 +43,15 @@ class Custom:
     coordinates: tuple[str, ...]
     axes: dict[str, tuple[str, str, str]]
 
-    def text(self, prefix: str) -> str:
-        return "".join(
+    def text(self, prefix: str, old: bool) -> str:
+        axes = "".join(
             f'<TransformAxis name="{name}"><axis>{direction}</axis>'
             f"<coordinates>{prefix if coordinate else ''}{coordinate}</coordinates>"
-            f"{function.replace('>', NAMED, 1)}</TransformAxis>"
+            f"{f'<function>{function}</function>' if old else function.replace('>', NAMED, 1)}"
+            "</TransformAxis>"
             for name, (direction, coordinate, function) in self.axes.items()
         )
+        return f"<SpatialTransform>{axes}</SpatialTransform>"
 
 
 KNEE = Custom(
@@ -85,47 +87,95 @@ KINDS: dict[str, tuple[str, ...]] = {
 Kind = str | Custom
 
 
-def chain(kinds: Sequence[Kind], sets: str = "", coordinate: dict[str, str] | None = None) -> str:
+@dataclass(frozen=True)
+class _Link:
+    """A body, and the joint between it and the one before, at odd places in both."""
+
+    number: int
+    kind: Kind
+    mass: float
+    com: Sequence[float]
+    moments: Sequence[float]
+    ends: Sequence[tuple[Sequence[float], Sequence[float]]]
+    more: Mapping[str, str]
+
+    @property
+    def tag(self) -> str:
+        return "CustomJoint" if isinstance(self.kind, Custom) else self.kind
+
+    def transform(self, old: bool) -> str:
+        return self.kind.text(f"joint{self.number}_", old) if isinstance(self.kind, Custom) else ""
+
+    @property
+    def coordinates(self) -> str:
+        names = self.kind.coordinates if isinstance(self.kind, Custom) else KINDS[self.kind]
+        full = [f"joint{self.number}_{name}" for name in names]
+        return "".join(f'<Coordinate name="{name}">{self.more.get(name, "")}</Coordinate>' for name in full)
+
+    @property
+    def body(self) -> str:
+        return (
+            f'<Body name="body{self.number}"><mass>{self.mass}</mass>'
+            f"<mass_center>{row(self.com)}</mass_center><inertia>{row(self.moments)}</inertia></Body>"
+        )
+
+    @property
+    def joint(self) -> str:
+        before = f"/bodyset/body{self.number - 1}" if self.number else "/ground"
+        frames = "".join(
+            f'<PhysicalOffsetFrame name="{end}{self.number}"><socket_parent>{carrier}</socket_parent>'
+            f"<translation>{row(place)}</translation><orientation>{row(turn)}</orientation></PhysicalOffsetFrame>"
+            for end, carrier, (place, turn) in zip(
+                ("parent", "child"), (before, f"/bodyset/body{self.number}"), self.ends, strict=True
+            )
+        )
+        return (
+            f'<{self.tag} name="joint{self.number}">'
+            f"<socket_parent_frame>parent{self.number}</socket_parent_frame>"
+            f"<socket_child_frame>child{self.number}</socket_child_frame>"
+            f"<coordinates>{self.coordinates}</coordinates><frames>{frames}</frames>"
+            f"{self.transform(False)}</{self.tag}>"
+        )
+
+    @property
+    def old_body(self) -> str:
+        """Body and joint of format 3."""
+        names = ("xx", "yy", "zz", "xy", "xz", "yz")
+        moments = "".join(f"<inertia_{n}>{m}</inertia_{n}>" for n, m in zip(names, self.moments, strict=True))
+        (start, turn), (place, own) = self.ends
+        return (
+            f'<Body name="body{self.number}"><mass>{self.mass}</mass>'
+            f"<mass_center>{row(self.com)}</mass_center>{moments}"
+            f'<Joint><{self.tag} name="joint{self.number}">'
+            f"<parent_body>{f'body{self.number - 1}' if self.number else 'ground'}</parent_body>"
+            f"<location_in_parent>{row(start)}</location_in_parent>"
+            f"<orientation_in_parent>{row(turn)}</orientation_in_parent>"
+            f"<location>{row(place)}</location><orientation>{row(own)}</orientation>"
+            f"<CoordinateSet><objects>{self.coordinates}</objects></CoordinateSet>{self.transform(True)}"
+            f"</{self.tag}></Joint></Body>"
+        )
+
+
+def chain(
+    kinds: Sequence[Kind], sets: str = "", coordinates: Mapping[str, str] | None = None, old: bool = False
+) -> str:
     """A model of bodies one behind the other by these joints, whose frames stand askew in both bodies.
 
-    sets: more of the model; coordinate: more of a coordinate, by its name
+    sets: more of the model; coordinates: more of each coordinate, by its name; old: in format 3
     """
     draw = np.random.default_rng(len(kinds))
-    bodies = joints = ""
-    parent = "/ground"
+    links = []
     for number, kind in enumerate(kinds):
         half = draw.normal(size=(3, 3))
         spread = half @ half.T
         inertia = np.trace(spread) * np.eye(3) - spread
-        moments = row(inertia[i, k] for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-        bodies += (
-            f'<Body name="body{number}"><mass>{draw.uniform(1, 3)}</mass>'
-            f"<mass_center>{row(draw.normal(size=3))}</mass_center><inertia>{moments}</inertia></Body>"
-        )
-        own, child = f"joint{number}", f"/bodyset/body{number}"
-        tag, names = ("CustomJoint", kind.coordinates) if isinstance(kind, Custom) else (kind, KINDS[kind])
-        frames = coordinates = ""
-        for end, place in (("parent", parent), ("child", child)):
-            frames += (
-                f'<PhysicalOffsetFrame name="{own}_{end}"><socket_parent>{place}</socket_parent>'
-                f"<translation>{row(draw.normal(size=3))}</translation>"
-                f"<orientation>{row(draw.normal(size=3))}</orientation></PhysicalOffsetFrame>"
-            )
-        for name in names:
-            full = f"{own}_{name}"
-            coordinates += f'<Coordinate name="{full}">{(coordinate or {}).get(full, "")}</Coordinate>'
-        transform = ""
-        if isinstance(kind, Custom):
-            transform = f"<SpatialTransform>{kind.text(own + '_')}</SpatialTransform>"
-        joints += (
-            f'<{tag} name="{own}"><socket_parent_frame>{own}_parent</socket_parent_frame>'
-            f"<socket_child_frame>{own}_child</socket_child_frame><coordinates>{coordinates}</coordinates>"
-            f"<frames>{frames}</frames>{transform}</{tag}>"
-        )
-        parent = child
-    return model(
-        f"<BodySet><objects>{bodies}</objects></BodySet><JointSet><objects>{joints}</objects></JointSet>{sets}"
-    )
+        moments = [float(inertia[i, k]) for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        mass, com = float(draw.uniform(1, 3)), draw.normal(size=3).tolist()
+        ends = [(draw.normal(size=3).tolist(), draw.normal(size=3).tolist()) for _ in range(2)]
+        links.append(_Link(number, kind, mass, com, moments, ends, coordinates or {}))
+    bodies = "".join(link.old_body if old else link.body for link in links)
+    joints = "" if old else f"<JointSet><objects>{''.join(link.joint for link in links)}</objects></JointSet>"
+    return model(f"<BodySet><objects>{bodies}</objects></BodySet>{joints}{sets}", "30000" if old else "40500")
 
 
 def constraints(*given: str) -> str:

@@ -27,6 +27,7 @@ from typer.testing import CliRunner
 from urdf_text import joint, link, robot
 
 CRANE, LEG, TURNTABLE = str(DATA / "crane.urdf"), str(DATA / "leg.toml"), str(DATA / "turntable.py")
+KNEE = str(DATA / "knee.osim")
 FIELDS = ("acceleration", "velocity", "gravity", "torque")
 
 
@@ -184,7 +185,7 @@ def test_its_code_does_not_grow_with_the_robot(directory_of: Callable[[str], Pat
 
 
 @needs("g++")
-@pytest.mark.parametrize("robot", [CRANE, "puma560"], ids=["crane", "arm"])
+@pytest.mark.parametrize("robot", [CRANE, "puma560", KNEE], ids=["crane", "arm", "knee"])
 def test_the_header_counts_its_operations(
     robot: str, directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:

@@ -1,0 +1,64 @@
+"""Joints that follow curves of their coordinate: the curves themselves, and every kernel of a package."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import DATA
+from linkwise import LinkwiseError, check_package, identify
+from linkwise.analysis.show.poses import poses
+from linkwise.package.load import import_package
+from linkwise.package.manifest import Manifest
+from linkwise.robot.curve import Curve
+from linkwise.robot.readers.osim_functions import piecewise_linear, simm_spline
+
+KNEE = f"{DATA / 'knee.osim'} loops"
+SPLINE = simm_spline((-2.0, -0.5, 0.1, 1.0), (0.3, -0.1, 0.4, 0.9))
+BENT = piecewise_linear((-1.0, 0.2, 1.5), (1.2, -0.6, 0.8))
+PARABOLA = Curve((0.0,), ((0.1, 0.5, -0.7),))
+PLACES = np.linspace(-4.0, 4.0, 401)
+
+
+@pytest.mark.parametrize("outer", [SPLINE, BENT, PARABOLA], ids=["spline", "bent", "parabola"])
+@pytest.mark.parametrize("inner", [SPLINE, BENT, PARABOLA], ids=["spline", "bent", "parabola"])
+def test_a_curve_of_a_curve_is_one(outer: Curve, inner: Curve) -> None:
+    whole = outer.after(inner)
+    expected = [outer(inner(x)) for x in PLACES]
+    np.testing.assert_allclose([whole(x) for x in PLACES], expected, rtol=1e-11, atol=1e-11)
+
+
+def test_a_spline_passes_its_points_smoothly_and_is_straight_beyond_them() -> None:
+    for x, y in ((-2.0, 0.3), (-0.5, -0.1), (0.1, 0.4), (1.0, 0.9)):
+        assert SPLINE(x) == pytest.approx(y, abs=1e-15)
+        for derivative in (0, 1):
+            sides = (SPLINE(x + step, derivative) for step in (-1e-13, 1e-13))
+            assert abs(next(sides) - next(sides)) < 1e-11
+    assert [SPLINE(x, 2) for x in (-3.0, 2.0)] == [0.0, 0.0]
+
+
+def test_every_back_end_moves_joints_along_their_curves(directory_of: Callable[[str], Path]) -> None:
+    failed = [result for result in check_package(directory_of(KNEE), samples=40) if not result.passed]
+    assert not failed
+
+
+def test_the_stick_figure_stands_where_the_robot_does(directory_of: Callable[[str], Path]) -> None:
+    manifest = Manifest.read(directory_of(KNEE))
+    robot = import_package(directory_of(KNEE)).load("numpy")
+    q = np.random.default_rng(3).uniform(-1.5, 1.5, (7, robot.n))
+    assert manifest.tree is not None
+    _, centres = poses(manifest.tree.bodies, q)
+    for body, centre in zip(manifest.tree.bodies, centres.swapaxes(0, 1), strict=True):
+        if body.link in robot.link_names:
+            own = (*body.com, 1.0)
+            frame = next(f for f in manifest.tree.frames if f.name == body.link)
+            turned = np.array(frame.rotation).T @ (np.array(own[:3]) - np.array(frame.translation))
+            place = robot.kinematics.pose(q, body.link) @ (*turned, 1.0)
+            np.testing.assert_allclose(place[:, :3], centre, atol=1e-13)
+
+
+def test_links_behind_curves_are_not_identified(directory_of: Callable[[str], Path], tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time,ankle_angle\n0,0\n")
+    with pytest.raises(LinkwiseError, match="'knee_t1' of knee follows a curve, and a URDF file"):
+        identify(log, directory_of(KNEE))

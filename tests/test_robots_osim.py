@@ -1,0 +1,200 @@
+"""OpenSim's files as they are read: formats, names and units, what is left out, and what is refused."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from linkwise import LinkwiseError, generate, read_robot, read_system
+from linkwise.robot.robot import Limits
+from osim_text import (
+    KNEE,
+    LINES,
+    ROLLING,
+    SLIDES,
+    Custom,
+    chain,
+    coefficients,
+    constant,
+    constraints,
+    coupler,
+    model,
+    points,
+)
+
+KINDS = ["FreeJoint", KNEE, "UniversalJoint", ROLLING, "WeldJoint", "PinJoint"]
+KNEE_FILE = Path(__file__).parent / "data" / "knee.osim"
+
+
+def robot_of(folder: Path, text: str):  # type: ignore[no-untyped-def]
+    (folder / "model.osim").write_text(text)
+    return read_robot(folder / "model.osim")
+
+
+def forces(content: str) -> str:
+    return f"<ForceSet><objects>{content}</objects></ForceSet>"
+
+
+def test_both_formats_say_the_same(tmp_path: Path) -> None:
+    new, old = (robot_of(tmp_path, chain(KINDS, old=old)) for old in (False, True))
+    assert new == old
+    assert new.name == "chain"
+
+
+def test_coordinates_have_their_names_units_and_limits(tmp_path: Path) -> None:
+    clamped = {
+        "joint1_angle": "<range>-2 0.1</range><clamped>true</clamped>",
+        "joint3_slip": "<range>0 1</range>",
+    }
+    robot = robot_of(tmp_path, chain(KINDS, coordinates=clamped))
+    assert [(c.name.removeprefix("joint"), c.unit) for c in robot.coordinates] == [
+        *((f"0_{name}", "rad") for name in ("first", "second", "third")),
+        *((f"0_{name}", "m") for name in "xyz"),
+        ("1_angle", "rad"),
+        *((f"2_{name}", "rad") for name in ("first", "second")),
+        ("3_turn", "rad"),
+        ("3_slip", "m"),
+        ("5_angle", "rad"),
+    ]
+    limits = dict(zip([c.name for c in robot.coordinates], robot.limits, strict=True))
+    assert limits["joint1_angle"] == Limits(-2.0, 0.1)
+    assert limits["joint3_slip"] == Limits()
+
+
+def test_a_locked_coordinate_stays_where_the_file_says(tmp_path: Path) -> None:
+    fixed = Custom(
+        (), {"rotation1": ("1 0 0", "", constant(0.4)), "translation1": ("0 1 0", "", constant(0.2))}
+    )
+    held = Custom(
+        ("turn", "slide"),
+        {
+            "rotation1": ("1 0 0", "turn", coefficients("LinearFunction", 1.0, 0.0)),
+            "translation1": ("0 1 0", "slide", coefficients("LinearFunction", 1.0, 0.0)),
+        },
+    )
+    locked = {"joint1_turn": 0.4, "joint1_slide": 0.2}
+    more = {k: f"<default_value>{v}</default_value><locked>true</locked>" for k, v in locked.items()}
+    ends = ["PinJoint", "PinJoint"]
+    expected = robot_of(tmp_path, chain([ends[0], fixed, ends[1]]))
+    robot = robot_of(tmp_path, chain([ends[0], held, ends[1]], coordinates=more))
+    assert robot.links == expected.links
+    assert {note.subject for note in robot.notes if note.kind == "locked"} == set(locked)
+
+
+def test_what_gives_torques_is_ignored_and_what_acts_by_itself_is_left_out(tmp_path: Path) -> None:
+    acting = forces(
+        '<Thelen2003Muscle name="biceps"/><CoordinateActuator name="motor"/>'
+        '<BushingForce name="disc"/><CoordinateLimitForce name="stop"><coordinate>joint0_angle</coordinate>'
+        '</CoordinateLimitForce><Ligament name="band"><appliesForce>false</appliesForce></Ligament>'
+        '<Unheard name="of"/>'
+    )
+    notes = robot_of(tmp_path, chain(["PinJoint"], acting)).notes
+    assert {note.subject for note in notes if note.kind == "ignored"} == {
+        "Thelen2003Muscle",
+        "CoordinateActuator",
+    }
+    left = {note.subject: (note.detail, note.effect) for note in notes if note.kind == "left out"}
+    assert left == {
+        "disc": ("", "bushing left out of the torques"),
+        "stop": ("on joint0_angle", "spring at the ends of its range left out of the torques"),
+        "of": ("", "Unheard left out of the torques"),
+    }
+
+
+def test_constraints_between_bodies_close_loops(tmp_path: Path) -> None:
+    pin = constraints(
+        '<PointConstraint name="pin"><socket_body_1>/bodyset/body1</socket_body_1>'
+        "<socket_body_2>/ground</socket_body_2><location_body_1>0.1 0 0</location_body_1>"
+        "<location_body_2>0 0.2 0</location_body_2></PointConstraint>"
+    )
+    bars = ["PlanarJoint", "PlanarJoint"]
+    (tie,) = robot_of(tmp_path, chain(bars, pin)).ties
+    assert (tie.name, tie.kind) == ("pin", "point")
+
+
+def test_a_function_may_stand_without_a_name_and_none_is_the_coordinate_itself(tmp_path: Path) -> None:
+    wrapped = robot_of(tmp_path, chain([KNEE]))
+    bare = robot_of(tmp_path, chain([KNEE]).replace(' name="function"', ""))
+    assert bare == wrapped
+    nothing = Custom(("angle",), {"rotation1": ("1 0 0", "angle", "")})
+    (link,) = robot_of(tmp_path, chain([nothing])).links
+    assert (link.joint.ratio, link.joint.curve) == (1.0, None)
+
+
+def fault(**changes: object) -> str:
+    return chain(["PinJoint", "PinJoint"], **changes)  # type: ignore[arg-type]
+
+
+def bent(function: str) -> Custom:
+    return Custom(("angle",), {"rotation1": ("1 0 0", "angle", function)})
+
+
+WRONG: Mapping[str, tuple[str, str]] = {
+    "another root": ("<Model/>", "the root element is <Model>; an OpenSim model has"),
+    "no bodies": (model(""), "the model 'chain' has no <Body>; give one that has some"),
+    "centimetres": (model("<length_units>cm</length_units>"), "lengths are in cm; give them in meters"),
+    "joint type": (
+        fault().replace("PinJoint", "EllipsoidJoint"),
+        "joint 'joint0' is a EllipsoidJoint, which is not modelled; make it one of",
+    ),
+    "function": (
+        chain([bent("<Sine></Sine>")]),
+        "joint 'joint0', rotation1 is a Sine, a function that is not modelled",
+    ),
+    "points": (
+        chain([bent(points("SimmSpline", (0, 1), (0, 2)))]),
+        "joint 'joint0', rotation1: its <SimmSpline> needs as many <y> as <x>, two or more, and <x> that",
+    ),
+    "coordinate": (
+        chain([KNEE]).replace("<coordinates>joint0_angle", "<coordinates>knee"),
+        "names 'knee', which is not a coordinate; correct it",
+    ),
+    "two coordinates": (
+        chain([ROLLING]).replace("<coordinates>joint0_turn<", "<coordinates>joint0_turn joint0_slip<"),
+        "rotation1 is a function of 2 coordinates; only functions of one are modelled",
+    ),
+    "number": (fault().replace("<mass>", "<mass>heavy "), "<mass>heavy"),
+    "frame": (
+        fault().replace("<socket_child_frame>child1<", "<socket_child_frame>nowhere<"),
+        "PinJoint 'joint1' stands in the frame 'nowhere', of which there are 0; name a body, ground or",
+    ),
+    "no joint": (
+        fault().replace("<socket_parent>/bodyset/body1<", "<socket_parent>/bodyset/body0<"),
+        "body 'body1' hangs on no joint; give it one",
+    ),
+    "coupled in a circle": (
+        fault(
+            sets=constraints(
+                coupler("joint1_angle", "joint0_angle", SLIDES),
+                coupler("joint0_angle", "joint1_angle", LINES),
+            )
+        ),
+        "leads back to itself; let one go free",
+    ),
+    "coupled to nobody": (
+        fault(sets=constraints(coupler("joint1_angle", "hip", SLIDES))),
+        "constraint 'joint1_angle_follows' names 'hip', which is not a coordinate; correct it",
+    ),
+    "constraint": (
+        fault(sets=constraints('<RollingOnSurfaceConstraint name="wheel"/>')),
+        "the model has the RollingOnSurfaceConstraint 'wheel'",
+    ),
+    "coordinate of no axis": (
+        chain([ROLLING]).replace("<coordinates>joint0_slip<", "<coordinates>joint0_turn<"),
+        "coordinate 'joint0_slip' moves no axis of its joint 'joint0'; lock it",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG)
+def test_what_is_not_modelled_is_refused_by_its_place(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(LinkwiseError) as refused:
+        robot_of(tmp_path, text)
+    assert message in str(refused.value)
+    assert str(refused.value).startswith(str(tmp_path / "model.osim"))
+
+
+def test_closed_forms_of_curves_are_refused() -> None:
+    system = read_system(KNEE_FILE)
+    for asked in ({"kernel": "straight"}, {"derivation": "energy"}):
+        with pytest.raises(LinkwiseError, match="joint 'knee_t1' follows a curve, and no closed forms"):
+            generate(system, **asked)  # type: ignore[arg-type]
