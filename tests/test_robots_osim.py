@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 import pytest
-from linkwise import LinkwiseError, generate, read_robot, read_system
+from linkwise import LinkwiseError, Options, generate, read_robot, read_system, write_package
+from linkwise.package.load import import_package
 from linkwise.robot.robot import Limits
 from osim_text import (
     KNEE,
@@ -191,6 +193,32 @@ def test_what_is_not_modelled_is_refused_by_its_place(text: str, message: str, t
         robot_of(tmp_path, text)
     assert message in str(refused.value)
     assert str(refused.value).startswith(str(tmp_path / "model.osim"))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (Options(tip="patella"), "joint 'groove_t1' follows 'knee_angle', which --root or --tip cuts away"),
+        (Options(base="floating"), "'ground' is the world, which cannot float"),
+        (Options(lock={"knee_t1": 0.0}), "'knee_t1' is not a moving joint; the joints are hip_adduction"),
+    ],
+    ids=["cut", "floating", "locked"],
+)
+def test_what_would_be_another_model_is_refused(options: Options, message: str) -> None:
+    with pytest.raises(LinkwiseError, match=message):
+        read_robot(KNEE_FILE, options)
+
+
+def test_a_joint_that_is_held_leaves_what_follows_where_it_is_there(tmp_path: Path) -> None:
+    def mass_matrix(name: str, q: list[float], **lock: float) -> np.ndarray:
+        files = generate(read_system(KNEE_FILE, Options(lock=lock)), ["numpy"])
+        write_package(files, tmp_path / name)
+        matrix: np.ndarray = import_package(tmp_path / name).load("numpy").mass_matrix(np.array(q))
+        return matrix
+
+    free, rest = mass_matrix("free", [0.1, -0.4, 0.7, 0.3, -0.2]), [0, 1, 2, 4]
+    held = mass_matrix("held", [0.1, -0.4, 0.7, -0.2], knee_angle=0.3)
+    np.testing.assert_allclose(held, free[np.ix_(rest, rest)], rtol=1e-13)
 
 
 def test_closed_forms_of_curves_are_refused() -> None:

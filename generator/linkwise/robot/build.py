@@ -149,6 +149,11 @@ def _connections(description: Description, base: str) -> tuple[str, tuple[Connec
     """Root link, and the joints parents first, that of a floating base among them."""
     root, connections = depth_first(description)
     if base == "floating":
+        if root == description.ground:
+            raise LinkwiseError(
+                f"{root!r} is the world, which cannot float, and the file has joints for what moves in it; "
+                "leave --base floating out, or begin at a body by --root"
+            )
         connections = (Connection("base", "floating", "", root), *connections)
     if all(c.type == "fixed" for c in connections):
         raise LinkwiseError(

@@ -1,6 +1,7 @@
 """Which joints become coordinates, which stand still and which follow another."""
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
@@ -41,22 +42,14 @@ def movement(
 
     Raises LinkwiseError for two axes of one name, a lock without an axis, and a mimic that cannot be.
     """
-    curved = {c.name: c for connection in connections for c in connection.coordinates}
-    together = {c.name: connection.coordinates for connection in connections for c in connection.coordinates}
-    names = Counter([*(axis.name for axis in axes if axis.follows is None), *curved])
-    _check_axes(axes, names, lock)
+    curved = _Curved(connections, lock)
+    _check_axes(axes, [*(axis.name for axis in axes if axis.follows is None), *curved.units], lock)
     mimics, freed = _mimics(connections, {axis.name for axis in axes}, lock, free_mimic)
     motion: dict[str, AxisRule] = {}
     moving: list[Coordinate] = []
-    places: dict[str, int] = {}
     for axis in axes:
         if axis.follows is not None:
-            name, curve = axis.follows
-            for c in together.get(name, ()):
-                if c.name not in lock and c.name not in places:
-                    places[c.name] = len(moving)
-                    moving.append(Coordinate(c.name, c.unit))
-            motion[axis.name] = _followed(curve, places.get(name), lock.get(name, 0.0))
+            motion[axis.name] = curved.rule(axis.name, *axis.follows, moving)
         elif axis.name in lock:
             motion[axis.name] = AxisRule(None, 0.0, lock[axis.name])
         elif axis.name not in mimics:
@@ -69,7 +62,7 @@ def movement(
         )
     notes = [
         *(Note("locked", a.name, f"at {lock[a.name]:g} {a.unit}") for a in axes if a.name in lock),
-        *(Note("locked", c.name, f"at {lock[c.name]:g} {c.unit}") for c in curved.values() if c.name in lock),
+        *(Note("locked", c, f"at {lock[c]:g} {unit}") for c, unit in curved.units.items() if c in lock),
         *(Note("mimic", name, _rule(mimic)) for name, mimic in mimics.items()),
         *(
             Note("ignored", c.name, "the mimic of a fixed joint")
@@ -80,13 +73,33 @@ def movement(
     return Movement(tuple(moving), motion, (*notes, *freed))
 
 
-def _followed(curve: Curve, coordinate: int | None, held: float) -> AxisRule:
-    """The rule of an axis that follows a coordinate by a curve, or stands where that is held."""
-    if coordinate is None:
-        return AxisRule(None, 0.0, curve(held))
-    if curve.line:
-        return AxisRule(coordinate, curve.line[1], curve.line[0])
-    return AxisRule(coordinate, curve=curve)
+class _Curved:
+    """Coordinates that axes follow by curves; those of one joint come together, in the file's order."""
+
+    def __init__(self, connections: Iterable[Connection], lock: dict[str, float]) -> None:
+        self._lock = lock
+        self._joints = {c.name: joint.coordinates for joint in connections for c in joint.coordinates}
+        self._places: dict[str, int] = {}
+        self.units = {c.name: c.unit for joint in self._joints.values() for c in joint}
+
+    def rule(self, axis: str, name: str, curve: Curve, moving: list[Coordinate]) -> AxisRule:
+        """The rule of an axis that follows `name`; what that needs is added to those moving.
+
+        Raises LinkwiseError for a coordinate whose joint is not there.
+        """
+        if name and name not in self._joints:
+            raise LinkwiseError(
+                f"joint {axis!r} follows {name!r}, which --root or --tip cuts away; keep both or neither"
+            )
+        for c in self._joints.get(name, ()):
+            if c.name not in self._lock and c.name not in self._places:
+                self._places[c.name] = len(moving)
+                moving.append(Coordinate(c.name, c.unit))
+        if name not in self._places:
+            return AxisRule(None, 0.0, curve(self._lock.get(name, 0.0)))
+        if curve.line:
+            return AxisRule(self._places[name], curve.line[1], curve.line[0])
+        return AxisRule(self._places[name], curve=curve)
 
 
 def _rule(mimic: Mimic) -> str:
@@ -95,9 +108,9 @@ def _rule(mimic: Mimic) -> str:
     return f"= {ratio}{mimic.master}{offset}"
 
 
-def _check_axes(axes: tuple[Axis, ...], coordinates: Counter[str], lock: dict[str, float]) -> None:
+def _check_axes(axes: tuple[Axis, ...], coordinates: list[str], lock: dict[str, float]) -> None:
     counts = Counter(axis.name for axis in axes)
-    for name, count in (counts | coordinates).items():
+    for name, count in (counts | Counter(coordinates)).items():
         if count > 1:
             raise LinkwiseError(
                 f"{count} joints are named {name!r}, one of them made from a joint's type; rename it"

@@ -176,3 +176,5 @@ class Description:
     """Joints that actuators of the file drive."""
     independent: tuple[str, ...] = ()
     """Joints whose motion is to give that of all others under the constraints; none: to be chosen."""
+    ground: str = ""
+    """The body that is the world itself, where the file has one."""

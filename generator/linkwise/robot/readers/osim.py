@@ -68,6 +68,7 @@ def read_osim(path: Path) -> Description:
         loops=tuple(unmodelled(model)),
         ties=tuple(ties(model, frames)),
         omissions=tuple(_forces(model)),
+        ground=GROUND,
     )
 
 
