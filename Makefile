@@ -3,7 +3,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: docs pictures demo demo-control test lint generate control bench corpus crash random fuzz same mutate report clean
+.PHONY: docs pictures demo demo-control test lint generate control bench corpus opensim crash random fuzz same mutate report clean
 .PHONY: ship pythons licences embedded exports
 
 $(READY): pyproject.toml constraints.txt
@@ -67,6 +67,10 @@ lint: $(READY)
 # The paper's cost-reduction figure.
 report: $(READY)
 	$(BIN)/linkwise report reduction --graphs --out out/report
+
+# Every .osim of a folder beside OpenSim: make opensim MODELS=folder
+opensim: $(READY)
+	$(BIN)/python tests/opensim_folder.py $(MODELS)
 
 # Every real robot at hand, beside Pinocchio: minutes.
 corpus: $(READY)

@@ -1,0 +1,44 @@
+"""Every OpenSim model of a folder through the generator, beside OpenSim: `make opensim MODELS=folder`.
+
+Prints for each file its joints and links, and the errors of the torques and of each link's share at a random
+motion, as parts of the largest torque, or the reason for refusing it. Exits with 1 where an error is above
+LIMIT.
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+from linkwise import LinkwiseError
+from numeric.opensim_beside import Beside
+
+LIMIT = 1e-6
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    files = sorted(parser.parse_args().folder.rglob("*.osim"))
+    bad = refused = 0
+    for number, file in enumerate(files):
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                both = Beside(file, Path(folder) / f"model{number}")
+                errors = both.errors()
+            except LinkwiseError as error:
+                refused += 1
+                print(f"refused  {error}")
+                continue
+        wrong = max(errors) > LIMIT
+        bad += wrong
+        size = f"{len(both.names)} joints, {len(both.robot.link_names)} links"
+        print(
+            f"{'WRONG' if wrong else 'ok':8} {file}: {size}; torques {errors[0]:.1e}, shares {errors[1]:.1e}"
+        )
+    print(f"{len(files)} models, {refused} refused, {bad} wrong")
+    return 1 if bad or not files else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
