@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     )
     from linkwise.check import check_package
     from linkwise.identification import Fitting, Identification, identify
+    from linkwise.kept_package import KeptPackage, kept_package
     from linkwise.package.write import write_package
     from linkwise.pipeline import generate, read_system
     from linkwise.robot import Coordinate, Options, read_robot
@@ -38,6 +39,7 @@ __all__ = [
     "Coordinate",
     "Fitting",
     "Identification",
+    "KeptPackage",
     "LinkEnergy",
     "LinkwiseError",
     "Load",
@@ -54,6 +56,7 @@ __all__ = [
     "energy_system",
     "generate",
     "identify",
+    "kept_package",
     "read_robot",
     "read_system",
     "write_package",
@@ -66,6 +69,7 @@ _ROOM_OF = {
     "Coordinate": "robot",
     "Fitting": "identification",
     "Identification": "identification",
+    "KeptPackage": "kept_package",
     "LinkEnergy": "symbolic.system",
     "Load": "analysis",
     "Lowpass": "analysis",
@@ -80,6 +84,7 @@ _ROOM_OF = {
     "energy_system": "symbolic.user_energies",
     "generate": "pipeline",
     "identify": "identification",
+    "kept_package": "kept_package",
     "read_robot": "robot",
     "read_system": "pipeline",
     "write_package": "package.write",
