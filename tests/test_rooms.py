@@ -12,7 +12,7 @@ HOUSE = Path(__file__).parents[1] / "generator/linkwise"
 
 ROOMS = (
     "cli",
-    "kept_package",
+    "package_cache",
     "pipeline",
     "report",
     "identification",

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     )
     from linkwise.check import check_package
     from linkwise.identification import Fitting, Identification, identify
-    from linkwise.kept_package import KeptPackage, kept_package
     from linkwise.package.write import write_package
+    from linkwise.package_cache import KeptPackage, kept_package
     from linkwise.pipeline import generate, read_system
     from linkwise.robot import Coordinate, Options, read_robot
     from linkwise.symbolic.system import LinkEnergy, System
@@ -69,7 +69,7 @@ _ROOM_OF = {
     "Coordinate": "robot",
     "Fitting": "identification",
     "Identification": "identification",
-    "KeptPackage": "kept_package",
+    "KeptPackage": "package_cache",
     "LinkEnergy": "symbolic.system",
     "Load": "analysis",
     "Lowpass": "analysis",
@@ -84,7 +84,7 @@ _ROOM_OF = {
     "energy_system": "symbolic.user_energies",
     "generate": "pipeline",
     "identify": "identification",
-    "kept_package": "kept_package",
+    "kept_package": "package_cache",
     "read_robot": "robot",
     "read_system": "pipeline",
     "write_package": "package.write",

@@ -2,7 +2,7 @@
 #ifndef LINKWISE_BLOCKS_H
 #define LINKWISE_BLOCKS_H
 
-#include "angles.h"
+#include "curves.h"
 #include "lanes.h"
 #include "rows.h"
 
@@ -37,15 +37,16 @@ enum { BLOCK_PARTS = BLOCK / LANES };
 static inline void moved_block(const struct numbers *x, const real *q, const real *qd, const real *qdd, motion *m)
 {
     ALIGNED real angle[FRAMES * BLOCK], sine[FRAMES * BLOCK], cosine[FRAMES * BLOCK];
-    angles(x, BLOCK, q, angle);
+    DISPLACED(BLOCK, q);
+    angles(x, BLOCK, moved, angle);
     API(sines)(FRAMES * BLOCK, angle, sine, cosine);
     for (int part = 0; part < BLOCK_PARTS; ++part)
         base_block(&m[part]);
     for (int f = 1; f <= FRAMES; ++f)
         for (int part = 0; part < BLOCK_PARTS; ++part) {
             const int turn = (f - 1) * BLOCK + part * LANES, k = joints[f - 1].coordinate * BLOCK + part * LANES;
-            frame_block(&m[part], f, &x->placings[f - 1], TAKE(sine + turn), TAKE(cosine + turn), TAKE(q + k),
-                TAKE(qd + k), TAKE(qdd + k));
+            frame_block(&m[part], f, &x->placings[f - 1], TAKE(sine + turn), TAKE(cosine + turn),
+                moved + MOVED_BY(f - 1) * BLOCK + part * LANES, FRAMES * BLOCK, TAKE(qd + k), TAKE(qdd + k));
         }
     for (int part = 0; part < BLOCK_PARTS; ++part)
         sum_columns_block(&m[part], NULL);

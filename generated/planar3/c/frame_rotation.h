@@ -8,13 +8,17 @@
 static inline vector place_in_world(const struct sample *s, int frame, const struct offsets *o, const real *point, const real *q)
 {
     vector at = place_of(&s->m, frame, o, point);
+    DISPLACED(1, q);
     for (int f = named_frames[frame].frame; f; f = joints[f - 1].parent) {
         const struct joint *const joint = &joints[f - 1];
         if (joint->placed)
             continue;
         at = add(at, turned(s->m.turn[joint->parent], s->x->placings[f - 1].place));
-        if (joint->kind == PRISMATIC)
-            at = add(at, scale(q[joint->coordinate], s->m.axis[f - 1].s));
+        if (joint->kind == PRISMATIC) {
+            const matrix turn = s->m.turn[f];
+            const vector z = {turn.x.z, turn.y.z, turn.z.z};
+            at = add(at, scale(s->x->placings[f - 1].ratio * moved[MOVED_BY(f - 1)], z));
+        }
     }
     return at;
 }

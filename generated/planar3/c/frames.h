@@ -17,6 +17,7 @@ void API(pose)(int frame, AT_POSITION, real *pose)
 {
     NUMBERS(x);
     OFFSETS(o);
+    DISPLACED(1, q);
     const struct named_frame *const named = &named_frames[frame];
     real t[3][4];
     for (int r = 0; r < 3; ++r) {
@@ -26,9 +27,9 @@ void API(pose)(int frame, AT_POSITION, real *pose)
     for (int f = named->frame; f; f = joints[f - 1].parent) {
         const struct placing *const here = &x->placings[f - 1];
         const int turns = joints[f - 1].kind == REVOLUTE;
-        const real moved = here->ratio * q[joints[f - 1].coordinate];
-        const real sine = turns ? F(sin)(moved) : R(0.0), cosine = turns ? F(cos)(moved) : R(1.0);
-        t[2][3] += turns ? R(0.0) : moved;
+        const real by = here->ratio * moved[MOVED_BY(f - 1)];
+        const real sine = turns ? F(sin)(by) : R(0.0), cosine = turns ? F(cos)(by) : R(1.0);
+        t[2][3] += turns ? R(0.0) : by;
         for (int c = 0; c < 4; ++c) {
             const real a = cosine * t[0][c] - sine * t[1][c], b = sine * t[0][c] + cosine * t[1][c], z = t[2][c];
             for (int r = 0; r < 3; ++r)

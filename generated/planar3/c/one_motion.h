@@ -17,7 +17,7 @@
 #ifndef LINKWISE_ONE_MOTION_H
 #define LINKWISE_ONE_MOTION_H
 
-#include "angles.h"
+#include "curves.h"
 #include "lanes.h"
 #include "vectors.h"
 
@@ -28,7 +28,8 @@ static inline void moved_one(const struct numbers *x, const real *q, const real 
     motion *m)
 {
     real angle[FRAMES], sine[FRAMES], cosine[FRAMES];
-    angles(x, 1, q, angle);
+    DISPLACED(1, q);
+    angles(x, 1, moved, angle);
 #ifdef VECTOR_SINES /* They are off by a few roundings more, which solving with an ill-conditioned M multiplies. */
     for (int f = 0; f < FRAMES; ++f) {
         sine[f] = F(sin)(angle[f]);
@@ -41,7 +42,8 @@ static inline void moved_one(const struct numbers *x, const real *q, const real 
     for (int f = 1; f <= FRAMES; ++f) {
         const int k = joints[f - 1].coordinate;
         if (!wanted || wanted[f])
-            frame_one(m, f, &x->placings[f - 1], sine[f - 1], cosine[f - 1], q[k], qd[k], qdd[k]);
+            frame_one(m, f, &x->placings[f - 1], sine[f - 1], cosine[f - 1], moved + MOVED_BY(f - 1), FRAMES, qd[k],
+                qdd[k]);
     }
     sum_columns_one(m, wanted);
 }

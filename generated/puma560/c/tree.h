@@ -1,8 +1,8 @@
 /* A robot in tables: a tree of joints, and the links that it carries. The same in every package of linkwise.
 
    Frame 0 is the base, and frame f what joint f moves, counted from 1: its z is the joint's axis. It stands in its
-   parent's frame at `place`, turned by `turn`, and then turns about z, or slides along it, by `ratio` times a coordinate.
-   Several joints may follow one coordinate. So a link's motion has a column for each coordinate of its path: column f - 1
+   parent's frame at `place`, turned by `turn`, and then turns about z, or slides along it, by `ratio` times a coordinate, or
+   times a curve of it, see curves.h. Several joints may follow one coordinate. So a link's motion has a column for each coordinate of its path: column f - 1
    is joint f, and columns from FRAMES on are sums of two others, for joints of one path that follow the same coordinate.
 
    The file that includes this one says how many there are: N coordinates, LINKS, FRAMES but for the base, COLUMNS, LONGEST,
@@ -36,6 +36,11 @@ struct placing {
 /* Numbers of a link, in its frame: mass, centre of mass, and the inertia about it, as xx, yy, zz, xy, xz, yz. */
 struct body {
     real mass, com[3], inertia[6];
+};
+
+/* The curve that a joint follows: its pieces among those of all joints. One that follows none has none. */
+struct curve {
+    short first, pieces;
 };
 
 /* Numbers of a robot; gravity in the base's axes. */

@@ -24,12 +24,15 @@
 #define wrenches KERNEL(wrenches)
 
 /* Frames, 0 being the base: axes, place, twist (w, v) and its rate (wd, vd), v at the base's origin. Columns: S and its
-   change. */
+   change. Where joints follow curves, how S changes by its own coordinate, and what this adds to S's second change. */
 typedef struct {
     matrix turn[FRAMES + 1];
     vector place[FRAMES + 1];
     screw twist[FRAMES + 1], rate[FRAMES + 1];
     screw axis[COLUMNS], change[COLUMNS];
+#ifdef CURVED
+    screw bend[FRAMES], second[FRAMES];
+#endif
 } motion;
 
 /* A link: c, cd, m, I, the matrix of z to -w x E z, and its wrenches for tau and g, of which the latter is a force. */
@@ -65,9 +68,10 @@ INLINE vector KERNEL(axes)(vector row, const real *t, number sine, number cosine
     return axes;
 }
 
-/* Frame f, its joint turned by an angle with this sine and cosine, or moved by ratio * q. */
-static inline void KERNEL(frame)(motion *m, int f, const struct placing *here, number sine, number cosine, number q, number qd,
-    number qdd)
+/* Frame f, its joint turned by an angle with this sine and cosine, or moved by ratio * by; derivatives of `by` are `stride`
+   behind each other. */
+static inline void KERNEL(frame)(motion *m, int f, const struct placing *here, number sine, number cosine, const real *by,
+    int stride, number qd, number qdd)
 {
     const struct joint *joint = &joints[f - 1];
     const matrix above = m->turn[joint->parent];
@@ -82,10 +86,25 @@ static inline void KERNEL(frame)(motion *m, int f, const struct placing *here, n
         axis.z = none;
         axis.s = direction;
         if (joint->placed)
-            place = add(place, scale(q, direction));
+            place = add(place, scale(TAKE(by), direction));
     }
+#ifdef CURVED
+    const number slope = TAKE(by + stride), bent = TAKE(by + 2 * stride), own = TAKE(by + 3 * stride) * qd * qd + bent * qdd;
+    const screw straight = axis, bend = {scale(bent, straight.z), scale(bent, straight.s)};
+    axis.z = scale(slope, straight.z);
+    axis.s = scale(slope, straight.s);
+#else
+    (void)stride;
+#endif
     change.z = cross(twist.z, axis.z);
     change.s = add_cross(cross(twist.z, axis.s), twist.s, axis.z);
+#ifdef CURVED
+    m->bend[f - 1] = bend;
+    m->second[f - 1].z = add(scale(qd, cross(twist.z, bend.z)), scale(own, straight.z));
+    m->second[f - 1].s = add(scale(qd, add_cross(cross(twist.z, bend.s), twist.s, bend.z)), scale(own, straight.s));
+    change.z = add(change.z, scale(qd, bend.z));
+    change.s = add(change.s, scale(qd, bend.s));
+#endif
     m->turn[f] = turn;
     m->place[f] = place;
     m->axis[f - 1] = axis;

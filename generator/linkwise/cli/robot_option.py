@@ -7,7 +7,7 @@ import typer
 
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.cli import tell
-from linkwise.kept_package import kept_package
+from linkwise.package_cache import kept_package
 from linkwise.progress import Progress
 
 RobotOption = Annotated[

@@ -168,7 +168,8 @@ def gradient_columns(xp: Any, moved: Twists) -> Any:
 
 def second_rates(xp: Any, moved: Twists) -> Any:
     """S-dot-dot = A x S + V x S-dot, (5, 2, frames, samples)."""
-    return motion_cross(xp, moved.accelerations, moved.screws) + motion_cross(xp, moved.twists, moved.rates)
+    second = motion_cross(xp, moved.accelerations, moved.screws) + motion_cross(xp, moved.twists, moved.rates)
+    return second if moved.second is None else second + moved.second
 
 
 def _halves(screws: Any) -> tuple[Any, Any]:

@@ -39,6 +39,9 @@ class Answering(Protocol):
     def gradient(self) -> list[Any]:
         """Packed c0."""
 
+    def own_bends(self) -> Any:
+        """What curves add to c0_ii, packed as tau; None where no joint follows one."""
+
     def singles(self, fields: Sequence[int]) -> list[Any]:
         """Packed g (field 3) or tau (field 4), or both."""
 
@@ -100,8 +103,14 @@ class RigidRule:
     ) -> Any:
         """c0 (..., count)."""
 
+        diagonal = self.tables(space, motion[0]).diagonal
+
         def answer(at: Answering) -> list[Any]:
-            return at.gradient()
+            gradient, own = at.gradient()[0], at.own_bends()
+            if own is None:
+                return [gradient]
+            with_zero = space.xp.concat([own, 0.0 * own[:, :1]], 1)
+            return [gradient + taken(with_zero, diagonal, -1)]
 
         return self._answers(space, motion, p, bodies, answer)[0]
 

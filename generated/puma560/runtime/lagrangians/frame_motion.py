@@ -11,6 +11,7 @@ from typing import Any
 import torch
 
 from .energy_interface import Values
+from .joint_curve import JointCurve
 
 Number = Any
 """A float, or a tensor of one value or of one a sample."""
@@ -32,9 +33,9 @@ class Axes:
         along = [found[0] for found in entries if len(found) == 1 and abs(found[0][0]) == 1.0]
         self._picked = along if len(along) == 3 else None
 
-    def turn(self, q: Values, k: int, ratio: float = 1.0) -> "Turn":
-        """Rᵀ of a joint that turns by ratio · q[k] about its z axis."""
-        return Turn(self, q, k, ratio)
+    def turn(self, q: Values, k: int, ratio: float = 1.0, curve: JointCurve | None = None) -> "Turn":
+        """Rᵀ of a joint that turns by ratio · q[k], or that of its curve, about its z axis."""
+        return Turn(self, q, k, ratio, curve)
 
     def slide(self, a: Vector) -> Triple:
         """Rᵀ a of a joint that slides: its axes are always those at q = 0."""
@@ -51,8 +52,8 @@ class Axes:
 class Turn:
     """Rᵀ a of vectors a: from the axes before a joint to those behind it, R = axes · Rz(ratio · q[k])."""
 
-    def __init__(self, axes: Axes, q: Values, k: int, ratio: float) -> None:
-        self._axes, self._q, self._k, self._ratio = axes, q, k, ratio
+    def __init__(self, axes: Axes, q: Values, k: int, ratio: float, curve: JointCurve | None) -> None:
+        self._axes, self._q, self._k, self._ratio, self._curve = axes, q, k, ratio, curve
         self._sine_and_cosine: tuple[Any, Any] | None = None
 
     def __call__(self, a: Vector) -> Triple:
@@ -67,7 +68,8 @@ class Turn:
 
     def _trigonometry(self) -> tuple[Any, Any]:
         """Sine and cosine of the angle, once, where they are needed."""
-        angle = self._q[self._k] if self._ratio == 1.0 else self._ratio * self._q[self._k]
+        moved = self._curve(self._q[self._k]) if self._curve else self._q[self._k]
+        angle = moved if self._ratio == 1.0 else self._ratio * moved
         self._sine_and_cosine = torch.sin(angle), torch.cos(angle)
         return self._sine_and_cosine
 

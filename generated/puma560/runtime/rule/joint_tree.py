@@ -2,7 +2,7 @@
 
 A joint moves a frame whose z axis lies on the joint's axis. With q its coordinate, a revolute joint places
 the frame at `translation` in the frame of its parent, turned by `rotation` Rz(ratio q); a prismatic one at
-`translation` + `rotation` z ratio q.
+`translation` + `rotation` z ratio q. Where the joint has a curve d, d(q) stands in place of q.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,6 +14,15 @@ from ..interface import Array
 Triple = tuple[float, float, float]
 Formula = Callable[[Any, Mapping[str, Any]], Any]
 """A number's value, from the array namespace (numpy or torch) and the run-time parameters by name."""
+
+
+class TreeCurve(NamedTuple):
+    """A function of q: polynomials in q - start, each from its start on, the first before it too."""
+
+    starts: tuple[float, ...]
+    """Ascending; the first two may be the same."""
+    pieces: tuple[tuple[float, ...], ...]
+    """Coefficients of powers 0, 1, 2, ... for rad or m."""
 
 
 class TreeJoint(NamedTuple):
@@ -29,6 +38,8 @@ class TreeJoint(NamedTuple):
     rotation: tuple[Triple, Triple, Triple]
     translation: Triple
     """In m."""
+    curve: TreeCurve | None = None
+    """What the joint moves by, in place of q."""
 
 
 class TreeLink(NamedTuple):

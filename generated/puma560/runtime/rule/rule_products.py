@@ -42,6 +42,13 @@ class Moment(NamedTuple):
         dense = _products(xp, self, matrices, gradient_columns(xp, self.moved))
         return [packed(xp, dense, tables.positions[2])]
 
+    def own_bends(self) -> Any:
+        """What tau's wrench does along how S changes by its own coordinate, packed as tau; or None."""
+        bends = self.moved.bends
+        return (
+            None if bends is None else self._replace(moved=self.moved._replace(screws=bends)).singles((4,))[0]
+        )
+
     def singles(self, fields: Sequence[int]) -> list[Any]:
         """Packed S_e . (wrench) of g or tau, or both."""
         xp = self.xp

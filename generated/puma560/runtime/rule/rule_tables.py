@@ -54,6 +54,8 @@ class RuleTables(NamedTuple):
     """Links and path of each."""
     positions: tuple[tuple[Any, ...], ...]
     """Of c2, c1, c0, g and tau in the answers, a table for each summand."""
+    diagonal: Any
+    """Of each c0_ik with i = k the packed tau_i, of others a zero behind."""
     pairs: tuple[Any, Any]
     """Links and joints of the pairs of `PairLayout`."""
     entries: tuple[tuple[tuple[Any, Any], ...], ...]
@@ -87,6 +89,7 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
         formula_sources(tree),
         tuple((_span(group.links), _span(group.path)) for group in layout.groups),
         tuple(tuple(getattr(layout, field)) for field in fields),
+        layout.diagonal,
         (pairs.links, pairs.joints),
         (*each, *pairs.entries[2:], *singles),
         regressor_tables(tree),

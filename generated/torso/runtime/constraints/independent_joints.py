@@ -105,5 +105,5 @@ def _floating(tree: JointTree, root: int, carried: set[int]) -> tuple[int, ...]:
             break
         run.append(children[0])
     kinds = {tree.joints[f].kind for f in run}
-    floats = len(kinds) > 1 and len(run) >= LEAST
-    return tuple(tree.joints[f].coordinate for f in run) if floats else ()
+    coordinates = tuple(dict.fromkeys(tree.joints[f].coordinate for f in run))
+    return coordinates if len(kinds) > 1 and len(coordinates) >= LEAST else ()

@@ -45,6 +45,13 @@ class FusedMoment(NamedTuple):
         kept = self.xp.stack([self.xp.concat(both, 0) for both in zip(after, before, strict=True)], 0)
         return [self._gathered(kept, self.tables.entries[2])]
 
+    def own_bends(self) -> Any:
+        """What tau's wrench does along how S changes by its own coordinate, packed as tau; or None."""
+        bends = self.moved.bends
+        return (
+            None if bends is None else self._replace(moved=self.moved._replace(screws=bends)).singles((4,))[0]
+        )
+
     def singles(self, fields: Sequence[int]) -> list[Any]:
         """Packed S_e . (wrench) of g or tau, or both."""
         wrenches = self.states.wrenches

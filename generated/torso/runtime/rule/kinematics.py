@@ -8,13 +8,15 @@ four, eight, and so is what adds up along a chain of joints.
 Vectors are in the base's axes, and moments and linear velocities about an origin o at rest: at the instant
 it is in the first hinge of each path, and places are counted from there, so that what is far from the base,
 or from another arm, loses no digits. The screw of joint f, times its ratio, is S_f = (z, s): s = (p - o) x z
-for a hinge at p, and z = 0, s = axis for a slide, wherever it is.
+for a hinge at p, and z = 0, s = axis for a slide, wherever it is. Where joints follow curves of their
+coordinates, the slopes of these are factors of the screws too, see `joint_curves`.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from .joint_curves import CurveTables, curve_tables, displaced
 from .joint_tree import JointTree
 
 
@@ -41,6 +43,8 @@ class KinematicTables(NamedTuple):
     """For each step of composition the frame that each one's axes are in so far."""
     behind: Any
     """(frames, 1): ones for the frames that have a hinge before them, whose steps count."""
+    curves: CurveTables | None
+    """What joints follow; None where none does."""
 
 
 class Poses(NamedTuple):
@@ -50,6 +54,8 @@ class Poses(NamedTuple):
     """(3, 3, frames, samples): [component, axis x, y or z]."""
     places: Any
     """From the first hinge of the path, (3, frames, samples), in m; zero before it."""
+    moved: Any = None
+    """`Displacement` of the joints."""
 
 
 class Twists(NamedTuple):
@@ -66,6 +72,10 @@ class Twists(NamedTuple):
     """The same: omega and v of each frame; V x S is also that of what carries the joint, as S x S = 0."""
     accelerations: Any
     """The same: their rates, from minus gravity."""
+    second: Any = None
+    """The same: what curves add to the second rates of the screws; None where no joint follows one."""
+    bends: Any = None
+    """The same: how the screws change by their own coordinates; None likewise."""
 
 
 def kinematic_tables(tree: JointTree) -> KinematicTables:
@@ -89,6 +99,7 @@ def kinematic_tables(tree: JointTree) -> KinematicTables:
         parents,
         tuple(doubled(parents)),
         np.array([*hinge_before(tree), False])[:, None].astype(float),
+        curve_tables(tree),
     )
 
 
@@ -111,7 +122,8 @@ def poses(xp: Any, tables: KinematicTables, translations: Any, position: Any) ->
     translations: of every frame in its parent's axes, (3, frames, samples); position: q of every frame's
     coordinate, (frames, samples)
     """
-    angle = tables.turns * position
+    moved = displaced(xp, tables.curves, position)
+    angle = tables.turns * moved.value
     # Stacked, as a compiler then keeps them; else it works them out again for every entry of the axes.
     cosine, sine = xp.stack([xp.cos(angle), xp.sin(angle)], 0)
     axes = tables.still + tables.cosine * cosine + tables.sine * sine
@@ -120,14 +132,20 @@ def poses(xp: Any, tables: KinematicTables, translations: Any, position: Any) ->
     # Each joint is so far from the one before: p_f - p_parent = R_parent t, and it all adds up.
     step = translations
     if tables.slides is not None:
-        step = step + tables.axes * (tables.slides * position)
+        step = step + tables.axes * (tables.slides * moved.value)
     before = taken(axes, tables.parents)
     step = before[:, 0] * step[0] + before[:, 1] * step[1] + before[:, 2] * step[2]
-    return Poses(axes, _summed(tables, tables.behind * step))
+    return Poses(axes, _summed(tables, tables.behind * step), moved)
 
 
 def joint_screws(xp: Any, tables: KinematicTables, poses: Poses) -> Any:
-    """z and s of each joint times its ratio, (5, 2, frames, samples); none for the ground."""
+    """z and s of each joint times its ratio and slope, (5, 2, frames, samples); none for the ground."""
+    screws = _straight_screws(xp, tables, poses)
+    return screws if tables.curves is None else screws * poses.moved.slope
+
+
+def _straight_screws(xp: Any, tables: KinematicTables, poses: Poses) -> Any:
+    """The same without slopes."""
     axis = poses.axes[:, 2]
     z = axis * tables.turns
     s = cross(around(xp, poses.places), around(xp, z))
@@ -144,13 +162,21 @@ def twists(
     velocity, acceleration: qd and qdd of every frame's coordinate, (frames, samples); gravity: (3, 1,
     samples)
     """
-    screws = joint_screws(xp, tables, poses)
+    screws = straight = _straight_screws(xp, tables, poses)
+    if tables.curves is not None:
+        screws = straight * poses.moved.slope
     # V = sum of S qd, Sd = V x S, A = -gravity + sum of S qdd + Sd qd, over the joints of the path.
     moved = _summed(tables, screws * velocity)
     rates = motion_cross(xp, moved, screws)
+    second = bends = None
+    if tables.curves is not None:
+        bends = straight * poses.moved.bend
+        own = poses.moved.jerk * velocity * velocity + poses.moved.bend * acceleration
+        second = motion_cross(xp, moved, bends) * velocity + straight * own
+        rates = rates + bends * velocity
     change = _summed(tables, screws * acceleration + rates * velocity)
     weight = around(xp, xp.stack([0.0 * gravity, gravity], 1))
-    return Twists(screws, rates, moved, change - weight)
+    return Twists(screws, rates, moved, change - weight, second, bends)
 
 
 def _summed(tables: KinematicTables, a: Any) -> Any:

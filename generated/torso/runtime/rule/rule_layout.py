@@ -54,6 +54,8 @@ class RuleLayout:
     torque: NDArray[np.intp]
     """Those of tau in answers (joint, kind, link), of which gravity is the second kind."""
     gravity: NDArray[np.intp]
+    diagonal: NDArray[np.intp]
+    """Of each packed c0_ik with i = k the packed tau_i, of others the number of these."""
 
 
 def rule_layout(tree: JointTree) -> RuleLayout:
@@ -82,7 +84,18 @@ def rule_layout(tree: JointTree) -> RuleLayout:
         total,
         torque(0),
         torque(1),
+        _diagonal([block.count for block in ordered]),
     )
+
+
+def _diagonal(counts: Sequence[int]) -> NDArray[np.intp]:
+    start, blocks = 0, []
+    for count in counts:
+        block = np.full((count, count), sum(counts))
+        np.fill_diagonal(block, range(start, start + count))
+        blocks.append(block.reshape(-1))
+        start += count
+    return np.concatenate(blocks)
 
 
 @dataclass(frozen=True)

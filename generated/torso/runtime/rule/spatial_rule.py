@@ -21,6 +21,7 @@ innermost, as `rigid_rule` has them.
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from .joint_curves import Displacement, displaced
 from .kinematics import taken
 from .rule_products import packed
 from .rule_tables import RuleTables
@@ -51,6 +52,10 @@ class SpatialMoment(NamedTuple):
     """W, (samples, N, 6)."""
     weights: Any
     """I of minus gravity, the same."""
+    second: Any = None
+    """What curves add to Sdd of each joint, (samples, joints, 6); None where no joint follows one."""
+    bends: Any = None
+    """The same: how S changes by its own coordinate; None likewise."""
 
     def coefficients(self) -> list[Any]:
         """Packed c2 and c1."""
@@ -63,9 +68,14 @@ class SpatialMoment(NamedTuple):
         """Packed c0."""
         s, rate = self.screws, self.rates
         second = _applied(self._cross(self.accelerations), s) + _applied(self.crosses, rate)
+        second = second if self.second is None else second + self.second
         columns = [second, 2.0 * rate[..., 3:], 0.0 * s], [second, 2.0 * rate[..., 3:], s]
         matrices = self.xp.concat([self._matrices(), self._wrench_cross(self.wrenches)], -1)
         return [packed(self.xp, self._products(matrices, columns), self.tables.positions[2])]
+
+    def own_bends(self) -> Any:
+        """What tau's wrench does along how S changes by its own coordinate, packed as tau; or None."""
+        return None if self.bends is None else self._replace(screws=self.bends).singles((4,))[0]
 
     def singles(self, fields: Sequence[int]) -> list[Any]:
         """Packed S_e . (wrench) of g or tau, or both."""
@@ -110,13 +120,24 @@ def spatial_moment(
 ) -> SpatialMoment:
     """Motion of joints and links for q, qd and qdd, (samples, n) each."""
     spatial = tables.spatial
-    x = _placed(xp, tables, numbers, taken(motion[0], spatial.coordinates, -1))
-    s = taken((x[:, :-1] @ spatial.units)[..., 0], spatial.swapped, -1)
+    moved = _moved(xp, tables, taken(motion[0], spatial.coordinates, -1))
+    x = _placed(xp, tables, numbers, moved.value)
+    s = straight = taken((x[:, :-1] @ spatial.units)[..., 0], spatial.swapped, -1)
     velocity, acceleration = (taken(a, spatial.own, -1)[..., None] for a in motion[1:])
+    slope, bend, jerk = (a if a is None else a[:, :-1, None] for a in moved[1:])
+    if slope is not None:
+        s = straight * slope
     # V = sum of S qd, A = -gravity + sum of S qdd + Sd qd, over the joints of the path; S x S = 0.
     v = spatial.chains @ (s * velocity)
     crosses = as_matrices(v, spatial.motion_cross)
     rate = _applied(crosses, s)
+    second = bends = None
+    if slope is not None:
+        bends = straight * bend
+        second = _applied(crosses, bends) * velocity + straight * (
+            jerk * velocity * velocity + bend * acceleration
+        )
+        rate = rate + bends * velocity
     a = spatial.chains @ (s * acceleration + rate * velocity) - numbers.gravity
     links = spatial.joints
     x = taken(x, links, -3)
@@ -126,11 +147,19 @@ def spatial_moment(
     turning = _applied(xp.swapaxes(taken(crosses, links, -3), -1, -2), momentum)
     wrench = _applied(inertia, taken(a, links)) - turning
     weight = _applied(inertia, -numbers.gravity)
-    return SpatialMoment(xp, tables, s, rate, a, crosses, inertia, momentum, wrench, weight)
+    return SpatialMoment(xp, tables, s, rate, a, crosses, inertia, momentum, wrench, weight, second, bends)
+
+
+def _moved(xp: Any, tables: RuleTables, position: Any) -> Displacement:
+    """What all joints move by, (samples, frames), for q of each."""
+    if tables.frames.curves is None:
+        return Displacement(position)
+    found = displaced(xp, tables.frames.curves, xp.swapaxes(position, 0, 1))
+    return Displacement(*(xp.swapaxes(a, 0, 1) for a in found))
 
 
 def _placed(xp: Any, tables: RuleTables, numbers: SpatialNumbers, position: Any) -> Any:
-    """X of all frames into the base's axes, (samples, frames, 6, 6), for q of each, (samples, frames)."""
+    """X of all frames into the base's axes, (samples, frames, 6, 6); position: (samples, frames)."""
     angle = tables.spatial.turns * position
     x = numbers.frames[0] + numbers.frames[1] * xp.cos(angle)[..., None, None]
     x = x + numbers.frames[2] * xp.sin(angle)[..., None, None]

@@ -1,0 +1,83 @@
+"""A robot's file in place of a package: one is generated, kept, and made again when the file changes."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from command_line import run_linkwise
+from conftest import DATA
+from linkwise import LinkwiseError, kept_package
+from linkwise.package.manifest import FILE
+
+KNEE = DATA / "knee.osim"
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("LINKWISE_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def walk(folder: Path) -> Path:
+    rows = "\n".join(f"{k / 50},{k % 3},{-k % 2},{k / 2},{k / 3},{-k}" for k in range(20))
+    joints = "hip_adduction,hip_rotation,hip_flexion,knee_angle,ankle_angle"
+    (folder / "walk.csv").write_text(f"time,{joints}\n{rows}\n", encoding="utf-8")
+    return folder / "walk.csv"
+
+
+def test_an_analysis_is_the_same_by_file_and_by_package(tmp_path: Path) -> None:
+    log = walk(tmp_path)
+    asked = ("--no-page", "--backend", "numpy", "--units", "deg")
+    made = run_linkwise("generate", KNEE, "--out", "out", "--backend", "numpy", folder=tmp_path)
+    assert made.returncode == 0
+    for robot, out in ((KNEE, "by_file"), ("out/knee", "by_package")):
+        done = run_linkwise("analyze", log, "--robot", robot, "--out", out, *asked, folder=tmp_path)
+        assert done.returncode == 0, done.stderr
+    tables = [(tmp_path / out / "analysis.parquet").read_bytes() for out in ("by_file", "by_package")]
+    assert len(tables[0]) == len(tables[1])
+
+
+def test_it_is_made_once_and_again_when_the_file_changes(tmp_path: Path) -> None:
+    file = tmp_path / "leg.osim"
+    shutil.copyfile(KNEE, file)
+    first = kept_package(file, "numpy").directory
+    made = (first / FILE).stat().st_mtime_ns
+    assert kept_package(file, "numpy").directory == first
+    assert (first / FILE).stat().st_mtime_ns == made
+    file.write_text(file.read_text().replace("<mass>8.4</mass>", "<mass>8.5</mass>"))
+    second = kept_package(file, "numpy").directory
+    assert second != first
+    masses = [json.loads((at / FILE).read_text())["tree"]["bodies"][2]["mass"] for at in (first, second)]
+    assert masses == [8.4, 8.5]
+
+
+def test_what_a_file_leaves_out_is_told_each_time(tmp_path: Path) -> None:
+    file = tmp_path / "leg.osim"
+    forces = '<ForceSet><objects><BushingForce name="disc"/></objects></ForceSet></Model>'
+    file.write_text(KNEE.read_text().replace("</Model>", forces))
+    for _ in range(2):
+        (warning,) = kept_package(file, "numpy").warnings
+        assert warning == f"{file}: bushing left out of the torques: disc"
+
+
+def test_a_package_is_itself_and_what_is_neither_is_refused_in_a_line(tmp_path: Path) -> None:
+    assert kept_package(tmp_path).directory == tmp_path
+    with pytest.raises(LinkwiseError, match=r"^gone.osim: no such file"):
+        kept_package("gone.osim")
+    for robot, message in (
+        ("gone.osim", "gone.osim: no such file"),
+        ("gone", "gone: no generated robot there"),
+    ):
+        done = run_linkwise("analyze", walk(tmp_path), "--robot", robot, "--out", "out", folder=tmp_path)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith(f"linkwise: error: {message}")
+        assert len(done.stderr.splitlines()) == 1
+        assert not (tmp_path / "out").exists()
+
+
+def test_a_cache_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("LINKWISE_CACHE", str(tmp_path / "file"))
+    with pytest.raises(LinkwiseError, match=r"knee\.osim: no package of it can be kept: .*LINKWISE_CACHE"):
+        kept_package(KNEE)
