@@ -230,13 +230,26 @@ def test_the_robots_order_is_taken_and_said_where_nothing_names_joints(tmp_path:
     ],
 )
 def test_other_files_are_named(tmp_path: Path, name: str, message: str) -> None:
-    (tmp_path / name).write_bytes(b"nothing of the kind " * 20)
+    (tmp_path / name).write_bytes(b"DataType=Vec3\nendheader\ntime\ta\n0\t1,2,3\n" * 9)
     with pytest.raises(LinkwiseError, match=message):
         open_log(tmp_path / name)
-    with pytest.raises(
-        LinkwiseError, match=r"this is a directory, not that of a bag: it has no metadata\.yaml"
-    ):
+
+
+def test_other_folders_profiles_and_topics_are_named(tmp_path: Path) -> None:
+    with pytest.raises(LinkwiseError, match=r"not that of a bag: it has no metadata\.yaml; give a file"):
         open_log(tmp_path)
+    bag = mcap(tmp_path)
+    content = bag.read_bytes()
+    assert content[21:25] == b"ros2"
+    bag.write_bytes(content[:21] + b"json" + content[25:])
+    with pytest.raises(
+        LinkwiseError, match=r"bag\.mcap: MCAP with the profile 'json', and not 'ros2'; record"
+    ):
+        open_log(bag)
+    with pytest.raises(
+        LinkwiseError, match=r"a\.csv: --topic goes with bags and files of arrays; leave it out"
+    ):
+        open_log(write_csv(tmp_path / "a.csv", TABLE), Reading(topic="/joint_states"))
 
 
 @pytest.mark.parametrize("write", [mcap, db3, ros1, npz, hdf5])
@@ -246,6 +259,7 @@ def test_a_file_cut_off_is_named(tmp_path: Path, write: Callable[[Path], Path]) 
     for count in (len(content) // 3, len(content) - 40):
         path.write_bytes(content[:count])
         with pytest.raises(
-            LinkwiseError, match=rf"^{path}: not an? .* or damaged \(.*\); write the file again$"
+            LinkwiseError,
+            match=rf"^{path}: not an? .* or damaged \(.*\); (write the file|mend it with .*) again$",
         ):
             analyze(path, PLANAR3)

@@ -91,6 +91,8 @@ def _opener(path: Path, reading: Reading, joints: Sequence[str]) -> Callable[[],
         return lambda: ArrayLog.open(Hdf5Arrays(path), reading, joints)
     if suffix == ".npz":
         return lambda: ArrayLog.open(NpzArrays(path), reading, joints)
+    if reading.topic is not None:
+        raise LinkwiseError("--topic goes with bags and files of arrays; leave it out")
     if suffix in DELIMITED:
         return lambda: open_delimited(path)
     if suffix in STORAGE:

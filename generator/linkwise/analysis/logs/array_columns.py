@@ -28,7 +28,7 @@ RANK = {word: rank for rank, word in enumerate(ENDING_OF)}
 
 
 @dataclass(frozen=True)
-class Found:
+class StoredArray:
     """An array in a file: its shape, whether it holds numbers, and the texts of one that names joints."""
 
     shape: tuple[int, ...]
@@ -51,7 +51,7 @@ class ArrayColumns:
     joints: the robot's, in whose order the columns of an array are if nothing names them
     """
 
-    found: Mapping[str, Found]
+    found: Mapping[str, StoredArray]
     time: str
     group: str
     joints: Sequence[str]
@@ -140,7 +140,7 @@ class ArrayColumns:
 
 
 def array_columns(
-    found: Mapping[str, Found], time: str | None, group: str | None, joints: Sequence[str]
+    found: Mapping[str, StoredArray], time: str | None, group: str | None, joints: Sequence[str]
 ) -> ArrayColumns:
     """Find the clock: the only array called `time` or `t`, or as given, in the group or nearest above it.
 
@@ -149,7 +149,7 @@ def array_columns(
     clocks = _clocks(found, time)
     where = listed(f"/{folder}" for folder in sorted(clocks))
     if not clocks:
-        told = listed(f"{array!r} {has.shape}" for array, has in found.items()) or "no arrays"
+        told = listed(f"{array!r} {has.shape}" for array, has in found.items()) or "it"
         raise LinkwiseError(
             f"no array of times{'' if time is None else f' {time!r}'} in {told}; call it 'time', in s, or"
             " name it with --time"
@@ -164,7 +164,7 @@ def array_columns(
     return ArrayColumns(found, clocks[above[0]], folder, joints, others)
 
 
-def _clocks(found: Mapping[str, Found], time: str | None) -> dict[str, str]:
+def _clocks(found: Mapping[str, StoredArray], time: str | None) -> dict[str, str]:
     """Arrays of times by the folder whose arrays they are of."""
     clocks: dict[str, str] = {}
     depth = 0 if time is None else time.strip("/").count("/")

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from linkwise.analysis.logs.array_columns import WORDS, Found, Place, array_columns
+from linkwise.analysis.logs.array_columns import WORDS, Place, StoredArray, array_columns
 from linkwise.analysis.settings import Reading
 from linkwise.errors import within
 from linkwise.escape import listed
@@ -22,7 +22,7 @@ class ArrayFile(Protocol):
     def path(self) -> Path:
         """The file."""
 
-    def found(self) -> Mapping[str, Found]:
+    def found(self) -> Mapping[str, StoredArray]:
         """What is in it."""
 
     def opened(self) -> AbstractContextManager[Callable[[str], Any]]:

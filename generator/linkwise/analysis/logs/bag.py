@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.analysis.logs.damaged_files import read_as
-from linkwise.analysis.logs.joint_states import ENDINGS, RECORDED, STAMPED, Cell, JointState, rows_of
+from linkwise.analysis.logs.joint_states import ENDINGS, RECORDED, STAMPED, Cell, JointMessage, rows_of
 from linkwise.errors import LinkwiseError
-from linkwise.escape import listed
+from linkwise.escape import listed, short
 from linkwise.extras import extra
 from linkwise.package.load import Array
 
+MCAP_MAGIC, MCAP_BEFORE, MCAP_OF_ROS = b"\x89MCAP0\r\n", 8 + 1 + 8, "ros2"
+"""The first bytes of an MCAP file, how many stand before the length of its profile, and that of ROS 2."""
+MEND = "mend it with `mcap recover` or `ros2 bag reindex`, or record it again"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 NAMED = 10_000
 """Messages at the beginning of a topic that are searched for the names of joints."""
@@ -79,9 +82,25 @@ def _opened(path: Path) -> Iterator[Any]:
         raise LinkwiseError(
             f"{path}: this is a directory, not that of a bag: it has no metadata.yaml; give a file"
         )
-    module = extra("rosbags.rosbag1" if path.suffix.lower() == ".bag" else "rosbags.rosbag2")
-    with read_as("a bag of ROS", path), module.Reader(path) as bag:
+    if (profile := _profile(path)) != MCAP_OF_ROS:
+        raise LinkwiseError(
+            f"{path}: MCAP with the profile {short(profile)!r}, and not {MCAP_OF_ROS!r}; record it with ros2"
+            " bag, or write the joints as .csv or .npz"
+        )
+    is_ros1 = path.is_file() and path.suffix.lower() == ".bag"
+    module = extra("rosbags.rosbag1" if is_ros1 else "rosbags.rosbag2")
+    with read_as("a bag of ROS", path, MEND), module.Reader(path) as bag:
         yield bag
+
+
+def _profile(path: Path) -> str:
+    """What the header of an MCAP file says of its messages; that of ROS 2 for other files."""
+    if not path.is_file() or path.suffix.lower() != ".mcap":
+        return MCAP_OF_ROS
+    with path.open("rb") as file:
+        is_mcap = file.read(MCAP_BEFORE).startswith(MCAP_MAGIC)
+        length = int.from_bytes(file.read(4), "little")
+        return file.read(min(length, 99)).decode("ascii", "replace") if is_mcap else MCAP_OF_ROS
 
 
 def _chosen_topic(topics: Mapping[str, Any], wanted: str | None) -> str:
@@ -104,7 +123,7 @@ def _chosen_topic(topics: Mapping[str, Any], wanted: str | None) -> str:
     return next(iter(found))
 
 
-def _states(bag: Any, topic: str) -> Iterator[JointState]:
+def _states(bag: Any, topic: str) -> Iterator[JointMessage]:
     """Messages of a topic by their time of recording."""
     stores = extra("rosbags.typesys")
     is_ros1 = type(bag).__module__.startswith("rosbags.rosbag1")
@@ -114,10 +133,10 @@ def _states(bag: Any, topic: str) -> Iterator[JointState]:
         message = parsed(raw, JOINT_STATE)
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         arrays = {quantity: getattr(message, quantity) for quantity in ENDINGS}
-        yield JointState(number, recorded, stamp, tuple(message.name), arrays)
+        yield JointMessage(number, recorded, stamp, tuple(message.name), arrays)
 
 
-def _columns(states: Sequence[JointState]) -> dict[str, Cell]:
+def _columns(states: Sequence[JointMessage]) -> dict[str, Cell]:
     """Columns of all joints that messages carry, in the order in which these name them."""
     found: dict[str, dict[str, Cell]] = {quantity: {} for quantity in ENDINGS}
     for state in states:

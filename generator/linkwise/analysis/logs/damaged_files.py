@@ -12,7 +12,7 @@ LONGEST_REASON = 200
 
 
 @contextmanager
-def read_as(kind: str, path: Path) -> Iterator[None]:
+def read_as(kind: str, path: Path, mend: str = "write the file again") -> Iterator[None]:
     """Raise LinkwiseError that begins with the path for every error in reading a file as `kind`."""
     with within(str(path)):
         try:
@@ -23,4 +23,4 @@ def read_as(kind: str, path: Path) -> Iterator[None]:
             raise LinkwiseError(f"cannot be read: {error.strerror}") from error
         except Exception as error:  # libraries promise nothing about damaged files
             reason = one_line(str(error), LONGEST_REASON) or type(error).__name__
-            raise LinkwiseError(f"not {kind}, or damaged ({reason}); write the file again") from error
+            raise LinkwiseError(f"not {kind}, or damaged ({reason}); {mend}") from error

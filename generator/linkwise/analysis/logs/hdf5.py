@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.logs.array_columns import NAMES, NUMBERS, Found, names_joints
+from linkwise.analysis.logs.array_columns import NAMES, NUMBERS, StoredArray, names_joints
 from linkwise.analysis.logs.damaged_files import read_as
 from linkwise.extras import extra
 
@@ -19,10 +19,10 @@ class Hdf5Arrays:
 
     path: Path
 
-    def found(self) -> Mapping[str, Found]:
+    def found(self) -> Mapping[str, StoredArray]:
         """Shapes of all datasets, and the texts of those that name joints."""
         library = extra("h5py")
-        found: dict[str, Found] = {}
+        found: dict[str, StoredArray] = {}
 
         def visit(name: str, item: Any) -> None:
             found.update(_named_by_attributes(name, item))
@@ -31,7 +31,7 @@ class Hdf5Arrays:
             texts: tuple[str, ...] = ()
             if names_joints(name, item.shape) and library.check_string_dtype(item.dtype):
                 texts = tuple(item.asstr()[()].tolist())
-            found[name] = Found(item.shape, item.dtype.kind in NUMBERS, texts)
+            found[name] = StoredArray(item.shape, item.dtype.kind in NUMBERS, texts)
 
         with self._file() as file:
             found.update(_named_by_attributes("", file))
@@ -51,12 +51,12 @@ class Hdf5Arrays:
             yield file
 
 
-def _named_by_attributes(name: str, item: Any) -> dict[str, Found]:
+def _named_by_attributes(name: str, item: Any) -> dict[str, StoredArray]:
     """Attributes of an item that name joints, as if they were arrays in it."""
     found = {}
     for word in NAMES:
         texts = np.asarray(item.attrs.get(word, ()))
         if texts.ndim == 1 and texts.size and texts.dtype.kind in "OSU":
             names = tuple(text.decode() if isinstance(text, bytes) else str(text) for text in texts)
-            found[f"{name}/{word}".lstrip("/")] = Found(texts.shape, is_numeric=False, texts=names)
+            found[f"{name}/{word}".lstrip("/")] = StoredArray(texts.shape, is_numeric=False, texts=names)
     return found

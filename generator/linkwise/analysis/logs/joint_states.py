@@ -17,7 +17,7 @@ BY_RECORDER = f"take the recorder's times with --time {RECORDED}"
 
 
 @dataclass(frozen=True)
-class JointState:
+class JointMessage:
     """A message, whose number in its topic counts from 1.
 
     `recorded` and `stamp` are in ns; `arrays` has one number of each quantity for each name, or none at all.
@@ -47,7 +47,7 @@ class Cell:
     joint: str = ""
 
 
-def rows_of(states: Iterator[JointState], cells: Sequence[Cell], rows: int) -> Iterator[tuple[Array, int]]:
+def rows_of(states: Iterator[JointMessage], cells: Sequence[Cell], rows: int) -> Iterator[tuple[Array, int]]:
     """Yield blocks (at most `rows`, len(cells)), times in s from the first message on, and messages read.
 
     A message without any of the joints is passed over, and so is one that repeats another, stamp and all.
@@ -56,12 +56,16 @@ def rows_of(states: Iterator[JointState], cells: Sequence[Cell], rows: int) -> I
     block: list[list[float]] = []
     first = last = None
     row: list[float] = []
-    number = 0
+    number, named, places = 0, None, None
     for state in states:
         number = state.number
         first = first or state
-        found = _row(state, cells, first)
-        if found is None or (last is not None and _repeats(cells, last, state, row, found, first)):
+        if state.names != named:
+            named, places = state.names, _places(state, cells)
+        if places is None:
+            continue
+        found = _row(state, cells, places, first)
+        if last is not None and _repeats(cells, last, state, row, found, first):
             continue
         last, row = state, found
         block.append(row)
@@ -71,41 +75,50 @@ def rows_of(states: Iterator[JointState], cells: Sequence[Cell], rows: int) -> I
     yield np.array(block).reshape(-1, len(cells)), number
 
 
-def _row(state: JointState, cells: Sequence[Cell], first: JointState) -> list[float] | None:
-    """The values of a message, None where it has none of the joints."""
+def _places(state: JointMessage, cells: Sequence[Cell]) -> list[int] | None:
+    """Where among the names of a message those of cells stand, -1 if nowhere; None if all do so."""
     place = {name: at for at, name in enumerate(state.names)}
     if len(place) < len(state.names):
         raise LinkwiseError(f"message {state.number} names a joint twice: {listed(state.names)}")
     wanted = {cell.joint for cell in cells if cell.joint}
     if wanted and wanted.isdisjoint(place):
         return None
+    return [place.get(cell.joint, -1) for cell in cells]
+
+
+def _row(
+    state: JointMessage, cells: Sequence[Cell], places: Sequence[int], first: JointMessage
+) -> list[float]:
+    """The values of a message."""
     row = []
-    for cell in cells:
+    there = {quantity: state.has(quantity) for quantity in ENDINGS}
+    for cell, place in zip(cells, places, strict=True):
         if cell.quantity == STAMPED:
             row.append((state.stamp - first.stamp) / 1e9)
         elif cell.quantity == RECORDED:
             row.append((state.recorded - first.recorded) / 1e9)
-        elif cell.joint in place and state.has(cell.quantity):
-            row.append(float(state.arrays[cell.quantity][place[cell.joint]]))
+        elif place >= 0 and there[cell.quantity]:
+            row.append(float(state.arrays[cell.quantity][place]))
         else:
+            has = [joint for joint in state.names if joint in {cell.joint for cell in cells}]
             raise LinkwiseError(
-                f"message {state.number} has {listed(map(repr, sorted(wanted & place.keys())))} and no"
-                f" {cell.quantity} of {cell.joint!r}, but a row needs all of the robot's joints: record them"
-                " in one message, or lock the others with linkwise generate --lock"
+                f"message {state.number} has {listed(map(repr, has))} and no {cell.quantity} of"
+                f" {cell.joint!r}, but a row needs all of the robot's joints: record them in one message, or"
+                " lock the others with linkwise generate --lock"
             )
     return row
 
 
 def _repeats(
     cells: Sequence[Cell],
-    last: JointState,
-    state: JointState,
+    last: JointMessage,
+    state: JointMessage,
     row: Sequence[float],
     found: Sequence[float],
-    first: JointState,
+    first: JointMessage,
 ) -> bool:
     """Whether a row repeats the one before; raises LinkwiseError where only its stamp does, or runs back."""
-    if state.stamp > last.stamp or not any(cell.quantity == STAMPED for cell in cells):
+    if state.stamp > last.stamp or all(cell.quantity != STAMPED for cell in cells):
         return False
     if state.stamp == last.stamp and np.array_equal(row, found, equal_nan=True):
         return True

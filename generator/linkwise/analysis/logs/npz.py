@@ -9,7 +9,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from linkwise.analysis.logs.array_columns import NUMBERS, Found, names_joints
+from linkwise.analysis.logs.array_columns import NUMBERS, StoredArray, names_joints
 from linkwise.analysis.logs.damaged_files import read_as
 from linkwise.errors import LinkwiseError
 
@@ -20,7 +20,7 @@ class NpzArrays:
 
     path: Path
 
-    def found(self) -> Mapping[str, Found]:
+    def found(self) -> Mapping[str, StoredArray]:
         """Shapes of all arrays, from their headers; raises LinkwiseError for names that are pickled."""
         found = {}
         with self.opened() as get, zipfile.ZipFile(self.path) as file:
@@ -35,7 +35,7 @@ class NpzArrays:
                     )
                 if names_joints(name, shape) and kind in "US":
                     texts = tuple(get(name).astype(str).tolist())
-                found[name] = Found(shape, kind in NUMBERS, texts)
+                found[name] = StoredArray(shape, kind in NUMBERS, texts)
         return found
 
     @contextmanager
