@@ -1,5 +1,7 @@
 """Bags and files of arrays: the same movement gives what its CSV gives, the unclear is refused."""
 
+import contextlib
+import sqlite3
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -58,6 +60,17 @@ def test_a_movement_is_the_same_in_every_format(tmp_path: Path, write: Callable[
     np.testing.assert_allclose(found.values, expected.values, rtol=1e-12, atol=1e-12)
     assert found.columns == expected.columns
     assert found.warnings == ()
+
+
+def test_a_bag_without_definitions_of_messages_is_read(tmp_path: Path) -> None:
+    """As recorders before ROS 2 Iron wrote them."""
+    path = db3(tmp_path)
+    with contextlib.closing(sqlite3.connect(path)) as file:
+        file.executescript(
+            "DROP TABLE message_definitions; DROP TABLE schema; DROP TABLE metadata;"
+            " ALTER TABLE topics DROP COLUMN type_description_hash"
+        )
+    np.testing.assert_array_equal(analyze(path, PLANAR3).q, Q)
 
 
 def test_uneven_time_is_told_about_resampling(tmp_path: Path) -> None:

@@ -32,9 +32,7 @@ UNITS = {
 
 Log = Annotated[
     Path,
-    typer.Argument(
-        help="Motion log: .csv, .mot, .parquet, .npz, .h5, or a ROS bag; docs/analyze.md lists all"
-    ),
+    typer.Argument(help="Motion log: .csv, .mot, .sto, .parquet, .npz, HDF5, or a bag of ROS"),
 ]
 Package = Annotated[Path, typer.Option(help="Directory of a generated robot")]
 AngleUnits = Annotated[
@@ -44,7 +42,7 @@ AngleUnits = Annotated[
 Time = Annotated[str | None, typer.Option(help="Column of the time, in s")]
 Topic = Annotated[
     str | None,
-    typer.Option(help="Topic of a bag, group of a HDF5 file: where the joints are, if several have some"),
+    typer.Option(help="Topic of a bag, group of an HDF5 file: where the joints are, if several have some"),
 ]
 Map = Annotated[
     list[str] | None,

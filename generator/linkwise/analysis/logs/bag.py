@@ -51,7 +51,7 @@ class BagLog:
             columns = _columns(states)
         is_stamped = bool(states[0].stamp)
         told = () if is_stamped else (f"messages of {name} have no stamps: the time is that of recording",)
-        times = {"time": Cell(STAMPED), RECORDED: Cell(RECORDED)} if is_stamped else {"time": Cell(RECORDED)}
+        times = {"time": Cell(STAMPED if is_stamped else RECORDED), RECORDED: Cell(RECORDED)}
         return cls(path, name, times | columns | times, size, told)
 
     @property
