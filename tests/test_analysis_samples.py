@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from linkwise.analysis.column_matching import select
 from linkwise.analysis.even_time import resampled
+from linkwise.analysis.logs import open_log
 from linkwise.analysis.samples import read_samples
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
@@ -14,7 +15,7 @@ ANGLES = ("rad", "rad", "rad")
 
 
 def read(path, reading=None, units=ANGLES, buffer=None):
-    return read_samples(path, JOINTS, units, reading or Reading(), silent, buffer)
+    return read_samples(open_log(path), JOINTS, units, reading or Reading(), silent, buffer)
 
 
 def test_samples_are_the_log(tmp_path):
@@ -128,7 +129,7 @@ def test_resampling_follows_the_signal_and_not_the_window(tmp_path):
     parts = np.concatenate([*resampled(table, 100.0, rows=97)])
     np.testing.assert_allclose(parts, whole, atol=1e-12)
     path = write_csv(tmp_path / "a.csv", table, ("joint1", "joint2"))
-    samples = read_samples(path, JOINTS[:2], ANGLES[:2], Reading(resample=50), silent)
+    samples = read_samples(open_log(path), JOINTS[:2], ANGLES[:2], Reading(resample=50), silent)
     np.testing.assert_allclose(samples.q, whole[::2, 1:][: len(samples.q)], atol=1e-12)
 
 
@@ -220,7 +221,7 @@ def test_times_that_no_clock_shows(tmp_path, time, message):
     rows = "".join(f"{time.format(at)},1\n" for at in range(10))
     path.write_text(f"time,joint1\n{rows}", encoding="utf-8")
     with pytest.raises(LinkwiseError, match=message):
-        read_samples(path, ("joint1",), ("rad",), Reading(), silent)
+        read_samples(open_log(path), ("joint1",), ("rad",), Reading(), silent)
 
 
 def test_splines_that_overflow_are_told(tmp_path):
@@ -231,4 +232,4 @@ def test_splines_that_overflow_are_told(tmp_path):
         r"--resample overflows between 0 s and 0\.39 s: the log's values are too large there, up to 1e\+308"
     )
     with pytest.raises(LinkwiseError, match=message):
-        read_samples(path, ("joint1",), ("rad",), Reading(resample=50.0), silent)
+        read_samples(open_log(path), ("joint1",), ("rad",), Reading(resample=50.0), silent)

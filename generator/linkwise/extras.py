@@ -7,11 +7,13 @@ from linkwise.errors import LinkwiseError
 
 BROUGHT_BY = {
     "clarabel": "identify",
+    "h5py": "logs",
     "matplotlib": "motion",
     "mujoco": "mjcf",
     "networkx": "torch",
     "plotly": "motion",
     "pyarrow": "motion",
+    "rosbags": "logs",
     "scipy": "motion",
     "torch": "torch",
 }

@@ -10,18 +10,20 @@ from fuzz.case import JOINTS, Case
 from fuzz.mutations import TEXTS, encoded, mutated_bytes, mutated_text
 
 
-def _rows(rng: Random) -> list[list[float]]:
+def random_rows(rng: Random) -> list[list[float]]:
+    """Samples: a time in s, and a number for each joint."""
     count, step = rng.choice((0, 1, 5, 20, 40)), rng.choice((0.01, 0.01, 1.0, 1e-9))
     return [[k * step, *(rng.uniform(-1, 1) for _ in JOINTS)] for k in range(count)]
 
 
-def _log_case(rng: Random, name: str, content: bytes) -> Case:
+def log_case(rng: Random, name: str, content: bytes) -> Case:
+    """An analysis of the log `name`, with a few flags."""
     flags: tuple[str, ...] = ("--no-page", "--format", rng.choice(("csv", "parquet")))
     if rng.random() < 0.05:
         flags = ()
     for flag in (
         "--ignore-extra", "--units=deg", "--cutoff=4", "--resample=50", "--edges=trim", "--map=joint1=joint2",
-        "--derivative=savitzky-golay", "--convention=gradient", "--time=t", "--json",
+        "--derivative=savitzky-golay", "--convention=gradient", "--time=t", "--topic=arm", "--json",
     ):  # fmt: skip
         if rng.random() < 0.06:
             flags = (*flags, flag)
@@ -33,16 +35,16 @@ def _log_case(rng: Random, name: str, content: bytes) -> Case:
 def csv(rng: Random) -> Case:
     """A log as delimited text."""
     mark = rng.choice((",", ",", ";", "\t"))
-    rows = [["time", *JOINTS], *([repr(value) for value in row] for row in _rows(rng))]
+    rows = [["time", *JOINTS], *([repr(value) for value in row] for row in random_rows(rng))]
     text = "\n".join(mark.join(row) for row in rows) + "\n"
     if rng.random() < 0.9:
         text = mutated_text(rng, text)
-    return _log_case(rng, rng.choice(("log.csv", "log.csv", "log.txt", "log.TSV")), encoded(rng, text))
+    return log_case(rng, rng.choice(("log.csv", "log.csv", "log.txt", "log.TSV")), encoded(rng, text))
 
 
 def storage(rng: Random) -> Case:
     """A log as OpenSim storage."""
-    rows = _rows(rng)
+    rows = random_rows(rng)
     lines = [
         "Coordinates",
         "version=1",
@@ -56,12 +58,12 @@ def storage(rng: Random) -> Case:
     text = "\n".join(lines) + "\n"
     if rng.random() < 0.9:
         text = mutated_text(rng, text)
-    return _log_case(rng, rng.choice(("log.mot", "log.sto")), encoded(rng, text))
+    return log_case(rng, rng.choice(("log.mot", "log.sto")), encoded(rng, text))
 
 
 def parquet(rng: Random) -> Case:
     """A log in Parquet: bytes flipped, or columns of other types."""
-    table = list(zip(*_rows(rng), strict=True)) or [()] * 4
+    table = list(zip(*random_rows(rng), strict=True)) or [()] * 4
     columns = {
         name: pa.array(values, pa.float64()) for name, values in zip(("time", *JOINTS), table, strict=True)
     }
@@ -74,4 +76,4 @@ def parquet(rng: Random) -> Case:
     codec = rng.choice(("none", "snappy", "zstd", "gzip"))
     pq.write_table(pa.table(columns), buffer, compression=codec)
     content = buffer.getvalue()
-    return _log_case(rng, "log.parquet", mutated_bytes(rng, content) if rng.random() < 0.8 else content)
+    return log_case(rng, "log.parquet", mutated_bytes(rng, content) if rng.random() < 0.8 else content)

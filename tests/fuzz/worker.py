@@ -25,7 +25,7 @@ from types import FrameType
 from fuzz.case import Case
 from fuzz.room import Room, Watch
 
-LIBRARIES = ("matplotlib.pyplot", "mujoco", "plotly.graph_objects", "pyarrow.parquet", "scipy.signal")
+LIBRARIES = ("h5py", "matplotlib.pyplot", "mujoco", "plotly.graph_objects", "pyarrow.parquet", "scipy.signal")
 COMMANDS = ("analyze", "check", "inspect", "motion", "report_reduction", "report_terms")
 MODULES = (*LIBRARIES, *(f"linkwise.cli.{command}" for command in COMMANDS))
 """What commands import."""

@@ -154,6 +154,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_analysis_ends.py",
             "tests/test_analysis_samples.py",
             "tests/test_analysis_run.py",
+            "tests/test_analysis_formats.py",
             "tests/test_analysis_logs.py",
             "tests/test_analysis_files.py",
             "tests/test_analysis_pictures.py",

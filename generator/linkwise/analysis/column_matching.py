@@ -4,7 +4,6 @@ import math
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from linkwise.analysis.logs import Log
 from linkwise.analysis.settings import Reading
@@ -32,11 +31,16 @@ class Selection:
 
 
 def select(
-    columns: Sequence[str], joints: Sequence[str], reading: Reading, beside: Collection[str] = ()
+    columns: Sequence[str],
+    joints: Sequence[str],
+    reading: Reading,
+    beside: Collection[str] = (),
+    brought: Collection[str] = (),
 ) -> Selection:
     """Match columns to joints by `reading.mapping`, else by name, also as OpenSim's states name them.
 
     beside: columns that are of no joint, and asked for elsewhere
+    brought: columns that the log's format has of itself, which may be left out unasked
 
     Raises LinkwiseError for a joint without a column, a column used twice, and a column without a joint
     where that was not allowed.
@@ -56,7 +60,7 @@ def select(
             f"no column for joint {listed(map(repr, missing))}; name it with --map COLUMN={missing[0]}"
             f" (columns not used: {listed(map(repr, free)) if free else 'none'})"
         )
-    extra = [column for column in free if column not in speeds]
+    extra = [column for column in free if column not in speeds and column not in brought]
     if extra and not reading.ignore_extra:
         raise LinkwiseError(
             f"no joint for column {listed(map(repr, extra))}; leave such columns out with --ignore-extra,"
@@ -91,9 +95,7 @@ def radians_per_unit(log: Log, reading: Reading) -> float:
     return math.pi / 180 if (log.degrees if told is None else told) else 1.0
 
 
-def unit_warnings(
-    log: Log, path: Path, reading: Reading, peaks: Sequence[tuple[str, float]]
-) -> tuple[str, ...]:
+def unit_warnings(log: Log, reading: Reading, peaks: Sequence[tuple[str, float]]) -> tuple[str, ...]:
     """Warnings about the unit of angles: not told in a file that ought to, or unlikely by their size.
 
     peaks: column and largest magnitude, as written in the log, of every angle
@@ -101,7 +103,7 @@ def unit_warnings(
     if not peaks:
         return ()
     warnings = []
-    if path.suffix.lower() in {".mot", ".sto"} and log.degrees is None and reading.units is None:
+    if log.path.suffix.lower() in {".mot", ".sto"} and log.degrees is None and reading.units is None:
         warnings.append(
             "the header has no inDegrees: angles are taken for radians; say so with --units rad or deg"
         )

@@ -52,13 +52,13 @@ def even_rate(
 ) -> float:
     """Sampling rate in Hz of `time` (S,) in s, whose first row in the log has the number `first_row`.
 
-    Raises LinkwiseError that names the rows for time that does not increase and for gaps; where `strict`,
-    for uneven time too, which is else left to `resampled`; `mend` then says before the
-    mean rate what to do.
+    Raises LinkwiseError that names the rows for time that does not increase and for gaps that splines do not
+    bridge; where `strict`, for uneven time and any gap too, which are else left to `resampled`; `mend` then
+    says before a rate what to do.
     """
     if len(time) < 2:
         raise LinkwiseError(f"{len(time)} samples; a movement needs 5 or more")
-    usual_step(time, first_row, GAP if strict else GAP_BEFORE_RESAMPLING)
+    usual = usual_step(time, first_row, GAP_BEFORE_RESAMPLING)
     steps = np.diff(time)
     mean = (time[-1] - time[0]) / (len(time) - 1)
     if mean < 1 / EXTREME:
@@ -69,6 +69,11 @@ def even_rate(
         if step is not None:
             return 1 / step
         at = int(np.argmax(off))
+        if steps[at] > GAP * usual:
+            raise LinkwiseError(
+                f"rows {first_row + at} to {first_row + at + 1}, time column: a gap of"
+                f" {steps[at]:.6g} s where steps are {usual:.6g} s; fill it, or {mend} {1 / usual:.6g}"
+            )
         raise LinkwiseError(
             f"row {first_row + at + 1}, time column: a step of {steps[at]:.6g} s where the mean is"
             f" {mean:.6g} s; {mend} {1 / mean:.6g}"

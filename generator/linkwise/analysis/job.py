@@ -14,7 +14,7 @@ from linkwise.analysis.induced_points import induced_points
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.loads.read_loads import placed_loads
-from linkwise.analysis.logs import open_log
+from linkwise.analysis.logs import Log, open_log
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_record import record
 from linkwise.analysis.samples import Samples, read_samples
@@ -161,20 +161,21 @@ def prepared(
 ) -> Job:
     """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
     points = induced_points(wanted.induced, robot)
-    switches = switch_columns(contacts, log)
-    samples, closed = _samples(log, robot, reading, switches, progress, buffer)
+    opened = open_log(log, reading, robot.joints)
+    switches = switch_columns(contacts, opened)
+    samples, closed = _samples(opened, robot, reading, switches, progress, buffer)
     with within(str(log)):
         span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
     borne = placed_loads(loads, robot, samples.time, reading.ignore_extra, progress, buffer)
-    times = contact_times(contacts, log, robot, reading, samples.time, progress, buffer)
+    times = contact_times(contacts, opened, robot, reading, samples.time, progress, buffer)
     decomposer = Decomposer.of(robot, processing.convention, wanted.power_terms, borne, points, times)
     return Job(log.name, reading, processing, samples, decomposer, closed)
 
 
 def _samples(
-    log: Path,
+    log: Log,
     robot: LoadedRobot,
     reading: Reading,
     switches: Sequence[str],
@@ -188,10 +189,9 @@ def _samples(
     if robot.constrained is None:
         return read_samples(log, robot.joints, robot.units, reading, progress, buffer, switches), None
     followers = set(robot.constrained.constraints.dependent)
-    columns = open_log(log).columns
-    with within(str(log)):
-        there = with_columns(columns, robot.joints, followers, reading)
+    with within(str(log.path)):
+        there = with_columns(log.columns, robot.joints, followers, reading)
     names, units = (tuple(given[k] for k in there) for given in (robot.joints, robot.units))
     samples = read_samples(log, names, units, reading, progress, buffer, switches)
-    with within(str(log)):
+    with within(str(log.path)):
         return closed_samples(samples, there, robot.constrained, reading.loop_tolerance, progress, buffer)

@@ -10,7 +10,7 @@ import numpy as np
 
 from linkwise.analysis.column_matching import radians_per_unit, select, unit_warnings
 from linkwise.analysis.even_time import even_rate, resampled
-from linkwise.analysis.logs import Log, open_log
+from linkwise.analysis.logs import Log
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.package.load import Array
@@ -36,7 +36,7 @@ class Samples:
 
 
 def read_samples(
-    path: Path,
+    log: Log,
     joints: tuple[str, ...],
     joint_units: tuple[str, ...],
     reading: Reading,
@@ -51,33 +51,32 @@ def read_samples(
     beside: columns that something else reads
     Raises LinkwiseError that names file, row and column for what cannot be analysed.
     """
-    log = open_log(path)
-    with within(str(path)):
-        selection = select(log.columns, joints, reading, beside)
+    with within(str(log.path)):
+        selection = select(log.columns, joints, reading, beside, log.brought)
     angles = [at for at, unit in enumerate(joint_units, 1) if unit == "rad"]
     factor = radians_per_unit(log, reading)
     peaks = np.zeros(1 + len(joints))
 
     def in_si() -> Iterator[Array]:
-        for block in finite_blocks(log, path, selection.columns, progress):
+        for block in finite_blocks(log, selection.columns, progress):
             np.maximum(peaks, np.abs(block).max(axis=0, initial=0.0), out=peaks)
             block[:, angles] *= factor
             yield block
 
     samples = collected(in_si(), 1 + len(joints), buffer)
-    with within(str(path)):
+    with within(str(log.path)):
         rate = even_rate(samples[:, 0], log.first_row, strict=reading.resample is None)
         warnings = (*log.warnings, *slowness(rate))
         if reading.resample is not None:
             rate = reading.resample
             samples = collected(resampled(samples, rate, progress=progress), 1 + len(joints), buffer)
     named = [(log.columns[selection.columns[at]], float(peaks[at])) for at in angles]
-    warnings += unit_warnings(log, path, reading, named)
+    warnings += unit_warnings(log, reading, named)
     first_row = log.first_row if reading.resample is None else None
     return Samples(samples[:, 0], samples[:, 1:], rate, selection.ignored, warnings, first_row)
 
 
-def finite_blocks(log: Log, path: Path, columns: Sequence[int], progress: Progress) -> Iterator[Array]:
+def finite_blocks(log: Log, columns: Sequence[int], progress: Progress) -> Iterator[Array]:
     """Blocks (rows, columns) of the log; LinkwiseError for a number that is not finite."""
     row = log.first_row
     for block, done in log.read(columns):
@@ -85,7 +84,8 @@ def finite_blocks(log: Log, path: Path, columns: Sequence[int], progress: Progre
             at, column = np.argwhere(~np.isfinite(block))[0]
             name = log.columns[columns[column]]
             raise LinkwiseError(
-                f"{path}: row {row + at}, column {name!r}: {block[at, column]} is not a sample; fill the gap"
+                f"{log.path}: row {row + at}, column {name!r}: {block[at, column]} is not a sample;"
+                " fill the gap"
             )
         yield block
         row += len(block)

@@ -31,6 +31,8 @@ class Reading:
     """Sampling rate in Hz to bring a log of uneven time to, by cubic splines."""
     loop_tolerance: float = 0.01
     """How far positions of the log may be from closing the robot's loops, in m and rad."""
+    topic: str | None = None
+    """Topic of a bag, or group of a file of arrays, that has the joints; None takes the only one."""
 
     def __post_init__(self) -> None:
         if self.resample is not None and not 0 < self.resample < float("inf"):

@@ -31,6 +31,7 @@ from linkwise.cli.log_options import (
     Pad,
     Resample,
     Time,
+    Topic,
     Window,
     carried,
     chosen_lowpass,
@@ -101,6 +102,7 @@ def analyze(
     out: Out,
     units: AngleUnits = None,
     time: Time = None,
+    topic: Topic = None,
     mapping: Map = None,
     ignore_extra: IgnoreExtra = False,
     resample: Resample = None,
@@ -131,7 +133,9 @@ def analyze(
     as_json: Json = False,
 ) -> None:
     """Who loads whom: every torque term of a recorded movement, as a table, figures and a page."""
-    reading = Reading(units, time, pairs("--map", mapping or []), ignore_extra, resample, loop_tolerance)
+    reading = Reading(
+        units, time, pairs("--map", mapping or []), ignore_extra, resample, loop_tolerance, topic
+    )
     processing = chosen_processing(
         derivative, window, degree, chosen_lowpass(cutoff, filter_order, padding), edges, convention
     )

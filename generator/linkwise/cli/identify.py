@@ -24,6 +24,7 @@ from linkwise.cli.log_options import (
     Pad,
     Resample,
     Time,
+    Topic,
     Window,
     chosen_lowpass,
     chosen_processing,
@@ -62,6 +63,7 @@ def identify(
     out: Out,
     units: AngleUnits = None,
     time: Time = None,
+    topic: Topic = None,
     mapping: Map = None,
     torque: Torque = None,
     unmeasured: Unmeasured = None,
@@ -81,7 +83,9 @@ def identify(
     as_json: Json = False,
 ) -> None:
     """What a log of motion and torques says of the links: masses, centres, inertias, friction."""
-    reading = Reading(units, time, pairs("--map", mapping or []), ignore_extra, resample, loop_tolerance)
+    reading = Reading(
+        units, time, pairs("--map", mapping or []), ignore_extra, resample, loop_tolerance, topic
+    )
     lowpass = chosen_lowpass(cutoff, filter_order, padding)
     processing = chosen_processing(derivative, window, degree, lowpass, "trim")
     without = tuple(unmeasured or [])

@@ -30,12 +30,19 @@ UNITS = {
 }
 """What progress is counted in."""
 
-Log = Annotated[Path, typer.Argument(help="Motion log: .csv, .mot, .sto or .parquet")]
+Log = Annotated[
+    Path,
+    typer.Argument(help="Motion log: .csv, .mot, .sto, .parquet, .npz, HDF5, or a bag of ROS"),
+]
 AngleUnits = Annotated[
     Units | None,
     typer.Option(help="Unit of the angles, lengths are metres; the file's own, else rad, if not given"),
 ]
 Time = Annotated[str | None, typer.Option(help="Column of the time, in s")]
+Topic = Annotated[
+    str | None,
+    typer.Option(help="Topic of a bag, group of an HDF5 file: where the joints are, if several have some"),
+]
 Map = Annotated[
     list[str] | None,
     typer.Option("--map", metavar="COLUMN=JOINT", help="Column of a joint; may be repeated"),

@@ -68,16 +68,16 @@ def read_torque_log(
     stands still.
     """
     measured = _measured(robot, torques, unmeasured)
-    there = open_log(path).columns
+    log = open_log(path, reading, robot.joints)
     with within(str(path)):
-        columns = _torque_columns(there, robot.joints, [robot.joints[i] for i in measured], torques)
+        columns = _torque_columns(log.columns, robot.joints, [robot.joints[i] for i in measured], torques)
         if not reading.ignore_extra:
-            _refuse_more_torques(there, robot, columns, measured)
-        moving = with_columns(there, robot.joints, followers(robot), reading)
+            _refuse_more_torques(log.columns, robot, columns, measured)
+        moving = with_columns(log.columns, robot.joints, followers(robot), reading)
     names = tuple(f"torque of {robot.joints[i]}" for i in measured)
     mapping = (*reading.mapping, *zip(columns, names, strict=True))
     samples = read_samples(
-        path,
+        log,
         (*(robot.joints[k] for k in moving), *names),
         (*(robot.units[k] for k in moving), *["N m"] * len(names)),
         replace(reading, mapping=mapping),

@@ -14,7 +14,7 @@ from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.given_loads import FORCE
 from linkwise.analysis.loads.placed_load import PlacedLoad, Wrench, model_pose
 from linkwise.analysis.loads.read_loads import placed_loads
-from linkwise.analysis.logs import open_log
+from linkwise.analysis.logs import Log
 from linkwise.analysis.samples import collected, finite_blocks
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
@@ -124,7 +124,7 @@ def _wrenches(loads: Sequence[PlacedLoad], model: Model, time: Array, q: Array) 
 
 def contact_times(
     contacts: Contacts,
-    log: Path,
+    log: Log,
     robot: LoadedRobot,
     reading: Reading,
     motion: Array,
@@ -154,25 +154,23 @@ def _told(loads: Sequence[PlacedLoad]) -> str:
     return listed([f"{load.name} is on {load.seat.frame.name}" for load in loads])
 
 
-def switch_columns(contacts: Contacts, log: Path) -> tuple[str, ...]:
+def switch_columns(contacts: Contacts, log: Log) -> tuple[str, ...]:
     """Columns of the motion's log that say when contacts are on; raises LinkwiseError for one not there."""
-    there = open_log(log).columns if contacts.columns else ()
     for name, given in contacts.columns.items():
-        if given.column not in there:
+        if given.column not in log.columns:
             raise LinkwiseError(
-                f"{log}: --contact-while {name}={given.column}: no column {given.column!r}; the log has"
-                f" {listed(map(repr, there))}; write it as NAME=COLUMN>VALUE"
+                f"{log.path}: --contact-while {name}={given.column}: no column {given.column!r}; the log has"
+                f" {listed(map(repr, log.columns))}; write it as NAME=COLUMN>VALUE"
             )
     return tuple(given.column for given in contacts.columns.values())
 
 
-def _switch(given: WhileColumn | None, log: Path, reading: Reading, progress: Progress) -> Switch | None:
+def _switch(given: WhileColumn | None, log: Log, reading: Reading, progress: Progress) -> Switch | None:
     if given is None:
         return None
-    opened = open_log(log)
-    with within(str(log)):
-        columns = time_column(opened.columns, reading), list(opened.columns).index(given.column)
-    return Switch(given, collected(finite_blocks(opened, log, columns, progress), 2, None))
+    with within(str(log.path)):
+        columns = time_column(log.columns, reading), list(log.columns).index(given.column)
+    return Switch(given, collected(finite_blocks(log, columns, progress), 2, None))
 
 
 def _by_contact(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[PlacedLoad, ...], ...]:

@@ -74,7 +74,7 @@ def _read(
 
     def blocks() -> Iterator[Array]:
         wanted = (load.time, *(at for some in load.columns.values() for at in some))
-        for block in finite_blocks(log, load.log, wanted, progress):
+        for block in finite_blocks(log, wanted, progress):
             rows = np.zeros((len(block), WIDTH))
             rows[:, 0] = block[:, 0]
             for number, part in enumerate(load.columns):

@@ -1,22 +1,42 @@
-"""Motion logs as blocks of numbers: delimited text, OpenSim storage and Parquet behind one face."""
+"""Motion logs as blocks of numbers: text, Parquet, bags of ROS and files of arrays behind one face."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
 
+from linkwise.analysis.logs.array_log import ArrayLog
+from linkwise.analysis.logs.bag import BagLog
+from linkwise.analysis.logs.hdf5 import Hdf5Arrays
 from linkwise.analysis.logs.headers import open_delimited, open_storage
+from linkwise.analysis.logs.npz import NpzArrays
 from linkwise.analysis.logs.parquet import ParquetLog
+from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import require_file
 from linkwise.package.load import Array
 
+AS_IT_IS = Reading()
+DELIMITED, STORAGE, HDF5 = (".csv", ".tsv", ".txt"), (".mot", ".sto"), (".h5", ".hdf5", ".hdf")
+BAGS = ".mcap", ".db3", ".bag"
+"""Of ROS 2, and the last of ROS 1."""
+MARKERS = ".trc", ".c3d"
+"""What cameras and force plates record."""
+
 
 class Log(Protocol):
-    """A table of numbers on disk, read once from top to bottom."""
+    """A table of numbers on disk, read from top to bottom."""
+
+    @property
+    def path(self) -> Path:
+        """The file, or a bag's folder."""
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Column names, in the file's order."""
+
+    @property
+    def brought(self) -> frozenset[str]:
+        """Columns that the format has of itself: that a robot does not ask for them is no mistake."""
 
     @property
     def degrees(self) -> bool | None:
@@ -28,7 +48,7 @@ class Log(Protocol):
 
     @property
     def size(self) -> int:
-        """What `read` counts up to: bytes of text, or rows."""
+        """What `read` counts up to: bytes of text, rows, or messages."""
 
     @property
     def first_row(self) -> int:
@@ -42,23 +62,47 @@ class Log(Protocol):
         """
 
 
-def open_log(path: Path) -> Log:
-    """Open a log by its suffix: .csv, .txt or .tsv, .mot or .sto, .parquet.
+def open_log(path: Path, reading: Reading = AS_IT_IS, joints: Sequence[str] = ()) -> Log:
+    """Open a log by its suffix; a folder as a bag of ROS 2.
+
+    reading: which topic or group has the joints, and which array the time, where the format has such
+    joints: what columns of arrays are, in this order, where the file names none
 
     Raises LinkwiseError for a missing file, an unknown suffix, or a header that cannot be read.
     """
-    suffix = path.suffix.lower()
     with within(str(path)):
-        require_file(path)
+        if not path.is_dir():
+            require_file(path)
+        opened = _opener(path, reading, joints)
     try:
-        if suffix in {".csv", ".tsv", ".txt"}:
-            return open_delimited(path)
-        if suffix in {".mot", ".sto"}:
-            return open_storage(path)
-        if suffix == ".parquet":
-            return ParquetLog.open(path)
+        return opened()
     except UnicodeDecodeError as error:
         raise LinkwiseError(f"{path}: not UTF-8 text; save it as UTF-8") from error
     except OSError as error:
         raise LinkwiseError(f"{path}: cannot be read: {error.strerror}") from error
-    raise LinkwiseError(f"{path}: unknown suffix; give a .csv, .mot, .sto or .parquet file")
+
+
+def _opener(path: Path, reading: Reading, joints: Sequence[str]) -> Callable[[], Log]:
+    """What opens a log; raises LinkwiseError for a kind of file that is none."""
+    suffix = path.suffix.lower()
+    if path.is_dir() or suffix in BAGS:
+        return lambda: BagLog.open(path, reading.topic)
+    if suffix in HDF5:
+        return lambda: ArrayLog.open(Hdf5Arrays(path), reading, joints)
+    if suffix == ".npz":
+        return lambda: ArrayLog.open(NpzArrays(path), reading, joints)
+    if reading.topic is not None:
+        raise LinkwiseError("--topic goes with bags and files of arrays; leave it out")
+    if suffix in DELIMITED:
+        return lambda: open_delimited(path)
+    if suffix in STORAGE:
+        return lambda: open_storage(path)
+    if suffix == ".parquet":
+        return lambda: ParquetLog.open(path)
+    if suffix in MARKERS:
+        raise LinkwiseError(
+            "this holds markers and force plates, not joints; give the .mot or .sto that inverse kinematics,"
+            " as OpenSim's, makes of it"
+        )
+    known = [*DELIMITED, *STORAGE, ".parquet", ".npz", *HDF5, *BAGS]
+    raise LinkwiseError(f"unknown suffix; give a {', '.join(known)} file, or a bag's folder")

@@ -45,6 +45,12 @@ def open_storage(path: Path) -> TextLog:
         raise LinkwiseError(
             f"{path}: row {row}: {len(columns)} column names where the header promises nColumns={promised}"
         )
+    kind = facts.get("datatype", "double")
+    if kind.lower() not in {"double", "float"}:
+        raise LinkwiseError(
+            f"{path}: DataType={short(kind, SHOWN)!r}: a cell holds several numbers; write each in a column"
+            " of its own, as flatten() of OpenSim's tables does"
+        )
     told = facts.get("indegrees")
     degrees = None if told is None else {"yes": True, "no": False}.get(told.lower())
     if told is not None and degrees is None:

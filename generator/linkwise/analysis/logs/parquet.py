@@ -27,6 +27,7 @@ class ParquetLog:
     degrees: bool | None = None
     first_row: int = 1
     warnings: tuple[str, ...] = ()
+    brought: frozenset[str] = frozenset()
 
     @classmethod
     def open(cls, path: Path) -> "ParquetLog":

@@ -39,6 +39,7 @@ class TextLog:
     degrees: bool | None = None
     promised: int | None = None
     warnings: tuple[str, ...] = ()
+    brought: frozenset[str] = frozenset()
 
     @property
     def size(self) -> int:

@@ -1,0 +1,201 @@
+"""Which columns a file of named arrays has: the time, and joints in arrays of their own or side by side.
+
+Names are paths, `arm/q`. What an array is called says which quantity it holds; another one than these is a
+column by its own name.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+
+NAMES = ("joint_names", "joints", "names", "name")
+"""What an array of texts is called, or an attribute, that names joints."""
+NUMBERS = "fiub"
+"""NumPy's kinds of what is a number."""
+WORDS = {
+    "": "q qpos position positions pos angle angles joint_position joint_positions joint_pos joint_angle"
+    " joint_angles joint_state joint_states joints",
+    "/velocity": "qd dq qdot qvel velocity velocities vel joint_velocity joint_velocities joint_vel",
+    "/acceleration": "qdd ddq qddot qacc acceleration accelerations joint_acceleration joint_accelerations",
+    "/effort": "tau torque torques effort efforts joint_torque joint_torques joint_effort joint_efforts",
+}
+"""What arrays are called, the likeliest first, and how their columns then end behind the joint's name."""
+ENDING_OF = {word: ending for ending, words in WORDS.items() for word in words.split()}
+RANK = {word: rank for rank, word in enumerate(ENDING_OF)}
+
+
+@dataclass(frozen=True)
+class StoredArray:
+    """An array in a file: its shape, whether it holds numbers, and the texts of one that names joints."""
+
+    shape: tuple[int, ...]
+    is_numeric: bool = True
+    texts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a column stands: its array, and which number of each sample it is."""
+
+    array: str
+    at: int
+
+
+@dataclass(frozen=True)
+class ArrayColumns:
+    """The columns of arrays that share a clock: the array `time`, and what lies in the folder `group`.
+
+    joints: the robot's, in whose order the columns of an array are if nothing names them
+    """
+
+    found: Mapping[str, StoredArray]
+    time: str
+    group: str
+    joints: Sequence[str]
+    others: frozenset[str]
+    """Folders with clocks of their own."""
+
+    @cached_property
+    def samples(self) -> int:
+        """How many there are."""
+        return max(self.found[self.time].shape)
+
+    @cached_property
+    def places(self) -> dict[str, Place]:
+        """Columns by name; raises LinkwiseError for positions of which nothing says whose they are."""
+        places: dict[str, Place] = {}
+        for array in sorted(self._beside(), key=lambda array: RANK.get(word_of(array), len(RANK))):
+            width = width_of(self.found[array].shape, self.samples)
+            name = array.removeprefix(f"{self.group}/")
+            raw = [name] if width == 1 else [f"{name}[{at}]" for at in range(width)]
+            columns = self._columns(array, name, width) or raw
+            columns = raw if places.keys() & set(columns) else columns
+            for at, column in enumerate(columns):
+                if column in places:
+                    other = places[column].array
+                    raise LinkwiseError(f"{other!r} and {array!r} are both of {column!r}; rename one")
+                places[column] = Place(array, at)
+        return places
+
+    @cached_property
+    def unnamed(self) -> tuple[str, ...]:
+        """Arrays of positions of several joints that nothing names."""
+        return tuple(
+            array
+            for array in self._beside()
+            if ENDING_OF.get(word_of(array)) == "" and not self._names(array)
+            if width_of(self.found[array].shape, self.samples) == len(self.joints) > 1
+        )
+
+    def _beside(self) -> Iterator[str]:
+        """Arrays of numbers on this clock, but the time; LinkwiseError for positions of other length."""
+        for array, found in self.found.items():
+            folders = set(folders_of(array))
+            if array == self.time or self.group not in folders or folders & self.others:
+                continue
+            if not found.is_numeric or len(found.shape) not in (1, 2):
+                continue
+            if width_of(found.shape, self.samples):
+                yield array
+            elif ENDING_OF.get(word_of(array)) == "":
+                raise LinkwiseError(
+                    f"array {array!r} is {found.shape} and {self.time!r} has {self.samples} samples; cut one"
+                )
+
+    def _columns(self, array: str, name: str, width: int) -> list[str] | None:
+        """Names of an array's columns by what it is called; None where that says nothing."""
+        if width == 1 and name in self.joints:
+            return [name]
+        ending = ENDING_OF.get(word_of(array))
+        above, _, below = name.partition("/")
+        if ending is None:
+            is_of_joint = width == 1 and below and above.lower() in ENDING_OF
+            return [f"{below}{ENDING_OF[above.lower()]}"] if is_of_joint else None
+        names = self._names(array)
+        if len(names) == width:
+            return [f"{joint}{ending}" for joint in names]
+        if width == 1 and "/" in name:
+            return [f"{name.rpartition('/')[0]}{ending}"]
+        if not names and len(self.joints) == width:
+            return [f"{joint}{ending}" for joint in self.joints]
+        if ending == "" and (names or self.joints):
+            there = f"{len(names)} names" if names else f"the robot has {len(self.joints)} joints"
+            raise LinkwiseError(
+                f"array {array!r} is {self.found[array].shape}, and {there}; name its columns in an array"
+                f" {NAMES[0]!r} of {width} texts"
+            )
+        return None
+
+    def _names(self, array: str) -> tuple[str, ...]:
+        """The names of joints that stand nearest to an array, at it or above; none where there are none."""
+        for folder in (array, *folders_of(array)):
+            for word in NAMES:
+                found = self.found.get(f"{folder}/{word}".lstrip("/"))
+                if found is not None and found.texts:
+                    return found.texts
+        return ()
+
+
+def array_columns(
+    found: Mapping[str, StoredArray], time: str | None, group: str | None, joints: Sequence[str]
+) -> ArrayColumns:
+    """Find the clock: the only array called `time` or `t`, or as given, in the group or nearest above it.
+
+    Raises LinkwiseError where there is none, or several.
+    """
+    clocks = _clocks(found, time)
+    where = listed(f"/{folder}" for folder in sorted(clocks))
+    if not clocks:
+        told = listed(f"{array!r} {has.shape}" for array, has in found.items()) or "it"
+        raise LinkwiseError(
+            f"no array of times{'' if time is None else f' {time!r}'} in {told}; call it 'time', in s, or"
+            " name it with --time"
+        )
+    if group is None and len(clocks) > 1:
+        raise LinkwiseError(f"times in several groups, {where}; choose one with --topic")
+    folder = next(iter(clocks)) if group is None else group.strip("/")
+    above = [at for at in (folder, *folders_of(folder)) if at in clocks]
+    if not above or not any(folder in folders_of(array) for array in found):
+        raise LinkwiseError(f"--topic {group}: no such group with times; they are in {where}")
+    others = frozenset(clocks).difference([folder, *folders_of(folder)])
+    return ArrayColumns(found, clocks[above[0]], folder, joints, others)
+
+
+def _clocks(found: Mapping[str, StoredArray], time: str | None) -> dict[str, str]:
+    """Arrays of times by the folder whose arrays they are of."""
+    clocks: dict[str, str] = {}
+    depth = 0 if time is None else time.strip("/").count("/")
+    for array, has in found.items():
+        is_called = (
+            word_of(array) in ("time", "t") if time is None else f"/{array}".endswith(f"/{time.strip('/')}")
+        )
+        is_vector = sum(size != 1 for size in has.shape) <= 1 and 0 not in has.shape and len(has.shape) > 0
+        if is_called and is_vector and has.is_numeric:
+            clocks.setdefault(folders_of(array)[depth], array)
+    return clocks
+
+
+def folders_of(array: str) -> list[str]:
+    """Folders that an array or a folder lies in, the innermost first, at last the file's root, ""."""
+    parts = array.split("/")[:-1]
+    return ["/".join(parts[:count]) for count in range(len(parts), -1, -1)]
+
+
+def word_of(array: str) -> str:
+    """What an array is called, without its folders, in small letters."""
+    return array.rpartition("/")[2].lower()
+
+
+def names_joints(array: str, shape: tuple[int, ...]) -> bool:
+    """Whether an array, if it holds texts, names joints."""
+    return word_of(array) in NAMES and len(shape) == 1
+
+
+def width_of(shape: tuple[int, ...], samples: int) -> int:
+    """Numbers a sample, the samples along either axis; 0 where neither has as many as there are samples."""
+    if len(shape) == 1:
+        return int(shape[0] == samples)
+    return shape[1] if shape[0] == samples else shape[0] if shape[1] == samples else 0

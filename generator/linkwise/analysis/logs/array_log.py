@@ -1,0 +1,94 @@
+"""Logs in files of named arrays, read block by block; rows are numbered from 1, the first sample."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from linkwise.analysis.logs.array_columns import WORDS, Place, StoredArray, array_columns
+from linkwise.analysis.settings import Reading
+from linkwise.errors import within
+from linkwise.escape import listed
+from linkwise.package.load import Array
+
+
+class ArrayFile(Protocol):
+    """A file of arrays by name; what cannot be read raises LinkwiseError that names the file."""
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+
+    def found(self) -> Mapping[str, StoredArray]:
+        """What is in it."""
+
+    def opened(self) -> AbstractContextManager[Callable[[str], Any]]:
+        """Open, and give arrays by name, or what is sliced like them."""
+
+
+@dataclass(frozen=True)
+class ArrayLog:
+    """Columns of arrays that have the samples along one axis; `places` says where each stands."""
+
+    source: ArrayFile
+    places: Mapping[str, Place]
+    size: int
+    """Samples."""
+    warnings: tuple[str, ...]
+    degrees: bool | None = None
+    first_row: int = 1
+
+    @classmethod
+    def open(cls, source: ArrayFile, reading: Reading, joints: Sequence[str]) -> "ArrayLog":
+        """Find the time and the joints' arrays; raises LinkwiseError where that is not clear."""
+        found = source.found()
+        with within(str(source.path)):
+            columns = array_columns(found, reading.time, reading.topic, joints)
+            time = {reading.time or columns.time.rpartition("/")[2]: Place(columns.time, 0)}
+            places = time | columns.places | time
+        told = tuple(
+            f"nothing names the columns of {array!r}: they are taken for the robot's joints {listed(joints)};"
+            " add an array 'joint_names'"
+            for array in columns.unnamed
+        )
+        return cls(source, places, columns.samples, told)
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.source.path
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The time, then joints, and arrays of other names by these."""
+        return tuple(self.places)
+
+    @property
+    def brought(self) -> frozenset[str]:
+        """Velocities, accelerations and efforts of joints whose positions are there, too."""
+        there = [f"{column}{ending}" for column in self.places for ending in WORDS if ending]
+        return frozenset(self.places).intersection(there)
+
+    def read(self, columns: Sequence[int], rows: int = 65536) -> Iterator[tuple[Array, int]]:
+        """Yield blocks (at most `rows`, len(columns)) and the samples read so far."""
+        places = [self.places[self.columns[at]] for at in columns]
+        with self.source.opened() as get:
+            arrays = {place.array: get(place.array) for place in places}
+            for start in range(0, self.size, rows):
+                stop = min(start + rows, self.size)
+                parts = {name: _rows(array, self.size, start, stop) for name, array in arrays.items()}
+                yield np.column_stack([parts[place.array][:, place.at] for place in places]), stop
+
+
+def _rows(array: Any, samples: int, start: int, stop: int) -> Array:
+    """Samples of an array, (stop - start, numbers a sample), whichever axis they are along."""
+    if len(array.shape) == 1:
+        part = np.asarray(array[start:stop])[:, None]
+    elif array.shape[0] == samples:
+        part = np.asarray(array[start:stop])
+    else:
+        part = np.asarray(array[:, start:stop]).T
+    return part.astype(np.float64)

@@ -1,0 +1,62 @@
+"""Datasets by path in HDF5 files."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from linkwise.analysis.logs.array_columns import NAMES, NUMBERS, StoredArray, names_joints
+from linkwise.analysis.logs.damaged_files import read_as
+from linkwise.extras import extra
+
+
+@dataclass(frozen=True)
+class Hdf5Arrays:
+    """Datasets in groups; attributes that name joints count as arrays in what they are attributes of."""
+
+    path: Path
+
+    def found(self) -> Mapping[str, StoredArray]:
+        """Shapes of all datasets, and the texts of those that name joints."""
+        library = extra("h5py")
+        found: dict[str, StoredArray] = {}
+
+        def visit(name: str, item: Any) -> None:
+            found.update(_named_by_attributes(name, item))
+            if not isinstance(item, library.Dataset) or item.shape is None:
+                return
+            texts: tuple[str, ...] = ()
+            if names_joints(name, item.shape) and library.check_string_dtype(item.dtype):
+                texts = tuple(item.asstr()[()].tolist())
+            found[name] = StoredArray(item.shape, item.dtype.kind in NUMBERS, texts)
+
+        with self._file() as file:
+            found.update(_named_by_attributes("", file))
+            file.visititems(visit)
+        return found
+
+    @contextmanager
+    def opened(self) -> Iterator[Callable[[str], Any]]:
+        """Give datasets by path, whose numbers are read when they are sliced."""
+        with self._file() as file:
+            yield file.__getitem__
+
+    @contextmanager
+    def _file(self) -> Iterator[Any]:
+        library = extra("h5py")
+        with read_as("an HDF5 file", self.path), library.File(self.path, "r") as file:
+            yield file
+
+
+def _named_by_attributes(name: str, item: Any) -> dict[str, StoredArray]:
+    """Attributes of an item that name joints, as if they were arrays in it."""
+    found = {}
+    for word in NAMES:
+        texts = np.asarray(item.attrs.get(word, ()))
+        if texts.ndim == 1 and texts.size and texts.dtype.kind in "OSU":
+            names = tuple(text.decode() if isinstance(text, bytes) else str(text) for text in texts)
+            found[f"{name}/{word}".lstrip("/")] = StoredArray(texts.shape, is_numeric=False, texts=names)
+    return found

@@ -1,0 +1,55 @@
+"""Arrays by name in NumPy's .npz files."""
+
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from linkwise.analysis.logs.array_columns import NUMBERS, StoredArray, names_joints
+from linkwise.analysis.logs.damaged_files import read_as
+from linkwise.errors import LinkwiseError
+
+
+@dataclass(frozen=True)
+class NpzArrays:
+    """What `numpy.savez` wrote, compressed or not."""
+
+    path: Path
+
+    def found(self) -> Mapping[str, StoredArray]:
+        """Shapes of all arrays, from their headers; raises LinkwiseError for names that are pickled."""
+        found = {}
+        with self.opened() as get, zipfile.ZipFile(self.path) as file:
+            for member in file.namelist():
+                with file.open(member) as array:
+                    shape, kind = _header(array)
+                name = member.removesuffix(".npy")
+                texts: tuple[str, ...] = ()
+                if names_joints(name, shape) and kind == "O":
+                    raise LinkwiseError(
+                        f"array {name!r} holds Python objects; save texts, as numpy.array([...]) makes them"
+                    )
+                if names_joints(name, shape) and kind in "US":
+                    texts = tuple(get(name).astype(str).tolist())
+                found[name] = StoredArray(shape, kind in NUMBERS, texts)
+        return found
+
+    @contextmanager
+    def opened(self) -> Iterator[Callable[[str], Any]]:
+        """Give arrays by name, each read as a whole."""
+        with read_as("an .npz file", self.path), self.path.open("rb") as file:
+            yield np.load(file, allow_pickle=False).__getitem__
+
+
+def _header(array: IO[bytes]) -> tuple[tuple[int, ...], str]:
+    """Shape of an array, and the kind of its numbers."""
+    version = np.lib.format.read_magic(array)
+    if version > (2, 0):  # fields with names in Unicode: a table of its own, and not an array
+        return (), "V"
+    reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = reader(array)
+    return shape, dtype.kind
