@@ -283,6 +283,7 @@ def test_nothing_is_allocated(robot: str, directory_of: Callable[[str], Path], t
     assert not [line for line in lines if " B " in line or " b " in line or " D " in line], "it has no state"
 
 
+@pytest.mark.ship
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_the_control_loop_of_the_docs_runs_without_a_system_call(compiler: str, tmp_path: Path) -> None:
     source, made = DOCS / "control_loop.c", str(tmp_path / "control_loop")

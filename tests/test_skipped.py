@@ -12,6 +12,7 @@ TESTS = Path(__file__).parent
 PAGES = "test_analysis_browser.py"
 
 
+@pytest.mark.ship
 def test_pages_without_a_browser_are_counted_with_what_to_install(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "pytest", str(TESTS / PAGES), "-k", "slider", "-p", "no:cacheprovider"]
     done = subprocess.run(
