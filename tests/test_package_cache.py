@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from command_line import run_linkwise
 from conftest import DATA
-from linkwise import LinkwiseError, kept_package
+from linkwise import LinkwiseError, Options, kept_package
 from linkwise.package.manifest import FILE
 
 KNEE = DATA / "knee.osim"
@@ -81,3 +81,16 @@ def test_a_cache_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setenv("LINKWISE_CACHE", str(tmp_path / "file"))
     with pytest.raises(LinkwiseError, match=r"knee\.osim: no package of it can be kept: .*LINKWISE_CACHE"):
         kept_package(KNEE)
+
+
+def test_options_of_reading_make_another_package_and_are_refused_for_one_that_is_there(
+    tmp_path: Path,
+) -> None:
+    held = kept_package(KNEE, "numpy", Options(lock={"knee_angle": 0.3})).directory
+    assert held != kept_package(KNEE, "numpy").directory
+    asked = ("analyze", walk(tmp_path), "--out", "out", "--lock", "ankle_angle=0")
+    done = run_linkwise(*asked, "--robot", held, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "is read already: leave --lock out, or name the robot's own file" in done.stderr
+    done = run_linkwise(*asked, "--robot", KNEE, folder=tmp_path)
+    assert "no joint for column 'ankle_angle'" in done.stderr

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from linkwise import LinkwiseError, Options, generate, read_robot, read_system, write_package
 from linkwise.package.load import import_package
+from linkwise.robot.notes import effects
 from linkwise.robot.robot import Limits
 from osim_text import (
     KNEE,
@@ -102,6 +103,12 @@ def test_what_gives_torques_is_ignored_and_what_acts_by_itself_is_left_out(tmp_p
     }
 
 
+def test_a_coordinate_that_files_in_degrees_have_in_radians_is_told(tmp_path: Path) -> None:
+    (note,) = effects(robot_of(tmp_path, chain([ROLLING, KNEE])).notes)
+    assert note.startswith("in radians in OpenSim's files, also where these are in degrees")
+    assert note.endswith(": joint0_turn")
+
+
 def test_constraints_between_bodies_close_loops(tmp_path: Path) -> None:
     pin = constraints(
         '<PointConstraint name="pin"><socket_body_1>/bodyset/body1</socket_body_1>'
@@ -148,7 +155,7 @@ WRONG: Mapping[str, tuple[str, str]] = {
     ),
     "coordinate": (
         chain([KNEE]).replace("<coordinates>joint0_angle", "<coordinates>knee"),
-        "names 'knee', which is not a coordinate; correct it",
+        "names 'knee', which is not a coordinate of the joint; it has joint0_angle",
     ),
     "two coordinates": (
         chain([ROLLING]).replace("<coordinates>joint0_turn<", "<coordinates>joint0_turn joint0_slip<"),
@@ -198,7 +205,10 @@ def test_what_is_not_modelled_is_refused_by_its_place(text: str, message: str, t
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (Options(tip="patella"), "joint 'groove_t1' follows 'knee_angle', which --root or --tip cuts away"),
+        (
+            Options(tip="patella"),
+            "'patella_slide' follows 'knee_angle', which --root or --tip cuts away",
+        ),
         (Options(base="floating"), "'ground' is the world, which cannot float"),
         (Options(lock={"knee_t1": 0.0}), "'knee_t1' is not a moving joint; the joints are hip_adduction"),
     ],

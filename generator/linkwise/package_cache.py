@@ -13,6 +13,7 @@ from linkwise.emit.assemble import checked_identifier
 from linkwise.emit.backend import chosen_backends
 from linkwise.emit.kernel_choice import chosen_kernel
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.makers import generator_files
 from linkwise.package.manifest import FILE
 from linkwise.package.write import write_package
@@ -35,32 +36,44 @@ class KeptPackage:
     warnings: tuple[str, ...] = ()
 
 
-def kept_package(robot: str | Path, backend: str | None = None, progress: Progress = silent) -> KeptPackage:
+def kept_package(
+    robot: str | Path,
+    backend: str | None = None,
+    options: Options | None = None,
+    progress: Progress = silent,
+) -> KeptPackage:
     """The package itself where `robot` is a directory; else that of the robot's file or built-in robot.
 
     Made for `backend`, or for those of analyses if not given. Raises LinkwiseError for a file that cannot be
-    read or generated, and for a cache that cannot be written.
+    read or generated, for options of a package, and for a cache that cannot be written.
     """
+    options = options or Options()
     if Path(robot).is_dir() or not is_description(robot):
+        if options.given:
+            flags = listed(f"--{name.replace('_', '-')}" for name in options.given)
+            raise LinkwiseError(f"{robot} is read already: leave {flags} out, or name the robot's own file")
         return KeptPackage(Path(robot))
     backends = USUAL if backend is None else (backend,)
     try:
         kept = cache_directory() / "packages"
         kept.mkdir(exist_ok=True)
         with locked(kept / ".lock", lambda _: None):
-            return _kept(robot, kept / _key(robot, backends), backends, progress)
+            folder = kept / _key(robot, backends, options)
+            return _kept(robot, folder, backends, options, progress)
     except (RuntimeError, OSError) as error:
         raise LinkwiseError(f"{robot}: no package of it can be kept: {error}") from error
 
 
-def _kept(robot: str | Path, folder: Path, backends: Sequence[str], progress: Progress) -> KeptPackage:
+def _kept(
+    robot: str | Path, folder: Path, backends: Sequence[str], options: Options, progress: Progress
+) -> KeptPackage:
     found = next(folder.glob(f"*/{FILE}"), None)
     if found is None or not (folder / WARNINGS).is_file():
-        system = read_system(robot)
+        system = read_system(robot, options)
         package = folder / checked_identifier(None, system.name)
         kind = chosen_kernel(system, "auto", backends)
         names = [chosen.name for chosen in chosen_backends(backends, kind)]
-        request = {"robot": Path(robot).name, "backends": names}
+        request = {"robot": Path(robot).name, "backends": names, **options.request()}
         write_package(generate(system, names, None, request, progress, kind), package)
         text = json.dumps(effects(system.notes))
         (folder / WARNINGS).write_text(text, encoding="utf-8")
@@ -69,15 +82,14 @@ def _kept(robot: str | Path, folder: Path, backends: Sequence[str], progress: Pr
     return KeptPackage(found.parent, tuple(f"{robot}: {warning}" for warning in warnings))
 
 
-def _key(robot: str | Path, backends: Sequence[str]) -> str:
+def _key(robot: str | Path, backends: Sequence[str], options: Options) -> str:
     """Hash of all that the package depends on."""
-    return hashlib.sha256("\0".join(_parts(robot, backends)).encode()).hexdigest()[:32]
+    return hashlib.sha256("\0".join(_parts(robot, backends, options)).encode()).hexdigest()[:32]
 
 
-def _parts(robot: str | Path, backends: Sequence[str]) -> Iterator[str]:
-    yield str(robot)
-    yield from backends
-    for path in robot_files(robot, Options()):
+def _parts(robot: str | Path, backends: Sequence[str], options: Options) -> Iterator[str]:
+    yield from (str(robot), *backends, repr(options))
+    for path in robot_files(robot, options):
         if path.is_file():
             yield hashlib.sha256(path.read_bytes()).hexdigest()
     for name in generator_files():

@@ -39,9 +39,11 @@ from linkwise.cli.log_options import (
     constant_loads,
     pairs,
 )
+from linkwise.cli.options import reads_robot
 from linkwise.cli.robot_option import RobotOption, opened_robot
 from linkwise.escape import json_text, listed
 from linkwise.progress import progress as shown_progress
+from linkwise.robot import Options
 
 Out = Annotated[Path, typer.Option(help="Directory to write; a former result is replaced")]
 Terms = Annotated[
@@ -96,7 +98,9 @@ app = typer.Typer(add_completion=False)
 
 
 @app.command()
+@reads_robot()
 def analyze(
+    options: Options,
     log: Log,
     robot: RobotOption,
     out: Out,
@@ -141,7 +145,7 @@ def analyze(
     )
     wanted = Wanted(format, tuple(figure or ()), page, power_terms, tuple(induced or ()))
     with shown_progress() as progress:
-        package = opened_robot(robot, backend, progress)
+        package = opened_robot(robot, backend, options, progress)
     package = carrying(package, carried(payload or [], package))
     held = chosen_contacts(
         contact or [],

@@ -30,6 +30,7 @@ from linkwise.cli.log_options import (
     chosen_processing,
     pairs,
 )
+from linkwise.cli.options import reads_robot
 from linkwise.cli.robot_option import RobotOption, opened_robot
 from linkwise.escape import json_text, listed
 from linkwise.identification import Fitting, Identification
@@ -39,6 +40,7 @@ from linkwise.identification.urdf_file import lost_gravity
 from linkwise.output import require_writable, write_files
 from linkwise.package.write import refuse_inside_package
 from linkwise.progress import progress as shown_progress
+from linkwise.robot import Options
 
 Out = Annotated[Path, typer.Option(help="Directory to write to: a page, a record, and the robot as URDF")]
 Torque = Annotated[
@@ -57,7 +59,9 @@ app = typer.Typer(add_completion=False)
 
 
 @app.command()
+@reads_robot()
 def identify(
+    options: Options,
     log: Log,
     robot: RobotOption,
     out: Out,
@@ -91,7 +95,7 @@ def identify(
     without = tuple(unmeasured or [])
     fitting = Fitting(pairs("--torque", torque or []), torque_factor, friction, unseen, without)
     with shown_progress() as progress:
-        package = opened_robot(robot, backend, progress)
+        package = opened_robot(robot, backend, options, progress)
     refuse_inside_package(out)
     require_writable(out)
     with shown_progress(UNITS) as progress:

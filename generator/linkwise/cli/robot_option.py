@@ -9,15 +9,16 @@ from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.cli import tell
 from linkwise.package_cache import kept_package
 from linkwise.progress import Progress
+from linkwise.robot import Options
 
 RobotOption = Annotated[
     Path, typer.Option(help="Directory of a generated robot; or a robot's file, of which a package is kept")
 ]
 
 
-def opened_robot(robot: Path, backend: str | None, progress: Progress) -> LoadedRobot:
+def opened_robot(robot: Path, backend: str | None, options: Options, progress: Progress) -> LoadedRobot:
     """The robot, loaded; says what of a file touches the torques. Raises LinkwiseError."""
-    kept = kept_package(robot, backend, progress)
+    kept = kept_package(robot, backend, options, progress)
     for warning in kept.warnings:
         tell(f"warning: {warning}", err=True)
     return load_robot(kept.directory, backend)

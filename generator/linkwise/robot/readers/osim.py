@@ -64,7 +64,7 @@ def read_osim(path: Path) -> Description:
         (Body(GROUND), *_bodies(elements, joints)),
         tuple(joint.connection(rules) for joint in joints),
         _vector(numbers_of(model, "gravity", EARTH, "the model", 3)),
-        notes=(*notes, *_ignored(model)),
+        notes=(*notes, *(note for joint in joints for note in joint.notes(rules)), *_ignored(model)),
         loops=tuple(unmodelled(model)),
         ties=tuple(ties(model, frames)),
         omissions=tuple(_forces(model)),

@@ -12,8 +12,10 @@ from xml.etree.ElementTree import Element
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot import transforms
+from linkwise.robot.curve import Curve
 from linkwise.robot.description import Connection, CurvedAxis, CurvedCoordinate
 from linkwise.robot.joint_types import X, Y, Z
+from linkwise.robot.notes import Note
 from linkwise.robot.readers.osim_coordinates import Rule, limits_of
 from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of
 from linkwise.robot.readers.osim_frames import Placed
@@ -35,27 +37,40 @@ TYPES: dict[str, tuple[Part, ...]] = {
     "PlanarJoint": (("prismatic", X, 1), ("prismatic", Y, 2), ("revolute", Z, 0)),
 }
 CUSTOM = "CustomJoint"
+IN_RADIANS = "in radians in OpenSim's files, also where these are in degrees: it turns no axis one to one"
 SUFFIXES = {"prismatic": "t", "revolute": "r"}
 UNITS: dict[Kind, Literal["rad", "m"]] = {"prismatic": "m", "revolute": "rad"}
 
 
 @dataclass(frozen=True)
 class _Moved:
-    """An axis, in the joint's frame, and how it moves."""
+    """An axis, in the joint's frame, and the function of one of the joint's coordinates by which it moves."""
 
     kind: Kind
     direction: tuple[float, float, float]
-    rule: Rule
+    coordinate: str = ""
+    curve: Curve = IDENTITY
+
+    @property
+    def one_to_one(self) -> bool:
+        """Whether it moves as far as its coordinate, there or back."""
+        return self.curve.line is not None and abs(self.curve.line[1]) == 1.0
+
+    def rule(self, rules: Mapping[str, Rule]) -> Rule:
+        """How it moves by what is free."""
+        if not self.coordinate:
+            return Rule("", self.curve)
+        return rules[self.coordinate].of(self.curve)
 
 
 def _carrier(axes: Sequence[_Moved], coordinate: str) -> int | None:
-    """Index of the axis that stands for a coordinate: what it moves itself, or by a line, if any."""
+    """Index of the axis that stands for a coordinate: what it moves one to one, or by a line, if any."""
 
-    def remoteness(at: int) -> tuple[bool, bool, bool]:
-        axis = axes[at]
-        return axis.rule.curve != IDENTITY, axis.rule.curve.line is None, axis.kind != "revolute"
+    def remoteness(at: int) -> tuple[bool, bool, bool, bool]:
+        axis, curve = axes[at], axes[at].curve
+        return not axis.one_to_one, curve.line is None, axis.kind != "revolute", curve != IDENTITY
 
-    own = (at for at, axis in enumerate(axes) if axis.rule.free == coordinate)
+    own = (at for at, axis in enumerate(axes) if axis.coordinate == coordinate)
     return min(own, key=remoteness, default=None)
 
 
@@ -76,13 +91,13 @@ class OsimJoint:
     def connection(self, rules: Mapping[str, Rule]) -> Connection:
         """The joint, with what its coordinates are."""
         turn = transforms.transpose(self.child.rotation)
-        axes = tuple(self._axes(rules))
-        free = [name for c in self.coordinates if rules[name := name_of(c)].free == name]
-        carriers = {name: _carrier(axes, name) for name in free}
-        for name, at in carriers.items():
-            if at is None:
+        axes = tuple(self._axes())
+        carriers = {name: _carrier(axes, name) for name in map(name_of, self.coordinates)}
+        free = [c for c in self.coordinates if rules[name_of(c)].free == name_of(c)]
+        for name in map(name_of, free):
+            if carriers[name] is None:
                 raise LinkwiseError(f"coordinate {name!r} moves no axis of its joint {self.name!r}; lock it")
-        names = {at: name for name, at in carriers.items()}
+        names = {at: name for name, at in carriers.items() if rules[name].free}
         return Connection(
             self.name,
             "curved" if axes else "fixed",
@@ -96,21 +111,30 @@ class OsimJoint:
                     f"{SUFFIXES[axis.kind]}{at + 1}",
                     axis.kind,
                     transforms.rotate(self.child.rotation, axis.direction),
-                    axis.rule.free,
-                    axis.rule.curve,
+                    rule.free,
+                    rule.curve,
                 )
                 for at, axis in enumerate(axes)
+                for rule in (axis.rule(rules),)
             ),
             coordinates=tuple(
-                CurvedCoordinate(name, UNITS[axes[at].kind], limits_of(c))
-                for c in self.coordinates
-                if (at := carriers.get(name := name_of(c))) is not None
+                CurvedCoordinate(name_of(c), UNITS[axes[at].kind], limits_of(c))
+                for c in free
+                if (at := carriers[name_of(c)]) is not None
             ),
         )
 
-    def _axes(self, rules: Mapping[str, Rule]) -> Iterator[_Moved]:
+    def notes(self, rules: Mapping[str, Rule]) -> Iterator[Note]:
+        """Say which free coordinates OpenSim calls coupled, and keeps in radians."""
+        axes = tuple(self._axes())
+        for name in map(name_of, self.coordinates):
+            at = _carrier(axes, name) if rules[name].free == name else None
+            if at is not None and axes[at].kind == "revolute" and not axes[at].one_to_one:
+                yield Note("warned", name, "", IN_RADIANS)
+
+    def _axes(self) -> Iterator[_Moved]:
         if self.element.tag == CUSTOM:
-            yield from self._custom(rules)
+            yield from self._custom()
             return
         parts = TYPES.get(self.element.tag)
         if parts is None:
@@ -125,9 +149,9 @@ class OsimJoint:
                 f"{len(parts)}"
             )
         for kind, direction, number in parts:
-            yield _Moved(kind, direction, rules[names[number]])
+            yield _Moved(kind, direction, names[number])
 
-    def _custom(self, rules: Mapping[str, Rule]) -> Iterator[_Moved]:
+    def _custom(self) -> Iterator[_Moved]:
         """Axes of a SpatialTransform: what slides first, for in the file it stands last."""
         transform = self.element.find("SpatialTransform")
         given = {name_of(axis): axis for axis in (transform if transform is not None else ())}
@@ -138,15 +162,16 @@ class OsimJoint:
                 if axis is None:
                     continue
                 place = f"joint {self.name!r}, {word}{number}"
-                rule = self._displacement(axis, rules, place)
-                direction = transforms.unit(numbers_of(axis, "axis", " ".join(map(str, usual)), place, 3))
-                if rule == Rule("", constant(0.0)):
+                coordinate, curve = self._displacement(axis, place)
+                if not coordinate and curve(0.0) == 0.0:
                     continue
+                direction = transforms.unit(numbers_of(axis, "axis", " ".join(map(str, usual)), place, 3))
                 if direction is None:
                     raise LinkwiseError(f"{place} has a zero axis; give its direction, such as 0 0 1")
-                yield _Moved(kind, direction, rule)
+                yield _Moved(kind, direction, coordinate, curve)
 
-    def _displacement(self, axis: Element, rules: Mapping[str, Rule], place: str) -> Rule:
+    def _displacement(self, axis: Element, place: str) -> tuple[str, Curve]:
+        """The coordinate of an axis, empty for none, and its function of that."""
         names = text_of(axis, "coordinates").split()
         if len(names) > 1:
             raise LinkwiseError(
@@ -154,8 +179,10 @@ class OsimJoint:
             )
         curve = function_of(axis, "function", place)
         if not names:
-            return Rule("", constant(curve(0.0) if curve else 0.0))
-        if names[0] not in rules:
-            raise LinkwiseError(f"{place} names {names[0]!r}, which is not a coordinate; correct it")
-        rule = rules[names[0]].of(curve or IDENTITY)
-        return rule if rule.free else Rule("", constant(rule.curve(0.0)))
+            return "", curve or constant(0.0)
+        own = list(map(name_of, self.coordinates))
+        if names[0] not in own:
+            raise LinkwiseError(
+                f"{place} names {names[0]!r}, which is not a coordinate of the joint; it has {listed(own)}"
+            )
+        return names[0], curve or IDENTITY
