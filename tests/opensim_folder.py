@@ -30,6 +30,10 @@ def main() -> int:
                 refused += 1
                 print(f"refused  {error}")
                 continue
+            except RuntimeError as error:  # OpenSim's own
+                refused += 1
+                print(f"OpenSim  {file}: {str(error).splitlines()[0]}")
+                continue
         wrong = max(errors) > LIMIT
         bad += wrong
         size = f"{len(both.names)} joints, {len(both.robot.link_names)} links"

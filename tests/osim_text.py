@@ -98,6 +98,8 @@ class _Link:
     moments: Sequence[float]
     ends: Sequence[tuple[Sequence[float], Sequence[float]]]
     more: Mapping[str, str]
+    turned: bool
+    """Whether the joint leads from the body back."""
 
     @property
     def tag(self) -> str:
@@ -129,10 +131,11 @@ class _Link:
                 ("parent", "child"), (before, f"/bodyset/body{self.number}"), self.ends, strict=True
             )
         )
+        parent, child = ("child", "parent") if self.turned else ("parent", "child")
         return (
             f'<{self.tag} name="joint{self.number}">'
-            f"<socket_parent_frame>parent{self.number}</socket_parent_frame>"
-            f"<socket_child_frame>child{self.number}</socket_child_frame>"
+            f"<socket_parent_frame>{parent}{self.number}</socket_parent_frame>"
+            f"<socket_child_frame>{child}{self.number}</socket_child_frame>"
             f"<coordinates>{self.coordinates}</coordinates><frames>{frames}</frames>"
             f"{self.transform(False)}</{self.tag}>"
         )
@@ -151,17 +154,23 @@ class _Link:
             f"<location_in_parent>{row(start)}</location_in_parent>"
             f"<orientation_in_parent>{row(turn)}</orientation_in_parent>"
             f"<location>{row(place)}</location><orientation>{row(own)}</orientation>"
+            f"<reverse>{str(self.turned).lower()}</reverse>"
             f"<CoordinateSet><objects>{self.coordinates}</objects></CoordinateSet>{self.transform(True)}"
             f"</{self.tag}></Joint></Body>"
         )
 
 
 def chain(
-    kinds: Sequence[Kind], sets: str = "", coordinates: Mapping[str, str] | None = None, old: bool = False
+    kinds: Sequence[Kind],
+    sets: str = "",
+    coordinates: Mapping[str, str] | None = None,
+    old: bool = False,
+    turned: Sequence[int] = (),
 ) -> str:
     """A model of bodies one behind the other by these joints, whose frames stand askew in both bodies.
 
-    sets: more of the model; coordinates: more of each coordinate, by its name; old: in format 3
+    sets: more of the model; coordinates: more of each coordinate, by its name; old: in format 3;
+    turned: joints, from 0, that lead from the later body to the earlier one
     """
     draw = np.random.default_rng(len(kinds))
     links = []
@@ -172,7 +181,7 @@ def chain(
         moments = [float(inertia[i, k]) for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
         mass, com = float(draw.uniform(1, 3)), draw.normal(size=3).tolist()
         ends = [(draw.normal(size=3).tolist(), draw.normal(size=3).tolist()) for _ in range(2)]
-        links.append(_Link(number, kind, mass, com, moments, ends, coordinates or {}))
+        links.append(_Link(number, kind, mass, com, moments, ends, coordinates or {}, number in turned))
     bodies = "".join(link.old_body if old else link.body for link in links)
     joints = "" if old else f"<JointSet><objects>{''.join(link.joint for link in links)}</objects></JointSet>"
     return model(f"<BodySet><objects>{bodies}</objects></BodySet>{joints}{sets}", "30000" if old else "40500")

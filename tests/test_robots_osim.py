@@ -1,5 +1,6 @@
 """OpenSim's files as they are read: formats, names and units, what is left out, and what is refused."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -38,9 +39,50 @@ def forces(content: str) -> str:
 
 
 def test_both_formats_say_the_same(tmp_path: Path) -> None:
-    new, old = (robot_of(tmp_path, chain(KINDS, old=old)) for old in (False, True))
+    new, old = (robot_of(tmp_path, chain(KINDS, old=old, turned=(1, 3))) for old in (False, True))
     assert new == old
     assert new.name == "chain"
+
+
+def test_what_opensim_reads_though_it_is_no_xml_is_read(tmp_path: Path) -> None:
+    plain = chain(["PinJoint"])
+    force = '<HuntCrossleyForce name="heel"><HuntCrossleyForce::ContactParametersSet/></HuntCrossleyForce>'
+    odd = chain(["PinJoint"], "<!-- two -- hyphens -->" + forces(force))
+    assert robot_of(tmp_path, odd).links == robot_of(tmp_path, plain).links
+    (tmp_path / "model.osim").write_bytes(plain.replace("body0", "fémur").encode("latin-1"))
+    assert [link.name for link in read_robot(tmp_path / "model.osim").links] == ["fémur"]
+
+
+def test_frames_are_found_by_their_whole_paths(tmp_path: Path) -> None:
+    plain = chain(["PinJoint", "PinJoint"])
+    expected = robot_of(tmp_path, plain).links
+    own = plain.replace('name="parent0"', 'name="start"').replace(">parent0<", ">start<")
+    for text in (
+        own.replace('name="parent1"', 'name="start"').replace(">parent1<", ">start<"),
+        own.replace('name="child0"', 'name="body0"').replace(">child0<", ">/jointset/joint0/body0<"),
+        plain.replace("<socket_parent>/bodyset/body0<", "<socket_parent>../../../bodyset/body0<"),
+    ):
+        assert text != plain
+        assert robot_of(tmp_path, text).links == expected
+
+
+def test_components_may_stand_among_those_of_others(tmp_path: Path) -> None:
+    kinds = ["PinJoint", "PinJoint"]
+    coupled = coupler("joint1_angle", "joint0_angle", LINES)
+    spread = chain(kinds, f"<components>{coupled}</components>")
+    assert robot_of(tmp_path, spread) == robot_of(tmp_path, chain(kinds, constraints(coupled)))
+    joints = chain(kinds).replace("<JointSet><objects>", "<components>")
+    joints = joints.replace("</objects></JointSet>", "</components>")
+    assert robot_of(tmp_path, joints) == robot_of(tmp_path, chain(kinds))
+
+
+def test_a_body_without_mass_has_no_inertia(tmp_path: Path) -> None:
+    text = chain(["PinJoint", "PinJoint"])
+    light = re.sub(r'(name="body0"><mass>)[^<]*', r"\g<1>0", text)
+    robot = robot_of(tmp_path, light)
+    assert robot.links[0].inertia == ((0.0,) * 3,) * 3
+    (note,) = (note for note in robot.notes if note.kind == "ignored")
+    assert (note.subject, note.detail) == ("body0", "its inertia, as its mass is 0")
 
 
 def test_coordinates_have_their_names_units_and_limits(tmp_path: Path) -> None:
@@ -120,13 +162,10 @@ def test_constraints_between_bodies_close_loops(tmp_path: Path) -> None:
     assert (tie.name, tie.kind) == ("pin", "point")
 
 
-def test_a_function_may_stand_without_a_name_and_none_is_the_coordinate_itself(tmp_path: Path) -> None:
+def test_a_function_may_stand_without_a_name(tmp_path: Path) -> None:
     wrapped = robot_of(tmp_path, chain([KNEE]))
     bare = robot_of(tmp_path, chain([KNEE]).replace(' name="function"', ""))
     assert bare == wrapped
-    nothing = Custom(("angle",), {"rotation1": ("1 0 0", "angle", "")})
-    (link,) = robot_of(tmp_path, chain([nothing])).links
-    assert (link.joint.ratio, link.joint.curve) == (1.0, None)
 
 
 def fault(**changes: object) -> str:
@@ -143,7 +182,7 @@ WRONG: Mapping[str, tuple[str, str]] = {
     "centimetres": (model("<length_units>cm</length_units>"), "lengths are in cm; give them in meters"),
     "joint type": (
         fault().replace("PinJoint", "EllipsoidJoint"),
-        "joint 'joint0' is a EllipsoidJoint, which is not modelled; make it one of",
+        "joint 'joint0' is of type EllipsoidJoint, which is not modelled; make it one of CustomJoint",
     ),
     "function": (
         chain([bent("<Sine></Sine>")]),
@@ -167,8 +206,16 @@ WRONG: Mapping[str, tuple[str, str]] = {
         "PinJoint 'joint1' stands in the frame 'nowhere', of which there are 0; name a body, ground or",
     ),
     "no joint": (
-        fault().replace("<socket_parent>/bodyset/body1<", "<socket_parent>/bodyset/body0<"),
-        "body 'body1' hangs on no joint; give it one",
+        fault().replace("<socket_parent>/bodyset/body1<", "<socket_parent>/ground<"),
+        "joint 'joint1' leads to 'ground', to which another one leads; have a PointConstraint or",
+    ),
+    "no way from ground": (
+        fault().replace("<socket_parent>/ground<", "<socket_parent>/bodyset/body1<"),
+        "no joints lead from ground to 'body1', on which joint 'joint0' stands; give it one",
+    ),
+    "format": (
+        fault().replace("40500", "30512"),
+        "format '30512' is not read; open the file in OpenSim",
     ),
     "coupled in a circle": (
         fault(

@@ -44,6 +44,11 @@ def test_generalized_forces_and_each_bodys_share_are_opensims(kinds: Sequence[Ki
     assert max(beside(tmp_path, chain(kinds)).errors()) <= LIMIT
 
 
+def test_a_joint_may_lead_towards_ground(tmp_path: Path) -> None:
+    kinds = [KNEE, "UniversalJoint", "SliderJoint"]
+    assert max(beside(tmp_path, chain(kinds, turned=(0, 1))).errors()) <= LIMIT
+
+
 @pytest.mark.parametrize("sets", SETS.values(), ids=SETS)
 def test_coupled_coordinates_load_the_one_that_they_follow(sets: str, tmp_path: Path) -> None:
     both = beside(tmp_path, chain(["PinJoint", KNEE, "SliderJoint", "PinJoint"], sets))

@@ -10,19 +10,17 @@ from xml.etree.ElementTree import Element
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
-from linkwise.robot.description import Body, Description
+from linkwise.robot.description import ZERO33, Body, Description
 from linkwise.robot.notes import Note, Omission
 from linkwise.robot.readers.osim_constraints import ties, unmodelled
 from linkwise.robot.readers.osim_coordinates import coordinate_rules
-from linkwise.robot.readers.osim_elements import members, name_of, numbers_of, text_of, yes
+from linkwise.robot.readers.osim_document import members, read_document
+from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of, yes
 from linkwise.robot.readers.osim_frames import GROUND, Frames, Placed, offset_of
-from linkwise.robot.readers.osim_joints import OsimJoint
-from linkwise.robot.readers.xml_file import parse
+from linkwise.robot.readers.osim_joints import OsimJoint, from_ground
 from linkwise.robot.robot import Mat3, Vec3
 
 EARTH = "0 -9.80665 0"
-GIVING = ("Muscle", "Actuator")
-"""What the tags of forces end in that give the joints' torques."""
 ACTING = {
     "BushingForce": "bushing",
     "FunctionBasedBushingForce": "bushing",
@@ -31,6 +29,7 @@ ACTING = {
     "SpringGeneralizedForce": "spring",
     "ExpressionBasedCoordinateForce": "spring",
     "PointToPointSpring": "spring",
+    "PathSpring": "spring",
     "ExpressionBasedPointToPointForce": "spring",
     "HuntCrossleyForce": "contact",
     "ElasticFoundationForce": "contact",
@@ -44,20 +43,12 @@ ACTING = {
 
 def read_osim(path: Path) -> Description:
     """Read a model; raises LinkwiseError naming the element and the remedy."""
-    root = parse(path)
-    model = root.find("Model") if root.tag == "OpenSimDocument" else None
-    if model is None:
-        raise LinkwiseError(
-            f"the root element is <{root.tag}>; an OpenSim model has <OpenSimDocument><Model>"
-        )
-    units = text_of(model, "length_units", "meters")
-    if units.lower() not in ("meters", "m"):
-        raise LinkwiseError(f"the model's lengths are in {units}; give them in meters")
+    model, old = read_document(path)
     elements = [body for body in members(model, "BodySet") if name_of(body) != GROUND]
     if not elements:
         raise LinkwiseError(f"the model {name_of(model)!r} has no <Body>; give one that has some")
-    frames = Frames(model, {name_of(body) for body in elements})
-    joints = list(_joints(model, elements, frames))
+    frames = Frames(model)
+    joints = from_ground(_joints_in_bodies(elements) if old else _joints(model, frames))
     rules, notes = coordinate_rules((c for joint in joints for c in joint.coordinates), model)
     return Description(
         name_of(model) or path.stem,
@@ -72,10 +63,7 @@ def read_osim(path: Path) -> Description:
     )
 
 
-def _joints(model: Element, bodies: list[Element], frames: Frames) -> Iterator[OsimJoint]:
-    if model.find("JointSet") is None:
-        yield from _joints_in_bodies(bodies)
-        return
+def _joints(model: Element, frames: Frames) -> Iterator[OsimJoint]:
     for joint in members(model, "JointSet"):
         parent, child = (
             frames.found(text_of(joint, f"socket_{end}_frame"), joint) for end in ("parent", "child")
@@ -90,8 +78,6 @@ def _joints_in_bodies(bodies: list[Element]) -> Iterator[OsimJoint]:
         holder = body.find("Joint")
         for joint in holder if holder is not None else ():
             place = f"joint {name_of(joint)!r}"
-            if yes(joint, "reverse"):
-                raise LinkwiseError(f"{place} is reversed, which is not modelled; exchange its bodies")
             parent = Placed(text_of(joint, "parent_body"))
             child = Placed(name_of(body))
             yield OsimJoint(
@@ -99,6 +85,7 @@ def _joints_in_bodies(bodies: list[Element]) -> Iterator[OsimJoint]:
                 parent.behind(*offset_of(joint, place, "location_in_parent", "orientation_in_parent")),
                 child.behind(*offset_of(joint, place, "location", "orientation")),
                 tuple(joint.iterfind("CoordinateSet/objects/Coordinate")),
+                yes(joint, "reverse"),
             )
 
 
@@ -111,7 +98,8 @@ def _bodies(elements: Iterable[Element], joints: Iterable[OsimJoint]) -> Iterato
         place = f"body {name!r}"
         (mass,) = numbers_of(element, "mass", "0", place, 1)
         com = _vector(numbers_of(element, "mass_center", "0 0 0", place, 3))
-        yield Body(name, mass, com, _inertia(element, place), origin=transforms.minus(places[name]))
+        inertia = _inertia(element, place) if mass else ZERO33  # as OpenSim takes it
+        yield Body(name, mass, com, inertia, origin=transforms.minus(places[name]))
 
 
 def _inertia(element: Element, place: str) -> Mat3:
@@ -133,16 +121,31 @@ def _forces(model: Element) -> Iterator[Omission]:
     """Forces that act by themselves."""
     for force in members(model, "ForceSet"):
         acts = yes(force, "appliesForce", True) and not yes(force, "isDisabled")
-        if acts and not force.tag.endswith(GIVING):
+        if acts and not _gives(force):
             coordinate = text_of(force, "coordinate")
             yield Omission(
                 ACTING.get(force.tag, force.tag), name_of(force), coordinate and f"on {coordinate}"
             )
 
 
+def _gives(force: Element) -> bool:
+    """Whether it is what gives the joints' torques."""
+    return "Muscle" in force.tag or force.tag.endswith("Actuator")
+
+
 def _ignored(model: Element) -> tuple[Note, ...]:
     """What of the model has no part in its dynamics, or is what gives the torques."""
-    counts = Counter(force.tag for force in members(model, "ForceSet") if force.tag.endswith(GIVING))
+    counts = Counter(force.tag for force in members(model, "ForceSet") if _gives(force))
     counts.update(part.tag for part in members(model, "ContactGeometrySet"))
     counts.update(part.tag for part in members(model, "MarkerSet"))
-    return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()))
+    weightless = (body for body in members(model, "BodySet") if _has_inertia_alone(body))
+    return (
+        *(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items())),
+        *(Note("ignored", name_of(body), "its inertia, as its mass is 0") for body in weightless),
+    )
+
+
+def _has_inertia_alone(body: Element) -> bool:
+    place = f"body {name_of(body)!r}"
+    (mass,) = numbers_of(body, "mass", "0", place, 1)
+    return mass == 0.0 and _inertia(body, place) != ZERO33

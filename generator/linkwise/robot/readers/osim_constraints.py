@@ -5,7 +5,8 @@ from xml.etree.ElementTree import Element
 
 from linkwise.robot.description import Anchor, AnchoredTie, Loop
 from linkwise.robot.readers.osim_coordinates import COUPLER, enforced
-from linkwise.robot.readers.osim_elements import members, name_of, numbers_of, text_of
+from linkwise.robot.readers.osim_document import members
+from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of
 from linkwise.robot.readers.osim_frames import Frames, Placed, offset_of
 from linkwise.robot.robot import TieKind
 
@@ -32,7 +33,7 @@ def unmodelled(model: Element) -> Iterator[Loop]:
         if constraint.tag not in (COUPLER, *KINDS) and enforced(constraint):
             yield Loop(
                 f"the model has the {constraint.tag} {name_of(constraint)!r}",
-                "remove it, or set its isEnforced to false",
+                "remove it, or switch it off there",
             )
 
 

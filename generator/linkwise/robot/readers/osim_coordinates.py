@@ -7,7 +7,8 @@ from xml.etree.ElementTree import Element
 from linkwise.errors import LinkwiseError
 from linkwise.robot.curve import Curve
 from linkwise.robot.notes import Note
-from linkwise.robot.readers.osim_elements import members, name_of, numbers_of, text_of, yes
+from linkwise.robot.readers.osim_document import members
+from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of, yes
 from linkwise.robot.readers.osim_functions import IDENTITY, constant, function_of
 from linkwise.robot.robot import UNLIMITED, Limits
 

@@ -1,6 +1,5 @@
 """Values of the elements of an OpenSim file."""
 
-from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
 from linkwise.errors import LinkwiseError
@@ -32,9 +31,3 @@ def yes(element: Element, tag: str, default: bool = False) -> bool:
 def name_of(element: Element) -> str:
     """Name of a component."""
     return element.get("name", "")
-
-
-def members(model: Element, tag: str) -> Iterator[Element]:
-    """Components of a set, such as BodySet."""
-    found = model.find(f"{tag}/objects")
-    yield from found if found is not None else ()

@@ -1,5 +1,7 @@
 """Frames of an OpenSim model: on which body each is, and where."""
 
+import posixpath
+from collections.abc import Iterable
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
@@ -10,7 +12,7 @@ from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of
 from linkwise.robot.robot import Rotation
 
 GROUND = "ground"
-OFFSET = "PhysicalOffsetFrame"
+BODY, OFFSET = "Body", "PhysicalOffsetFrame"
 
 
 @dataclass(frozen=True)
@@ -38,27 +40,48 @@ def offset_of(
 
 
 class Frames:
-    """The frames of a model by name: ground, bodies, and offset frames wherever they stand."""
+    """The bodies and offset frames of a model by their paths, such as /jointset/hip_r/pelvis_offset."""
 
-    def __init__(self, model: Element, bodies: set[str]) -> None:
-        self._bodies = bodies
-        self._offsets: dict[str, list[Element]] = {}
-        for frame in model.iter(OFFSET):
-            self._offsets.setdefault(name_of(frame), []).append(frame)
+    def __init__(self, model: Element) -> None:
+        self._frames: dict[str, Element] = {}
+        self._paths: dict[int, str] = {}
+        self._enter(model, "")
+
+    def _enter(self, owner: Element, path: str) -> None:
+        for child in owner:
+            objects = child.find("objects")
+            if objects is not None:
+                self._name(objects, f"{path}/{child.tag.lower()}")
+            elif child.tag in ("components", "frames"):
+                self._name(child, path)
+            elif child.tag == "Ground":
+                self._enter(child, f"/{GROUND}")
+
+    def _name(self, parts: Iterable[Element], path: str) -> None:
+        for part in parts:
+            own = f"{path}/{name_of(part)}"
+            self._paths[id(part)] = own
+            if part.tag in (BODY, OFFSET):
+                self._frames[own] = part
+            self._enter(part, own)
 
     def found(self, path: str, owner: Element, passed: tuple[str, ...] = ()) -> Placed:
-        """The frame at the end of a path, first among those of its owner; raises LinkwiseError for none."""
-        name = path.rstrip("/").rpartition("/")[2]
-        own = [frame for frame in owner.iter(OFFSET) if name_of(frame) == name]
-        if not own and name == GROUND:
+        """The frame at a path from its owner on, or the only one of its name; LinkwiseError for none."""
+        whole = posixpath.normpath(posixpath.join(self._paths.get(id(owner), "/"), path))
+        name = posixpath.basename(whole)
+        if whole == f"/{GROUND}":
             return Placed(GROUND)
-        if not own and name in self._bodies:
-            return Placed(name)
-        frames = own or self._offsets.get(name, [])
-        if len(frames) != 1 or name in passed:
+        alike = [at for at in self._frames if posixpath.basename(at) == name]
+        ways = [whole] if whole in self._frames else alike
+        if not ways and name == GROUND:
+            return Placed(GROUND)
+        if len(ways) != 1 or ways[0] in passed:
             raise LinkwiseError(
                 f"{owner.tag} {name_of(owner)!r} stands in the frame {path!r}, of which there are "
-                f"{len(frames)}; name a body, ground or an offset frame of one"
+                f"{len(ways)}; name a body, ground or an offset frame of one"
             )
-        carrier = self.found(text_of(frames[0], "socket_parent"), owner, (*passed, name))
-        return carrier.behind(*offset_of(frames[0], f"frame {name!r}", "translation", "orientation"))
+        frame = self._frames[ways[0]]
+        if frame.tag == BODY:
+            return Placed(name_of(frame))
+        carrier = self.found(text_of(frame, "socket_parent"), frame, (*passed, *ways))
+        return carrier.behind(*offset_of(frame, f"frame {name!r}", "translation", "orientation"))

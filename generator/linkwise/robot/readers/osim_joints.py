@@ -4,8 +4,8 @@ A joint stands in two frames, one on each body. From that on the parent lead fir
 that frame, then what turns, each axis turned by those before it; a UniversalJoint, say, turns about x and y.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 from xml.etree.ElementTree import Element
 
@@ -18,7 +18,7 @@ from linkwise.robot.joint_types import X, Y, Z
 from linkwise.robot.notes import Note
 from linkwise.robot.readers.osim_coordinates import Rule, limits_of
 from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of
-from linkwise.robot.readers.osim_frames import Placed
+from linkwise.robot.readers.osim_frames import GROUND, Placed
 from linkwise.robot.readers.osim_functions import IDENTITY, constant, function_of
 
 Kind = Literal["revolute", "prismatic"]
@@ -74,14 +74,42 @@ def _carrier(axes: Sequence[_Moved], coordinate: str) -> int | None:
     return min(own, key=remoteness, default=None)
 
 
+def from_ground(joints: Iterable["OsimJoint"]) -> tuple["OsimJoint", ...]:
+    """The joints as they lead away from ground, some of them turned; raises LinkwiseError for a loop."""
+    found: list[OsimJoint] = []
+    reached, waiting = {GROUND}, list(joints)
+    while waiting:
+        ahead = [joint for joint in waiting if joint.parent.body in reached]
+        behind = [joint.turned for joint in waiting if joint.child.body in reached]
+        (joint,) = (*ahead, *behind)[:1] or (None,)
+        if joint is None:
+            raise LinkwiseError(
+                f"no joints lead from ground to {waiting[0].parent.body!r}, on which joint "
+                f"{waiting[0].name!r} stands; give it one, a FreeJoint say"
+            )
+        if joint.child.body in reached:
+            raise LinkwiseError(
+                f"joint {joint.name!r} leads to {joint.child.body!r}, to which another one leads; have a "
+                "PointConstraint or a WeldConstraint close the loop in its place"
+            )
+        waiting = [other for other in waiting if other.element is not joint.element]
+        reached.add(joint.child.body)
+        found.append(joint)
+    return tuple(found)
+
+
 @dataclass(frozen=True)
 class OsimJoint:
-    """A joint, its frames on both bodies, and its coordinates' elements."""
+    """A joint, its frames on both bodies, and its coordinates' elements.
+
+    Where it is `reversed`, its coordinates say where the parent is from the child on.
+    """
 
     element: Element
     parent: Placed
     child: Placed
     coordinates: tuple[Element, ...]
+    reversed: bool = False
 
     @property
     def name(self) -> str:
@@ -132,15 +160,28 @@ class OsimJoint:
             if at is not None and axes[at].kind == "revolute" and not axes[at].one_to_one:
                 yield Note("warned", name, "", IN_RADIANS)
 
+    @property
+    def turned(self) -> "OsimJoint":
+        """The same joint as it leads from its child to its parent."""
+        return replace(self, parent=self.child, child=self.parent, reversed=not self.reversed)
+
     def _axes(self) -> Iterator[_Moved]:
+        """Axes from the parent on: of a reversed joint the last one first, and each the other way."""
+        axes = tuple(self._own_axes())
+        if not self.reversed:
+            yield from axes
+        for axis in axes[::-1] if self.reversed else ():
+            yield replace(axis, direction=transforms.minus(axis.direction))
+
+    def _own_axes(self) -> Iterator[_Moved]:
         if self.element.tag == CUSTOM:
             yield from self._custom()
             return
         parts = TYPES.get(self.element.tag)
         if parts is None:
             raise LinkwiseError(
-                f"joint {self.name!r} is a {self.element.tag}, which is not modelled; make it one of "
-                f"{listed([*TYPES, CUSTOM])}"
+                f"joint {self.name!r} is of type {self.element.tag}, which is not modelled; make it one of "
+                f"{listed([CUSTOM, *TYPES])}"
             )
         names = [name_of(coordinate) for coordinate in self.coordinates]
         if len(names) != len(parts):
@@ -185,4 +226,4 @@ class OsimJoint:
             raise LinkwiseError(
                 f"{place} names {names[0]!r}, which is not a coordinate of the joint; it has {listed(own)}"
             )
-        return names[0], curve or IDENTITY
+        return names[0], curve or constant(0.0)

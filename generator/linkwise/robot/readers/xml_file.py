@@ -1,5 +1,6 @@
 """XML files: parsed within bounds, and the numbers of their attributes."""
 
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder
 
@@ -41,9 +42,13 @@ class _Builder(TreeBuilder):
         return super().end(tag)
 
 
-def parse(path: Path) -> Element:
-    """Root element; raises LinkwiseError for malformed XML, and for xacro, which is to be expanded first."""
-    data = content(path, 4 * MIB)
+def parse(path: Path, largest: int = 4 * MIB, as_xml: Callable[[bytes], bytes] | None = None) -> Element:
+    """Root element; raises LinkwiseError for malformed XML, and for xacro, which is to be expanded first.
+
+    largest: most bytes of the file; as_xml: what makes XML of a file that is not quite
+    """
+    data = content(path, largest)
+    data = as_xml(data) if as_xml else data
     parser = DefusedXMLParser(target=_Builder())
     try:
         parser.feed(data)

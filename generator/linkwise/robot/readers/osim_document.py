@@ -1,0 +1,66 @@
+"""An OpenSim document: what XML it needs to be, which format it has, and where components stand in it."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from linkwise.errors import LinkwiseError
+from linkwise.robot.readers.bounded import MIB
+from linkwise.robot.readers.osim_elements import text_of
+from linkwise.robot.readers.xml_file import parse
+
+LARGEST = 64 * MIB
+"""Models of a whole spine have hundreds of muscles."""
+COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+CLASS_OF_CLASS = re.compile(rb"(</?\w+)::")
+"""As in <HuntCrossleyForce::ContactParametersSet>, which OpenSim writes and XML forbids."""
+
+OLDEST, JOINTS_BY_THEMSELVES, SOCKETS = 20000, 30500, 30517
+"""Versions: the first one read, with joints in bodies; of those in a JointSet, and of those with sockets."""
+ENDS = {
+    "BodySet": ("Body",),
+    "JointSet": ("Joint",),
+    "ConstraintSet": ("Constraint",),
+    "ForceSet": ("Force", "Spring", "Ligament", "Muscle", "_Deprecated", "Actuator"),
+    "ContactGeometrySet": (),
+    "MarkerSet": ("Marker",),
+}
+"""How the tags of a set's components end, for some stand among the components of others."""
+
+
+def read_document(path: Path) -> tuple[Element, bool]:
+    """The model, and whether its joints are in its bodies; raises LinkwiseError naming the remedy."""
+    root = parse(path, LARGEST, as_xml)
+    model = root.find("Model") if root.tag == "OpenSimDocument" else None
+    if model is None:
+        raise LinkwiseError(
+            f"the root element is <{root.tag}>; an OpenSim model has <OpenSimDocument><Model>"
+        )
+    text = root.get("Version", "")
+    version = int(text) if text.isdecimal() else 0
+    if version < OLDEST or JOINTS_BY_THEMSELVES <= version < SOCKETS:
+        raise LinkwiseError(f"format {text!r} is not read; open the file in OpenSim and save it")
+    units = text_of(model, "length_units", "meters")
+    if units.lower() not in ("meters", "m"):
+        raise LinkwiseError(f"the model's lengths are in {units}; give them in meters")
+    return model, version < JOINTS_BY_THEMSELVES
+
+
+def as_xml(data: bytes) -> bytes:
+    """What OpenSim reads although it is no XML: hyphens in comments, colons in tags, another encoding."""
+    mended = CLASS_OF_CLASS.sub(rb"\1.", COMMENT.sub(b"", data))
+    try:
+        mended.decode("utf-8")
+    except UnicodeDecodeError:
+        if b"encoding=" not in mended[:100] or b"UTF-8" in mended[:100].upper():
+            return mended.decode("latin-1").encode("utf-8")
+    return mended
+
+
+def members(model: Element, tag: str) -> Iterator[Element]:
+    """Components of a set, such as BodySet, and those of its kind among the components of others."""
+    found = model.find(f"{tag}/objects")
+    yield from found if found is not None else ()
+    for holder in model.iter("components"):
+        yield from (part for part in holder if part.tag.endswith(ENDS[tag]))
