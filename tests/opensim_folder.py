@@ -1,8 +1,9 @@
 """Every OpenSim model of a folder through the generator, beside OpenSim: `make opensim MODELS=folder`.
 
 Prints for each file its joints and links, and the errors of the torques and of each link's share at a random
-motion, as parts of the largest torque, or the reason for refusing it. Exits with 1 where an error is above
-LIMIT.
+motion, as parts of the largest torque, or the reason for refusing it. Where they differ, linkwise is held
+against the Lagrangian of OpenSim's own energies: Simbody's velocity terms are off where the second and third
+rotation of a joint follow one coordinate. Exits with 1 where an error is above LIMIT.
 """
 
 import argparse
@@ -34,12 +35,13 @@ def main() -> int:
                 refused += 1
                 print(f"OpenSim  {file}: {str(error).splitlines()[0]}")
                 continue
+        told = f"torques {errors[0]:.1e}, shares {errors[1]:.1e}"
         wrong = max(errors) > LIMIT
+        if wrong and (by_energies := both.error_of_energies()) <= LIMIT:
+            wrong, told = False, f"{told}, but by OpenSim's own energies {by_energies:.1e}"
         bad += wrong
         size = f"{len(both.names)} joints, {len(both.robot.link_names)} links"
-        print(
-            f"{'WRONG' if wrong else 'ok':8} {file}: {size}; torques {errors[0]:.1e}, shares {errors[1]:.1e}"
-        )
+        print(f"{'WRONG' if wrong else 'ok':8} {file}: {size}; {told}")
     print(f"{len(files)} models, {refused} refused, {bad} wrong")
     return 1 if bad or not files else 0
 

@@ -1,8 +1,8 @@
 """What OpenSim answers of a model that linkwise has read, in linkwise's coordinates and their rates."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import opensim as osim
@@ -42,6 +42,12 @@ class Beside:
         of_sums = np.abs(self.robot.inverse_dynamics(*self.motion) - expected).max() / size
         return float(of_sums), float(np.abs(shares - own).max() / size)
 
+    def error_of_energies(self) -> float:
+        """Largest error of the torques beside those of OpenSim's energies, as a part of the largest."""
+        expected = self.torques_of_energies()
+        off = np.abs(self.robot.inverse_dynamics(*self.motion) - expected).max()
+        return float(off / (np.abs(expected).max() or 1.0))
+
     def torques(self, alone: Sequence[str] = ()) -> Any:
         """OpenSim's generalized forces by linkwise's coordinates; of the bodies `alone` where some are named.
 
@@ -50,25 +56,65 @@ class Beside:
         """
         model, locked = bare(self.file, alone)
         state = model.initSystem()
+        moved = self._moved(model, state, locked, *self.motion)
+        wanted = osim.Vector.createFromMat(moved.turn @ moved.jerk + moved.turning @ moved.rate)
+        force = numbers(osim.InverseDynamicsSolver(model).solve(state, wanted))
+        return moved.columns.T @ moved.turn.T @ force
+
+    def torques_of_energies(self) -> Any:
+        """What the Lagrangian of OpenSim's own energies asks for, by differences of fourth order."""
+        model, locked = bare(self.file, ())
+        state = model.initSystem()
+        q, qd, qdd = self.motion
+        units = np.eye(len(q))
+
+        def energies(q: Any, qd: Any) -> Any:
+            self._moved(model, state, locked, q, qd, qdd)
+            return np.array([model.calcKineticEnergy(state), model.calcPotentialEnergy(state)])
+
+        def momentum(time: float) -> Any:
+            place, rate = q + qd * time + qdd * time**2 / 2, qd + qdd * time
+            both = [[energies(place, rate + sign * unit)[0] for unit in units] for sign in (1.0, -1.0)]
+            return np.subtract(*both) / 2.0  # exact: kinetic energy is quadratic in the rates
+
+        def lagrangian(way: Any) -> Callable[[float], Any]:
+            return lambda step: -np.subtract(*energies(q + step * way, qd))
+
+        return slope(momentum) + np.array([slope(lagrangian(unit)) for unit in units])
+
+    def _moved(self, model: Any, state: Any, locked: dict[str, float], *motion: Any) -> "Moved":
+        """OpenSim's model at a motion of linkwise's coordinates."""
         order, n = slots(model, state), len(self.names)
-        free = dict(zip(self.names, self.motion[0], strict=True))
-        followed = follows(model, order, free, locked)
+        followed = follows(model, order, dict(zip(self.names, motion[0], strict=True)), locked)
         columns, bends = np.zeros((2, len(order), n))
-        for row, (name, _, slope, bend) in enumerate(followed):
+        for row, (name, _, first, second) in enumerate(followed):
             if name:
-                columns[row, self.names.index(name)] = slope
-                bends[row, self.names.index(name)] = bend
+                columns[row, self.names.index(name)] = first
+                bends[row, self.names.index(name)] = second
         q = np.array([value for _, value, _, _ in followed])
         for name, place in zip(order, q, strict=True):
             model.getCoordinateSet().get(name).setValue(state, float(place), False)
-        _, qd, qdd = self.motion
-        rate, jerk = columns @ qd, columns @ qdd + bends @ np.square(qd)
+        rate, jerk = columns @ motion[1], columns @ motion[2] + bends @ np.square(motion[1])
         turn, turning = speeds(model, order, q, rate)
         state.setU(osim.Vector.createFromMat(turn @ rate))
         model.realizeVelocity(state)
-        wanted = osim.Vector.createFromMat(turn @ jerk + turning @ rate)
-        force = numbers(osim.InverseDynamicsSolver(model).solve(state, wanted))
-        return columns.T @ turn.T @ force
+        return Moved(columns, rate, jerk, turn, turning)
+
+
+class Moved(NamedTuple):
+    """How OpenSim's coordinates follow linkwise's, their rates, and E of u = E q̇ with its rate."""
+
+    columns: Any
+    rate: Any
+    jerk: Any
+    turn: Any
+    turning: Any
+
+
+def slope(function: Callable[[float], Any], step: float = 1e-3) -> Any:
+    """Derivative at 0."""
+    near, far = (function(way * step) - function(-way * step) for way in (1, 2))
+    return (8.0 * near - far) / (12.0 * step)
 
 
 def bare(file: Path, alone: Sequence[str]) -> tuple[Any, dict[str, float]]:

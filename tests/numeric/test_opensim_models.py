@@ -4,7 +4,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from osim_text import KNEE, LINES, ROLLING, Kind, chain, coefficients, constraints, coupler, points
+from osim_text import (
+    KNEE,
+    LINES,
+    ROLLING,
+    ROLLS,
+    Custom,
+    Kind,
+    chain,
+    coefficients,
+    constraints,
+    coupler,
+    points,
+)
 
 pytest.importorskip(
     "opensim", reason="needs opensim, which has wheels for Linux on x86-64: pip install opensim"
@@ -47,6 +59,14 @@ def test_generalized_forces_and_each_bodys_share_are_opensims(kinds: Sequence[Ki
 def test_a_joint_may_lead_towards_ground(tmp_path: Path) -> None:
     kinds = [KNEE, "UniversalJoint", "SliderJoint"]
     assert max(beside(tmp_path, chain(kinds, turned=(0, 1))).errors()) <= LIMIT
+
+
+def test_where_opensims_velocity_terms_are_off_its_energies_are_not(tmp_path: Path) -> None:
+    """Simbody's are where the second and the third rotation follow one coordinate, as in Rajagopal's knee."""
+    axes = {f"rotation{k + 1}": (axis, "angle", ROLLS) for k, axis in enumerate(("1 0 0", "0 1 0", "0 0 1"))}
+    both = beside(tmp_path, chain(["PinJoint", Custom(("angle",), axes), "PinJoint"]))
+    assert max(both.errors()) > 1e-6
+    assert both.error_of_energies() <= 1e-8
 
 
 @pytest.mark.parametrize("sets", SETS.values(), ids=SETS)
