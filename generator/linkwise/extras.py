@@ -14,6 +14,7 @@ BROUGHT_BY = {
     "pyarrow": "motion",
     "scipy": "motion",
     "torch": "torch",
+    "xarray": "names",
 }
 """The extra of pyproject.toml that installs each library."""
 
