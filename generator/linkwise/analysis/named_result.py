@@ -12,7 +12,7 @@ from linkwise.analysis.result_columns import Column, force_unit
 from linkwise.extras import extra
 from linkwise.package.load import Array
 from linkwise.runtime.named_arrays import Part, dataset
-from linkwise.runtime.robot_axes import Axis, axes_of
+from linkwise.runtime.robot_axes import NamedAxis, axes_of
 from linkwise.version import VERSION
 
 BASE = {"N·m": "rad", "N": "m"}
@@ -42,17 +42,17 @@ def named_result(result: AnalysisResult) -> Any:
     return dataset(parts, axes, ["time"], {"time": ("time", result.time, {"units": "s"})}, about)
 
 
-def _axes(result: AnalysisResult) -> dict[str, Axis]:
+def _axes(result: AnalysisResult) -> dict[str, NamedAxis]:
     robot = result.robot
     rows = robot.constraint_rows
     contacts = () if robot.contacts is None else robot.contacts.names
     components = {_component(column): column.unit.partition("/")[0] for column in _accelerations(result)}
     return axes_of(robot.joints, robot.units, robot.links) | {
-        "load": Axis("load", tuple(borne.name for borne in result.loads)),
-        "constraint": Axis("constraint", rows, tuple(BASE.get(force_unit(row), "") for row in rows)),
-        "contact": Axis("contact", contacts),
-        "point": Axis("point", result.induced),
-        "component": Axis("component", tuple(components), tuple(components.values())),
+        "load": NamedAxis("load", tuple(borne.name for borne in result.loads)),
+        "constraint": NamedAxis("constraint", rows, tuple(BASE.get(force_unit(row), "") for row in rows)),
+        "contact": NamedAxis("contact", contacts),
+        "point": NamedAxis("point", result.induced),
+        "component": NamedAxis("component", tuple(components), tuple(components.values())),
     }
 
 
@@ -65,7 +65,7 @@ def _component(column: Column) -> str:
     return unquote(column.name.split("/")[2])
 
 
-def _values(result: AnalysisResult, kind: str, axes: Sequence[Axis]) -> Array:
+def _values(result: AnalysisResult, kind: str, axes: Sequence[NamedAxis]) -> Array:
     """A quantity's columns as one array, zeros where none is, NaN for rows that a point does not have."""
     out = np.zeros((len(result.time), *(len(axis.names) for axis in axes)))
     dimensions = [axis.dimension for axis in axes]
@@ -80,7 +80,7 @@ def _values(result: AnalysisResult, kind: str, axes: Sequence[Axis]) -> Array:
     return out
 
 
-def _place(column: Column, axis: Axis) -> Any:
+def _place(column: Column, axis: NamedAxis) -> Any:
     """Where along an axis a column stands."""
     match axis.dimension:
         case "joint" | "link" | "point":

@@ -9,6 +9,7 @@ from linkwise.robot.description import Connection, Mimic
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.notes import UNCOUPLED, Note
 from linkwise.robot.robot import Coordinate, unusable
+from linkwise.runtime.chosen_names import nearest_first
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,9 @@ def _check_axes(axes: tuple[Axis, ...], lock: dict[str, float]) -> None:
             )
     for name in lock:
         if name not in counts:
-            raise LinkwiseError(f"--lock {name!r} is not a moving joint; the joints are {listed(counts)}")
+            raise LinkwiseError(
+                f"--lock {name!r} is not a moving joint; the joints are {listed(nearest_first(name, counts))}"
+            )
         if fault := unusable(lock[name]):
             raise LinkwiseError(f"--lock {name!r} has {fault} for a value; give rad or m")
 

@@ -9,6 +9,7 @@ from linkwise.escape import listed
 from linkwise.robot.description import Connection, Description, Loop
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import unusable
+from linkwise.runtime.chosen_names import nearest_first
 
 
 def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
@@ -82,7 +83,8 @@ def cut(description: Description, root: str | None, tip: str | None) -> Descript
     known = {body.name for body in description.bodies}
     for flag, link in (("--root", root), ("--tip", tip)):
         if link is not None and link not in known:
-            raise LinkwiseError(f"{flag} {link!r} is not a link; the links are {listed(sorted(known))}")
+            near = listed(nearest_first(link, sorted(known)))
+            raise LinkwiseError(f"{flag} {link!r} is not a link; the links are {near}")
     kept = known if root is None else _below(description, root)
     if tip is not None:
         parent = {c.child: c.parent for c in description.connections if c.parent in kept}

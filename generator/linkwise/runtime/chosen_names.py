@@ -31,11 +31,11 @@ def end_of_path(given: str) -> str:
 
 
 def nearest_first(given: Any, names: Iterable[str]) -> list[str]:
-    """The names, those that are spelled most like the given one first."""
-    wanted = difflib.SequenceMatcher(b=end_of_path(str(given)).casefold())
+    """The names, those first whose letters and digits are most like those of the given one."""
+    wanted = difflib.SequenceMatcher(b=_letters(given))
 
     def likeness(name: str) -> float:
-        wanted.set_seq1(end_of_path(name).casefold())
+        wanted.set_seq1(_letters(name))
         return wanted.ratio()
 
     return sorted(names, key=likeness, reverse=True)
@@ -63,6 +63,10 @@ def whole_number(given: Any) -> int | None:
         return None if isinstance(given, bool) else index(given)
     except TypeError:
         return None
+
+
+def _letters(name: Any) -> str:
+    return "".join(c for c in end_of_path(str(name)).casefold() if c.isalnum())
 
 
 def choice(given: Any, names: Iterable[str], whole: str) -> str:

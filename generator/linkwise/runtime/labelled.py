@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from .arguments import has_tensors
 from .chosen_names import choice, short
 from .motion_quantities import AppliedLoad
-from .named_arguments import Samples, samples_along, taken
+from .named_arguments import SampleAxes, samples_along, taken
 from .named_arrays import Part, alone, dataset, xarray
 from .quantity_axes import CONSTRAINTS, QUANTITIES
-from .robot_axes import Axis, axes_of, tied_axes
+from .robot_axes import NamedAxis, axes_of, tied_axes
 
 VARIANTS = ("_by_link", "_with_passive")
 """Ends of names of what the arguments of a call choose."""
@@ -65,7 +65,7 @@ def _parts(key: str, answer: Any) -> list[Part]:
 
 
 def _before(
-    part: Part, instants: NDArray[Any] | None, samples: Samples | None, along: Any
+    part: Part, instants: NDArray[Any] | None, samples: SampleAxes | None, along: Any
 ) -> tuple[list[str], dict[str, Any]]:
     """Dimensions before those of the quantities, and what stands along them."""
     quantity, values = part
@@ -78,11 +78,11 @@ def _before(
     return [*first, *samples.dimensions], samples.coordinates | over
 
 
-def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict[str, Axis]:
+def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict[str, NamedAxis]:
     """Axes by the names that quantities have for them."""
     axes = axes_of(robot.joint_names, robot.joint_units, robot.link_names)
     if key.startswith("kinematics.poses"):
-        axes["frame"] = Axis("frame", robot.kinematics.frames)
+        axes["frame"] = NamedAxis("frame", robot.kinematics.frames)
     if ties:
         units = [robot.joint_units[robot.joint_index(name)] for name in ties.independent]
         axes |= tied_axes(ties.independent, units, ties.rows, ties.row_units)
@@ -91,7 +91,7 @@ def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict
         centre = frame == "centre of mass" and frame not in robot.kinematics.frames
         of = "constraint" if key == "induced_reactions" else "joint" if frame is None else "component"
         axes["moved"] = axes["axis" if centre else of]
-        axes["load"] = Axis("load", _names_of(arguments.get("loads", ()), robot.link_names))
+        axes["load"] = NamedAxis("load", _names_of(arguments.get("loads", ()), robot.link_names))
     return axes
 
 

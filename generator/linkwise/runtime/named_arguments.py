@@ -12,7 +12,7 @@ OF_INDEPENDENT = ("yd", "ydd")
 """Arguments of constraints that are of the independent joints."""
 
 
-class Samples(NamedTuple):
+class SampleAxes(NamedTuple):
     """Dimensions before those of a quantity, and what stands along them, as xarray takes it."""
 
     dimensions: Sequence[str]
@@ -21,7 +21,7 @@ class Samples(NamedTuple):
 
 def taken(
     arguments: dict[str, Any], joints: Sequence[str], independent: Sequence[str]
-) -> tuple[dict[str, Any], Samples | None]:
+) -> tuple[dict[str, Any], SampleAxes | None]:
     """The arguments as arrays, joints in the robot's order; and their samples, where some have names.
 
     Raises ValueError for a joint that an argument lacks, and where arguments are of other samples.
@@ -45,22 +45,22 @@ def taken(
         if set(coordinate.dims) <= set(dimensions)
     }
     values = [array.transpose(*dimensions, ...).to_numpy() for array in alike]
-    return arguments | dict(zip(named, values, strict=True)), Samples(dimensions, along)
+    return arguments | dict(zip(named, values, strict=True)), SampleAxes(dimensions, along)
 
 
-def samples_along(along: Any, count: int) -> Samples:
+def samples_along(along: Any, count: int) -> SampleAxes:
     """The axes of samples without names, of which there are so many, as `along` names them.
 
     Raises ValueError where it names more or fewer.
     """
     if along is None:
-        return Samples(["sample"] if count == 1 else [f"sample_{at}" for at in range(count)], {})
+        return SampleAxes(["sample"] if count == 1 else [f"sample_{at}" for at in range(count)], {})
     names = [along] if isinstance(along, str) else list(along)
     if len(names) != count:
         raise ValueError(f"along has {len(names)} names, {names}; the samples have {count} axes")
     if not isinstance(along, Mapping):
-        return Samples(names, {})
-    return Samples(names, {name: _along(name, values) for name, values in along.items()})
+        return SampleAxes(names, {})
+    return SampleAxes(names, {name: _along(name, values) for name, values in along.items()})
 
 
 def _along(name: str, values: Any) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .quantity_axes import ORDER, Quantity
-from .robot_axes import Axis
+from .robot_axes import NamedAxis
 from .units import Unit, inertial, measured, product, written
 
 Part = tuple[Quantity, Any]
@@ -29,7 +29,7 @@ def xarray() -> Any:
 
 def dataset(
     parts: Sequence[Part],
-    axes: Mapping[str, Axis],
+    axes: Mapping[str, NamedAxis],
     before: Sequence[str],
     coordinates: Mapping[str, Any],
     attributes: Mapping[str, Any],
@@ -59,7 +59,7 @@ def dataset(
 
 
 def _with_units(
-    parts: Sequence[Part], axes: Mapping[str, Axis], variables: Mapping[str, Any]
+    parts: Sequence[Part], axes: Mapping[str, NamedAxis], variables: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Coordinates of units that hang on the entry; the others are put among what the variables say."""
     shared: dict[Any, str] = {}
@@ -81,7 +81,7 @@ def names_array(names: Iterable[str]) -> NDArray[Any]:
     return np.array(list(names), dtype=object)
 
 
-def units_of(entries: Sequence[Quantity], axes: Mapping[str, Axis]) -> tuple[list[str], NDArray[Any]]:
+def units_of(entries: Sequence[Quantity], axes: Mapping[str, NamedAxis]) -> tuple[list[str], NDArray[Any]]:
     """Dimensions along which the unit of a quantity changes, and how it is written along these."""
     factors = [_factors(entry.unit) for entry in entries]
     named = {axis for some in factors for _, axis, _ in some if axis}

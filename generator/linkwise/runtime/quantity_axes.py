@@ -13,7 +13,7 @@ class Quantity(NamedTuple):
 
     name: str
     axes: tuple[str, ...]
-    """Names of `robot_axes.Axis`, such as joint; `moved` is what an induced acceleration is of."""
+    """Names of `robot_axes.NamedAxis`, such as joint; `moved` is what an induced acceleration is of."""
     unit: str
     """Factors of it over factors below: symbols, or what is measured along which axis."""
     meaning: str

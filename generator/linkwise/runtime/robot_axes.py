@@ -22,7 +22,7 @@ LOSSES = ("spring", "damping", "friction")
 """What joints have of their own that accelerates, in the order of induced accelerations."""
 
 
-class Axis(NamedTuple):
+class NamedAxis(NamedTuple):
     """An axis of an answer."""
 
     dimension: str
@@ -33,31 +33,31 @@ class Axis(NamedTuple):
     """Of what entries are places of, such as rad and m for joints; none where that means nothing."""
 
 
-def axes_of(joints: Sequence[str], units: Sequence[str], links: Sequence[str]) -> dict[str, Axis]:
+def axes_of(joints: Sequence[str], units: Sequence[str], links: Sequence[str]) -> dict[str, NamedAxis]:
     """Axes of a robot's answers, by the names that `Quantity` has for them."""
     along = tuple(joints), tuple(units)
     return {
-        "joint": Axis("joint", *along),
-        "link": Axis("link", tuple(links)),
-        "cause": Axis("cause", *along),
-        "other_cause": Axis("other_cause", *along),
-        "parameter": Axis("parameter", tuple(PARAMETER_UNITS), tuple(PARAMETER_UNITS.values())),
-        "component": Axis("component", (*TURNS, *MOVES), ("rad",) * 3 + ("m",) * 3),
-        "axis": Axis("axis", MOVES, ("m",) * 3),
-        "world": Axis("world", (*MOVES, "1")),
-        "own": Axis("own", (*MOVES, "origin"), ("1", "1", "1", "m")),
-        "source": Axis("source", LOSSES),
+        "joint": NamedAxis("joint", *along),
+        "link": NamedAxis("link", tuple(links)),
+        "cause": NamedAxis("cause", *along),
+        "other_cause": NamedAxis("other_cause", *along),
+        "parameter": NamedAxis("parameter", tuple(PARAMETER_UNITS), tuple(PARAMETER_UNITS.values())),
+        "component": NamedAxis("component", (*TURNS, *MOVES), ("rad",) * 3 + ("m",) * 3),
+        "axis": NamedAxis("axis", MOVES, ("m",) * 3),
+        "world": NamedAxis("world", (*MOVES, "1")),
+        "own": NamedAxis("own", (*MOVES, "origin"), ("1", "1", "1", "m")),
+        "source": NamedAxis("source", LOSSES),
     }
 
 
 def tied_axes(
     independent: Sequence[str], units: Sequence[str], rows: Sequence[str], row_units: Sequence[str]
-) -> dict[str, Axis]:
+) -> dict[str, NamedAxis]:
     """Axes that constraints add: those of the independent joints, which `units` are of, and of the rows."""
     along = tuple(independent), tuple(units)
     return {
-        "independent": Axis("joint", *along),
-        "independent_cause": Axis("cause", *along),
-        "constraint": Axis("constraint", tuple(rows), tuple(row_units)),
-        "part": Axis("part", ()),
+        "independent": NamedAxis("joint", *along),
+        "independent_cause": NamedAxis("cause", *along),
+        "constraint": NamedAxis("constraint", tuple(rows), tuple(row_units)),
+        "part": NamedAxis("part", ()),
     }

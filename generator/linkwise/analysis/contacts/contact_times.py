@@ -21,6 +21,7 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.package.load import Array, Model
 from linkwise.progress import Progress
+from linkwise.runtime.chosen_names import nearest_first
 
 FLOOR = 1e-3
 """Of the largest measured force, that a contact which is on has at least: a plate may be missed."""
@@ -161,7 +162,7 @@ def switch_columns(contacts: Contacts, log: Path) -> tuple[str, ...]:
         if given.column not in there:
             raise LinkwiseError(
                 f"{log}: --contact-while {name}={given.column}: no column {given.column!r}; the log has"
-                f" {listed(map(repr, there))}; write it as NAME=COLUMN>VALUE"
+                f" {listed(map(repr, nearest_first(given.column, there)))}; write it as NAME=COLUMN>VALUE"
             )
     return tuple(given.column for given in contacts.columns.values())
 
