@@ -7,7 +7,7 @@ from linkwise.analysis.result_columns import load_unit
 from linkwise.analysis.work import Work
 from linkwise.runtime.html_tables import page_part, remark, table
 
-HEAD = ("joint", "peak torque", "mean", "most through", "peak of it", "gave", "took back")
+HEAD = ("joint", "peak |τ|", "mean |τ|", "most through link", "peak of it", "gave", "took back")
 
 
 def result_table(result: AnalysisResult) -> str:

@@ -145,8 +145,10 @@ def _frame(name: str, axes: str, unit: str, meaning: str) -> dict[str, tuple[Qua
 
 
 KINEMATICS: Mapping[str, tuple[Quantity, ...]] = {
-    **_frame("pose", "world own", "place:own", "of a place in the frame to one in the world"),
-    **_frame("poses", "frame world own", "place:own", "of a place in the frame to one in the world"),
+    **_frame("pose", "world own", "place:world / place:own", "of a place in the frame to one in the world"),
+    **_frame(
+        "poses", "frame world own", "place:world / place:own", "of a place in the frame to one in the world"
+    ),
     **_frame(
         "jacobian",
         "component cause",

@@ -18,6 +18,8 @@ PARAMETER_UNITS = {
 """Inertial parameters of a link, in the order of regressors."""
 TURNS, MOVES = ("angular_x", "angular_y", "angular_z"), ("x", "y", "z")
 """Rows of a frame: turns about the world's axes, then its point along them."""
+HOMOGENEOUS = ("m", "m", "m", "1")
+"""Units of the coordinates that a pose takes and gives."""
 LOSSES = ("spring", "damping", "friction")
 """What joints have of their own that accelerates, in the order of induced accelerations."""
 
@@ -44,8 +46,8 @@ def axes_of(joints: Sequence[str], units: Sequence[str], links: Sequence[str]) -
         "parameter": NamedAxis("parameter", tuple(PARAMETER_UNITS), tuple(PARAMETER_UNITS.values())),
         "component": NamedAxis("component", (*TURNS, *MOVES), ("rad",) * 3 + ("m",) * 3),
         "axis": NamedAxis("axis", MOVES, ("m",) * 3),
-        "world": NamedAxis("world", (*MOVES, "1")),
-        "own": NamedAxis("own", (*MOVES, "origin"), ("1", "1", "1", "m")),
+        "world": NamedAxis("world", (*MOVES, "1"), HOMOGENEOUS),
+        "own": NamedAxis("own", (*MOVES, "origin"), HOMOGENEOUS),
         "source": NamedAxis("source", LOSSES),
     }
 

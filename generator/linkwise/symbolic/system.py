@@ -46,6 +46,10 @@ class RigidSystem:
     robot: Robot
     links: tuple[RigidLink, ...]
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the robot."""
+        return self.robot._repr_html_()
+
     @property
     def name(self) -> str:
         """Name of the robot."""
