@@ -25,9 +25,10 @@ def known_as(given: str, names: Collection[str]) -> str | None:
 def end_of_path(given: str) -> str:
     """What a path of OpenSim's leads to, by its own name; any other text as it is."""
     parts = given.split("/")
-    if len(parts) < 3:
+    state = parts[-1] in STATES
+    if len(parts) < 3 or not (state or given.startswith("/")):
         return given
-    return parts[-2] if parts[-1] in STATES else parts[-1]
+    return parts[-2] if state else parts[-1]
 
 
 def nearest_first(given: Any, names: Iterable[str]) -> list[str]:
