@@ -16,6 +16,8 @@ MOST_FOUND, LONGEST_FOUND = 6, 300
 """Names of columns that are offered in all, and letters of what is offered for one."""
 MANY_TURNS = 4 * math.pi
 """An angle past two turns in radians is more likely one in degrees."""
+TIMES = ("time", "t")
+"""Names of the time's column, in any case."""
 STATE, SPEED = (f"/{state}" for state in STATES)
 JOINTS = "/jointset/"
 """How OpenSim's paths of coordinates begin, /jointset/JOINT/COORDINATE, with /value behind among states."""
@@ -133,7 +135,7 @@ def time_column(columns: Sequence[str], reading: Reading) -> int:
             )
         return list(columns).index(reading.time)
     for at, name in enumerate(columns):
-        if name.lower() in {"time", "t"}:
+        if name.lower() in TIMES:
             return at
     raise LinkwiseError(
         f"no column 'time' in {listed(map(repr, columns))}; say which one holds seconds with --time COLUMN"
@@ -142,14 +144,11 @@ def time_column(columns: Sequence[str], reading: Reading) -> int:
 
 def with_nearest(wanted: Sequence[str], found: Sequence[str]) -> str:
     """What is wanted, each beside what was found, the nearest first: 'knee_r' (found 'knee', 'hip')."""
+    if not found:
+        return f"{listed(map(repr, wanted))} (found none)"
     shown = max(1, MOST_FOUND // len(wanted))
-    return listed(
-        (
-            f"{name!r} (found {listed(map(repr, nearest_first(name, found)[:shown])) or 'none'})"
-            for name in wanted
-        ),
-        longest=LONGEST_FOUND,
-    )
+    near = {name: listed(map(repr, nearest_first(name, found)[:shown])) for name in wanted}
+    return listed((f"{name!r} (found {those})" for name, those in near.items()), longest=LONGEST_FOUND)
 
 
 def _mapped(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> dict[str, str]:

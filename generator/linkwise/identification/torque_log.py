@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples
-from linkwise.analysis.column_matching import with_columns, with_nearest
+from linkwise.analysis.column_matching import TIMES, with_columns, with_nearest
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.logs import open_log
@@ -177,8 +177,9 @@ def _torque_columns(
         missing += [] if there else [joint]
     if missing:
         example = missing[0]
+        others = [column for column in columns if column not in joints and column.lower() not in TIMES]
         raise LinkwiseError(
-            f"no torque column for joint {with_nearest(missing, columns)}; call it 'tau/{example}' or "
+            f"no torque column for joint {with_nearest(missing, others)}; call it 'tau/{example}' or "
             f"'{example}_moment', or name it with --torque COLUMN={example}; where nothing measures it, as "
             f"of a floating base, say so with --unmeasured {example}"
         )

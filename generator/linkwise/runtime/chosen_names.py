@@ -32,7 +32,9 @@ def end_of_path(given: str) -> str:
 
 
 def nearest_first(given: Any, names: Iterable[str]) -> list[str]:
-    """The names, those first whose letters and digits are most like those of the given one."""
+    """The names, those first whose letters and digits are most like those of a text that is given."""
+    if not isinstance(given, str):
+        return list(names)
     wanted = difflib.SequenceMatcher(b=_letters(given))
 
     def likeness(name: str) -> float:
@@ -66,8 +68,8 @@ def whole_number(given: Any) -> int | None:
         return None
 
 
-def _letters(name: Any) -> str:
-    return "".join(c for c in end_of_path(str(name)).casefold() if c.isalnum())
+def _letters(name: str) -> str:
+    return "".join(c for c in end_of_path(name).casefold() if c.isalnum())
 
 
 def choice(given: Any, names: Iterable[str], whole: str) -> str:
