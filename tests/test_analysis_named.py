@@ -54,12 +54,16 @@ def test_a_torque_is_found_by_joint_link_cause_and_order(leg: Any) -> None:
 
 def test_every_column_is_an_entry_of_a_quantity(leg: Any) -> None:
     found = leg.to_xarray()
-    entries = {name: found[name].values.reshape(len(leg.time), -1) for name in found.data_vars}
+    over_time = [name for name in found.data_vars if "time" in found[name].dims]
+    entries = {name: found[name].values.reshape(len(leg.time), -1) for name in over_time}
     there = {values.tobytes() for name in entries for values in entries[name].T}
     for column, values in zip(leg.columns[1:], leg.values[1:], strict=True):
         assert values.tobytes() in there, column.name
     for name in ("q", "qdd", "torque", "partial_torque", "load_torque", "power", "constraint_force"):
         np.testing.assert_array_equal(found[name], getattr(leg, name))
+    for name in ("work", "joint_work", "load_work", "contact_work"):
+        work = getattr(leg, name)
+        np.testing.assert_array_equal(found[name].sel(way="given") - found[name].sel(way="taken"), work.net)
 
 
 def test_units_are_those_of_the_columns(leg: Any) -> None:

@@ -85,3 +85,14 @@ COLUMNS: Mapping[Kind, Quantity] = {
     **_induced("acc_kinematic", "induced_kinematic", "cause"),
 }
 """By the quantity of the columns; the axes of points are told by the result."""
+
+WORKS: Mapping[str, Quantity] = {
+    name: Quantity(name, axes, "J", meaning)
+    for name, axes, meaning in (
+        ("work", ("joint", "link"), "what the joint gave to the link, and took back"),
+        ("joint_work", ("joint",), "what the joint gave to all links together, and took back"),
+        ("load_work", ("joint", "load"), "what the joint gave against the load, and took back"),
+        ("contact_work", ("link", "contact"), "what the contact fed into the link, and took back"),
+    )
+}
+"""Over the whole movement, by the result's own names."""

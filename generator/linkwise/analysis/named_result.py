@@ -1,12 +1,12 @@
 """A result as xarray's Dataset, each quantity with names along its axes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 
-from linkwise.analysis.named_quantities import COLUMNS
+from linkwise.analysis.named_quantities import COLUMNS, WORKS
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import Column, force_unit
 from linkwise.extras import extra
@@ -39,7 +39,18 @@ def named_result(result: AnalysisResult) -> Any:
         "provenance": result.provenance,
         "linkwise": VERSION,
     }
-    return dataset(parts, axes, ["time"], {"time": ("time", result.time, {"units": "s"})}, about)
+    found = dataset(parts, axes, ["time"], {"time": ("time", result.time, {"units": "s"})}, about)
+    return found.merge(dataset(list(_works(result)), axes, [], {}, {}))
+
+
+def _works(result: AnalysisResult) -> Iterator[Part]:
+    """What was given and what was taken back, over the whole movement."""
+    of = {"work": result.work, "joint_work": result.joint_work}
+    of |= {"load_work": result.load_work} if result.loads else {}
+    of |= {"contact_work": result.contact_work} if result.robot.contacts is not None else {}
+    for name, work in of.items():
+        for way, values in (("given", work.given), ("taken", work.taken)):
+            yield WORKS[name]._replace(beside=("way", way)), values
 
 
 def _axes(result: AnalysisResult) -> dict[str, NamedAxis]:
