@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import DATA
 from linkwise import Contact, Load, Options, Reading, generate, read_robot, read_system, write_package
 from linkwise.analysis import analyze
 from linkwise.cli.app import app
@@ -180,7 +181,8 @@ def test_displays_hold_names_as_text_and_no_colour_of_their_own(hostile: Any, tm
     (tmp_path / "robot.toml").write_text(chain("<b>evil</b>", HOSTILE[:7]), encoding="utf-8")
     robot = read_robot(tmp_path / "robot.toml")
     loaded = hostile.robot.package.module.load("numpy")
-    for one in (hostile, robot, robot.links[2], loaded, read_system("planar3", Options("symbolic"))):
+    systems = read_system("planar3", Options("symbolic")), read_system(DATA / "turntable.py")
+    for one in (hostile, robot, robot.links[2], loaded, *systems):
         page = one._repr_html_()
         assert Shown(page).tags <= {"div", "p", "table", "tr", "th", "td", "br"}
         assert "color:" not in page.replace("border-color:color-mix", "")

@@ -137,9 +137,8 @@ def time_column(columns: Sequence[str], reading: Reading) -> int:
     for at, name in enumerate(columns):
         if name.lower() in TIMES:
             return at
-    raise LinkwiseError(
-        f"no column 'time' in {listed(map(repr, columns))}; say which one holds seconds with --time COLUMN"
-    )
+    near = listed(map(repr, nearest_first("time", columns)))
+    raise LinkwiseError(f"no column 'time' in {near}; say which one holds seconds with --time COLUMN")
 
 
 def with_nearest(wanted: Sequence[str], found: Sequence[str]) -> str:

@@ -64,8 +64,10 @@ def _check_names(description: Description) -> None:
     for c in description.connections:
         for role, link in (("parent", c.parent), ("child", c.child)):
             if link not in known:
+                near = listed(nearest_first(link, sorted(known)))
                 raise LinkwiseError(
                     f"joint {c.name!r} has the {role} {link!r}, which is not a link; correct it or add one"
+                    f"; the links are {near}"
                 )
         mimic = (c.mimic.ratio, c.mimic.offset) if c.mimic else ()
         origin = (*c.translation, *(entry for row in c.rotation for entry in row))
