@@ -13,7 +13,7 @@ from installation import needs_of
 
 PAGE = Path(__file__).parents[1] / "docs/licences.md"
 MARK = "<!-- from here on by `make licences` -->\n"
-USERS = ("", "torch", "onnx", "mjcf", "motion", "logs", "identify")
+USERS = ("", "torch", "onnx", "mjcf", "motion", "logs", "identify", "names")
 DEVELOPERS = ("docs", "test", "lint")
 NOT_LISTED = re.compile(r"linkwise$|(nvidia|cuda|triton)\b")
 """linkwise itself, and what PyTorch brings for GPUs of one maker, of which the page says a line."""

@@ -75,7 +75,7 @@ def test_forces_are_on_the_bodies_and_in_the_axes_that_the_file_says(leg: Path) 
     [
         (
             {"body": "calcn_r"},
-            r"grf.xml: load 'right' on 'calcn_r': leg has no such body; its bodies are base, .*foot",
+            r"grf.xml: load 'right' on 'calcn_r': leg has no such body; its bodies are carriage, .*foot",
         ),
         ({"body": "base"}, r"grf.xml: load 'right' on 'base': that stands on the ground"),
         ({"side": "2_"}, r"force_identifier is '2_ground_force_v', and 0 columns of grf.mot begin so"),

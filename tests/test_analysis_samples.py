@@ -57,7 +57,7 @@ def test_unlikely_units_are_warned_of(tmp_path, scale, units, warning):
 @pytest.mark.parametrize(
     ("columns", "reading", "message"),
     [
-        (("time", "joint1", "joint2"), {}, "no column for joint 'joint3'; name it with --map"),
+        (("time", "joint1", "joint2"), {}, "no column for joint 'joint3' .found none.; name it with --map C"),
         (("time", *JOINTS, "emg"), {}, "no joint for column 'emg'; .* --ignore-extra"),
         (("stamp", *JOINTS), {}, "no column 'time' .* --time COLUMN"),
         (("time", *JOINTS, "joint1"), {}, "column 'joint1' stands twice"),
@@ -86,8 +86,31 @@ def test_opensim_states_are_matched_by_the_coordinate():
     assert (found.joints, found.ignored) == ((1, 3, 5), STATES[2::2])
     with pytest.raises(LinkwiseError, match="no joint for column '/forceset/soleus/activation'; leave"):
         select((*STATES, "/forceset/soleus/activation"), JOINTS, Reading())
-    with pytest.raises(LinkwiseError, match=r"no column for joint 'joint1'; name it with --map"):
+    twice = (
+        r"'joint1' \(found '/jointset/j/joint1/value', '/jointset/other/joint1/value'\); name it with --map"
+    )
+    with pytest.raises(LinkwiseError, match=twice):
         select((*STATES, "/jointset/other/joint1/value"), JOINTS, Reading())
+
+
+def test_a_path_of_opensim_is_its_coordinate_wherever_it_comes_from():
+    paths = ("time", "/jointset/j/joint1", "j/joint2/value", "angle")
+    reading = Reading(mapping=(("angle", "/jointset/j/joint3/value"),))
+    assert select(paths, JOINTS, reading).joints == (1, 2, 3)
+    with pytest.raises(LinkwiseError, match="no column for joint 'joint1'"):
+        select(("time", "/jointset/j/joint1/speed", *JOINTS[1:]), JOINTS, Reading())
+
+
+def test_each_joint_that_is_wanted_stands_beside_the_nearest_columns_of_the_log():
+    joints = ("hip_flexion_r", "knee_angle_r", "ankle_angle_r")
+    columns = ("time", "emg", "AnkleAngleR", "knee_angle_left", "/jointset/hip/hip_flex_r/value", "knee_r")
+    with pytest.raises(LinkwiseError) as told:
+        select(columns, joints, Reading())
+    assert str(told.value) == (
+        "no column for joint 'hip_flexion_r' (found '/jointset/hip/hip_flex_r/value', 'AnkleAngleR'), "
+        "'knee_angle_r' (found 'knee_angle_left', 'AnkleAngleR'), "
+        "'ankle_angle_r' (found 'AnkleAngleR', 'knee_angle_left'); name it with --map COLUMN=hip_flexion_r"
+    )
 
 
 @pytest.mark.parametrize(

@@ -300,9 +300,9 @@ BAD: dict[str, tuple[Callable[[LoadedRobot, Path], dict[str, Any]], str]] = {
         lambda robot, folder: {
             "log": write_csv(folder / "log.csv", np.zeros((30, 4)) + np.arange(30)[:, None])
         },
-        "no torque column for joint 'joint1', 'joint2', 'joint3'; call it 'tau/joint1' or 'joint1_moment', "
-        "or name it with --torque COLUMN=joint1; where nothing measures it, as of a floating base, say so "
-        "with --unmeasured joint1",
+        "no torque column for joint 'joint1', 'joint2', 'joint3' (found none); call it 'tau/joint1' or "
+        "'joint1_moment', or name it with --torque COLUMN=joint1; where nothing measures it, as of a "
+        "floating base, say so with --unmeasured joint1",
     ),
     "no such joint to leave out": (
         lambda robot, folder: {

@@ -157,7 +157,9 @@ def test_symbolic_parameters_default_to_the_robots_numbers(
 
 def test_unknown_parameter_and_backend_are_named(package_of: Callable[[str], ModuleType]) -> None:
     package = package_of("planar3 symbolic")
-    with pytest.raises(ValueError, match=r"no parameter 'm_9'; near it are m_3, m_2, m_1, and `param"):
+    with pytest.raises(
+        ValueError, match=r"no parameter 'm_9'; near it are m_1, m_2, m_3, l_1, r_1, I_1, and `param"
+    ):
         package.load("numpy", parameters={"m_9": 1.0})
     with pytest.raises(ValueError, match=r"no back end 'jax'.*choose one of numpy, torch, autograd"):
         package.load("jax")

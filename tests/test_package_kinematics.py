@@ -222,7 +222,7 @@ def test_large_batches_are_computed_in_pieces_that_fit(arm: ModuleType) -> None:
 def test_what_is_no_frame_is_named(arm: ModuleType) -> None:
     kinematics = arm.load("numpy").kinematics
     with pytest.raises(
-        ValueError, match="frame is 'tol', which is not there; choose base, upper, fore, tool"
+        ValueError, match="frame is 'tol', which is not there; choose tool, fore, base, upper"
     ):
         kinematics.pose(Q, "tol")
     with pytest.raises(

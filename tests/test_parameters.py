@@ -183,7 +183,7 @@ REFUSED = {
     "near": ({"m_uper": 1.0}, "no parameter 'm_uper'; near it are m_upper, .*and `parameters` has all 24"),
     "far": (
         {"zzz": 1.0},
-        "no parameter 'zzz'; near it are l1, m_fore, m_upper, .*and `parameters` has all 24",
+        "no parameter 'zzz'; near it are I_fore_zz, I_upper_zz, .*and `parameters` has all 24",
     ),
     "shapes": (
         {"m_upper": np.ones(3), "I_upper_xx": np.full(2, 0.01)},

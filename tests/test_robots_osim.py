@@ -257,7 +257,7 @@ def test_what_is_not_modelled_is_refused_by_its_place(text: str, message: str, t
             "'patella_slide' follows 'knee_angle', which --root or --tip cuts away",
         ),
         (Options(base="floating"), "'ground' is the world, which cannot float"),
-        (Options(lock={"knee_t1": 0.0}), "'knee_t1' is not a moving joint; the joints are hip_adduction"),
+        (Options(lock={"knee_t1": 0.0}), "'knee_t1' is not a moving joint; the joints are knee_angle"),
     ],
     ids=["cut", "floating", "locked"],
 )

@@ -16,6 +16,7 @@ BROUGHT_BY = {
     "rosbags": "logs",
     "scipy": "motion",
     "torch": "torch",
+    "xarray": "names",
 }
 """The extra of pyproject.toml that installs each library."""
 

@@ -102,6 +102,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_parameters.py",
             "tests/test_runtime.py",
             "tests/test_user_energies.py",
+            "tests/test_labelled.py",
             CHECK,
             "tests/numeric/test_regressors.py",
         ),
@@ -159,6 +160,7 @@ ROOMS: dict[str, Room] = {
             "tests/test_analysis_files.py",
             "tests/test_analysis_pictures.py",
             "tests/test_analysis_page.py",
+            "tests/test_analysis_named.py",
         ),
     ),
     "identification": Room(

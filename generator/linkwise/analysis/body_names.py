@@ -2,25 +2,23 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from difflib import get_close_matches
 
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.package.manifest import FrameEntry
+from linkwise.runtime.chosen_names import known_as, nearest_first
 
 
 def body_frame(what: str, body: str, robot: LoadedRobot) -> FrameEntry:
     """The frame of a body of the file; raises LinkwiseError, names near it first, where there is none."""
     tree = robot.package.manifest.tree
     frames = {} if tree is None else {frame.name: frame for frame in tree.frames}
-    if body not in frames:
-        near = get_close_matches(body, frames, 3)
-        others = [name for name in frames if name not in near]
-        raise LinkwiseError(
-            f"{what} {body!r}: {robot.name} has no such body; its bodies are {listed([*near, *others])}"
-        )
-    return frames[body]
+    name = known_as(body, frames)
+    if name is None:
+        near = listed(nearest_first(body, frames))
+        raise LinkwiseError(f"{what} {body!r}: {robot.name} has no such body; its bodies are {near}")
+    return frames[name]
 
 
 def named_body(text: str, robot: LoadedRobot) -> tuple[str, str]:

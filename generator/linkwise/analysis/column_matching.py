@@ -9,11 +9,17 @@ from linkwise.analysis.logs import Log
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
+from linkwise.runtime.chosen_names import STATES, end_of_path, known_as, nearest_first
 
+MOST_FOUND, LONGEST_FOUND = 6, 300
+"""Names of columns that are offered in all, and letters of what is offered for one."""
 MANY_TURNS = 4 * math.pi
 """An angle past two turns in radians is more likely one in degrees."""
-STATE = "/value"
-"""How OpenSim ends a coordinate's column among the states: /jointset/JOINT/COORDINATE/value."""
+TIMES = ("time", "t")
+"""Names of the time's column, in any case."""
+STATE, SPEED = (f"/{state}" for state in STATES)
+JOINTS = "/jointset/"
+"""How OpenSim's paths of coordinates begin, /jointset/JOINT/COORDINATE, with /value behind among states."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +60,11 @@ def select(
     missing = [joint for joint, column in source.items() if column not in at_column]
     used = {*source.values(), columns[time]}
     free = [column for column in columns if column not in used and column not in beside]
-    speeds = {f"{column.removesuffix(STATE)}/speed" for column in used if column.endswith(STATE)}
+    speeds = {f"{column.removesuffix(STATE)}{SPEED}" for column in used if column.endswith(STATE)}
     if missing:
+        positions = [column for column in free if not column.endswith(SPEED)]
         raise LinkwiseError(
-            f"no column for joint {listed(map(repr, missing))}; name it with --map COLUMN={missing[0]}"
-            f" (columns not used: {listed(map(repr, free)) if free else 'none'})"
+            f"no column for joint {with_nearest(missing, positions)}; name it with --map COLUMN={missing[0]}"
         )
     extra = [column for column in free if column not in speeds and column not in brought]
     if extra and not reading.ignore_extra:
@@ -126,36 +132,51 @@ def time_column(columns: Sequence[str], reading: Reading) -> int:
     if reading.time is not None:
         if reading.time not in columns:
             raise LinkwiseError(
-                f"--time {reading.time}: no such column; the log has {listed(map(repr, columns))}"
+                f"--time {reading.time}: no such column; the log has"
+                f" {listed(map(repr, nearest_first(reading.time, columns)))}"
             )
         return list(columns).index(reading.time)
     for at, name in enumerate(columns):
-        if name.lower() in {"time", "t"}:
+        if name.lower() in TIMES:
             return at
-    raise LinkwiseError(
-        f"no column 'time' in {listed(map(repr, columns))}; say which one holds seconds with --time COLUMN"
-    )
+    near = listed(map(repr, nearest_first("time", columns)))
+    raise LinkwiseError(f"no column 'time' in {near}; say which one holds seconds with --time COLUMN")
+
+
+def with_nearest(wanted: Sequence[str], found: Sequence[str]) -> str:
+    """What is wanted, each beside what was found, the nearest first: 'knee_r' (found 'knee', 'hip')."""
+    if not found:
+        return f"{listed(map(repr, wanted))} (found none)"
+    shown = max(1, MOST_FOUND // len(wanted))
+    near = {name: listed(map(repr, nearest_first(name, found)[:shown])) for name in wanted}
+    return listed((f"{name!r} (found {those})" for name, those in near.items()), longest=LONGEST_FOUND)
 
 
 def _mapped(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> dict[str, str]:
     """Name of each joint's column, in the robot's order."""
     source = {joint: _named(joint, columns) for joint in joints}
-    for column, joint in reading.mapping:
-        if joint not in source:
+    for column, given in reading.mapping:
+        joint = known_as(given, joints)
+        if joint is None:
             raise LinkwiseError(
-                f"--map {column}={joint}: the robot has no joint {joint!r}; its joints are"
-                f" {listed(map(repr, joints))}"
+                f"--map {column}={given}: the robot has no joint {given!r}; its joints are"
+                f" {listed(map(repr, nearest_first(given, joints)))}"
             )
         if column not in columns:
             raise LinkwiseError(
                 f"--map {column}={joint}: the log has no column {column!r}; it has"
-                f" {listed(map(repr, columns))}"
+                f" {listed(map(repr, nearest_first(column, columns)))}"
             )
         source[joint] = column
     return source
 
 
 def _named(joint: str, columns: Sequence[str]) -> str:
-    """The column of a joint's name; where there is none, the only state of that coordinate."""
-    states = [column for column in columns if column.startswith("/") and column.endswith(f"/{joint}{STATE}")]
-    return states[0] if joint not in columns and len(states) == 1 else joint
+    """The column of a joint's name; where there is none, the only path of OpenSim's to that coordinate."""
+    paths = [
+        column
+        for column in columns
+        if end_of_path(column) == joint
+        and (column.endswith(STATE) or (column.startswith(JOINTS) and not column.endswith(SPEED)))
+    ]
+    return paths[0] if joint not in columns and len(paths) == 1 else joint

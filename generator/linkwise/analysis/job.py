@@ -15,8 +15,10 @@ from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.loads.read_loads import placed_loads
 from linkwise.analysis.logs import Log, open_log
+from linkwise.analysis.named_result import named_result
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_record import record
+from linkwise.analysis.result_table import result_table
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
@@ -43,6 +45,23 @@ class Analysis(AnalysisResult):
         """
         extra("matplotlib.pyplot")  # switches on a notebook's display of figures
         return draw(self, name)
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset of all quantities, with names along the axes: time, joint, link, cause, order.
+
+        to_xarray().propagation.sel(joint="knee_angle_r", link="foot") is (time, cause, order): what each
+        joint's acceleration and velocity ask of the knee through the foot. Quantities are called as the
+        properties here, or as `robot.labelled` of a package calls them. The attribute `units` has the unit;
+        where joints of angles and of lengths differ, `units_from` names the coordinate that has. It is saved
+        by to_netcdf or to_zarr, and as wide as all joints times all links: zeros stand where no column is.
+
+        Raises LinkwiseError without xarray.
+        """
+        return named_result(self)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: of each joint its torque and work, and through which link most comes."""
+        return result_table(self)
 
     def record(self) -> dict[str, Any]:
         """Everything but the samples, as plain data: choices, closure, columns and their totals."""

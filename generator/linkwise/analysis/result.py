@@ -16,6 +16,7 @@ from linkwise.analysis.work import Work
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, printable
 from linkwise.package.load import Array
+from linkwise.runtime.chosen_names import nearest_first
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +74,13 @@ class AnalysisResult:
             if column.name == name:
                 found: Array = values
                 return found
-        raise LinkwiseError(f"no column {name!r}; there are {[c.name for c in self.columns]}")
+        near = nearest_first(name, (c.name for c in self.columns))
+        raise LinkwiseError(f"no column {name!r}; nearest are {listed(map(repr, near))}")
+
+    @property
+    def table(self) -> dict[str, Array]:
+        """All columns (S,) by their names: pandas.DataFrame(result.table), polars.DataFrame(result.table)."""
+        return {column.name: values for column, values in zip(self.columns, self.values, strict=True)}
 
     @property
     def time(self) -> Array:

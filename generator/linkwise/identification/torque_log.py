@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples
-from linkwise.analysis.column_matching import with_columns
+from linkwise.analysis.column_matching import TIMES, with_columns, with_nearest
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.logs import open_log
@@ -19,6 +19,7 @@ from linkwise.escape import listed
 from linkwise.identification.position_noise import position_noise
 from linkwise.package.load import Array
 from linkwise.progress import Progress
+from linkwise.runtime.chosen_names import nearest_first
 
 SPELLINGS = ("tau/{}", "tau_{}", "{}_moment", "{}_force", "{}_torque", "{}/effort", "{}_effort")
 """How logs name the torque of a joint: `analyze`, scripts, OpenSim's inverse dynamics, ROS."""
@@ -130,7 +131,8 @@ def _measured(
     for joint in unmeasured:
         if joint not in joints:
             raise LinkwiseError(
-                f"--unmeasured {joint}: there is no such joint; there are {listed(map(repr, joints))}"
+                f"--unmeasured {joint}: there is no such joint; there are "
+                f"{listed(map(repr, nearest_first(joint, joints)))}"
             )
     for column, joint in torques:
         if joint in unmeasured:
@@ -161,9 +163,11 @@ def _torque_columns(
     given = {joint: column for column, joint in torques}
     for joint, column in given.items():
         if joint not in joints or column not in columns:
-            what, there = ("joint", joints) if joint not in joints else ("column", columns)
+            missing_joint = joint not in joints
+            what, wanted, there = ("joint", joint, joints) if missing_joint else ("column", column, columns)
             raise LinkwiseError(
-                f"--torque {column}={joint}: there is no such {what}; there are {listed(map(repr, there))}"
+                f"--torque {column}={joint}: there is no such {what}; there are "
+                f"{listed(map(repr, nearest_first(wanted, there)))}"
             )
     found, missing = [], []
     for joint in measured:
@@ -173,8 +177,9 @@ def _torque_columns(
         missing += [] if there else [joint]
     if missing:
         example = missing[0]
+        others = [column for column in columns if column not in joints and column.lower() not in TIMES]
         raise LinkwiseError(
-            f"no torque column for joint {listed(map(repr, missing))}; call it 'tau/{example}' or "
+            f"no torque column for joint {with_nearest(missing, others)}; call it 'tau/{example}' or "
             f"'{example}_moment', or name it with --torque COLUMN={example}; where nothing measures it, as "
             f"of a floating base, say so with --unmeasured {example}"
         )

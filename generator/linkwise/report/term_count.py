@@ -8,6 +8,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.report.expand import Variables
 from linkwise.report.laurent import DIGIT, Laurent, add, exponents, lifted
+from linkwise.runtime.chosen_names import known_as, nearest_first
 
 ORDERS = ("gravity", "velocity", "acceleration")
 
@@ -36,11 +37,12 @@ class TermQuery:
 
 def position(text: str, names: Sequence[str], option: str) -> int:
     """Index of a name, or of a number from 1; raises LinkwiseError naming the choices."""
-    if text in names:
-        return names.index(text)
+    if (name := known_as(text, names)) is not None:
+        return names.index(name)
     if text.isascii() and text.isdigit() and len(text) < 10 and 1 <= int(text) <= len(names):
         return int(text) - 1
-    raise LinkwiseError(f"{option} {text!r} is not there; choose 1..{len(names)} or {listed(names)}")
+    near = listed(nearest_first(text, names))
+    raise LinkwiseError(f"{option} {text!r} is not there; choose 1..{len(names)} or {near}")
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from linkwise.robot.joint_types import expand
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import Coupling, Frame, Tie
 from linkwise.robot.ties import Ends, check_ties, tied
+from linkwise.runtime.chosen_names import nearest_first
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ def check_constraints(description: Description) -> None:
             raise LinkwiseError("a constraint has an empty name; name it")
         if count > 1:
             raise LinkwiseError(f"{count} constraints are named {name!r}; rename all but one")
-    check_ties(description.ties, description.bodies)
+    check_ties(description.ties, description.bodies, description.sites)
     if description.couplings:
         check_joints(
             description.couplings, {axis.name for c in description.connections for axis in expand(c)}
@@ -69,10 +70,11 @@ def constrained(
     wanted = tuple(name for item in wanted for name in (_names(item, known) if independent else [item]))
     for name, count in Counter(wanted).items():
         if name not in known:
+            told = f"the joints are {listed(nearest_first(name, known))}"
             raise LinkwiseError(
-                f"--independent {name!r} is not a moving joint; the joints are {listed(known)}"
+                f"--independent {name!r} is not a moving joint; {told}"
                 if independent
-                else f"independent has {name!r}, which is not a moving joint; the joints are {listed(known)}"
+                else f"independent has {name!r}, which is not a moving joint; {told}"
             )
         if count > 1:
             raise LinkwiseError(f"the independent joint {name!r} is given {count} times; give it once")

@@ -11,6 +11,7 @@ from linkwise.robot.description import Connection, Mimic
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.notes import UNCOUPLED, Note
 from linkwise.robot.robot import Coordinate, unusable
+from linkwise.runtime.chosen_names import nearest_first
 
 
 @dataclass(frozen=True)
@@ -117,9 +118,8 @@ def _check_axes(axes: tuple[Axis, ...], coordinates: list[str], lock: dict[str, 
             )
     for name in lock:
         if name not in coordinates:
-            raise LinkwiseError(
-                f"--lock {name!r} is not a moving joint; the joints are {listed(coordinates)}"
-            )
+            near = listed(nearest_first(name, coordinates))
+            raise LinkwiseError(f"--lock {name!r} is not a moving joint; the joints are {near}")
         if fault := unusable(lock[name]):
             raise LinkwiseError(f"--lock {name!r} has {fault} for a value; give rad or m")
 

@@ -3,10 +3,12 @@
 from collections.abc import Collection, Iterable, Mapping
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.robot.coordinates import AxisRule
 from linkwise.robot.description import JointCoupling
 from linkwise.robot.notes import UNCOUPLED, Note
 from linkwise.robot.robot import Coupling, unusable
+from linkwise.runtime.chosen_names import nearest_first
 
 CLOSE = 1e-9
 """In rad and m, by which joints that stand still may miss what a coupling asks of them."""
@@ -54,7 +56,7 @@ def check_joints(couplings: Iterable[JointCoupling], axes: Collection[str]) -> N
             if joint not in axes:
                 raise LinkwiseError(
                     f"constraint {coupling.name!r} couples {joint!r}, which is not a joint that moves; "
-                    "correct it"
+                    f"correct it: the joints are {listed(nearest_first(joint, sorted(axes)))}"
                 )
 
 

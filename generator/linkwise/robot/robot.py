@@ -10,6 +10,7 @@ import sympy as sp
 from linkwise.errors import LinkwiseError
 from linkwise.robot.curve import Curve
 from linkwise.robot.notes import Note
+from linkwise.robot.robot_display import description_table, link_table
 
 Scalar: TypeAlias = float | sp.Expr
 """A number, or a SymPy expression in named parameters."""
@@ -140,6 +141,10 @@ class Link:
     com: Vec3
     inertia: Mat3
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: what the link weighs, where, and on which joint it hangs."""
+        return link_table(self)
+
     @property
     def massless(self) -> bool:
         """Whether the link carries neither mass nor inertia, and so has no Lagrangian."""
@@ -244,6 +249,10 @@ class Robot:
                     raise LinkwiseError(f"a {what} has an empty name; name it")
                 if count > 1:
                     raise LinkwiseError(f"two {what}s are named {name!r}; rename one")
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: joints with unit and limits, links with mass and parent."""
+        return description_table(self)
 
     @property
     def joint_limits(self) -> tuple[Limits, ...]:

@@ -6,10 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import sympy as sp
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.description import Anchor, AnchoredTie, Body, Description, Site
 from linkwise.robot.notes import LEFT_OUT, Note
 from linkwise.robot.robot import Frame, Scalar, Tie, unusable
+from linkwise.runtime.chosen_names import nearest_first
 
 CLOSE = 1e-6
 """In m, by which ends that move as one may miss a tie without a word."""
@@ -48,14 +50,20 @@ def anchor_frames(description: Description, taken: Iterable[str]) -> tuple[tuple
     return (*sites, *made), ends
 
 
-def check_ties(ties: Iterable[AnchoredTie], bodies: Iterable[Body]) -> None:
-    """Raise LinkwiseError for links that the file doesn't have, and numbers that cannot be."""
+def check_ties(ties: Iterable[AnchoredTie], bodies: Iterable[Body], sites: Iterable[Site]) -> None:
+    """Raise LinkwiseError for links that the file doesn't have, and numbers that cannot be.
+
+    sites: those by whose names ends could have been given too
+    """
     known = {body.name for body in bodies}
+    names = [*sorted(known), *(site.name for site in sites)]
     for tie in ties:
         for anchor in (tie.first, tie.second):
             if anchor.body not in known:
+                near = listed(nearest_first(anchor.body, names))
                 raise LinkwiseError(
-                    f"constraint {tie.name!r} ties {anchor.body!r}, which is not a link or a site; correct it"
+                    f"constraint {tie.name!r} ties {anchor.body!r}, which is not a link or a site; "
+                    f"correct it: there are {near}"
                 )
             if fault := unusable(*anchor.translation, *(e for row in anchor.rotation for e in row)):
                 raise LinkwiseError(f"constraint {tie.name!r} has {fault} in its place; give numbers")

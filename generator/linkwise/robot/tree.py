@@ -9,6 +9,7 @@ from linkwise.escape import listed
 from linkwise.robot.description import Connection, Description, Loop
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import unusable
+from linkwise.runtime.chosen_names import nearest_first
 
 
 def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
@@ -63,8 +64,10 @@ def _check_names(description: Description) -> None:
     for c in description.connections:
         for role, link in (("parent", c.parent), ("child", c.child)):
             if link not in known:
+                near = listed(nearest_first(link, sorted(known)))
                 raise LinkwiseError(
                     f"joint {c.name!r} has the {role} {link!r}, which is not a link; correct it or add one"
+                    f"; the links are {near}"
                 )
         mimic = (c.mimic.ratio, c.mimic.offset) if c.mimic else ()
         origin = (*c.translation, *(entry for row in c.rotation for entry in row))
@@ -82,7 +85,8 @@ def cut(description: Description, root: str | None, tip: str | None) -> Descript
     known = {body.name for body in description.bodies}
     for flag, link in (("--root", root), ("--tip", tip)):
         if link is not None and link not in known:
-            raise LinkwiseError(f"{flag} {link!r} is not a link; the links are {listed(sorted(known))}")
+            near = listed(nearest_first(link, sorted(known)))
+            raise LinkwiseError(f"{flag} {link!r} is not a link; the links are {near}")
     kept = known if root is None else _below(description, root)
     if tip is not None:
         parent = {c.child: c.parent for c in description.connections if c.parent in kept}

@@ -13,6 +13,8 @@ import sympy as sp
 from linkwise.errors import LinkwiseError
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import Coordinate, Joint, Mat3, Robot, Scalar, Vec3
+from linkwise.runtime.html_tables import page_part, table
+from linkwise.runtime.robot_table import joint_table
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,10 @@ class RigidSystem:
 
     robot: Robot
     links: tuple[RigidLink, ...]
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the robot."""
+        return self.robot._repr_html_()
 
     @property
     def name(self) -> str:
@@ -91,6 +97,14 @@ class EnergySystem:
     links: tuple[LinkEnergy, ...]
     parameters: Mapping[sp.Symbol, float] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: coordinates, and links with those that move them."""
+        names = [c.name for c in self.coordinates]
+        moved = [", ".join(names[k] for k in self.path(j)) for j in range(len(self.links))]
+        links = [(str(j), *row) for j, row in enumerate(zip(self.link_names, moved, strict=True))]
+        joints = joint_table(names, [c.unit for c in self.coordinates], ())
+        return page_part(self.name, joints, table(("j", "link", "moved by"), links))
 
     @property
     def link_names(self) -> tuple[str, ...]:

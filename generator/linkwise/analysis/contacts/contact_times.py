@@ -21,6 +21,7 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.package.load import Array, Model
 from linkwise.progress import Progress
+from linkwise.runtime.chosen_names import nearest_first
 
 FLOOR = 1e-3
 """Of the largest measured force, that a contact which is on has at least: a plate may be missed."""
@@ -158,9 +159,10 @@ def switch_columns(contacts: Contacts, log: Log) -> tuple[str, ...]:
     """Columns of the motion's log that say when contacts are on; raises LinkwiseError for one not there."""
     for name, given in contacts.columns.items():
         if given.column not in log.columns:
+            near = listed(map(repr, nearest_first(given.column, log.columns)))
             raise LinkwiseError(
                 f"{log.path}: --contact-while {name}={given.column}: no column {given.column!r}; the log has"
-                f" {listed(map(repr, log.columns))}; write it as NAME=COLUMN>VALUE"
+                f" {near}; write it as NAME=COLUMN>VALUE"
             )
     return tuple(given.column for given in contacts.columns.values())
 

@@ -11,6 +11,7 @@ from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import moving_joints
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
+from linkwise.runtime.chosen_names import nearest_first
 from linkwise.runtime.constraints.held_frames import ground_normal
 from linkwise.runtime.constraints.independent_joints import loose_base
 from linkwise.runtime.robot_constraints import Contact
@@ -55,7 +56,7 @@ def _unactuated(robot: LoadedRobot, given: Sequence[str]) -> tuple[int, ...]:
         if name not in robot.driven_joints:
             raise LinkwiseError(
                 f"--unactuated {name}: {robot.name} has no such joint that moves by itself; they are"
-                f" {listed(robot.driven_joints)}"
+                f" {listed(nearest_first(name, robot.driven_joints))}"
             )
     model: Any = robot.model
     base = [robot.joints.index(name) for name in given] or list(loose_base(model.backend.tree))
@@ -100,6 +101,5 @@ def _check_names(names: Sequence[str], contacts: Contacts) -> None:
         raise LinkwiseError(f"contact {twice[0]!r} stands twice; tell them apart as NAME:FRAME")
     strange = [name for name in contacts.columns if name not in names]
     if strange:
-        raise LinkwiseError(
-            f"--contact-while {strange[0]}=…: there is no such contact; they are {listed(names)}"
-        )
+        near = listed(nearest_first(strange[0], names))
+        raise LinkwiseError(f"--contact-while {strange[0]}=…: there is no such contact; they are {near}")

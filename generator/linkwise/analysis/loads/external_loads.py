@@ -13,6 +13,7 @@ from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
+from linkwise.runtime.chosen_names import nearest_first
 
 GROUND = "ground"
 NONE = ("", "Unassigned")
@@ -73,7 +74,7 @@ def _three(load: LoadColumns, key: str, identifier: str, columns: Sequence[str])
         there = f"{len(found)} columns of {load.log.name} begin so"
         raise LinkwiseError(
             f"load {load.name!r}: {key} is {identifier!r}, and {there}; it needs three, x, y and z, of"
-            f" {listed(map(repr, columns))}"
+            f" {listed(map(repr, nearest_first(identifier, columns)))}"
         )
     return tuple(found)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from linkwise.analysis.body_names import named_body
-from linkwise.analysis.column_matching import time_column
+from linkwise.analysis.column_matching import time_column, with_nearest
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.analysis.settings import Reading
@@ -54,16 +54,21 @@ def load_columns(
             f"no load for column {listed(map(repr, extra))}; name columns BODY/force_x, BODY/moment_x or"
             " BODY/point_x, or leave such columns out with --ignore-extra"
         )
-    return tuple(_load(log, time, load, parts, robot) for load, parts in found.items())
+    return tuple(_load(log, time, load, parts, robot, columns) for load, parts in found.items())
 
 
 def _load(
-    log: Path, time: int, load: str, parts: dict[str, dict[str, int]], robot: LoadedRobot
+    log: Path,
+    time: int,
+    load: str,
+    parts: dict[str, dict[str, int]],
+    robot: LoadedRobot,
+    there: Sequence[str],
 ) -> LoadColumns:
     name, body = named_body(load, robot)
     missing = [f"{load}/{part}_{axis}" for part, axes in parts.items() for axis in "xyz" if axis not in axes]
     if missing:
-        raise LinkwiseError(f"no column {listed(map(repr, missing))}; a load has x, y and z of what it has")
+        raise LinkwiseError(f"no column {with_nearest(missing, there)}; a load has x, y and z of what it has")
     if not {"force", "moment"} & set(parts):
         raise LinkwiseError(f"load {load!r} has a point and neither force nor moment; add {load}/force_x, …")
     columns = {part: tuple(parts[part][axis] for axis in "xyz") for part in parts}

@@ -13,6 +13,7 @@ from linkwise.analysis.show.shares_figure import shares
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.plotstyle import saved, styled
+from linkwise.runtime.chosen_names import nearest_first
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,5 +58,5 @@ def check_figure(name: str, robot: LoadedRobot, points: Sequence[str]) -> None:
     if kind not in FIGURES or (joint and (kind != "paper" or joint not in robot.driven_joints)):
         raise LinkwiseError(
             f"--figure {name}: give one of {', '.join(FIGURES)}, or paper:JOINT with a joint of"
-            f" {listed(robot.driven_joints)}, or induced:POINT"
+            f" {listed(nearest_first(joint, robot.driven_joints))}, or induced:POINT"
         )

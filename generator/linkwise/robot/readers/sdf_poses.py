@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.description import IDENTITY, ZERO3
 from linkwise.robot.robot import Rotation, Vec3
+from linkwise.runtime.chosen_names import nearest_first
 
 MODEL, WORLD = "__model__", "world"
 PLACED = ("link", "joint", "frame")
@@ -101,7 +103,10 @@ class ModelPoses:
             return None
         if name not in self._named:
             hint = "; write nested models out" if "::" in name else ""
-            raise LinkwiseError(f"{asked_by} names {name!r}, which is no link, joint or frame here{hint}")
+            near = listed(nearest_first(name, self._named))
+            raise LinkwiseError(
+                f"{asked_by} names {name!r}, which is no link, joint or frame here{hint}; there are {near}"
+            )
         return self._named[name]
 
     def _first_link(self) -> str:

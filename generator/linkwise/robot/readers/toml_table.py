@@ -10,6 +10,7 @@ from linkwise.escape import listed
 from linkwise.robot.readers.bounded import MIB, check_toml_bounds, content
 from linkwise.robot.readers.formula import parse_formula
 from linkwise.robot.robot import Scalar, Vec3, unusable
+from linkwise.runtime.chosen_names import nearest_first
 
 
 def toml_data(path: Path) -> dict[str, Any]:
@@ -36,9 +37,8 @@ class TomlTable:
         self.place, self.data, self.parameters = place, data, parameters
         for key in data:
             if key not in known:
-                raise LinkwiseError(
-                    f"{place} has the unknown key {key!r}; known are {listed(sorted(known), 20)}"
-                )
+                near = listed(nearest_first(key, sorted(known)), 20)
+                raise LinkwiseError(f"{place} has the unknown key {key!r}; known are {near}")
 
     def text(self, key: str, default: str | None = None) -> str:
         """A string."""

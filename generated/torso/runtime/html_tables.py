@@ -1,0 +1,48 @@
+"""Small tables for notebooks, in light and dark: they bring no colours of their own."""
+
+import html
+from collections.abc import Iterable, Sequence
+
+MOST_ROWS, LONGEST = 60, 80
+"""Of a table, and of a cell in letters; of rows beyond the number is told."""
+CELL = "text-align:left;vertical-align:top;padding:.15em 1em .15em 0;white-space:nowrap"
+HEAD = f"{CELL};font-weight:normal;opacity:.65"
+LINE = "border-bottom:1px solid;border-color:color-mix(in srgb,currentColor 25%,transparent)"
+TITLE = "margin:0 0 .4em;font-weight:600"
+
+
+def page_part(title: str, *tables: str) -> str:
+    """A title, and tables side by side as far as there is room."""
+    beside = "".join(tables)
+    return (
+        f'<div><p style="{TITLE}">{text(title)}</p>'
+        f'<div style="display:flex;flex-wrap:wrap;gap:1em 2.5em;align-items:flex-start">{beside}</div></div>'
+    )
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of texts."""
+    every = list(rows)
+    more = [[f"and {len(every) - MOST_ROWS} more", *[""] * (len(head) - 1)]] if len(every) > MOST_ROWS else []
+    heads = "".join(f'<th style="{HEAD};{LINE}">{text(cell)}</th>' for cell in head)
+    lines = (
+        "".join(f'<td style="{CELL}">{text(_short(cell))}</td>' for cell in row)
+        for row in [*every[:MOST_ROWS], *more]
+    )
+    body = "".join(f'<tr style="background:none">{line}</tr>' for line in lines)
+    return f'<table style="border-collapse:collapse;margin:0"><tr>{heads}</tr>{body}</table>'
+
+
+def text(cell: str) -> str:
+    """Text of HTML, in which what cannot be seen is written out."""
+    return html.escape(cell if cell.isprintable() else repr(cell))
+
+
+def remark(*lines: str) -> str:
+    """Small lines below."""
+    told = "<br>".join(map(text, lines))
+    return f'<p style="margin:.5em 0 0;font-size:.85em;opacity:.7">{told}</p>'
+
+
+def _short(cell: str) -> str:
+    return cell if len(cell) <= LONGEST else f"{cell[: LONGEST - 3]}..."
