@@ -1,12 +1,47 @@
 """Joints, links and others chosen by number or by name, and what to offer where there is no such name."""
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from operator import index
 from typing import Any
 
 MOST_NAMES = 6
 LONGEST = 60
+STATES = ("value", "speed")
+"""How OpenSim ends a coordinate's path where it is a state: /jointset/JOINT/COORDINATE/value."""
+
+
+def known_as(given: str, names: Collection[str]) -> str | None:
+    """The name that is given, or the one at the end of a path of OpenSim's; None for neither.
+
+    /jointset/hip_r/hip_flexion_r/value is hip_flexion_r, /bodyset/foot_r is foot_r.
+    """
+    if given in names:
+        return given
+    name = end_of_path(given)
+    return name if name in names else None
+
+
+def end_of_path(given: str) -> str:
+    """What a path of OpenSim's leads to, by its own name; any other text as it is."""
+    parts = given.split("/")
+    state = parts[-1] in STATES
+    if len(parts) < 3 or not (state or given.startswith("/")):
+        return given
+    return parts[-2] if state else parts[-1]
+
+
+def nearest_first(given: Any, names: Iterable[str]) -> list[str]:
+    """The names, those first whose letters and digits are most like those of a text that is given."""
+    if not isinstance(given, str):
+        return list(names)
+    wanted = difflib.SequenceMatcher(b=_letters(given))
+
+    def likeness(name: str) -> float:
+        wanted.set_seq1(_letters(name))
+        return wanted.ratio()
+
+    return sorted(names, key=likeness, reverse=True)
 
 
 def position_of(given: Any, names: Sequence[str], kind: str, argument: str) -> int:
@@ -14,8 +49,8 @@ def position_of(given: Any, names: Sequence[str], kind: str, argument: str) -> i
 
     kind: what there are names of, such as joint; joint_names then lists them
     """
-    if isinstance(given, str) and given in names:
-        return names.index(given)
+    if isinstance(given, str) and (name := known_as(given, names)) is not None:
+        return names.index(name)
     number = whole_number(given)
     if number is not None and 0 <= number < len(names):
         return number
@@ -33,13 +68,17 @@ def whole_number(given: Any) -> int | None:
         return None
 
 
+def _letters(name: str) -> str:
+    return "".join(c for c in end_of_path(name).casefold() if c.isalnum())
+
+
 def choice(given: Any, names: Iterable[str], whole: str) -> str:
-    """All names where they are few, else those near the given one, and where all of them are."""
-    known = list(names)
+    """The names, those nearest the given one first; of many these alone, and where all of them are."""
+    known = nearest_first(given, names)
+    near = ", ".join(map(plain, known[:MOST_NAMES]))
     if len(known) <= MOST_NAMES:
-        return ", ".join(map(plain, known))
-    near = difflib.get_close_matches(str(given), known, MOST_NAMES, 0.5) or known[:MOST_NAMES]
-    return f"near it are {', '.join(map(plain, near))}, and `{whole}` has all {len(known)}"
+        return near
+    return f"near it are {near}, and `{whole}` has all {len(known)}"
 
 
 def plain(name: str) -> str:

@@ -11,7 +11,6 @@ from .interface import Backend
 from .outputs import accepted
 from .passive_joints import passive_torques
 from .quantities import (
-    PARAMETERS,
     Coefficients,
     Energy,
     GradientPropagation,
@@ -20,6 +19,8 @@ from .quantities import (
     Power,
     Propagation,
 )
+from .quantity_axes import ARRAYS
+from .robot_axes import axes_of
 from .structure import Structure
 
 KINDS: dict[str, Any] = {
@@ -42,22 +43,14 @@ Shapes = tuple[tuple[int, ...], ...]
 
 def answer_shapes(structure: Structure) -> dict[str, Shapes]:
     """Shapes of each call's results for one sample."""
-    n, links, sizes = structure.n, structure.N, structure.sizes
-    cubes: Shapes = ((n, links, n), (n, links, n), (n, links))
+    axes, sizes = axes_of(structure.joint_names, structure.joint_units, structure.link_names), structure.sizes
     return {
         "packed": tuple((size,) for size in sizes),
         "packed_torque": ((sizes.tau,),),
-        "partial_torque": ((n, links),),
-        "inverse_dynamics": ((n,),),
-        "coefficients": cubes,
-        "propagation": cubes,
-        "gradient_propagation": cubes,
-        "position_gradient": ((n, links, n),),
         "packed_position_gradient": ((sizes.c1,),),
-        "masked": ((n, links),),
-        "regressor": ((n, links, PARAMETERS),),
-        "passive_torque": ((n,),) * len(PassiveTorque._fields),
-        "coefficient_regressors": tuple((*shape, PARAMETERS) for shape in cubes),
+    } | {
+        call: tuple(tuple(len(axes[axis].names) for axis in quantity.axes) for quantity in quantities)
+        for call, quantities in ARRAYS.items()
     }
 
 

@@ -18,10 +18,12 @@ from numpy.typing import ArrayLike
 
 from .controller_calls import ControllerCalls
 from .interface import Array, Backend
+from .labelled import labelled
 from .motion_calls import MotionCalls
 from .quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
 from .robot_constraints import Constraints, Contact
 from .robot_kinematics import Kinematics
+from .robot_table import robot_table
 from .structure import JointLimits, Layout, Structure
 from .sum_calls import SumCalls
 
@@ -141,6 +143,29 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         autograd; raises TypeError on another back end, ValueError for a call or argument that is not there.
         """
         return self.backend.module(self, call, fixed)
+
+    def labelled(self, call: str, *given: Any, along: Any = None, **named: Any) -> Any:
+        """The answer of a call with names along its axes: an xarray DataArray, or a Dataset of several.
+
+        call: its name, such as "partial_torque", "kinematics.jacobian" or "constraints.forces"; the call's
+        own arguments follow. Arguments may be DataArrays: joints are then found by their names, whatever
+        their order, and the other axes, such as time, are those of the answer.
+        along: names of the axes of samples without names: "time", ("trial", "time") or {"time": instants};
+        sample unless given
+
+        labelled("partial_torque", q, qd, qdd).sel(joint="knee", link="foot") is tau_ij. Axes are joint i,
+        link j, cause k; `order` tells shares by acceleration from those by velocity. The attribute `units`
+        has the unit; where joints of angles and of lengths differ, `units_from` names the coordinate with it.
+        Values are NumPy's arrays, without gradients.
+
+        Raises ImportError without xarray, ValueError for a call without such axes, such as packed, or a joint
+        that an argument lacks, and what the call raises.
+        """
+        return labelled(self, None, call, given, named, along)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: joints with unit and limits, links with the joints that move them."""
+        return robot_table(self.structure, repr(self).strip("<>"))
 
     def __repr__(self) -> str:
         counts = {"joint": self.n, "link": self.N, "parameter": len(self.parameters)}

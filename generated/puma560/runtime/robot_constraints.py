@@ -3,6 +3,7 @@
 from typing import Any, Generic, NamedTuple
 
 from .interface import Array
+from .labelled import labelled
 from .quantities import Coefficients, ConstrainedMotion, Propagation
 
 
@@ -80,6 +81,16 @@ class Constraints(Generic[Array]):
         """What each of the C rows holds: "loop force_x", say."""
         rows: tuple[str, ...] = self._answers.rows
         return rows
+
+    @property
+    def row_units(self) -> tuple[str, ...]:
+        """In which each row is open: rad or m; none for a coupling, whose sum may have any."""
+        units: tuple[str, ...] = self._answers.row_units
+        return units
+
+    def labelled(self, call: str, *given: Any, along: Any = None, **named: Any) -> Any:
+        """`Dynamics.labelled` of these calls: made.labelled("forces", q, qd, qdd)."""
+        return labelled(self._answers.robot, self, call, given, named, along)
 
     @property
     def independent(self) -> tuple[str, ...]:

@@ -8,8 +8,9 @@ that it multiplies.
 from typing import Generic, NamedTuple
 
 from .interface import Array
+from .robot_axes import PARAMETER_UNITS
 
-PARAMETERS = 10
+PARAMETERS = len(PARAMETER_UNITS)
 """Inertial parameters of a link: m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz."""
 
 

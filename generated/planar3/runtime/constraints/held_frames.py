@@ -49,6 +49,11 @@ class Held(NamedTuple):
         """What each row holds."""
         return [f"{self.name} {row}" for row in ROWS[self.kind]]
 
+    @property
+    def row_units(self) -> list[str]:
+        """In which each row is open where the frames are not together: rad or m."""
+        return ["rad" if row in TURNS else "m" for row in ROWS[self.kind]]
+
 
 def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
     """Ties of the tree, then contacts; raises as `Dynamics.constrained` does."""

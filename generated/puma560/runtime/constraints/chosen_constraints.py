@@ -38,6 +38,10 @@ class ChosenConstraints:
             *(row for one in self.held for row in one.row_names),
             *(coupling.name for coupling in tree.couplings),
         )
+        self.row_units = (
+            *(unit for one in self.held for unit in one.row_units),
+            *("" for _ in tree.couplings),  # whose numbers make the unit of their sum
+        )
         self.row_names = tuple(
             [one.name for one in self.held for _ in one.row_names] + [c.name for c in tree.couplings]
         )

@@ -21,7 +21,7 @@ class ConstraintAnswers:
         self.robot = robot
         self._chosen, self._tie_rows, self._tolerance = chosen, rows, tolerance
         self._columns = joint_columns(chosen.independent, robot.n)
-        self.names, self.rows = chosen.names, chosen.rows
+        self.names, self.rows, self.row_units = chosen.names, chosen.rows, chosen.row_units
         self.independent = tuple(robot.joint_names[k] for k in self._columns.independent)
         self.dependent = tuple(robot.joint_names[k] for k in self._columns.dependent)
         self._told = RowNames(chosen.rows, chosen.row_names, robot.joint_names)

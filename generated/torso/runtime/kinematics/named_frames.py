@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from ..chosen_names import choice, short, whole_number
+from ..chosen_names import choice, known_as, short, whole_number
 
 
 def frame_index(given: Any, frames: Sequence[str], links: Sequence[str]) -> int:
@@ -12,8 +12,8 @@ def frame_index(given: Any, frames: Sequence[str], links: Sequence[str]) -> int:
     Raises ValueError for one that is not there, TypeError for what is neither a name nor a number.
     """
     if isinstance(given, str):
-        if given in frames:
-            return frames.index(given)
+        if (name := known_as(given, frames)) is not None:
+            return frames.index(name)
         known = choice(given, frames, "kinematics.frames")
         raise ValueError(f"frame is {short(given)}, which is not there; choose {known}")
     number = whole_number(given)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from ..answers import KINDS, MOTION, Answers, Shapes
+from ..answers import KINDS, MOTION, Answers
 from ..interface import Backend
 from ..structure import Structure
 from .namespace import side_by_side
@@ -13,25 +13,6 @@ GIVEN = dict.fromkeys(("forward_dynamics", "forward_dynamics_with_passive"), ("q
 """Names of the arguments of calls that are not given q, qd and qdd."""
 
 
-def sum_shapes(structure: Structure) -> dict[str, Shapes]:
-    """Shapes of each call's results for one sample."""
-    n, links = structure.n, structure.N
-    return {
-        "mass_matrix": ((n, n),),
-        "mass_matrix_by_link": ((n, links, n),),
-        "coriolis_matrix": ((n, n),),
-        "coriolis_matrix_by_link": ((n, links, n),),
-        "gravity_torque": ((n,),),
-        "gravity_torque_by_link": ((n, links),),
-        "forward_dynamics": ((n,),),
-        "forward_dynamics_with_passive": ((n,),),
-        "energy": ((links,), (links,)),
-        "power": ((n, links, n), (n, links, n), (n, links)),
-        "christoffel": ((n, n, n),),
-        "christoffel_by_link": ((n, links, n, n),),
-    }
-
-
 class SumAnswers(Answers):
     """The calls of a back end, its sums too; arguments as `Dynamics` says."""
 
@@ -39,7 +20,6 @@ class SumAnswers(Answers):
         self, structure: Structure, backend: Backend[Any], check_finite: bool, composed: Any = None
     ) -> None:
         super().__init__(structure, backend, check_finite, composed)
-        self._shapes |= sum_shapes(structure)
         self._sums = Summed(structure, backend, self._parts)
 
     def mass_matrix(self, q: Any, by_link: bool, out: Any = None) -> Any:
