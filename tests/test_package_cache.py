@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from command_line import run_linkwise
 from conftest import DATA
-from linkwise import LinkwiseError, Options, kept_package
+from linkwise import LinkwiseError, Options, analyze, kept_package
 from linkwise.package.manifest import FILE
 
 KNEE = DATA / "knee.osim"
@@ -94,3 +94,14 @@ def test_options_of_reading_make_another_package_and_are_refused_for_one_that_is
     assert "is read already: leave --lock out, or name the robot's own file" in done.stderr
     done = run_linkwise(*asked, "--robot", KNEE, folder=tmp_path)
     assert "no joint for column 'ankle_angle'" in done.stderr
+
+
+def test_columns_of_joints_that_the_file_couples_are_left_out_unasked(tmp_path: Path) -> None:
+    log, paths = walk(tmp_path), ("patella_slide", "/jointset/groove/patella_slide/value")
+    head, *rows = log.read_text().splitlines()
+    log.write_text("\n".join([",".join((head, *paths)), *(f"{row},0.1,0.1" for row in rows)]))
+    found = analyze(log, kept_package(KNEE, "numpy").directory)
+    assert found.ignored == paths
+    log.write_text("\n".join([f"{head},arm", *(f"{row},0.1" for row in rows)]))
+    with pytest.raises(LinkwiseError, match="no joint for column 'arm'"):
+        analyze(log, kept_package(KNEE, "numpy").directory)

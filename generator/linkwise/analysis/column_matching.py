@@ -42,11 +42,13 @@ def select(
     reading: Reading,
     beside: Collection[str] = (),
     brought: Collection[str] = (),
+    coupled: Collection[str] = (),
 ) -> Selection:
     """Match columns to joints by `reading.mapping`, else by name, also as OpenSim's states name them.
 
     beside: columns that are of no joint, and asked for elsewhere
-    brought: columns that the log's format has of itself, which may be left out unasked
+    brought: columns that the log's format has of itself, and coupled: joints that follow others by the
+    robot's file, whose columns may be left out unasked
 
     Raises LinkwiseError for a joint without a column, a column used twice, and a column without a joint
     where that was not allowed.
@@ -66,7 +68,8 @@ def select(
         raise LinkwiseError(
             f"no column for joint {with_nearest(missing, positions)}; name it with --map COLUMN={missing[0]}"
         )
-    extra = [column for column in free if column not in speeds and column not in brought]
+    unasked = {*speeds, *brought, *(column for column in free if end_of_path(column) in coupled)}
+    extra = [column for column in free if column not in unasked]
     if extra and not reading.ignore_extra:
         raise LinkwiseError(
             f"no joint for column {listed(map(repr, extra))}; leave such columns out with --ignore-extra,"

@@ -206,11 +206,12 @@ def _samples(
     switches: columns of the log that say when contacts are on
     """
     if robot.constrained is None:
-        return read_samples(log, robot.joints, robot.units, reading, progress, buffer, switches), None
+        joints = robot.joints, robot.units
+        return read_samples(log, *joints, reading, progress, buffer, switches, robot.coupled), None
     followers = set(robot.constrained.constraints.dependent)
     with within(str(log.path)):
         there = with_columns(log.columns, robot.joints, followers, reading)
     names, units = (tuple(given[k] for k in there) for given in (robot.joints, robot.units))
-    samples = read_samples(log, names, units, reading, progress, buffer, switches)
+    samples = read_samples(log, names, units, reading, progress, buffer, switches, robot.coupled)
     with within(str(log.path)):
         return closed_samples(samples, there, robot.constrained, reading.loop_tolerance, progress, buffer)

@@ -45,6 +45,11 @@ class LoadedRobot:
     """Where the robot stands on the ground."""
 
     @property
+    def coupled(self) -> frozenset[str]:
+        """Joints of the file that follow coordinates and are none themselves."""
+        return frozenset(body.joint for body in self.bodies or ()) - set(self.joints)
+
+    @property
     def driven(self) -> tuple[int, ...]:
         """Joints that have torques: all, or the independent ones."""
         every = tuple(range(len(self.joints)))

@@ -2,7 +2,7 @@
 
 import mmap
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,16 +43,17 @@ def read_samples(
     progress: Progress,
     buffer: Path | None = None,
     beside: Sequence[str] = (),
+    coupled: Collection[str] = (),
 ) -> Samples:
     """Read, convert to SI and check a log.
 
     joint_units: one for each joint, "rad" or "m"
     buffer: a directory on whose disk, as a rule, a buffer keeps the samples; None keeps them in memory
-    beside: columns that something else reads
+    beside: columns that something else reads; coupled: joints whose columns may be left out unasked
     Raises LinkwiseError that names file, row and column for what cannot be analysed.
     """
     with within(str(log.path)):
-        selection = select(log.columns, joints, reading, beside, log.brought)
+        selection = select(log.columns, joints, reading, beside, log.brought, coupled)
     angles = [at for at, unit in enumerate(joint_units, 1) if unit == "rad"]
     factor = radians_per_unit(log, reading)
     peaks = np.zeros(1 + len(joints))

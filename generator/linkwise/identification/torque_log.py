@@ -83,6 +83,7 @@ def read_torque_log(
         (*(robot.units[k] for k in moving), *["N m"] * len(names)),
         replace(reading, mapping=mapping),
         progress,
+        coupled=robot.coupled,
     )
     torque = samples.q[:, len(moving) :] * factor
     with within(str(path)):
