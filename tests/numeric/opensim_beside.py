@@ -6,12 +6,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import opensim as osim
-from linkwise import generate, read_robot, read_system, write_package
+from linkwise import Options, generate, read_robot, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 
 from numeric.opensim_model import numbers
 
+AS_OPENSIM = Options(allow_unphysical=True)
+"""OpenSim takes bodies that cannot exist, as some public models have."""
 SPECK = 1e-14
 """Mass and inertia of a body that is to have none: OpenSim asks for some."""
 
@@ -21,8 +23,9 @@ class Beside:
 
     def __init__(self, file: Path, package: Path) -> None:
         osim.Logger.setLevelString("Error")
+        osim.Logger.removeFileSink()
         self.file = file
-        write_package(generate(read_system(file), ["numpy"]), package)
+        write_package(generate(read_system(file, AS_OPENSIM), ["numpy"]), package)
         module: Any = import_package(package)
         self.robot = module.load("numpy")
         self.names: Sequence[str] = self.robot.joint_names
@@ -137,7 +140,7 @@ def bare(file: Path, alone: Sequence[str]) -> tuple[Any, dict[str, float]]:
 
 def merged(file: Path) -> dict[str, list[str]]:
     """Each link's body, and those that are fixed to it."""
-    robot = read_robot(file)
+    robot = read_robot(file, AS_OPENSIM)
     links = {link.name: [link.name] for link in robot.links}
     for note in robot.notes:
         if note.kind == "merged" and (onto := note.detail.removeprefix("into ")) in links:

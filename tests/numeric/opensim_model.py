@@ -15,6 +15,7 @@ class OpenSimModel:
 
     def __init__(self, robot: RobotData) -> None:
         osim.Logger.setLevelString("Error")
+        osim.Logger.removeFileSink()
         self.model = osim.Model()
         self.model.setGravity(osim.Vec3(*robot.gravity))
         self.root = robot.links[0].name
