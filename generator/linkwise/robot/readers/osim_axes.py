@@ -1,0 +1,131 @@
+"""Axes of an OpenSim joint, in its frame on the parent: which coordinate moves each, and by which function.
+
+First comes what slides, along axes of that frame, then what turns, each axis turned by those before it; a
+UniversalJoint, say, turns about x and y.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+from xml.etree.ElementTree import Element
+
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+from linkwise.robot import transforms
+from linkwise.robot.curve import Curve
+from linkwise.robot.joint_types import X, Y, Z
+from linkwise.robot.readers.osim_coordinates import Rule
+from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of
+from linkwise.robot.readers.osim_functions import IDENTITY, constant, function_of
+
+Kind = Literal["revolute", "prismatic"]
+Part = tuple[Kind, tuple[float, float, float], int]
+"""An axis, and which of the joint's coordinates moves it."""
+
+TURNING: tuple[Part, ...] = (("revolute", X, 0), ("revolute", Y, 1), ("revolute", Z, 2))
+TYPES: dict[str, tuple[Part, ...]] = {
+    "WeldJoint": (),
+    "PinJoint": (("revolute", Z, 0),),
+    "SliderJoint": (("prismatic", X, 0),),
+    "UniversalJoint": TURNING[:2],
+    "GimbalJoint": TURNING,
+    "BallJoint": TURNING,
+    "FreeJoint": (("prismatic", X, 3), ("prismatic", Y, 4), ("prismatic", Z, 5), *TURNING),
+    "PlanarJoint": (("prismatic", X, 1), ("prismatic", Y, 2), ("revolute", Z, 0)),
+}
+CUSTOM = "CustomJoint"
+KINDS: tuple[tuple[Kind, str], ...] = (("prismatic", "translation"), ("revolute", "rotation"))
+"""Of a SpatialTransform; what slides comes first, for in the file it stands last."""
+
+
+@dataclass(frozen=True)
+class MovedAxis:
+    """An axis, in the joint's frame, and the function of one of the joint's coordinates by which it moves."""
+
+    kind: Kind
+    direction: tuple[float, float, float]
+    coordinate: str = ""
+    curve: Curve = IDENTITY
+
+    @property
+    def one_to_one(self) -> bool:
+        """Whether it moves as far as its coordinate, there or back."""
+        return self.curve.line is not None and abs(self.curve.line[1]) == 1.0
+
+    def rule(self, rules: Mapping[str, Rule]) -> Rule:
+        """How it moves by what is free."""
+        if not self.coordinate:
+            return Rule("", self.curve)
+        return rules[self.coordinate].of(self.curve)
+
+
+def carrier(axes: Sequence[MovedAxis], coordinate: str) -> int | None:
+    """Index of the axis that stands for a coordinate: what it moves one to one, or by a line, if any."""
+
+    def remoteness(at: int) -> tuple[bool, bool, bool, bool]:
+        axis, curve = axes[at], axes[at].curve
+        return not axis.one_to_one, curve.line is None, axis.kind != "revolute", curve != IDENTITY
+
+    own = (at for at, axis in enumerate(axes) if axis.coordinate == coordinate)
+    return min(own, key=remoteness, default=None)
+
+
+def axes_of(joint: Element, coordinates: Sequence[str]) -> Iterator[MovedAxis]:
+    """Axes of a joint with coordinates of these names; raises LinkwiseError for what is not modelled."""
+    place = f"joint {name_of(joint)!r}"
+    if joint.tag == CUSTOM:
+        yield from _custom(joint, coordinates, place)
+        return
+    parts = TYPES.get(joint.tag)
+    if parts is None:
+        raise LinkwiseError(
+            f"{place} is of type {joint.tag}, which is not modelled; make it one of "
+            f"{listed([CUSTOM, *TYPES])}"
+        )
+    if len(coordinates) != len(parts):
+        raise LinkwiseError(
+            f"{place} is a {joint.tag} with {len(coordinates)} coordinates; give it {len(parts)}"
+        )
+    for kind, direction, number in parts:
+        yield MovedAxis(kind, direction, coordinates[number])
+
+
+def _custom(joint: Element, coordinates: Sequence[str], place: str) -> Iterator[MovedAxis]:
+    transform = joint.find("SpatialTransform")
+    given = {name_of(axis): axis for axis in (transform if transform is not None else ())}
+    for kind, word in KINDS:
+        for number, usual in enumerate((X, Y, Z), 1):
+            name = f"{word}{number}"
+            if name in given:
+                yield from _axis(given[name], kind, usual, coordinates, f"{place}, {name}")
+
+
+def _axis(
+    axis: Element, kind: Kind, usual: tuple[float, float, float], coordinates: Sequence[str], place: str
+) -> Iterator[MovedAxis]:
+    """The axis, or none where it stands still at 0."""
+    coordinate, curve = _displacement(axis, coordinates, place)
+    if not coordinate and curve(0.0) == 0.0:
+        return
+    direction = transforms.unit(numbers_of(axis, "axis", " ".join(map(str, usual)), place, 3))
+    if direction is None:
+        raise LinkwiseError(f"{place} has a zero axis; give its direction, such as 0 0 1")
+    yield MovedAxis(kind, direction, coordinate, curve)
+
+
+def _displacement(axis: Element, coordinates: Sequence[str], place: str) -> tuple[str, Curve]:
+    """The coordinate of an axis, empty where it stands still, and its function of that."""
+    names = text_of(axis, "coordinates").split()
+    if len(names) > 1:
+        raise LinkwiseError(
+            f"{place} is a function of {len(names)} coordinates; only functions of one are modelled"
+        )
+    if names and names[0] not in coordinates:
+        raise LinkwiseError(
+            f"{place} names {names[0]!r}, which is not a coordinate of the joint; it has "
+            f"{listed(coordinates)}"
+        )
+    curve = function_of(axis, "function", place) or constant(0.0)
+    if not names or (curve.line is not None and curve.line[1] == 0.0):
+        return "", constant(curve(0.0))
+    return names[0], curve
