@@ -227,7 +227,7 @@ def test_nothing_is_leaked_or_freed_twice(planar3: ModuleType) -> None:
 
     def rise() -> list[int]:
         before = counts()
-        for _ in range(300):
+        for _ in range(100):
             for call in CALLS.values():
                 call(robot, *motion)
             robot.packed(*motion, out=out)
