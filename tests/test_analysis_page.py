@@ -1,6 +1,7 @@
 """The page's template and the data in it."""
 
 import base64
+import gzip
 import json
 import re
 from dataclasses import replace
@@ -11,6 +12,7 @@ from linkwise.analysis import analyze
 from linkwise.analysis.show.page import TEMPLATE, page_data, report, view
 from linkwise.emit.render import variables
 from motion_logs import PLANAR3, smooth, write_csv
+from plotly.offline import get_plotlyjs
 
 EVIL = '</script><script>alert("1")</script>&<!--'
 
@@ -18,6 +20,11 @@ EVIL = '</script><script>alert("1")</script>&<!--'
 @pytest.fixture(scope="module")
 def analysis(tmp_path_factory):
     return analyze(write_csv(tmp_path_factory.mktemp("a") / "a.csv", smooth(80, 3)), PLANAR3)
+
+
+def unpacked(html: str, name: str) -> str:
+    block = re.search(rf'<script type="application/gzip" id="{name}">(.*?)</script>', html, re.S)
+    return gzip.decompress(base64.b64decode(block[1])).decode()
 
 
 def test_template_and_view_agree(analysis):
@@ -49,8 +56,7 @@ def test_names_cannot_end_their_element(analysis):
     html = report(replace(analysis, robot=robot, source=EVIL))
     assert EVIL not in html
     assert "alert(" not in html.replace('alert(\\"1', "").replace("alert(&quot;1", "")
-    block = re.search(r'<script type="application/json" id="data">(.*?)</script>', html, re.S)
-    data = json.loads(block[1])
+    data = json.loads(unpacked(html, "data"))
     assert (data["robot"], data["joints"][0]["name"], data["links"][1]) == (EVIL, EVIL, EVIL)
 
 
@@ -59,6 +65,15 @@ def test_page_is_one_file(analysis):
     head = html[: html.index('id="data"')]
     assert not re.search(r"(src|href)=", head)
     assert "default-src 'none'" in head
+
+
+def test_a_small_logs_page_is_small_and_has_the_whole_library_with_its_licence(analysis):
+    html = report(analysis)
+    script = get_plotlyjs()
+    assert unpacked(html, "plotly") == script
+    assert len(html) < 0.45 * len(script)
+    notice = re.search("<!-- (.*?) -->", html)[1]
+    assert re.fullmatch(r"plotly.js v[\d.]+ Copyright .* Licensed under the MIT license", notice)
 
 
 def test_robot_without_geometry(analysis):

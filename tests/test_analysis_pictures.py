@@ -1,10 +1,11 @@
 """Figures and the stick figure."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from linkwise.analysis import analyze
+from linkwise.analysis import Load, Reading, analyze
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.result_columns import Column
 from linkwise.analysis.show.poses import poses
@@ -45,6 +46,110 @@ def test_shares_fill_the_bars(analysis):
             ends += [patch.get_width() for patch in bar]
         np.testing.assert_allclose(ends, 100)
     figure.draw_without_rendering()
+
+
+def test_shares_of_many_joints_are_their_own_the_largest_other_ones_and_the_rest(analysis, monkeypatch):
+    monkeypatch.setattr("linkwise.analysis.show.shares_figure.MANY", 2)
+    figure = analysis.figure("shares")
+    assert [axis.get_title(loc="left") for axis in figure.axes] == [
+        "everything, gravity too",
+        "the movement alone, without gravity",
+    ]
+    widths = np.array([[patch.get_width() for patch in bar] for bar in figure.axes[1].containers])
+    sizes = np.zeros((3, 3))
+    for column, mean in zip(analysis.columns, analysis.totals.mean, strict=True):
+        if column.quantity in ("tau_qdd", "tau_qd"):
+            sizes[column.joint, column.cause] += mean
+    others = np.sort(sizes[~np.eye(3, dtype=bool)].reshape(3, 2), axis=1)
+    expected = np.array([sizes.diagonal(), others[:, 1], others[:, 0]])
+    np.testing.assert_allclose(widths, 100 * expected / sizes.sum(axis=1))
+
+
+def bars(figure):
+    """Rows by name, then for each phase by name the means and the root mean squares."""
+    means, sizes = figure.axes[1:]
+    rows = [text.get_text() for text in means.get_yticklabels()]
+    return rows, {
+        bar.get_label(): tuple([patch.get_width() for patch in one] for one in (bar, beside))
+        for bar, beside in zip(means.containers, sizes.containers, strict=True)
+    }
+
+
+@pytest.fixture(scope="module")
+def pushed(tmp_path_factory):
+    """An arm that is pushed at its hand in two spans of time; a column `grip` of the log is up meanwhile."""
+    place = tmp_path_factory.mktemp("pushed")
+    log = smooth(400, 3)
+    on = (log[:, 0] % 2 < 0.8).astype(float)
+    push = Load("push", "link3", 30 * on[:, None] * [0, 1, 0], time=log[:, 0])
+    path = write_csv(place / "a.csv", np.column_stack([log, on]), [*JOINTS, "grip"])
+    return path, push, on > 0
+
+
+def causes_of(result, i):
+    """Curves of causes from the result's arrays."""
+    moved = (result.acceleration + result.velocity)[:, i].sum(axis=1)
+    return {
+        "all causes together": result.torque[:, i],
+        "gravity": result.gravity[:, i].sum(axis=-1),
+        "load push": result.load_torque[:, i, 0],
+        **{f"{joint} motion": moved[:, k] for k, joint in enumerate(JOINTS)},
+    }
+
+
+def test_causes_in_each_phase_are_numpys_and_add_up(pushed):
+    path, push, on = pushed
+    phases = ["stance/swing=push", "grip=grip", "half=0..1.995"]
+    result = analyze(path, PLANAR3, loads=[push], phases=phases)
+    figure = result.figure("causes:joint2")
+    rows, shown = bars(figure)
+    masks = {"stance": on, "swing": ~on, "grip": on, "half": result.time < 1.996}
+    curves = causes_of(result, 1)
+    assert set(rows) == set(curves)
+    assert list(shown) == list(masks)
+    for name, (means, sizes) in shown.items():
+        mask = masks[name]
+        np.testing.assert_allclose(means, [curves[row][mask].mean() for row in rows], atol=1e-12)
+        np.testing.assert_allclose(sizes, [np.sqrt((curves[row][mask] ** 2).mean()) for row in rows])
+        assert sum(means[1:]) == pytest.approx(means[0], rel=1e-12)
+    sizes = [np.sqrt((curves[row] ** 2).mean()) for row in rows[1:]]
+    assert sizes == sorted(sizes, reverse=True)
+    figure.draw_without_rendering()
+
+
+def test_a_joint_that_bears_one_load_has_the_phases_of_that_load(pushed, analysis):
+    path, push, on = pushed
+    result = analyze(path, PLANAR3, Reading(ignore_extra=True), loads=[push])
+    _, shown = bars(result.figure("causes:joint1"))
+    assert list(shown) == ["load push acts", "load push does not act"]
+    assert shown["load push acts"][0][0] == pytest.approx(result.torque[on, 0].mean())
+    _, shown = bars(analysis.figure("causes:joint1"))
+    assert list(shown) == ["the whole movement"]
+
+
+def test_many_causes_are_named_by_size_and_the_rest_is_one(analysis, monkeypatch):
+    monkeypatch.setattr("linkwise.analysis.show.causes_figure.MOST", 1)
+    rows, shown = bars(analysis.figure("causes:joint1"))
+    assert rows[-1] == "motion of 2 others"
+    means, _ = shown["the whole movement"]
+    assert sum(means[1:]) == pytest.approx(means[0], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("phase", "message"),
+    [
+        ("stance=shove", "--phase stance=shove: no load, contact or column 'shove'; there are push, time"),
+        ("stance", "write it as NAME=LOAD"),
+        ("stance/=push", "write it as NAME=LOAD"),
+        ("stance=push>hard", "write it as NAME=LOAD"),
+        ("late=9..12", "--phase: late has no sample between 0 and 3.99 s"),
+        ("still=push>31", "--phase: still has no sample"),
+    ],
+)
+def test_phases_that_are_not_there_are_named(pushed, phase, message):
+    path, push, _ = pushed
+    with pytest.raises(LinkwiseError, match=re.escape(message)):
+        analyze(path, PLANAR3, Reading(ignore_extra=True), loads=[push], phases=[phase]).figure("causes")
 
 
 def test_power_figure_draws_joint_power_and_work_by_link(analysis):

@@ -1,7 +1,9 @@
 """Names from files go through one rule for each kind of place, and come out as the text that they are."""
 
 import ast
+import base64
 import csv
+import gzip
 import html.parser
 import json
 import re
@@ -192,7 +194,7 @@ def test_the_page_holds_names_as_text_only(start: int, analysis) -> None:
     page = Page(report(renamed(analysis, names, names[0])))
     assert page.tags == plain.tags
     assert page.title == f"{to.printable(names[0])} · {to.printable(names[0])}"
-    data = json.loads(page.scripts[0])
+    data = json.loads(gzip.decompress(base64.b64decode(page.scripts[0])))
     assert [joint["name"] for joint in data["joints"]] == list(map(to.printable, names))
     assert page.scripts[1:] == plain.scripts[1:]
 
@@ -205,6 +207,7 @@ def test_plots_draw_names_literally_and_without_a_warning(analysis) -> None:
         warnings.simplefilter("error")  # of a character without a picture, of a legend that hides a name
         for names in (("_a\x1b", "$x^", "日本"), ("$\\frac{$ ^^M", "\u202eb", "\n")):
             assert figure_png(renamed(analysis, names, names[0]), "shares")
+            assert figure_png(renamed(analysis, names, names[0]), "causes")
 
 
 def test_a_templates_name_reaches_no_hover_template() -> None:

@@ -16,6 +16,7 @@ from linkwise.analysis.loads import Loads
 from linkwise.analysis.loads.read_loads import placed_loads
 from linkwise.analysis.logs import Log, open_log
 from linkwise.analysis.named_result import named_result
+from linkwise.analysis.phases import Phase, PlacedPhase, phase_columns, placed_phases
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_record import record
 from linkwise.analysis.result_table import result_table
@@ -38,8 +39,8 @@ class Analysis(AnalysisResult):
     """What `analyze` returns: an `AnalysisResult` that draws and records itself."""
 
     def figure(self, name: str = "paper") -> "Figure":
-        """A matplotlib figure: "paper", or "paper:JOINT" for another joint than the first; "shares"; "power";
-        "induced", or "induced:POINT" likewise; "contacts".
+        """A matplotlib figure: "paper" or "causes", with ":JOINT" for another joint than the first; "shares";
+        "power"; "induced", or "induced:POINT" likewise; "contacts".
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """
@@ -79,6 +80,8 @@ class Wanted:
     """Power by cause and order, too: as many columns again as torques have."""
     induced: tuple[str, ...] = ()
     """Whose acceleration is told by its sources: FRAME or FRAME,X,Y,Z, joints, centre-of-mass."""
+    phases: tuple[Phase, ...] = ()
+    """Phases of the movement that the figure of causes holds against each other."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,7 @@ class Job:
     decomposer: Decomposer
     closed: ClosedLog | None = None
     """How far positions of the log were off, where joints are tied."""
+    phases: tuple[PlacedPhase, ...] = ()
 
     def run(self, sink: Sink, progress: Progress) -> Streamed:
         """Analyse every sample, handing the blocks to `sink`."""
@@ -141,6 +145,7 @@ class Job:
             kept.stride,
             self.closed,
             self.decomposer.times,
+            self.phases,
         )
 
     def _never_on(self, done: Streamed) -> Iterator[str]:
@@ -181,7 +186,7 @@ def prepared(
     """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
     points = induced_points(wanted.induced, robot)
     opened = open_log(log, reading, robot.joints)
-    switches = switch_columns(contacts, opened)
+    switches = (*switch_columns(contacts, opened), *phase_columns(wanted.phases, opened))
     samples, closed = _samples(opened, robot, reading, switches, progress, buffer)
     with within(str(log)):
         span_of(samples, processing)
@@ -190,7 +195,9 @@ def prepared(
     borne = placed_loads(loads, robot, samples.time, reading.ignore_extra, progress, buffer)
     times = contact_times(contacts, opened, robot, reading, samples.time, progress, buffer)
     decomposer = Decomposer.of(robot, processing.convention, wanted.power_terms, borne, points, times)
-    return Job(log.name, reading, processing, samples, decomposer, closed)
+    every = (*borne, *(() if times is None else times.loads))
+    phases = placed_phases(wanted.phases, opened, robot, every, reading, progress)
+    return Job(log.name, reading, processing, samples, decomposer, closed, phases)
 
 
 def _samples(

@@ -8,6 +8,7 @@ from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.contact_times import ContactTimes
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
+from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result_columns import Column
 from linkwise.analysis.result_quantities import Quantity
 from linkwise.analysis.settings import Processing, Reading
@@ -67,6 +68,8 @@ class AnalysisResult:
     """How far positions of the log were off, where joints are tied; None where none are."""
     times: ContactTimes | None = None
     """When contacts are on, where there are any."""
+    phases: tuple[PlacedPhase, ...] = ()
+    """Those that were asked for."""
 
     def __getitem__(self, name: str) -> Array:
         """One column (S,) by its name, as in the Parquet file: "tau/joint1/link2"; else LinkwiseError."""

@@ -10,6 +10,7 @@ from linkwise.analysis.job import Analysis, Wanted, prepared
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.payload import carrying
+from linkwise.analysis.phases import Phase
 from linkwise.analysis.settings import Payload, Processing, Reading
 from linkwise.analysis.show import check_figure, figure_png
 from linkwise.analysis.show.page import NUMBERS, SAMPLES, numbers_on_page, report
@@ -41,6 +42,7 @@ def analyze(
     loads_cutoff: float | None = None,
     induced: Sequence[str] = (),
     contacts: Contacts | Sequence[Contact] = (),
+    phases: Sequence[str] = (),
 ) -> Analysis:
     """Analyse a motion log with a generated robot (its directory), all samples in memory.
 
@@ -49,12 +51,16 @@ def analyze(
     loads_cutoff in Hz is of the low-pass that those of files get
     induced: whose acceleration is to be told by its sources: FRAME or FRAME,X,Y,Z, joints, centre-of-mass
     contacts: frames that the ground holds, whose reactions are found from the motion; `Contacts` says when
+    phases: of the movement, as --phase has them, for the figure "causes": "stance/swing=LOAD"
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
     held = Contacts.of(contacts)
     loaded = carrying(robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot)), payloads)
     loaded, borne = standing_on(loaded, held), Loads.of(loads, loads_cutoff)
-    wanted, made = Wanted(induced=tuple(induced)), (reading or Reading(), processing or Processing())
+    wanted, made = (
+        Wanted(induced=tuple(induced), phases=tuple(map(Phase.of, phases))),
+        (reading or Reading(), processing or Processing()),
+    )
     job = prepared(Path(log), loaded, *made, borne, held, progress, wanted)
     kept = KeptSamples(len(job.decomposer.columns), 1)
     return job.analysis(job.run(kept, progress), kept)

@@ -10,6 +10,7 @@ from linkwise.analysis import Analysis
 from linkwise.analysis.job import Wanted
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.payload import carrying
+from linkwise.analysis.phases import Phase
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.settings import Convention, Reading
 from linkwise.analysis.tables import Format
@@ -53,7 +54,17 @@ TableFormat = Annotated[Format, typer.Option(help="Format of the table")]
 Figures = Annotated[
     list[str] | None,
     typer.Option(
-        help="paper, paper:JOINT, shares, power, induced, induced:POINT or contacts; may be repeated"
+        help="paper or causes, alone or with :JOINT, shares, power, induced, induced:POINT or contacts;"
+        " may be repeated"
+    ),
+]
+Phases = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--phase",
+        metavar="NAME/REST=WHAT",
+        help="Part of the movement that the figure causes holds against the rest: WHAT is a load or contact,"
+        " a column COLUMN>VALUE of the log, or FROM..TO in s; may be repeated",
     ),
 ]
 PowerTerms = Annotated[bool, typer.Option("--power-terms", help="Write power by cause and order too")]
@@ -121,6 +132,7 @@ def analyze(
     convention: Terms = "closing",
     format: TableFormat = "parquet",
     figure: Figures = None,
+    phase: Phases = None,
     power_terms: PowerTerms = False,
     payload: Carried = None,
     load: ConstantLoads = None,
@@ -143,7 +155,8 @@ def analyze(
     processing = chosen_processing(
         derivative, window, degree, chosen_lowpass(cutoff, filter_order, padding), edges, convention
     )
-    wanted = Wanted(format, tuple(figure or ()), page, power_terms, tuple(induced or ()))
+    phases = tuple(map(Phase.of, phase or ()))
+    wanted = Wanted(format, tuple(figure or ()), page, power_terms, tuple(induced or ()), phases)
     with shown_progress() as progress:
         package = opened_robot(robot, backend, options, progress)
     package = carrying(package, carried(payload or [], package))

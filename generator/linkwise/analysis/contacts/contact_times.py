@@ -140,7 +140,8 @@ def contact_times(
         return None
     loads = placed_loads(contacts.measured, robot, motion, reading.ignore_extra, progress, buffer)
     names = robot.contacts.names
-    switches = tuple(_switch(contacts.columns.get(name), log, reading, progress) for name in names)
+    given = [contacts.columns.get(name) for name in names]
+    switches = tuple(None if one is None else read_switch(one, log, reading, progress) for one in given)
     found = _by_contact(robot, loads)
     for name, column, some in zip(names, switches, found, strict=True):
         if contacts.loads and column is None and not some:
@@ -167,9 +168,8 @@ def switch_columns(contacts: Contacts, log: Log) -> tuple[str, ...]:
     return tuple(given.column for given in contacts.columns.values())
 
 
-def _switch(given: WhileColumn | None, log: Log, reading: Reading, progress: Progress) -> Switch | None:
-    if given is None:
-        return None
+def read_switch(given: WhileColumn, log: Log, reading: Reading, progress: Progress) -> Switch:
+    """Read a column that the log has, and its time."""
     with within(str(log.path)):
         columns = time_column(log.columns, reading), list(log.columns).index(given.column)
     return Switch(given, collected(finite_blocks(log, columns, progress), 2, None))

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.causes_figure import causes
 from linkwise.analysis.show.contacts_figure import contacts
 from linkwise.analysis.show.induced_figure import induced
 from linkwise.analysis.show.paper_figure import paper
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
     "paper": paper,
     "shares": shares,
+    "causes": causes,
     "power": power,
     "induced": induced,
     "contacts": contacts,
@@ -28,7 +30,8 @@ FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
 
 
 def draw(result: AnalysisResult, name: str) -> "Figure":
-    """Draw one of FIGURES by its name; "paper:JOINT" or "induced:POINT" for another joint or point.
+    """Draw one of FIGURES by its name; "paper:JOINT", "causes:JOINT" or "induced:POINT" for another
+    joint or point.
 
     Raises LinkwiseError for another name.
     """
@@ -55,8 +58,10 @@ def check_figure(name: str, robot: LoadedRobot, points: Sequence[str]) -> None:
         return
     if kind == "contacts" and robot.contacts is None and not joint:
         raise LinkwiseError(f"--figure {name}: add --contact, whose forces it draws")
-    if kind not in FIGURES or (joint and (kind != "paper" or joint not in robot.driven_joints)):
+    if kind not in FIGURES or (
+        joint and (kind not in ("paper", "causes") or joint not in robot.driven_joints)
+    ):
         raise LinkwiseError(
-            f"--figure {name}: give one of {', '.join(FIGURES)}, or paper:JOINT with a joint of"
+            f"--figure {name}: give one of {', '.join(FIGURES)}, causes:JOINT or paper:JOINT with a joint of"
             f" {listed(nearest_first(joint, robot.driven_joints))}, or induced:POINT"
         )
