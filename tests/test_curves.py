@@ -60,5 +60,5 @@ def test_the_stick_figure_stands_where_the_robot_does(directory_of: Callable[[st
 def test_links_behind_curves_are_not_identified(directory_of: Callable[[str], Path], tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("time,ankle_angle\n0,0\n")
-    with pytest.raises(LinkwiseError, match="'knee_t1' of knee follows a curve, and a URDF file"):
+    with pytest.raises(LinkwiseError, match="'knee_angle' of knee moves axes by curves, and a URDF file"):
         identify(log, directory_of(KNEE))

@@ -1,6 +1,7 @@
 """A robot's file in place of a package: one is generated, kept, and made again when the file changes."""
 
 import json
+import math
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from command_line import run_linkwise
 from conftest import DATA
 from linkwise import LinkwiseError, Options, analyze, kept_package
 from linkwise.package.manifest import FILE
+from osim_text import ROLLING, chain
 
 KNEE = DATA / "knee.osim"
 
@@ -93,7 +95,20 @@ def test_options_of_reading_make_another_package_and_are_refused_for_one_that_is
     assert (done.returncode, done.stdout) == (2, "")
     assert "is read already: leave --lock out, or name the robot's own file" in done.stderr
     done = run_linkwise(*asked, "--robot", KNEE, folder=tmp_path)
-    assert "no joint for column 'ankle_angle'" in done.stderr
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (0, "left out: ankle_angle")
+
+
+def test_what_opensim_keeps_in_radians_stays_so_in_a_log_in_degrees(tmp_path: Path) -> None:
+    """Of a coordinate that turns no axis one to one; columns of a locked one are left out unasked."""
+    locked = {"joint2_angle": "<default_value>0.4</default_value><locked>true</locked>"}
+    (tmp_path / "model.osim").write_text(chain([ROLLING, "PinJoint", "PinJoint"], coordinates=locked))
+    columns = "joint0_turn", "joint0_slip", "joint1_angle", "joint2_angle"
+    rows = "\n".join(f"{k / 50} 0.5 0.1 90 20" for k in range(20))
+    head = f"walk\nversion=1\nnRows=20\nnColumns=5\ninDegrees=yes\nendheader\ntime {' '.join(columns)}"
+    (tmp_path / "walk.mot").write_text(f"{head}\n{rows}\n")
+    found = analyze(tmp_path / "walk.mot", kept_package(tmp_path / "model.osim", "numpy").directory)
+    assert found.ignored == ("joint2_angle",)
+    assert found.q[0] == pytest.approx([0.5, 0.1, math.pi / 2], rel=1e-15)
 
 
 def test_columns_of_joints_that_the_file_couples_are_left_out_unasked(tmp_path: Path) -> None:

@@ -147,7 +147,7 @@ def test_what_gives_torques_is_ignored_and_what_acts_by_itself_is_left_out(tmp_p
 
 def test_a_coordinate_that_files_in_degrees_have_in_radians_is_told(tmp_path: Path) -> None:
     (note,) = effects(robot_of(tmp_path, chain([ROLLING, KNEE])).notes)
-    assert note.startswith("in radians in OpenSim's files, also where these are in degrees")
+    assert note.startswith("in radians in every log")
     assert note.endswith(": joint0_turn")
 
 

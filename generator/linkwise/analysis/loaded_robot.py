@@ -46,8 +46,18 @@ class LoadedRobot:
 
     @property
     def coupled(self) -> frozenset[str]:
-        """Joints of the file that follow coordinates and are none themselves."""
-        return frozenset(body.joint for body in self.bodies or ()) - set(self.joints)
+        """Joints of the file that follow coordinates, or are held, and are none themselves."""
+        following = frozenset(body.joint for body in self.bodies or ())
+        return (following | self.package.manifest.held.keys()) - set(self.joints)
+
+    @property
+    def units_in_logs(self) -> tuple[str, ...]:
+        """For each joint "rad" where a log in degrees has it so, else "m" or "always rad"."""
+        always = self.package.manifest.in_radians
+        return tuple(
+            "always rad" if name in always else unit
+            for name, unit in zip(self.joints, self.units, strict=True)
+        )
 
     @property
     def driven(self) -> tuple[int, ...]:

@@ -47,7 +47,7 @@ def read_samples(
 ) -> Samples:
     """Read, convert to SI and check a log.
 
-    joint_units: one for each joint, "rad" or "m"
+    joint_units: one for each joint, "rad" for those that a log in degrees has in these
     buffer: a directory on whose disk, as a rule, a buffer keeps the samples; None keeps them in memory
     beside: columns that something else reads; coupled: joints whose columns may be left out unasked
     Raises LinkwiseError that names file, row and column for what cannot be analysed.

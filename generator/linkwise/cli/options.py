@@ -31,7 +31,8 @@ def robot_options(
         ),
     ] = "numeric",
     lock: Annotated[
-        list[str] | None, _flag(metavar="JOINT=VALUE", help="Hold a joint; may be repeated")
+        list[str] | None,
+        _flag(metavar="JOINT=VALUE", help="Hold a joint, rad or m; may be repeated"),
     ] = None,
     base: Annotated[Literal["fixed", "floating"], _flag(help="How the root link is held")] = "fixed",
     root: Annotated[str | None, _flag(help="Keep only this link and what it carries")] = None,

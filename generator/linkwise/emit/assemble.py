@@ -160,6 +160,8 @@ def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
             LinkEntry(name, system.path(j), cost)
             for j, (name, cost) in enumerate(zip(system.link_names, costs, strict=True))
         ),
+        dict(system.robot.held) if isinstance(system, RigidSystem) else {},
+        tuple(c.name for c in system.coordinates if c.coupled),
         operations,
         code_size(derivation.package, files),
         {s.name: float(v) for s, v in system.parameters.items()},

@@ -91,10 +91,10 @@ def _random_motion(robot: LoadedRobot, read: TorqueLog) -> Motion:
 def _own_parameters(robot: LoadedRobot) -> Array:
     if robot.bodies is None:
         raise LinkwiseError(f"{robot.name} is made of energies; only rigid links have parameters to identify")
-    if curved := [body.joint for body in robot.bodies if body.curve]:
+    if curved := [robot.joints[body.coordinate] for body in robot.bodies if body.curve]:
         raise LinkwiseError(
-            f"joint {curved[0]!r} of {robot.name} follows a curve, and a URDF file, as identified links are "
-            "written, has none; lock it"
+            f"joint {curved[0]!r} of {robot.name} moves axes by curves, and a URDF file, as identified links "
+            "are written, has none; lock it"
         )
     model = robot.model if robot.constrained is None else robot.constrained.open
     if not hasattr(model, "regressor") or model.backend.rule is None:

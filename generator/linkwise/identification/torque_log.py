@@ -80,7 +80,7 @@ def read_torque_log(
     samples = read_samples(
         log,
         (*(robot.joints[k] for k in moving), *names),
-        (*(robot.units[k] for k in moving), *["N m"] * len(names)),
+        (*(robot.units_in_logs[k] for k in moving), *["N m"] * len(names)),
         replace(reading, mapping=mapping),
         progress,
         coupled=robot.coupled,

@@ -68,6 +68,8 @@ class Manifest:
     """What a package is of: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
 
     request: the options of `generate`; kernel: which kind its C is
+    held: joints that stand still, and where, in rad or m
+    in_radians: joints that logs have in radians, also where others are in degrees
     files: the SHA-256 of every other file, by its path in the package
     operations: those of a full decomposition
     code_size: an estimate for C on a microcontroller; None without C
@@ -80,6 +82,8 @@ class Manifest:
     kernel: KernelKind
     joints: tuple[JointEntry, ...]
     links: tuple[LinkEntry, ...]
+    held: Mapping[str, float]
+    in_radians: tuple[str, ...]
     operations: int
     code_size: CodeSize | None
     parameters: Mapping[str, float]

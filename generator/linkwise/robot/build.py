@@ -114,6 +114,7 @@ def build(description: Description, options: Options) -> Robot:
         held.wanted,
         held.driven,
         limits=coordinate_limits(connections, moving.coordinates),
+        held=(*description.held, *options.lock.items()),
     )
 
 

@@ -95,7 +95,7 @@ class _Curved:
         for c in self._joints.get(name, ()):
             if c.name not in self._lock and c.name not in self._places:
                 self._places[c.name] = len(moving)
-                moving.append(Coordinate(c.name, c.unit))
+                moving.append(Coordinate(c.name, c.unit, c.coupled))
         if name not in self._places:
             return AxisRule(None, 0.0, curve(self._lock.get(name, 0.0)))
         if curve.line:

@@ -127,6 +127,8 @@ class CurvedCoordinate:
     name: str
     unit: Literal["rad", "m"]
     limits: Limits = UNLIMITED
+    coupled: bool = False
+    """See `Coordinate`."""
 
 
 @dataclass(frozen=True)
@@ -176,5 +178,7 @@ class Description:
     """Joints that actuators of the file drive."""
     independent: tuple[str, ...] = ()
     """Joints whose motion is to give that of all others under the constraints; none: to be chosen."""
+    held: tuple[tuple[str, float], ...] = ()
+    """Joints that the file holds, and where, in rad or m."""
     ground: str = ""
     """The body that is the world itself, where the file has one."""

@@ -34,10 +34,14 @@ class _Acceleration(sp.Symbol):  # type: ignore[misc]
 
 @dataclass(frozen=True)
 class Coordinate:
-    """A generalized coordinate: its name, and rad for an angle or m for a length."""
+    """A generalized coordinate: its name, and rad for an angle or m for a length.
+
+    One that is `coupled` turns no axis one to one; OpenSim's files then have it in radians, always.
+    """
 
     name: str
     unit: Literal["rad", "m"] = "rad"
+    coupled: bool = False
 
     @property
     def q(self) -> sp.Symbol:
@@ -231,6 +235,8 @@ class Robot:
     independent: tuple[int, ...] = ()
     limits: tuple[Limits, ...] = ()
     """Of each coordinate, or none at all; those of joints that follow another are no limits of that one."""
+    held: tuple[tuple[str, float], ...] = ()
+    """Joints that are held, and where, in rad or m."""
 
     def __post_init__(self) -> None:
         if not self.coordinates:

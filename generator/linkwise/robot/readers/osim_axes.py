@@ -52,6 +52,11 @@ class MovedAxis:
         """Whether it moves as far as its coordinate, there or back."""
         return self.curve.line is not None and abs(self.curve.line[1]) == 1.0
 
+    @property
+    def in_radians(self) -> bool:
+        """Whether OpenSim's files have its coordinate in radians, also where others are in degrees."""
+        return self.kind == "revolute" and not self.one_to_one
+
     def rule(self, rules: Mapping[str, Rule]) -> Rule:
         """How it moves by what is free."""
         if not self.coordinate:

@@ -14,7 +14,7 @@ from linkwise.robot.readers.osim_coordinates import Rule, limits_of
 from linkwise.robot.readers.osim_elements import name_of
 from linkwise.robot.readers.osim_frames import GROUND, Placed
 
-IN_RADIANS = "in radians in OpenSim's files, also where these are in degrees: it turns no axis one to one"
+IN_RADIANS = "in radians in every log, as in OpenSim's files whose other angles are in degrees"
 SUFFIXES = {"prismatic": "t", "revolute": "r"}
 UNITS: dict[Kind, Literal["rad", "m"]] = {"prismatic": "m", "revolute": "rad"}
 
@@ -91,7 +91,7 @@ class OsimJoint:
                 for rule in (axis.rule(rules),)
             ),
             coordinates=tuple(
-                CurvedCoordinate(name_of(c), UNITS[axes[at].kind], limits_of(c))
+                CurvedCoordinate(name_of(c), UNITS[axes[at].kind], limits_of(c), axes[at].in_radians)
                 for c in free
                 if (at := carriers[name_of(c)]) is not None
             ),
@@ -102,7 +102,7 @@ class OsimJoint:
         axes = tuple(self._axes())
         for name in map(name_of, self.coordinates):
             at = carrier(axes, name) if rules[name].free == name else None
-            if at is not None and axes[at].kind == "revolute" and not axes[at].one_to_one:
+            if at is not None and axes[at].in_radians:
                 yield Note("warned", name, "", IN_RADIANS)
 
     @property
