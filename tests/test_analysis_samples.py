@@ -42,7 +42,7 @@ def test_degrees_turn_angles_only(tmp_path):
 @pytest.mark.parametrize(
     ("scale", "units", "warning"),
     [
-        (60, None, "reaches 54 rad, 8.6 turns: if that is degrees, pass --units deg"),
+        (60, "rad", "reaches 54 rad, 8.6 turns: if that is degrees, pass --units deg"),
         (1, "deg", "if that is radians, pass --units rad"),
         (1, None, None),
         (60, "deg", None),
@@ -52,6 +52,12 @@ def test_unlikely_units_are_warned_of(tmp_path, scale, units, warning):
     path = write_csv(tmp_path / "a.csv", smooth(400, 3) * [1, scale, scale, scale])
     warnings = read(path, Reading(units=units)).warnings
     assert [warning in text for text in warnings] == ([True] if warning else [])
+
+
+def test_angles_of_many_turns_want_their_unit_told(tmp_path):
+    path = write_csv(tmp_path / "a.csv", smooth(400, 3) * [1, 60, 60, 60])
+    with pytest.raises(LinkwiseError, match=r"a.csv: column 'joint.' reaches 54 rad, 8.6 turns: say what"):
+        read(path)
 
 
 @pytest.mark.parametrize(
@@ -209,12 +215,12 @@ def test_milliseconds_are_warned_of(tmp_path):
     assert read(write_csv(tmp_path / "b.csv", smooth(30, 3, rate=10))).warnings == ()
 
 
-def test_a_header_without_a_unit_is_warned_of(tmp_path):
+def test_a_header_without_a_unit_is_refused_unless_it_is_told(tmp_path):
     path = write_mot(tmp_path / "a.mot", smooth(30, 3), JOINTS)
     said = path.read_text(encoding="utf-8")
     path.write_text(said.replace("inDegrees=yes\n", ""), encoding="utf-8")
-    (warning,) = read(path).warnings
-    assert warning.startswith("the header has no inDegrees: angles are taken for radians")
+    with pytest.raises(LinkwiseError, match=r"a.mot: the header has no inDegrees: say .* --units deg or rad"):
+        read(path)
     assert read(path, Reading(units="rad")).warnings == ()
     path.write_text(said.replace("inDegrees=yes", "inDegrees=maybe"), encoding="utf-8")
     with pytest.raises(LinkwiseError, match=r"a.mot: inDegrees='maybe' in the header is neither yes nor no"):

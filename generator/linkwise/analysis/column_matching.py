@@ -105,29 +105,28 @@ def radians_per_unit(log: Log, reading: Reading) -> float:
 
 
 def unit_warnings(log: Log, reading: Reading, peaks: Sequence[tuple[str, float]]) -> tuple[str, ...]:
-    """Warnings about the unit of angles: not told in a file that ought to, or unlikely by their size.
+    """Warnings about a told unit of angles that is unlikely by their size.
 
     peaks: column and largest magnitude, as written in the log, of every angle
+
+    Raises LinkwiseError where the unit is not told: in a file whose header ought to, and where angles in
+    radians would turn many times.
     """
     if not peaks:
         return ()
-    warnings = []
-    if log.path.suffix.lower() in {".mot", ".sto"} and log.degrees is None and reading.units is None:
-        warnings.append(
-            "the header has no inDegrees: angles are taken for radians; say so with --units rad or deg"
-        )
+    told = reading.units is not None or log.degrees is not None
+    if log.path.suffix.lower() in {".mot", ".sto"} and not told:
+        raise LinkwiseError("the header has no inDegrees: say what angles are in with --units deg or rad")
     in_radians = radians_per_unit(log, reading) == 1.0
     column, peak = max(peaks, key=lambda item: item[1])
     if in_radians and peak > MANY_TURNS:
-        warnings.append(
-            f"column {column!r} reaches {peak:.4g} rad, {peak / math.tau:.1f} turns: if that is"
-            " degrees, pass --units deg"
-        )
+        turns = f"column {column!r} reaches {peak:.4g} rad, {peak / math.tau:.1f} turns"
+        if not told:
+            raise LinkwiseError(f"{turns}: say what angles are in with --units deg or rad")
+        return (f"{turns}: if that is degrees, pass --units deg",)
     if not in_radians and 0 < peak <= math.pi:
-        warnings.append(
-            f"no angle exceeds {peak:.4g} degrees ({column!r}): if that is radians, pass --units rad"
-        )
-    return tuple(warnings)
+        return (f"no angle exceeds {peak:.4g} degrees ({column!r}): if that is radians, pass --units rad",)
+    return ()
 
 
 def time_column(columns: Sequence[str], reading: Reading) -> int:

@@ -72,7 +72,8 @@ def read_samples(
             rate = reading.resample
             samples = collected(resampled(samples, rate, progress=progress), 1 + len(joints), buffer)
     named = [(log.columns[selection.columns[at]], float(peaks[at])) for at in angles]
-    warnings += unit_warnings(log, reading, named)
+    with within(str(log.path)):
+        warnings += unit_warnings(log, reading, named)
     first_row = log.first_row if reading.resample is None else None
     return Samples(samples[:, 0], samples[:, 1:], rate, selection.ignored, warnings, first_row)
 
