@@ -212,7 +212,8 @@ def test_motions_are_written_and_analysed(call, tmp_path):
 def test_warnings_and_left_out_columns_are_told(call, tmp_path):
     table = np.column_stack([smooth(20, 3) * [1, 90, 90, 90], np.zeros(20)])
     log = write_csv(tmp_path / "a.csv", table, ("joint1", "joint2", "joint3", "emg"))
-    result = call("analyze", log, *ROBOT, "--out", tmp_path / "out", "--no-page", "--ignore-extra")
+    asked = ("--no-page", "--ignore-extra", "--units", "rad")
+    result = call("analyze", log, *ROBOT, "--out", tmp_path / "out", *asked)
     assert "if that is degrees, pass --units deg" in result.stderr
     assert "left out: emg" in result.stderr
 

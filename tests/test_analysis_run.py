@@ -269,7 +269,7 @@ def test_results_that_overflow_are_named(tmp_path, lowpass, value):
         r"a.csv: row \d+, time 0[.\d]* s: result column '(q|tau).*/joint.' is -?(inf|nan); the log's values"
     )
     with pytest.raises(LinkwiseError, match=message) as error:
-        analyze(path, PLANAR3, processing=Processing(lowpass=lowpass))
+        analyze(path, PLANAR3, Reading(units="rad"), Processing(lowpass=lowpass))
     if lowpass is None:
         assert str(error.value).endswith(f"too large: 'joint2' comes to {value:.3g} in row 32")
 
@@ -279,7 +279,7 @@ def test_a_coordinate_that_overflows_in_the_filter_is_named(tmp_path):
     table[::2, 2] = 1.7e308
     path = write_csv(tmp_path / "a.csv", table)
     with pytest.raises(LinkwiseError, match=r"values are too large: 'joint2' overflows in the filter$"):
-        analyze(path, PLANAR3, processing=Processing(lowpass=Lowpass(5.0)))
+        analyze(path, PLANAR3, Reading(units="rad"), Processing(lowpass=Lowpass(5.0)))
 
 
 def test_slashes_in_names_are_escaped(tmp_path):
