@@ -114,6 +114,7 @@ def test_causes_in_each_phase_are_numpys_and_add_up(pushed):
         assert sum(means[1:]) == pytest.approx(means[0], rel=1e-12)
     sizes = [np.sqrt((curves[row] ** 2).mean()) for row in rows[1:]]
     assert sizes == sorted(sizes, reverse=True)
+    assert result.record()["phases"][::2] == ["stance: force of push above 20 N", "half: from 0 to 1.995 s"]
     figure.draw_without_rendering()
 
 

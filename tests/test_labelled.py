@@ -275,3 +275,14 @@ def test_a_notebook_shows_joints_and_links(packages: tuple[Any, Any]) -> None:
     assert cells[:12] == ["0", "crank", "rad", "1", "knee", "rad", "2", "/lift", "m", "3", "ram", "m"]
     assert cells[-6:] == ["2", "tip", "crank, knee, /lift", "3", "slider", "ram"]
     assert "color:" not in page.replace("border-color:", "")
+
+
+def test_tensors_that_want_gradients_are_refused(packages: tuple[Any, Any]) -> None:
+    torch = pytest.importorskip("torch")
+    robot = packages[0].load("torch")
+    q, qd, qdd = map(torch.tensor, (Q, QD, QDD))
+    with pytest.raises(TypeError, match=r"call under torch\.no_grad"):
+        robot.labelled("partial_torque", q.requires_grad_(), qd, qdd)
+    with torch.no_grad():
+        answer = robot.labelled("partial_torque", q, qd, qdd)
+    np.testing.assert_array_equal(answer, robot.partial_torque(Q, QD, QDD))

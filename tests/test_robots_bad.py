@@ -384,6 +384,10 @@ OPTIONS: dict[str, tuple[dict[str, Any], str]] = {
     "tip before root": ({"root": "c", "tip": "a"}, "--tip 'a' is not below --root 'c'"),
     "root at the end": ({"root": "c"}, "no joint moves"),
     "far lock": ({"lock": {"ab": 1e300}}, "--lock 'ab' has a number beyond 1e+12 for a value; give rad or m"),
+    "lock in degrees": (
+        {"lock": {"ab": 30.0}},
+        "--lock ab=30 is outside of the joint's limits, -9 to 9; give rad or m, or change the limits",
+    ),
     "lock of all": ({"lock": {"ab": 0.0, "bc": 1.0}}, "no joint moves; free at least one"),
 }
 

@@ -30,10 +30,16 @@ WARNINGS = "warnings.json"
 
 @dataclass(frozen=True)
 class KeptPackage:
-    """A package, and what touches the torques of the robot that it was made of."""
+    """A package, and what touches the torques of the robot that it was made of.
+
+    It stands where the path of a package may: `analyze(log, kept_package(file))`.
+    """
 
     directory: Path
     warnings: tuple[str, ...] = ()
+
+    def __fspath__(self) -> str:
+        return str(self.directory)
 
 
 def kept_package(

@@ -108,5 +108,9 @@ def _names_of(loads: Any, links: Sequence[str]) -> tuple[str, ...]:
 
 
 def _array(value: Any) -> NDArray[Any]:
-    """An array, or what a tensor holds, without its gradient."""
-    return np.asarray(value.detach().cpu() if has_tensors([value]) else value)
+    """An array, or what a tensor holds; raises TypeError for one that gradients are asked of."""
+    if not has_tensors([value]):
+        return np.asarray(value)
+    if value.requires_grad:
+        raise TypeError("names stand along arrays, which have no gradients; call under torch.no_grad()")
+    return np.asarray(value.cpu())

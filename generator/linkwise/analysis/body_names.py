@@ -35,5 +35,6 @@ def told_apart(what: str, names: Sequence[str], others: Sequence[str]) -> None:
     twice = [name for name, count in Counter(names).items() if count > 1 or name in others]
     if twice:
         raise LinkwiseError(
-            f"{what} {listed(map(repr, twice))}: another has that name; tell them apart as NAME:BODY"
+            f"{what} {listed(map(repr, twice))}: another has that name; tell them apart as NAME:BODY,"
+            " or by their names in the file"
         )

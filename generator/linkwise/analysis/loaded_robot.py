@@ -8,6 +8,7 @@ from typing import cast
 
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.contacts.ground_contacts import GroundContacts
+from linkwise.analysis.follower_columns import FollowingJoint
 from linkwise.analysis.settings import Payload
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
@@ -45,10 +46,9 @@ class LoadedRobot:
     """Where the robot stands on the ground."""
 
     @property
-    def coupled(self) -> frozenset[str]:
-        """Joints of the file that follow coordinates, or are held, and are none themselves."""
-        following = frozenset(body.joint for body in self.bodies or ())
-        return (following | self.package.manifest.held.keys()) - set(self.joints)
+    def followers(self) -> tuple[FollowingJoint, ...]:
+        """Joints of the file that follow joints, or are held, and are none themselves."""
+        return FollowingJoint.of(self.package.manifest)
 
     @property
     def units_in_logs(self) -> tuple[str, ...]:

@@ -33,6 +33,7 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         "samples": result.total,
         "loads": [borne.record() for borne in result.loads],
         "induced": list(result.induced),
+        "phases": [phase.told for phase in result.phases],
         "closure": asdict(result.closure),
         **({} if result.closed is None else {"constraints": _constraints(result, result.closed)}),
         **({} if robot.contacts is None else {"contacts": _contacts(result)}),

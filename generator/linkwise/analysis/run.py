@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from os import PathLike
 from pathlib import Path
 
 from linkwise.analysis.contacts import Contacts
@@ -33,7 +34,7 @@ RECORD = "analysis.json"
 
 def analyze(
     log: str | Path,
-    robot: str | Path | LoadedRobot,
+    robot: str | PathLike[str] | LoadedRobot,
     reading: Reading | None = None,
     processing: Processing | None = None,
     progress: Progress = silent,
@@ -44,8 +45,9 @@ def analyze(
     contacts: Contacts | Sequence[Contact] = (),
     phases: Sequence[str] = (),
 ) -> Analysis:
-    """Analyse a motion log with a generated robot (its directory), all samples in memory.
+    """Analyse a motion log with a generated robot, all samples in memory.
 
+    robot: the directory of its package; of a robot's file `linkwise.kept_package` makes one
     payloads: point masses that the robot carries, each a link of its own in the result
     loads: forces and moments from outside, or files of them, each a cause of its own in the result;
     loads_cutoff in Hz is of the low-pass that those of files get

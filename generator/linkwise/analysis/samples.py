@@ -2,7 +2,7 @@
 
 import mmap
 import tempfile
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from linkwise.analysis.column_matching import radians_per_unit, select, unit_warnings
 from linkwise.analysis.even_time import even_rate, resampled
+from linkwise.analysis.follower_columns import FollowerColumns, FollowingJoint
 from linkwise.analysis.logs import Log
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
@@ -43,34 +44,38 @@ def read_samples(
     progress: Progress,
     buffer: Path | None = None,
     beside: Sequence[str] = (),
-    coupled: Collection[str] = (),
+    followers: Sequence[FollowingJoint] = (),
 ) -> Samples:
     """Read, convert to SI and check a log.
 
     joint_units: one for each joint, "rad" for those that a log in degrees has in these
     buffer: a directory on whose disk, as a rule, a buffer keeps the samples; None keeps them in memory
-    beside: columns that something else reads; coupled: joints whose columns may be left out unasked
+    beside: columns that something else reads; followers: joints whose columns may be left out unasked
     Raises LinkwiseError that names file, row and column for what cannot be analysed.
     """
     with within(str(log.path)):
-        selection = select(log.columns, joints, reading, beside, log.brought, coupled)
+        selection = select(log.columns, joints, reading, beside, log.brought, [one.name for one in followers])
     angles = [at for at, unit in enumerate(joint_units, 1) if unit == "rad"]
     factor = radians_per_unit(log, reading)
-    peaks = np.zeros(1 + len(joints))
+    width = 1 + len(joints)
+    peaks = np.zeros(width)
+    following = FollowerColumns(log.columns, selection.ignored, followers, joints, factor)
 
     def in_si() -> Iterator[Array]:
-        for block in finite_blocks(log, selection.columns, progress):
+        for whole in finite_blocks(log, selection.columns, progress, following.numbers):
+            block = whole[:, :width]
             np.maximum(peaks, np.abs(block).max(axis=0, initial=0.0), out=peaks)
             block[:, angles] *= factor
+            following.look(block[:, 1:], whole[:, width:])
             yield block
 
-    samples = collected(in_si(), 1 + len(joints), buffer)
+    samples = collected(in_si(), width, buffer)
     with within(str(log.path)):
         rate = even_rate(samples[:, 0], log.first_row, strict=reading.resample is None)
-        warnings = (*log.warnings, *slowness(rate))
+        warnings = (*log.warnings, *slowness(rate), *following.warnings())
         if reading.resample is not None:
             rate = reading.resample
-            samples = collected(resampled(samples, rate, progress=progress), 1 + len(joints), buffer)
+            samples = collected(resampled(samples, rate, progress=progress), width, buffer)
     named = [(log.columns[selection.columns[at]], float(peaks[at])) for at in angles]
     with within(str(log.path)):
         warnings += unit_warnings(log, reading, named)
@@ -78,12 +83,14 @@ def read_samples(
     return Samples(samples[:, 0], samples[:, 1:], rate, selection.ignored, warnings, first_row)
 
 
-def finite_blocks(log: Log, columns: Sequence[int], progress: Progress) -> Iterator[Array]:
-    """Blocks (rows, columns) of the log; LinkwiseError for a number that is not finite."""
-    row = log.first_row
-    for block, done in log.read(columns):
-        if not np.isfinite(block).all():
-            at, column = np.argwhere(~np.isfinite(block))[0]
+def finite_blocks(
+    log: Log, columns: Sequence[int], progress: Progress, others: Sequence[int] = ()
+) -> Iterator[Array]:
+    """Blocks (rows, columns and others) of the log; LinkwiseError for what is not finite in the columns."""
+    row, width = log.first_row, len(columns)
+    for block, done in log.read((*columns, *others)):
+        if not np.isfinite(block[:, :width]).all():
+            at, column = np.argwhere(~np.isfinite(block[:, :width]))[0]
             name = log.columns[columns[column]]
             raise LinkwiseError(
                 f"{log.path}: row {row + at}, column {name!r}: {block[at, column]} is not a sample;"

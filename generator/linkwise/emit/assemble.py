@@ -15,7 +15,7 @@ from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
 from linkwise.emit.c import loop_costs
 from linkwise.emit.c.flash import code_size
-from linkwise.emit.definition import energies, joint_entries, rigid_tree
+from linkwise.emit.definition import energies, follower_entries, in_radians, joint_entries, rigid_tree
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.shared_texts import init_text, names_text
 from linkwise.errors import LinkwiseError
@@ -160,8 +160,8 @@ def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
             LinkEntry(name, system.path(j), cost)
             for j, (name, cost) in enumerate(zip(system.link_names, costs, strict=True))
         ),
-        dict(system.robot.held) if isinstance(system, RigidSystem) else {},
-        tuple(c.name for c in system.coordinates if c.coupled),
+        follower_entries(system),
+        in_radians(system),
         operations,
         code_size(derivation.package, files),
         {s.name: float(v) for s, v in system.parameters.items()},

@@ -8,7 +8,7 @@ import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from linkwise.emit.formula_symbols import motion_symbol, parameter_symbols
-from linkwise.package.entries import CurveEntry
+from linkwise.package.entries import CurveEntry, FollowerEntry
 from linkwise.package.manifest import (
     BodyEntry,
     CouplingEntry,
@@ -89,6 +89,31 @@ def rigid_tree(system: System) -> RigidTree | None:
             for place, value in _places(robot)
             if isinstance(value, sp.Expr) and value.free_symbols
         },
+    )
+
+
+def follower_entries(system: System) -> tuple[FollowerEntry, ...]:
+    """Return the joints of the robot's file that are no coordinates."""
+    if isinstance(system, EnergySystem):
+        return ()
+    names = [c.name for c in system.coordinates]
+    return tuple(
+        FollowerEntry(
+            one.name,
+            one.unit,
+            names.index(one.coordinate) if one.coordinate else None,
+            CurveEntry(one.curve.starts, one.curve.pieces),
+        )
+        for one in system.robot.followers
+    )
+
+
+def in_radians(system: System) -> tuple[str, ...]:
+    """Return the names of those, and of coordinates, that logs have in radians, always."""
+    following = system.robot.followers if isinstance(system, RigidSystem) else ()
+    return (
+        *(one.name for one in system.coordinates if one.coupled),
+        *(one.name for one in following if one.coupled),
     )
 
 

@@ -1,6 +1,7 @@
 """`identify`: from a log and a robot to what its links carry."""
 
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -47,13 +48,15 @@ class Fitting:
 
 def identify(
     log: str | Path,
-    robot: str | Path | LoadedRobot,
+    robot: str | PathLike[str] | LoadedRobot,
     reading: Reading | None = None,
     processing: Processing | None = None,
     fitting: Fitting | None = None,
     progress: Progress = silent,
 ) -> Identification:
     """Identify a robot's links from a log of motion and torques.
+
+    robot: the directory of its package; of a robot's file `linkwise.kept_package` makes one
 
     Velocities and accelerations come from positions, as in `analyze`; torques are taken as they are.
     Raises LinkwiseError, in one line that names the mend, for what cannot be identified.

@@ -83,7 +83,7 @@ def read_torque_log(
         (*(robot.units_in_logs[k] for k in moving), *["N m"] * len(names)),
         replace(reading, mapping=mapping),
         progress,
-        coupled=robot.coupled,
+        followers=robot.followers,
     )
     torque = samples.q[:, len(moving) :] * factor
     with within(str(path)):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from linkwise.package.entries import PLACE, JointEntry, LinkEntry, RigidTree, Row
+from linkwise.package.entries import PLACE, CurveEntry, JointEntry, LinkEntry, RigidTree, Row
 
 ROUNDING = 1e-6
 """Largest error of an entry of a rotation times its transpose."""
@@ -32,7 +32,9 @@ def check_tree(tree: RigidTree, joints: Sequence[JointEntry], links: Sequence[Li
         if set(link.path) != by_link[link.name]:
             raise ValueError(f"the path of link {link.name!r} is not that of the tree")
     _check_joints(tree, joints)
-    _check_curves(tree)
+    for index, body in enumerate(tree.bodies):
+        if body.curve:
+            check_curve(f"bodies[{index}]", body.curve)
     _check_frames(tree, links)
     _check_passive(tree)
     _check_constraints(tree, len(joints))
@@ -69,14 +71,12 @@ def _check_frames(tree: RigidTree, links: Sequence[LinkEntry]) -> None:
             raise ValueError(f"tree.frames has no frame {link.name[:80]!a} on the body of that link")
 
 
-def _check_curves(tree: RigidTree) -> None:
-    """Raise ValueError for curves without pieces, or whose pieces are not in order."""
-    for index, body in enumerate(tree.bodies):
-        curve = body.curve
-        if curve and not (len(curve.starts) == len(curve.pieces) > 0 and all(curve.pieces)):
-            raise ValueError(f"bodies[{index}].curve needs a start for each piece, and powers in each")
-        if curve and list(curve.starts) != sorted(curve.starts):
-            raise ValueError(f"bodies[{index}].curve has starts that do not ascend")
+def check_curve(place: str, curve: CurveEntry) -> None:
+    """Raise ValueError for a curve without pieces, or whose pieces are not in order."""
+    if not (len(curve.starts) == len(curve.pieces) > 0 and all(curve.pieces)):
+        raise ValueError(f"{place}.curve needs a start for each piece, and powers in each")
+    if list(curve.starts) != sorted(curve.starts):
+        raise ValueError(f"{place}.curve has starts that do not ascend")
 
 
 def _check_passive(tree: RigidTree) -> None:

@@ -56,6 +56,19 @@ class CurveEntry:
 
 
 @dataclass(frozen=True)
+class FollowerEntry:
+    """A joint of the robot's file that is no joint here: a curve of one, by its index, or a number.
+
+    In rad or m, as its unit says.
+    """
+
+    name: str
+    unit: Literal["rad", "m"]
+    joint: int | None
+    curve: CurveEntry
+
+
+@dataclass(frozen=True)
 class BodyEntry:
     """A moving frame on its parent's, as `linkwise.robot.robot.Joint` places it, and the mass it carries.
 

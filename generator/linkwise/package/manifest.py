@@ -11,13 +11,14 @@ from typing import Any
 
 from linkwise.errors import LinkwiseError
 from linkwise.output import sweep
-from linkwise.package.checked_tree import check_tree
+from linkwise.package.checked_tree import check_curve, check_tree
 from linkwise.package.decode import decoded, parsed, require
 from linkwise.package.entries import (
     BodyEntry,
     CodeSize,
     CouplingEntry,
     EnergyEntry,
+    FollowerEntry,
     FrameEntry,
     JointEntry,
     KernelKind,
@@ -68,8 +69,8 @@ class Manifest:
     """What a package is of: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
 
     request: the options of `generate`; kernel: which kind its C is
-    held: joints that stand still, and where, in rad or m
-    in_radians: joints that logs have in radians, also where others are in degrees
+    followers: joints of the robot's file that are none here: they follow others, or are held
+    in_radians: joints and followers that logs have in radians, also where others are in degrees
     files: the SHA-256 of every other file, by its path in the package
     operations: those of a full decomposition
     code_size: an estimate for C on a microcontroller; None without C
@@ -82,7 +83,7 @@ class Manifest:
     kernel: KernelKind
     joints: tuple[JointEntry, ...]
     links: tuple[LinkEntry, ...]
-    held: Mapping[str, float]
+    followers: tuple[FollowerEntry, ...]
     in_radians: tuple[str, ...]
     operations: int
     code_size: CodeSize | None
@@ -104,6 +105,10 @@ class Manifest:
         for link in self.links:
             if not all(k < count for k in link.path):
                 raise ValueError(f"the path of link {link.name!r} names a joint that is not there")
+        for number, follower in enumerate(self.followers):
+            if follower.joint is not None and not follower.joint < count:
+                raise ValueError(f"followers[{number}] follows a joint that is not there")
+            check_curve(f"followers[{number}]", follower.curve)
         for path, digest in self.files.items():
             if not is_inside(path) or path == FILE:
                 raise ValueError(f"files has {path[:80]!a}, which is not a path of a file in the package")
@@ -170,6 +175,7 @@ def _read(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise LinkwiseError(
             f"{path.parent}: no generated robot there (no {FILE}); make one with `linkwise generate`"
+            f"{', or with `linkwise.kept_package`' if path.parent.is_file() else ''}"
         )
     try:
         require(path.stat().st_size <= LARGEST, f"the file of {path.stat().st_size} bytes", "a manifest")

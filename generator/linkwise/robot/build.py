@@ -11,8 +11,9 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot.constrained import check_constraints, constrained
 from linkwise.robot.coordinates import AxisRule, movement
 from linkwise.robot.description import Connection, Description
+from linkwise.robot.following_joints import followers
 from linkwise.robot.joint_types import Axis, expand, expansion_notes
-from linkwise.robot.limits import coordinate_limits
+from linkwise.robot.limits import check_locks, coordinate_limits
 from linkwise.robot.links import moving_links
 from linkwise.robot.mass import check_bodies
 from linkwise.robot.mass_matrix import check_mass_matrix
@@ -69,6 +70,7 @@ def build(description: Description, options: Options) -> Robot:
     joints = [(connection, expand(connection)) for connection in connections]
     axes = tuple(axis for _, parts in joints for axis in parts)
     moving = movement(axes, connections, options.lock, options.free_mimic)
+    check_locks(connections, options.lock)
     checked_passive(connections, options.allow_unphysical)
     passive = passive_axes(connections, moving.motion)
     sites, ends = anchor_frames(
@@ -114,7 +116,7 @@ def build(description: Description, options: Options) -> Robot:
         held.wanted,
         held.driven,
         limits=coordinate_limits(connections, moving.coordinates),
-        held=(*description.held, *options.lock.items()),
+        followers=tuple(followers(axes, connections, moving, options.lock)),
     )
 
 

@@ -40,6 +40,11 @@ class Curve:
             return None
         return self(0.0), self(0.0, 1)
 
+    @classmethod
+    def straight(cls, at_zero: float, slope: float = 0.0) -> "Curve":
+        """One that is a line, or the same everywhere."""
+        return cls((0.0,), ((at_zero, slope) if slope else (at_zero,),))
+
     def scaled(self, factor: float) -> "Curve":
         """The curve times a number."""
         return Curve(self.starts, tuple(tuple(factor * c for c in piece) for piece in self.pieces))

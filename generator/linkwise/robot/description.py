@@ -5,7 +5,18 @@ from typing import Literal
 
 from linkwise.robot.curve import Curve
 from linkwise.robot.notes import Note, Omission
-from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Mat3, Passive, Rotation, Scalar, TieKind, Vec3
+from linkwise.robot.robot import (
+    NOTHING,
+    UNLIMITED,
+    Follower,
+    Limits,
+    Mat3,
+    Passive,
+    Rotation,
+    Scalar,
+    TieKind,
+    Vec3,
+)
 
 ZERO3: Vec3 = (0.0, 0.0, 0.0)
 ZERO33: Mat3 = (ZERO3, ZERO3, ZERO3)
@@ -136,8 +147,8 @@ class Connection:
     """A joint as the file has it: any type, any axis; its place in the parent's frame, its axis in its own.
 
     `snapped` says that entries of the rotation were rounded to −1, 0 or 1; only a joint of one axis has
-    anything `passive`, and limits. A `curved` joint has `axes`, from the parent on, and the coordinates that
-    they follow.
+    anything `passive`, and limits. A `curved` joint has `axes`, from the parent on, the coordinates that they
+    follow, and `followers` that are coordinates in the file only.
     """
 
     name: str
@@ -153,6 +164,7 @@ class Connection:
     limits: Limits = UNLIMITED
     axes: tuple[CurvedAxis, ...] = ()
     coordinates: tuple[CurvedCoordinate, ...] = ()
+    followers: tuple[Follower, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -178,7 +190,5 @@ class Description:
     """Joints that actuators of the file drive."""
     independent: tuple[str, ...] = ()
     """Joints whose motion is to give that of all others under the constraints; none: to be chosen."""
-    held: tuple[tuple[str, float], ...] = ()
-    """Joints that the file holds, and where, in rad or m."""
     ground: str = ""
     """The body that is the world itself, where the file has one."""

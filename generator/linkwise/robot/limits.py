@@ -1,13 +1,16 @@
 """Limits that a robot's file gives its joints, by the coordinates that these became."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.description import Connection
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.robot import UNLIMITED, Coordinate, Limits
+
+ROUNDING = 1e-6
+"""How far, in rad or m, a joint may stand past a limit that was rounded."""
 
 
 def coordinate_limits(
@@ -19,11 +22,27 @@ def coordinate_limits(
     the sake of form, and how they bind the other is for who drives both. Raises LinkwiseError for a limit
     that is not a number.
     """
-    own = {c.name: c for c in connections if c.type in SINGLE}
-    for c in own.values():
-        if any(map(math.isnan, astuple(c.limits))):
-            raise LinkwiseError(f"joint {c.name!r} has NaN for a limit; give a number, or leave it out")
-    known = {name: c.limits for name, c in own.items()}
-    known |= {c.name: c.limits for connection in connections for c in connection.coordinates}
+    known = _known(connections)
+    for name, limits in known.items():
+        if any(map(math.isnan, astuple(limits))):
+            raise LinkwiseError(f"joint {name!r} has NaN for a limit; give a number, or leave it out")
     found = tuple(known.get(c.name, UNLIMITED) for c in coordinates)
     return found if any(limits != UNLIMITED for limits in found) else ()
+
+
+def check_locks(connections: Sequence[Connection], lock: Mapping[str, float]) -> None:
+    """Raise LinkwiseError where a joint is to stand outside of its limits, as a number in degrees would."""
+    known = _known(connections)
+    for name, at in lock.items():
+        limits = known.get(name, UNLIMITED)
+        if at < limits.lower - ROUNDING or at > limits.upper + ROUNDING:
+            raise LinkwiseError(
+                f"--lock {name}={at:g} is outside of the joint's limits, {limits.lower:g} to"
+                f" {limits.upper:g}; give rad or m, or change the limits in the file"
+            )
+
+
+def _known(connections: Sequence[Connection]) -> dict[str, Limits]:
+    """Limits of the file's joints of one axis, and of coordinates that axes follow."""
+    known = {c.name: c.limits for c in connections if c.type in SINGLE}
+    return known | {c.name: c.limits for connection in connections for c in connection.coordinates}

@@ -60,6 +60,18 @@ class Coordinate:
 
 
 @dataclass(frozen=True)
+class Follower:
+    """A joint of the file that is no coordinate: a curve of one or, where that has no name, a number."""
+
+    name: str
+    unit: Literal["rad", "m"]
+    coordinate: str
+    curve: Curve
+    coupled: bool = False
+    """See `Coordinate`."""
+
+
+@dataclass(frozen=True)
 class Joint:
     """One degree of freedom between a parent link's frame and a link's frame.
 
@@ -235,8 +247,7 @@ class Robot:
     independent: tuple[int, ...] = ()
     limits: tuple[Limits, ...] = ()
     """Of each coordinate, or none at all; those of joints that follow another are no limits of that one."""
-    held: tuple[tuple[str, float], ...] = ()
-    """Joints that are held, and where, in rad or m."""
+    followers: tuple[Follower, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.coordinates:

@@ -59,7 +59,6 @@ def read_osim(path: Path) -> Description:
         loops=tuple(unmodelled(model)),
         ties=tuple(ties(model, frames)),
         omissions=tuple(_forces(model)),
-        held=tuple((name, rule.curve(0.0)) for name, rule in rules.items() if not rule.free),
         ground=GROUND,
     )
 

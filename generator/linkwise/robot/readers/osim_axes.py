@@ -16,7 +16,7 @@ from linkwise.robot.curve import Curve
 from linkwise.robot.joint_types import X, Y, Z
 from linkwise.robot.readers.osim_coordinates import Rule
 from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of
-from linkwise.robot.readers.osim_functions import IDENTITY, constant, function_of
+from linkwise.robot.readers.osim_functions import IDENTITY, function_of
 
 Kind = Literal["revolute", "prismatic"]
 Part = tuple[Kind, tuple[float, float, float], int]
@@ -130,7 +130,7 @@ def _displacement(axis: Element, coordinates: Sequence[str], place: str) -> tupl
             f"{place} names {names[0]!r}, which is not a coordinate of the joint; it has "
             f"{listed(coordinates)}"
         )
-    curve = function_of(axis, "function", place) or constant(0.0)
+    curve = function_of(axis, "function", place) or Curve.straight(0.0)
     if not names or (curve.line is not None and curve.line[1] == 0.0):
-        return "", constant(curve(0.0))
+        return "", Curve.straight(curve(0.0))
     return names[0], curve

@@ -9,7 +9,7 @@ from linkwise.robot.curve import Curve
 from linkwise.robot.notes import Note
 from linkwise.robot.readers.osim_document import members
 from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of, yes
-from linkwise.robot.readers.osim_functions import IDENTITY, constant, function_of
+from linkwise.robot.readers.osim_functions import IDENTITY, function_of
 from linkwise.robot.robot import UNLIMITED, Limits
 
 COUPLER = "CoordinateCouplerConstraint"
@@ -44,7 +44,7 @@ def coordinate_rules(
         (value,) = numbers_of(coordinate, "default_value", "0", place, 1)
         own[name] = Rule(name, IDENTITY)
         if yes(coordinate, "locked"):
-            own[name] = Rule("", constant(value))
+            own[name] = Rule("", Curve.straight(value))
             notes.append(Note("locked", name, f"at {value:g}, as the file says"))
         if yes(coordinate, "prescribed"):
             notes.append(Note("ignored", name, "that its motion is prescribed: it moves as a log says"))

@@ -10,12 +10,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot.curve import Curve
 from linkwise.robot.readers.osim_elements import numbers_of
 
-IDENTITY = Curve((0.0,), ((0.0, 1.0),))
-
-
-def constant(value: float) -> Curve:
-    """The same everywhere."""
-    return Curve((0.0,), ((value,),))
+IDENTITY = Curve.straight(0.0, 1.0)
 
 
 def function_of(owner: Element, tag: str, place: str) -> Curve | None:
@@ -43,7 +38,7 @@ def _known(element: Element, place: str) -> Curve:
 
 
 def _constant(element: Element, place: str) -> Curve:
-    return constant(*numbers_of(element, "value", "0", place, 1))
+    return Curve.straight(*numbers_of(element, "value", "0", place, 1))
 
 
 def _linear(element: Element, place: str) -> Curve:

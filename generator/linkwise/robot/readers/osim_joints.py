@@ -13,6 +13,7 @@ from linkwise.robot.readers.osim_axes import Kind, MovedAxis, axes_of, carrier
 from linkwise.robot.readers.osim_coordinates import Rule, limits_of
 from linkwise.robot.readers.osim_elements import name_of
 from linkwise.robot.readers.osim_frames import GROUND, Placed
+from linkwise.robot.robot import Follower
 
 IN_RADIANS = "in radians in every log, as in OpenSim's files whose other angles are in degrees"
 SUFFIXES = {"prismatic": "t", "revolute": "r"}
@@ -94,6 +95,17 @@ class OsimJoint:
                 CurvedCoordinate(name_of(c), UNITS[axes[at].kind], limits_of(c), axes[at].in_radians)
                 for c in free
                 if (at := carriers[name_of(c)]) is not None
+            ),
+            followers=tuple(
+                Follower(
+                    name,
+                    "rad" if at is None else UNITS[axes[at].kind],
+                    rules[name].free,
+                    rules[name].curve,
+                    at is not None and axes[at].in_radians,
+                )
+                for name, at in carriers.items()
+                if rules[name].free != name
             ),
         )
 
