@@ -96,3 +96,28 @@ def test_a_missing_file_of_forces_is_named(leg: Path) -> None:
         analyze(leg / "walk.csv", leg / "leg", loads=[leg / "none.xml"])
     with pytest.raises(LinkwiseError, match=r"grf.xml: no datafile; name the .mot or .sto file"):
         analyze(leg / "walk.csv", leg / "leg", loads=[write_loads(leg, RIGHT, data="")])
+
+
+def test_what_stands_among_defaults_is_no_load(leg: Path) -> None:
+    path = write_loads(leg, RIGHT)
+    expected = analyze(leg / "walk.csv", leg / "leg", loads=[path])
+    shank = FORCE.format(**(USUAL | {"name": "default", "body": "shank", "side": "1_"}))
+    text = path.read_text().replace("<objects>", f"<defaults>{shank}</defaults><objects>")
+    path.write_text(text)
+    np.testing.assert_array_equal(
+        analyze(leg / "walk.csv", leg / "leg", loads=[path]).values, expected.values
+    )
+
+
+def test_columns_that_stand_in_another_order_than_x_y_z_are_refused(leg: Path) -> None:
+    table = smooth(481, 3, rate=600)
+    write_mot(leg / "turned.mot", table, ["push_v_z", "push_v_y", "push_v_x"])
+    force = {"name": "right", "body": "foot"}
+    path = write_loads(leg, force, data="turned.mot")
+    text = path.read_text().replace("ground_force_v", "push_v")
+    for other in ("point", "torque"):
+        start, end = f"<{other}_identifier>", f"</{other}_identifier>"
+        text = text[: text.index(start)] + text[text.index(end) + len(end) :]
+    path.write_text(text)
+    with pytest.raises(LinkwiseError, match="'push_v_z', 'push_v_y', 'push_v_x'; bring them into the order"):
+        analyze(leg / "walk.csv", leg / "leg", loads=[path])

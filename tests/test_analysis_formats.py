@@ -5,6 +5,7 @@ import sqlite3
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -15,6 +16,7 @@ from linkwise.analysis.logs import open_log
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
 from motion_logs import JOINTS, PLANAR3, smooth, write_csv
+from numpy.typing import NDArray
 
 TABLE = smooth(80, 3)
 TIME, Q = TABLE[:, 0], TABLE[:, 1:]
@@ -190,7 +192,11 @@ def test_measured_torques_are_found_and_need_not_be_left_out(tmp_path: Path) -> 
             {},
             r"array 'q' is \(80, 3\), and 2 names; name its columns",
         ),
-        ({"t": TIME, "q": Q, "joints": ["a", "a", "b"]}, {}, "'q' and 'q' are both of 'a'; rename one"),
+        (
+            {"t": TIME, "q": Q, "joints": ["a", "a", "b"]},
+            {},
+            "'a' names two columns of 'q'; name each joint once",
+        ),
         (
             {"t": TIME, "q": Q, "joints": np.array(JOINTS, object)},
             {},
@@ -276,3 +282,30 @@ def test_a_file_cut_off_is_named(tmp_path: Path, write: Callable[[Path], Path]) 
             match=rf"^{path}: not an? .* or damaged \(.*\); (write the file|mend it with .*) again$",
         ):
             analyze(path, PLANAR3)
+
+
+def test_units_of_datasets_count(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    for units, factor in (("degrees", 180 / np.pi), ("rad", 1.0)):
+        with h5py.File(path, "w") as file:
+            file["time"], file["q"], file["joint_names"] = TIME, Q * factor, [list(JOINTS)]
+            file["q"].attrs["units"] = units
+        np.testing.assert_allclose(analyze(path, PLANAR3).q, Q, rtol=1e-14)
+    with pytest.raises(LinkwiseError, match="--units deg contradicts the file, whose angles are in radians"):
+        analyze(path, PLANAR3, Reading(units="deg"))
+    with h5py.File(path, "w") as file:
+        file["time"] = TIME
+        for name, values, units in zip(JOINTS, Q.T, ("deg", "rad", ""), strict=True):
+            file[name] = values
+            file[name].attrs["unit"] = units
+    with pytest.raises(LinkwiseError, match="arrays 'joint1', 'joint2' are in rad and in degrees"):
+        analyze(path, PLANAR3)
+
+
+@pytest.mark.parametrize(
+    ("q", "told"), [(Q[:, None], r"\(80, 1, 3\)"), (Q + 0j, r"\(80, 3\) without numbers")]
+)
+def test_positions_that_cannot_be_are_named(tmp_path: Path, q: NDArray[Any], told: str) -> None:
+    np.savez(tmp_path / "a.npz", time=TIME, q=q)
+    with pytest.raises(LinkwiseError, match=rf"a.npz: array 'q' is {told}; positions are numbers, \("):
+        analyze(tmp_path / "a.npz", PLANAR3)

@@ -220,7 +220,7 @@ REFUSED = {
     "none": (
         lambda table: table,
         ["fx", "fy", "fz"],
-        r"plate.csv: no column of a load; name them BODY/force_x, BODY/force_y, …, or give OpenSim's XML",
+        r"plate.csv: no column of a load in 'time', 'fx', 'fy', 'fz'; name them BODY/force_x",
     ),
 }
 

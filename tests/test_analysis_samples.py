@@ -35,7 +35,7 @@ def test_degrees_turn_angles_only(tmp_path):
     q = read(path, units=("m", "rad", "rad")).q
     np.testing.assert_array_equal(q[:, 0], table[:, 1])
     np.testing.assert_allclose(q[:, 1:], np.radians(table[:, 2:]), rtol=1e-15)
-    with pytest.raises(LinkwiseError, match="--units rad contradicts the file's inDegrees=yes"):
+    with pytest.raises(LinkwiseError, match="--units rad contradicts the file, whose angles are in degrees"):
         read(path, Reading(units="rad"))
 
 
@@ -43,6 +43,7 @@ def test_degrees_turn_angles_only(tmp_path):
     ("scale", "units", "warning"),
     [
         (60, "rad", "reaches 54 rad, 8.6 turns: if that is degrees, pass --units deg"),
+        (7.5, "rad", "reaches 6.75 rad, 1.1 turns: if that is degrees, pass --units deg"),
         (1, "deg", "if that is radians, pass --units rad"),
         (1, None, None),
         (60, "deg", None),
@@ -52,6 +53,48 @@ def test_unlikely_units_are_warned_of(tmp_path, scale, units, warning):
     path = write_csv(tmp_path / "a.csv", smooth(400, 3) * [1, scale, scale, scale])
     warnings = read(path, Reading(units=units)).warnings
     assert [warning in text for text in warnings] == ([True] if warning else [])
+
+
+def test_angles_past_their_joints_limits_and_columns_in_degrees_want_their_unit_told(tmp_path):
+    path = write_csv(tmp_path / "a.csv", smooth(400, 3) * [1, 5, 1, 1])
+    limited = {"joint_units": ANGLES, "progress": silent, "reach": (1.2, np.inf, 0.1)}
+    with pytest.raises(LinkwiseError, match=r"'joint1' reaches 2.5 rad, the limits of its joint 1.2: say"):
+        read_samples(open_log(path), JOINTS, reading=Reading(), **limited)
+    assert not read_samples(open_log(path), JOINTS, reading=Reading(units="rad"), **limited).warnings
+    named = write_csv(tmp_path / "b.csv", smooth(400, 3), ["joint1 [deg]", "degrade", "joint3"])
+    mapping = {"joint1 [deg]": "joint1", "degrade": "joint2"}
+    with pytest.raises(LinkwiseError, match=r"column 'joint1 \[deg\]' speaks of degrees: say"):
+        read(named, Reading(mapping=mapping))
+    assert not read(named, Reading(mapping=mapping, units="rad")).warnings
+
+
+def test_lengths_in_mm_are_warned_of(tmp_path):
+    path = write_csv(tmp_path / "a.csv", smooth(400, 3) * [1, 900, 1, 1])
+    (warning,) = read(path, units=("m", "rad", "rad")).warnings
+    assert warning == "column 'joint1' reaches 450 m: if that is mm, divide it by 1000"
+
+
+def test_resampling_that_makes_fast_motion_slow_is_warned_of(tmp_path):
+    path = write_csv(tmp_path / "a.csv", smooth(400, 3, rate=1000))
+    (warning,) = read(path, Reading(resample=100)).warnings
+    assert warning.startswith("--resample 100 of 1000 samples a second: what moves faster than 50 Hz comes")
+    assert not read(path, Reading(resample=1000)).warnings
+
+
+def test_two_columns_of_one_joint_are_named(tmp_path):
+    path = write_csv(tmp_path / "a.csv", smooth(30, 4), (*JOINTS, "/jointset/a/joint2/value"))
+    with pytest.raises(LinkwiseError, match=r"columns 'joint2' and '/jointset/a/joint2/value' are both of"):
+        read(path)
+    mapping = (("joint1", "joint3"), ("joint2", "joint3"))
+    with pytest.raises(LinkwiseError, match=r"--map joint2=joint3: column 'joint1' is that joint already"):
+        read(path, Reading(mapping=mapping))
+    with pytest.raises(LinkwiseError, match=r"mapping \['joint1'\]: give pairs of a column and a joint"):
+        Reading(mapping=["joint1"])
+
+
+def test_speeds_of_old_states_are_left_out(tmp_path):
+    path = write_csv(tmp_path / "a.csv", smooth(30, 6), (*JOINTS, *(f"{name}_u" for name in JOINTS)))
+    assert read(path).ignored == ("joint1_u", "joint2_u", "joint3_u")
 
 
 def test_angles_of_many_turns_want_their_unit_told(tmp_path):
@@ -208,10 +251,11 @@ def test_jitter_is_not_rounding(tmp_path):
         read(write_csv(tmp_path / "a.csv", table))
 
 
-def test_milliseconds_are_warned_of(tmp_path):
-    table = smooth(30, 3) * [1000, 1, 1, 1]
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1000), ("µs", 10**6), ("ns", 10**9)])
+def test_time_in_other_units_is_warned_of(tmp_path, unit, factor):
+    table = smooth(30, 3) * [factor, 1, 1, 1]
     (warning,) = read(write_csv(tmp_path / "a.csv", table)).warnings
-    assert warning == "0.1 samples a second are few: if time is in ms, divide it by 1000"
+    assert warning.endswith(f" samples a second are few: if time is in {unit}, divide it by {factor}")
     assert read(write_csv(tmp_path / "b.csv", smooth(30, 3, rate=10))).warnings == ()
 
 

@@ -286,3 +286,28 @@ def test_tensors_that_want_gradients_are_refused(packages: tuple[Any, Any]) -> N
     with torch.no_grad():
         answer = robot.labelled("partial_torque", q, qd, qdd)
     np.testing.assert_array_equal(answer, robot.partial_torque(Q, QD, QDD))
+
+
+def test_tables_are_taken_by_the_names_of_their_columns(packages: tuple[Any, Any]) -> None:
+    pd, pl = (pytest.importorskip(name) for name in ("pandas", "polars"))
+    robot = packages[0].load("numpy")
+    turned = [2, 0, 3, 1]
+    names = [robot.joint_names[k] for k in turned]
+    expected = robot.gravity_torque(Q)
+    for table in (pd.DataFrame(Q[:, turned], columns=names), pl.DataFrame(Q[:, turned], schema=names)):
+        np.testing.assert_array_equal(robot.labelled("gravity_torque", table), expected)
+    row = pd.Series(Q[1, turned], index=names)
+    np.testing.assert_array_equal(robot.labelled("gravity_torque", row), expected[1])
+    frame = pd.DataFrame(Q, columns=list(robot.joint_names)).rename_axis("frame")
+    assert robot.labelled("gravity_torque", frame).dims == ("frame", "joint")
+    with pytest.raises(ValueError, match="q has no joint 'crank'; it has 0, 1, 2, 3"):
+        robot.labelled("gravity_torque", pd.DataFrame(Q))
+
+
+def test_arrays_in_other_units_or_without_joints_are_refused(packages: tuple[Any, Any]) -> None:
+    robot = packages[0].load("numpy")
+    q = xr.DataArray(Q, dims=("trial", "joint"), attrs={"units": "deg"})
+    with pytest.raises(ValueError, match="q is in deg; give it in rad and m"):
+        robot.labelled("gravity_torque", q)
+    with pytest.raises(ValueError, match=r"q has the dimensions \(trial, joints\); call that of the joints"):
+        robot.labelled("gravity_torque", xr.DataArray(Q, dims=("trial", "joints")))

@@ -22,7 +22,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def walk(folder: Path) -> Path:
-    rows = "\n".join(f"{k / 50},{k % 3},{-k % 2},{k / 2},{k / 3},{-k / 2}" for k in range(20))
+    rows = "\n".join(f"{k / 50},{k % 3},{-k % 2},{k / 8},{k / 9},{-k / 8}" for k in range(20))
     joints = "hip_adduction,hip_rotation,hip_flexion,knee_angle,ankle_angle"
     (folder / "walk.csv").write_text(f"time,{joints}\n{rows}\n", encoding="utf-8")
     return folder / "walk.csv"

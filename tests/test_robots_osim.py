@@ -283,3 +283,14 @@ def test_closed_forms_of_curves_are_refused() -> None:
     for asked in ({"kernel": "straight"}, {"derivation": "energy"}):
         with pytest.raises(LinkwiseError, match="joint 'knee_t1' follows a curve, and no closed forms"):
             generate(system, **asked)  # type: ignore[arg-type]
+
+
+def test_what_is_true_may_be_written_as_1(tmp_path: Path) -> None:
+    kinds, more = ["PinJoint", "PinJoint"], "<locked>{}</locked><default_value>0.4</default_value>"
+    texts = ("true", "1", "True")
+    held = [robot_of(tmp_path, chain(kinds, coordinates={"joint1_angle": more.format(t)})) for t in texts]
+    assert all(robot == held[0] and len(robot.coordinates) == 1 for robot in held)
+    coupled = [constraints(coupler("joint1_angle", "joint0_angle", LINES, enforced)) for enforced in "10"]
+    assert [len(robot_of(tmp_path, chain(kinds, sets)).coordinates) for sets in coupled] == [1, 2]
+    with pytest.raises(LinkwiseError, match="Coordinate 'joint1_angle': <locked>yes</locked> needs true or"):
+        robot_of(tmp_path, chain(kinds, coordinates={"joint1_angle": more.format("yes")}))

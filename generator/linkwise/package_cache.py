@@ -54,7 +54,7 @@ def kept_package(
     read or generated, for options of a package, and for a cache that cannot be written.
     """
     options = options or Options()
-    if Path(robot).is_dir() or not is_description(robot):
+    if Path(robot).is_dir() or not (is_description(robot) or Path(robot).is_file()):
         if options.given:
             flags = listed(f"--{name.replace('_', '-')}" for name in options.given)
             raise LinkwiseError(f"{robot} is read already: leave {flags} out, or name the robot's own file")

@@ -4,8 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from linkwise import read_robot
 from osim_text import (
     KNEE,
+    LINEAR,
     LINES,
     ROLLING,
     ROLLS,
@@ -15,12 +17,15 @@ from osim_text import (
     coefficients,
     constraints,
     coupler,
+    multiplied,
     points,
 )
 
 pytest.importorskip(
     "opensim", reason="needs opensim, which has wheels for Linux on x86-64: pip install opensim"
 )
+
+import opensim
 
 from numeric.opensim_beside import Beside
 
@@ -84,3 +89,29 @@ def test_a_locked_coordinate_and_limits(tmp_path: Path) -> None:
     assert list(both.names) == ["joint0_second", "joint1_angle"]
     assert -0.2 <= both.motion[0, 1] <= 0.1
     assert max(both.errors()) <= LIMIT
+
+
+TURNS = {
+    "a line": coefficients("LinearFunction", 1.0, 0.3),
+    "there and back": coefficients("LinearFunction", -1.0, 0.0),
+    "half as far": coefficients("LinearFunction", 0.5, 0.0),
+    "a polynomial": coefficients("PolynomialFunction", 1.0, 0.0),
+    "a product": multiplied(1.0, LINEAR),
+}
+
+
+@pytest.mark.parametrize("slides", [False, True])
+@pytest.mark.parametrize("turn", TURNS.values(), ids=TURNS)
+def test_which_coordinates_files_have_in_degrees_is_opensims_choice(
+    turn: str, slides: bool, tmp_path: Path
+) -> None:
+    axes = {"rotation1": ("1 0 0", "angle", turn)}
+    axes |= {"translation1": ("1 0 0", "angle", LINEAR)} if slides else {}
+    file = tmp_path / "model.osim"
+    file.write_text(chain([Custom(("angle",), axes), "PinJoint"]))
+    model = opensim.Model(str(file))
+    model.initSystem()
+    kind = model.getCoordinateSet().get(0).getMotionType()
+    coordinate = read_robot(file).coordinates[0]
+    assert kind in (1, 2, 3), "rotational, translational or coupled"
+    assert (coordinate.unit, coordinate.coupled) == ("m" if kind == 2 else "rad", kind == 3)

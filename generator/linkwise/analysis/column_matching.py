@@ -1,8 +1,9 @@
 """Which column of a log is the time, which is which joint, and in which unit its angles are."""
 
 import math
+import re
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise.analysis.logs import Log
@@ -13,11 +14,16 @@ from linkwise.runtime.chosen_names import STATES, end_of_path, known_as, nearest
 
 MOST_FOUND, LONGEST_FOUND = 6, 300
 """Names of columns that are offered in all, and letters of what is offered for one."""
-MANY_TURNS = 4 * math.pi
-"""An angle past two turns in radians is more likely one in degrees."""
+PAST_LIMITS = 1.0
+"""An angle so far past its joint's limits, in rad, is more likely one in degrees, as is one past a turn."""
+SAYS_DEGREES = re.compile(r"(?<![^\W_])deg(?:rees?)?(?![^\W_])", re.IGNORECASE)
+FAR = 100.0
+"""m; a length beyond it is more likely one in mm."""
 TIMES = ("time", "t")
 """Names of the time's column, in any case."""
 STATE, SPEED = (f"/{state}" for state in STATES)
+OLD_SPEED = "_u"
+"""How states of OpenSim 3 end that are speeds."""
 JOINTS = "/jointset/"
 """How OpenSim's paths of coordinates begin, /jointset/JOINT/COORDINATE, with /value behind among states."""
 
@@ -63,6 +69,7 @@ def select(
     used = {*source.values(), columns[time]}
     free = [column for column in columns if column not in used and column not in beside]
     speeds = {f"{column.removesuffix(STATE)}{SPEED}" for column in used if column.endswith(STATE)}
+    speeds |= {f"{column}{OLD_SPEED}" for column in used}
     if missing:
         positions = [column for column in free if not column.endswith(SPEED)]
         raise LinkwiseError(
@@ -71,6 +78,12 @@ def select(
     unasked = {*speeds, *brought, *(column for column in free if end_of_path(column) in coupled)}
     extra = [column for column in free if column not in unasked]
     if extra and not reading.ignore_extra:
+        for column in extra:
+            if (own := source.get(end_of_path(column))) is not None:
+                raise LinkwiseError(
+                    f"columns {own!r} and {column!r} are both of joint {end_of_path(column)!r}; leave what is"
+                    " of none out with --ignore-extra"
+                )
         raise LinkwiseError(
             f"no joint for column {listed(map(repr, extra))}; leave such columns out with --ignore-extra,"
             " or map them with --map COLUMN=JOINT"
@@ -98,19 +111,26 @@ def radians_per_unit(log: Log, reading: Reading) -> float:
     told = None if reading.units is None else reading.units == "deg"
     if told is not None and log.degrees is not None and told != log.degrees:
         raise LinkwiseError(
-            f"--units {reading.units} contradicts the file's"
-            f" inDegrees={'yes' if log.degrees else 'no'}; leave --units out"
+            f"--units {reading.units} contradicts the file, whose angles are in"
+            f" {'degrees' if log.degrees else 'radians'}; leave --units out"
         )
     return math.pi / 180 if (log.degrees if told is None else told) else 1.0
 
 
-def unit_warnings(log: Log, reading: Reading, peaks: Sequence[tuple[str, float]]) -> tuple[str, ...]:
+@dataclass(frozen=True)
+class Peak:
+    """An angle's column, its largest magnitude there, and the largest that its joint may have in rad."""
+
+    column: str
+    magnitude: float
+    reach: float = math.inf
+
+
+def unit_warnings(log: Log, reading: Reading, peaks: Sequence[Peak]) -> tuple[str, ...]:
     """Warnings about a told unit of angles that is unlikely by their size.
 
-    peaks: column and largest magnitude, as written in the log, of every angle
-
-    Raises LinkwiseError where the unit is not told: in a file whose header ought to, and where angles in
-    radians would turn many times.
+    Raises LinkwiseError where the unit is not told: in a file whose header ought to, where a column's name
+    says degrees, and where angles in radians would make more than a turn or pass their joint's limits.
     """
     if not peaks:
         return ()
@@ -118,15 +138,36 @@ def unit_warnings(log: Log, reading: Reading, peaks: Sequence[tuple[str, float]]
     if log.path.suffix.lower() in {".mot", ".sto"} and not told:
         raise LinkwiseError("the header has no inDegrees: say what angles are in with --units deg or rad")
     in_radians = radians_per_unit(log, reading) == 1.0
-    column, peak = max(peaks, key=lambda item: item[1])
-    if in_radians and peak > MANY_TURNS:
-        turns = f"column {column!r} reaches {peak:.4g} rad, {peak / math.tau:.1f} turns"
-        if not told:
-            raise LinkwiseError(f"{turns}: say what angles are in with --units deg or rad")
-        return (f"{turns}: if that is degrees, pass --units deg",)
-    if not in_radians and 0 < peak <= math.pi:
-        return (f"no angle exceeds {peak:.4g} degrees ({column!r}): if that is radians, pass --units rad",)
-    return ()
+    largest = max(peaks, key=lambda peak: peak.magnitude)
+    if not in_radians and 0 < largest.magnitude <= math.pi:
+        size = f"{largest.magnitude:.4g} degrees ({largest.column!r})"
+        return (f"no angle exceeds {size}: if that is radians, pass --units rad",)
+    doubts = tuple(_doubts(peaks, largest, told)) if in_radians else ()
+    if doubts and not told:
+        raise LinkwiseError(f"{doubts[0]}: say what angles are in with --units deg or rad")
+    return tuple(f"{doubt}: if that is degrees, pass --units deg" for doubt in doubts[:1])
+
+
+def _doubts(peaks: Sequence[Peak], largest: Peak, told: bool) -> Iterator[str]:
+    """Why angles are hardly in radians; their names and limits count only where nobody told that they are."""
+    if largest.magnitude > math.tau:
+        turns = f"{largest.magnitude / math.tau:.1f} turns"
+        yield f"column {largest.column!r} reaches {largest.magnitude:.4g} rad, {turns}"
+    for peak in () if told else peaks:
+        if SAYS_DEGREES.search(peak.column):
+            yield f"column {peak.column!r} speaks of degrees"
+        if peak.magnitude > peak.reach + PAST_LIMITS:
+            limit = f"the limits of its joint {peak.reach:.4g}"
+            yield f"column {peak.column!r} reaches {peak.magnitude:.4g} rad, {limit}"
+
+
+def far_warnings(peaks: Sequence[Peak]) -> tuple[str, ...]:
+    """Warnings about lengths, in the log, that are unlikely by their size."""
+    return tuple(
+        f"column {peak.column!r} reaches {peak.magnitude:.4g} m: if that is mm, divide it by 1000"
+        for peak in peaks
+        if peak.magnitude > FAR
+    )
 
 
 def time_column(columns: Sequence[str], reading: Reading) -> int:
@@ -157,7 +198,8 @@ def with_nearest(wanted: Sequence[str], found: Sequence[str]) -> str:
 def _mapped(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> dict[str, str]:
     """Name of each joint's column, in the robot's order."""
     source = {joint: _named(joint, columns) for joint in joints}
-    for column, given in reading.mapping:
+    taken: dict[str, str] = {}
+    for column, given in reading.pairs:
         joint = known_as(given, joints)
         if joint is None:
             raise LinkwiseError(
@@ -168,6 +210,10 @@ def _mapped(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> 
             raise LinkwiseError(
                 f"--map {column}={joint}: the log has no column {column!r}; it has"
                 f" {listed(map(repr, nearest_first(column, columns)))}"
+            )
+        if taken.setdefault(joint, column) != column:
+            raise LinkwiseError(
+                f"--map {column}={joint}: column {taken[joint]!r} is that joint already; keep one"
             )
         source[joint] = column
     return source

@@ -214,11 +214,14 @@ def _samples(
     """
     if robot.constrained is None:
         joints = robot.joints, robot.units_in_logs
-        return read_samples(log, *joints, reading, progress, buffer, switches, robot.followers), None
+        return read_samples(
+            log, *joints, reading, progress, buffer, switches, robot.reach, robot.followers
+        ), None
     followers = set(robot.constrained.constraints.dependent)
     with within(str(log.path)):
         there = with_columns(log.columns, robot.joints, followers, reading)
     names, units = (tuple(given[k] for k in there) for given in (robot.joints, robot.units_in_logs))
-    samples = read_samples(log, names, units, reading, progress, buffer, switches, robot.followers)
+    reach = [robot.reach[k] for k in there]
+    samples = read_samples(log, names, units, reading, progress, buffer, switches, reach, robot.followers)
     with within(str(log.path)):
         return closed_samples(samples, there, robot.constrained, reading.loop_tolerance, progress, buffer)

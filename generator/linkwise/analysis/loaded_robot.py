@@ -1,6 +1,7 @@
 """A generated robot package as the analysis uses it: names, a back end that works here, bodies, an oracle."""
 
 import hashlib
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,6 +58,15 @@ class LoadedRobot:
         return tuple(
             "always rad" if name in always else unit
             for name, unit in zip(self.joints, self.units, strict=True)
+        )
+
+    @property
+    def reach(self) -> tuple[float, ...]:
+        """Largest magnitude that the limits of each joint allow, in its unit; infinite without any."""
+        ends = ((joint.lower, joint.upper) for joint in self.package.manifest.joints)
+        return tuple(
+            math.inf if lower is None or upper is None else max(abs(lower), abs(upper))
+            for lower, upper in ends
         )
 
     @property

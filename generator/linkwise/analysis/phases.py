@@ -40,6 +40,9 @@ class Phase:
         if not (sign and name and what) or (slash and not rest):
             raise LinkwiseError(f"--phase {text}: {FORM}")
         if spans := _spans(what):
+            for start, end in spans:
+                if start >= end:
+                    raise LinkwiseError(f"--phase {text}: {start:g} s is not before {end:g} s; {FORM}")
             return cls(name, rest, "", None, spans)
         column, above, value = what.rpartition(">")
         if not above:
@@ -59,9 +62,7 @@ def _spans(text: str) -> tuple[tuple[float, float], ...]:
         ends = [tuple(float(end) for end in span.split("..")) for span in text.split(",")]
     except ValueError:
         return ()
-    return (
-        tuple((a, b) for a, b in ends) if all(len(span) == 2 and span[0] < span[1] for span in ends) else ()
-    )
+    return tuple((a, b) for a, b in ends) if all(len(span) == 2 for span in ends) else ()
 
 
 @dataclass(frozen=True, eq=False)

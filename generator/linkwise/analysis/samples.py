@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from linkwise.analysis.column_matching import radians_per_unit, select, unit_warnings
-from linkwise.analysis.even_time import even_rate, resampled
+from linkwise.analysis.column_matching import Peak, far_warnings, radians_per_unit, select, unit_warnings
+from linkwise.analysis.even_time import TOLERANCE, even_rate, resampled
 from linkwise.analysis.follower_columns import FollowerColumns, FollowingJoint
 from linkwise.analysis.logs import Log
 from linkwise.analysis.settings import Reading
@@ -20,6 +20,7 @@ from linkwise.runtime.native.native_system import system_here
 
 SLOW = 5.0
 """Hz; hardly any movement is recorded so slowly, and milliseconds taken for seconds look like it."""
+CLOCKS = {"ms": 1000, "µs": 10**6, "ns": 10**9}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +45,15 @@ def read_samples(
     progress: Progress,
     buffer: Path | None = None,
     beside: Sequence[str] = (),
+    reach: Sequence[float] = (),
     followers: Sequence[FollowingJoint] = (),
 ) -> Samples:
     """Read, convert to SI and check a log.
 
     joint_units: one for each joint, "rad" for those that a log in degrees has in these
     buffer: a directory on whose disk, as a rule, a buffer keeps the samples; None keeps them in memory
-    beside: columns that something else reads; followers: joints whose columns may be left out unasked
+    beside: columns that something else reads; reach: the largest magnitude that each joint's limits allow, in
+    its unit, of all joints or none; followers: joints whose columns may be left out unasked
     Raises LinkwiseError that names file, row and column for what cannot be analysed.
     """
     with within(str(log.path)):
@@ -72,13 +75,16 @@ def read_samples(
     samples = collected(in_si(), width, buffer)
     with within(str(log.path)):
         rate = even_rate(samples[:, 0], log.first_row, strict=reading.resample is None)
-        warnings = (*log.warnings, *slowness(rate), *following.warnings())
+        warnings = (*log.warnings, *slowness(rate), *following.warnings(), *_thinned(rate, reading.resample))
         if reading.resample is not None:
             rate = reading.resample
             samples = collected(resampled(samples, rate, progress=progress), width, buffer)
-    named = [(log.columns[selection.columns[at]], float(peaks[at])) for at in angles]
+    by_unit: dict[str, list[Peak]] = {"rad": [], "m": []}
+    for at, unit in enumerate(joint_units):
+        size = peaks[at + 1], reach[at] if reach else np.inf
+        by_unit.get(unit, []).append(Peak(log.columns[selection.joints[at]], *map(float, size)))
     with within(str(log.path)):
-        warnings += unit_warnings(log, reading, named)
+        warnings += unit_warnings(log, reading, by_unit["rad"]) + far_warnings(by_unit["m"])
     first_row = log.first_row if reading.resample is None else None
     return Samples(samples[:, 0], samples[:, 1:], rate, selection.ignored, warnings, first_row)
 
@@ -105,7 +111,18 @@ def slowness(rate: float) -> tuple[str, ...]:
     """A warning where so many samples a second, Hz, are hardly those of a movement."""
     if rate >= SLOW:
         return ()
-    return (f"{rate:.4g} samples a second are few: if time is in ms, divide it by 1000",)
+    unit = next((unit for unit, factor in CLOCKS.items() if rate * factor >= 1.0), "ns")
+    return (f"{rate:.4g} samples a second are few: if time is in {unit}, divide it by {CLOCKS[unit]}",)
+
+
+def _thinned(rate: float, wanted: float | None) -> tuple[str, ...]:
+    """A warning where resampling to `wanted` Hz turns fast motion of a log into slow one."""
+    if wanted is None or wanted >= rate * (1 - TOLERANCE):
+        return ()
+    return (
+        f"--resample {wanted:g} of {rate:.6g} samples a second: what moves faster than {wanted / 2:g} Hz"
+        f" comes out as something slower; resample at {rate:.6g} or more",
+    )
 
 
 def collected(blocks: Iterator[Array], width: int, directory: Path | None) -> Array:

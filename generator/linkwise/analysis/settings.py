@@ -1,6 +1,7 @@
 """How a log is read and its movement derived: the user's choices, as recorded in every output."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -19,13 +20,13 @@ class Reading:
 
     `units` is the angles' unit; None takes what the file says (`inDegrees`), else radians. Lengths
     are always metres. `time` names the column of the time, in s; None takes "time" or "t". `mapping`
-    holds (column, joint) pairs; other joints take the column of their name, or OpenSim's state of that
-    coordinate. `ignore_extra` leaves out columns that no joint has.
+    holds (column, joint) pairs, or is a dict of them; other joints take the column of their name, or
+    OpenSim's state of that coordinate. `ignore_extra` leaves out columns that no joint has.
     """
 
     units: Units | None = None
     time: str | None = None
-    mapping: tuple[tuple[str, str], ...] = ()
+    mapping: tuple[tuple[str, str], ...] | Mapping[str, str] = ()
     ignore_extra: bool = False
     resample: float | None = None
     """Sampling rate in Hz to bring a log of uneven time to, by cubic splines."""
@@ -37,8 +38,15 @@ class Reading:
     def __post_init__(self) -> None:
         if self.resample is not None and not 0 < self.resample < float("inf"):
             raise LinkwiseError(f"--resample {self.resample:g}: give a rate in Hz above 0")
+        if not all(isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in self.pairs):
+            raise LinkwiseError(f"mapping {self.mapping!r}: give pairs of a column and a joint, or a dict")
         if not 0 <= self.loop_tolerance < float("inf"):
             raise LinkwiseError(f"--loop-tolerance {self.loop_tolerance:g}: give m and rad, 0 or more")
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """The mapping as (column, joint) pairs."""
+        return tuple(self.mapping.items() if isinstance(self.mapping, Mapping) else self.mapping)
 
 
 @dataclass(frozen=True)

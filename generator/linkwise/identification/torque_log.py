@@ -1,5 +1,6 @@
 """A log of motion and torques: which columns are the torques, and all of it in SI units."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -76,13 +77,14 @@ def read_torque_log(
             _refuse_more_torques(log.columns, robot, columns, measured)
         moving = with_columns(log.columns, robot.joints, followers(robot), reading)
     names = tuple(f"torque of {robot.joints[i]}" for i in measured)
-    mapping = (*reading.mapping, *zip(columns, names, strict=True))
+    mapping = (*reading.pairs, *zip(columns, names, strict=True))
     samples = read_samples(
         log,
         (*(robot.joints[k] for k in moving), *names),
         (*(robot.units_in_logs[k] for k in moving), *["N m"] * len(names)),
         replace(reading, mapping=mapping),
         progress,
+        reach=(*(robot.reach[k] for k in moving), *[math.inf] * len(names)),
         followers=robot.followers,
     )
     torque = samples.q[:, len(moving) :] * factor

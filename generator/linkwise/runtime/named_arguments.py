@@ -8,6 +8,8 @@ from .named_arrays import names_array, xarray
 
 LAST = ("joint", "component", "axis")
 """Dimensions that are none of the samples."""
+OTHER_UNITS = ("deg", "\u00b0", "mm", "cm")
+"""How units begin that are none of SI."""
 OF_INDEPENDENT = ("yd", "ydd")
 """Arguments of constraints that are of the independent joints."""
 
@@ -27,9 +29,12 @@ def taken(
     Raises ValueError for a joint that an argument lacks, and where arguments are of other samples.
     """
     xr = xarray()
+    arguments = {name: _of_frame(a, xr) for name, a in arguments.items()}
     named = {name: a for name, a in arguments.items() if isinstance(a, xr.DataArray)}
     if not named:
         return arguments, None
+    for name, array in named.items():
+        _check_named(name, array)
     wanted = {name: independent if name in OF_INDEPENDENT else joints for name in named}
     ordered = [_in_order(name, array, wanted[name]) for name, array in named.items()]
     try:
@@ -46,6 +51,32 @@ def taken(
     }
     values = [array.transpose(*dimensions, ...).to_numpy() for array in alike]
     return arguments | dict(zip(named, values, strict=True)), SampleAxes(dimensions, along)
+
+
+def _of_frame(value: Any, xr: Any) -> Any:
+    """A table or row of pandas or polars as an array with its columns' names; any other value itself."""
+    if not hasattr(value, "to_numpy") or isinstance(value, xr.DataArray):
+        return value
+    index: Any = getattr(value, "index", None)
+    if hasattr(value, "columns"):
+        samples = "sample" if getattr(index, "name", None) is None else str(index.name)
+        names = names_array(str(column) for column in value.columns)
+        along = {"joint": names} if index is None else {"joint": names, samples: index.to_numpy()}
+        return xr.DataArray(value.to_numpy(), dims=(samples, "joint"), coords=along)
+    if hasattr(index, "to_numpy"):
+        names = names_array(str(name) for name in index)
+        return xr.DataArray(value.to_numpy(), dims=("joint",), coords={"joint": names})
+    return value
+
+
+def _check_named(name: str, array: Any) -> None:
+    """Raise ValueError for an array in other units, or without an axis of joints, components or axes."""
+    units = str(array.attrs.get("units", ""))
+    if units.casefold().startswith(OTHER_UNITS):
+        raise ValueError(f"{name} is in {units}; give it in rad and m")
+    if not set(array.dims) & set(LAST):
+        there = ", ".join(map(str, array.dims))
+        raise ValueError(f"{name} has the dimensions ({there}); call that of the joints 'joint'")
 
 
 def samples_along(along: Any, count: int) -> SampleAxes:

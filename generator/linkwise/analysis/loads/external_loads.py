@@ -16,6 +16,8 @@ from linkwise.input_file import require_file
 from linkwise.runtime.chosen_names import nearest_first
 
 GROUND = "ground"
+LOADS, FORCE = "ExternalLoads", "ExternalForce"
+"""Elements; what stands among <defaults> is no load."""
 NONE = ("", "Unassigned")
 """What OpenSim writes where there is nothing."""
 IDENTIFIERS = {"force": "force_identifier", "moment": "torque_identifier", "point": "point_identifier"}
@@ -34,11 +36,13 @@ def external_loads(path: Path) -> tuple[LoadColumns, ...]:
     with within(str(path)):
         require_file(path)
         root = parse(path)
-        forces = [force for force in root.iter("ExternalForce") if not _is_off(force)]
+        loads = root if root.tag == LOADS else root.find(LOADS)
+        there = [] if loads is None else loads.findall(f"objects/{FORCE}")
+        forces = [force for force in there if not _is_off(force)]
         if not forces:
             raise LinkwiseError("no ExternalForce that is on; give OpenSim's file of ExternalLoads")
-        loads = [_unread(force, _data_file(path, root, force)) for force in forces]
-        return tuple(_with_columns(load, force) for load, force in zip(loads, forces, strict=True))
+        unread = [_unread(force, _data_file(path, loads, force)) for force in forces]
+        return tuple(_with_columns(load, force) for load, force in zip(unread, forces, strict=True))
 
 
 def _unread(force: Element, log: Path) -> LoadColumns:
@@ -70,6 +74,12 @@ def _three(load: LoadColumns, key: str, identifier: str, columns: Sequence[str])
     if len(exact) == 3:
         return tuple(exact)
     found = [at for at, name in enumerate(columns) if name.startswith(identifier)]
+    ends = "".join(columns[at][-1:].lower() for at in found)
+    if len(found) == 3 and sorted(ends) == ["x", "y", "z"] and ends != "xyz":
+        raise LinkwiseError(
+            f"load {load.name!r}: the columns of {load.log.name} that begin with {key} {identifier!r} stand"
+            f" as {listed(map(repr, (columns[at] for at in found)))}; bring them into the order x, y, z"
+        )
     if len(found) != 3:
         there = f"{len(found)} columns of {load.log.name} begin so"
         raise LinkwiseError(
@@ -79,9 +89,9 @@ def _three(load: LoadColumns, key: str, identifier: str, columns: Sequence[str])
     return tuple(found)
 
 
-def _data_file(path: Path, root: Element, force: Element) -> Path:
+def _data_file(path: Path, loads: Element | None, force: Element) -> Path:
     """The storage file of all forces, or of this one."""
-    told = (root.findtext(".//datafile") or "").strip()
+    told = "" if loads is None else (loads.findtext("datafile") or "").strip()
     if told in NONE:
         told = _told(force, "data_source_name")
     if not told:

@@ -12,6 +12,7 @@ from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
+from linkwise.runtime.chosen_names import end_of_path
 
 PARTS = {"force": FORCE, "moment": MOMENT, "point": POINT}
 NAMED = re.compile(r"(?P<load>.+)/(?P<part>force|moment|point)_(?P<axis>[xyz])")
@@ -46,8 +47,8 @@ def load_columns(
             extra.append(column)
     if not found:
         raise LinkwiseError(
-            "no column of a load; name them BODY/force_x, BODY/force_y, …, or give OpenSim's XML of external"
-            " loads"
+            f"no column of a load in {listed(map(repr, columns))}; name them BODY/force_x, BODY/force_y, …,"
+            " or give OpenSim's XML of external loads"
         )
     if extra and not ignore_extra:
         raise LinkwiseError(
@@ -72,4 +73,6 @@ def _load(
     if not {"force", "moment"} & set(parts):
         raise LinkwiseError(f"load {load!r} has a point and neither force nor moment; add {load}/force_x, …")
     columns = {part: tuple(parts[part][axis] for axis in "xyz") for part in parts}
-    return LoadColumns(name or body, body, log, time, columns, point_in=WORLD if "point" in parts else None)
+    return LoadColumns(
+        name or end_of_path(body), body, log, time, columns, point_in=WORLD if "point" in parts else None
+    )

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from linkwise.analysis.body_names import told_apart
+from linkwise.analysis.column_matching import FAR
 from linkwise.analysis.even_time import even_rate, usual_step
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot
@@ -90,8 +91,17 @@ def _read(
             rate = even_rate(table[:, 0], log.first_row, strict=True, mend=mend)
             lowpass(table[:, 1:7], rate, Lowpass(cutoff), flag="--loads-cutoff")
     noticed = (*log.warnings, *slowness(1 / usual_step(table[:, 0], log.first_row)))
+    noticed += _far(load, table)
     warnings = tuple(f"{load.log.name}: {warning}" for warning in noticed)
     return PlacedLoad(load.name, seat, table, load.log.name, cutoff, warnings)
+
+
+def _far(load: LoadColumns, table: Array) -> tuple[str, ...]:
+    """A warning about points that are unlikely by their size."""
+    largest = float(np.abs(table[:, POINT]).max())
+    if largest <= FAR:
+        return ()
+    return (f"load {load.name!r}: its point reaches {largest:.4g} m: if that is mm, divide it by 1000",)
 
 
 def _about_origin(seat: Seat, rows: Array) -> None:

@@ -11,8 +11,11 @@ from functools import cached_property
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 
-NAMES = ("joint_names", "joints", "names", "name")
+NAMES = ("joint_names", "joints", "names", "name", "columns")
 """What an array of texts is called, or an attribute, that names joints."""
+UNITS = dict.fromkeys(("deg", "degs", "degree", "degrees", "°"), True)
+UNITS |= dict.fromkeys(("rad", "rads", "radian", "radians"), False)
+"""What an attribute calls units of angles, and whether these are degrees."""
 NUMBERS = "fiub"
 """NumPy's kinds of what is a number."""
 WORDS = {
@@ -34,6 +37,13 @@ class StoredArray:
     shape: tuple[int, ...]
     is_numeric: bool = True
     texts: tuple[str, ...] = ()
+    unit: str = ""
+    """As an attribute of the array says."""
+
+    @property
+    def told(self) -> str:
+        """What it is, in words."""
+        return f"{self.shape}" if self.is_numeric or self.texts else f"{self.shape} without numbers"
 
 
 @dataclass(frozen=True)
@@ -76,6 +86,10 @@ class ArrayColumns:
             for at, column in enumerate(columns):
                 if column in places:
                     other = places[column].array
+                    if other == array:
+                        raise LinkwiseError(
+                            f"{column!r} names two columns of {array!r}; name each joint once"
+                        )
                     raise LinkwiseError(f"{other!r} and {array!r} are both of {column!r}; rename one")
                 places[column] = Place(array, at)
         return places
@@ -89,6 +103,31 @@ class ArrayColumns:
             if ENDING_OF.get(word_of(array)) == "" and not self._names(array)
             if width_of(self.found[array].shape, self.samples) == len(self.joints) > 1
         )
+
+    def check(self) -> None:
+        """Raise LinkwiseError where all positions are in arrays that cannot have them."""
+        columns = {column for column in self.places if column in self.joints}
+        for array, found in self.found.items():
+            is_flat = found.is_numeric and len(found.shape) in (1, 2)
+            is_of_positions = ENDING_OF.get(word_of(array)) == "" and self.group in folders_of(array)
+            if is_of_positions and not (columns or is_flat or found.texts):
+                raise LinkwiseError(
+                    f"array {array!r} is {found.told}; positions are numbers, (samples, joints) or (samples,)"
+                )
+
+    @cached_property
+    def degrees(self) -> bool | None:
+        """Whether positions are in degrees, as attributes say; None where they do not.
+
+        Raises LinkwiseError where some are and others are not.
+        """
+        arrays = dict.fromkeys(place.array for column, place in self.places.items() if column in self.joints)
+        told = {array: UNITS.get(self.found[array].unit.lower()) for array in arrays}
+        known = {array: unit for array, unit in told.items() if unit is not None}
+        if len(set(known.values())) > 1:
+            there = listed(map(repr, known))
+            raise LinkwiseError(f"arrays {there} are in rad and in degrees; bring them to one")
+        return next(iter(known.values()), None)
 
     def _beside(self) -> Iterator[str]:
         """Arrays of numbers on this clock, but the time; LinkwiseError for positions of other length."""
@@ -149,7 +188,7 @@ def array_columns(
     clocks = _clocks(found, time)
     where = listed(f"/{folder}" for folder in sorted(clocks))
     if not clocks:
-        told = listed(f"{array!r} {has.shape}" for array, has in found.items()) or "it"
+        told = listed(f"{array!r} {has.told}" for array, has in found.items()) or "it"
         raise LinkwiseError(
             f"no array of times{'' if time is None else f' {time!r}'} in {told}; call it 'time', in s, or"
             " name it with --time"
@@ -191,7 +230,7 @@ def word_of(array: str) -> str:
 
 def names_joints(array: str, shape: tuple[int, ...]) -> bool:
     """Whether an array, if it holds texts, names joints."""
-    return word_of(array) in NAMES and len(shape) == 1
+    return word_of(array) in NAMES and len(shape) > 0 and sum(size != 1 for size in shape) <= 1
 
 
 def width_of(shape: tuple[int, ...], samples: int) -> int:

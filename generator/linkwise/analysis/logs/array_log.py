@@ -49,12 +49,14 @@ class ArrayLog:
             columns = array_columns(found, reading.time, reading.topic, joints)
             time = {reading.time or columns.time.rpartition("/")[2]: Place(columns.time, 0)}
             places = time | columns.places | time
+            columns.check()
+            degrees = columns.degrees
         told = tuple(
             f"nothing names the columns of {array!r}: they are taken for the robot's joints {listed(joints)};"
             " add an array 'joint_names'"
             for array in columns.unnamed
         )
-        return cls(source, places, columns.samples, told)
+        return cls(source, places, columns.samples, told, degrees)
 
     @property
     def path(self) -> Path:

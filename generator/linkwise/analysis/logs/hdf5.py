@@ -30,8 +30,8 @@ class Hdf5Arrays:
                 return
             texts: tuple[str, ...] = ()
             if names_joints(name, item.shape) and library.check_string_dtype(item.dtype):
-                texts = tuple(item.asstr()[()].tolist())
-            found[name] = StoredArray(item.shape, item.dtype.kind in NUMBERS, texts)
+                texts = tuple(item.asstr()[()].ravel().tolist())
+            found[name] = StoredArray(item.shape, item.dtype.kind in NUMBERS, texts, _unit(item))
 
         with self._file() as file:
             found.update(_named_by_attributes("", file))
@@ -49,6 +49,12 @@ class Hdf5Arrays:
         library = extra("h5py")
         with read_as("an HDF5 file", self.path), library.File(self.path, "r") as file:
             yield file
+
+
+def _unit(item: Any) -> str:
+    """What attributes say an array is in; nothing where they do not."""
+    told = (item.attrs.get(word, "") for word in ("units", "unit"))
+    return next((text.strip() for text in told if isinstance(text, str) and text.strip()), "")
 
 
 def _named_by_attributes(name: str, item: Any) -> dict[str, StoredArray]:

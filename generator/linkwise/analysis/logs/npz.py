@@ -34,7 +34,7 @@ class NpzArrays:
                         f"array {name!r} holds Python objects; save texts, as numpy.array([...]) makes them"
                     )
                 if names_joints(name, shape) and kind in "US":
-                    texts = tuple(get(name).astype(str).tolist())
+                    texts = tuple(get(name).astype(str).ravel().tolist())
                 found[name] = StoredArray(shape, kind in NUMBERS, texts)
         return found
 

@@ -16,7 +16,7 @@ from linkwise.robot.curve import Curve
 from linkwise.robot.joint_types import X, Y, Z
 from linkwise.robot.readers.osim_coordinates import Rule
 from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of
-from linkwise.robot.readers.osim_functions import IDENTITY, function_of
+from linkwise.robot.readers.osim_functions import IDENTITY, LINEAR, function_of, written_function
 
 Kind = Literal["revolute", "prismatic"]
 Part = tuple[Kind, tuple[float, float, float], int]
@@ -46,11 +46,14 @@ class MovedAxis:
     direction: tuple[float, float, float]
     coordinate: str = ""
     curve: Curve = IDENTITY
+    written: str = LINEAR
+    """What the file calls the function."""
 
     @property
     def one_to_one(self) -> bool:
-        """Whether it moves as far as its coordinate, there or back."""
-        return self.curve.line is not None and abs(self.curve.line[1]) == 1.0
+        """Whether OpenSim takes it to move as far as its coordinate: there or back, by a LinearFunction."""
+        line = self.curve.line if self.written == LINEAR else None
+        return line is not None and abs(line[1]) == 1.0
 
     @property
     def in_radians(self) -> bool:
@@ -65,11 +68,15 @@ class MovedAxis:
 
 
 def carrier(axes: Sequence[MovedAxis], coordinate: str) -> int | None:
-    """Index of the axis that stands for a coordinate: what it moves one to one, or by a line, if any."""
+    """Index of the axis that stands for a coordinate: what it moves one to one, or by a line, if any.
+
+    Of what turns and what slides one to one, OpenSim takes what slides; of others, here, what turns.
+    """
 
     def remoteness(at: int) -> tuple[bool, bool, bool, bool]:
         axis, curve = axes[at], axes[at].curve
-        return not axis.one_to_one, curve.line is None, axis.kind != "revolute", curve != IDENTITY
+        turns = axis.kind == "revolute"
+        return not axis.one_to_one, curve.line is None, turns == axis.one_to_one, curve != IDENTITY
 
     own = (at for at, axis in enumerate(axes) if axis.coordinate == coordinate)
     return min(own, key=remoteness, default=None)
@@ -115,7 +122,8 @@ def _axis(
     direction = transforms.unit(numbers_of(axis, "axis", " ".join(map(str, usual)), place, 3))
     if direction is None:
         raise LinkwiseError(f"{place} has a zero axis; give its direction, such as 0 0 1")
-    yield MovedAxis(kind, direction, coordinate, curve)
+    written = written_function(axis, "function")
+    yield MovedAxis(kind, direction, coordinate, curve, "" if written is None else written.tag)
 
 
 def _displacement(axis: Element, coordinates: Sequence[str], place: str) -> tuple[str, Curve]:

@@ -4,6 +4,8 @@ from xml.etree.ElementTree import Element
 
 from linkwise.errors import LinkwiseError
 
+BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
+
 
 def text_of(element: Element, tag: str, default: str = "") -> str:
     """Text of a child, or the default where it is empty or not there."""
@@ -24,8 +26,11 @@ def numbers_of(element: Element, tag: str, default: str, place: str, count: int 
 
 
 def yes(element: Element, tag: str, default: bool = False) -> bool:
-    """Whether a child says true."""
-    return text_of(element, tag, str(default)).lower() == "true"
+    """Whether a child says true; raises LinkwiseError for neither true nor false."""
+    text = text_of(element, tag, str(default))
+    if text.lower() not in BOOLEANS:
+        raise LinkwiseError(f"{element.tag} {name_of(element)!r}: <{tag}>{text}</{tag}> needs true or false")
+    return BOOLEANS[text.lower()]
 
 
 def name_of(element: Element) -> str:

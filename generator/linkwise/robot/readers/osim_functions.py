@@ -11,19 +11,26 @@ from linkwise.robot.curve import Curve
 from linkwise.robot.readers.osim_elements import numbers_of
 
 IDENTITY = Curve.straight(0.0, 1.0)
+LINEAR = "LinearFunction"
 
 
 def function_of(owner: Element, tag: str, place: str) -> Curve | None:
-    """The function that an element has; None for none.
+    """The function that an element has; None for none. Raises LinkwiseError for one that is not modelled."""
+    written = written_function(owner, tag)
+    return None if written is None else _known(written, place)
+
+
+def written_function(owner: Element, tag: str) -> Element | None:
+    """The element of a function that another one has.
 
     It is a child of its own, with or without the name `tag`, or stands in a child that is called so; no other
     child of what has functions holds elements.
     """
     for child in owner:
         if child.tag == tag and len(child):
-            return _known(child[0], place)
+            return child[0]
         if len(child) or child.get("name") == tag:
-            return _known(child, place)
+            return child
     return None
 
 
@@ -117,7 +124,7 @@ def _third_difference(x: Sequence[float], y: Sequence[float]) -> float:
 
 FUNCTIONS: dict[str, Callable[[Element, str], Curve]] = {
     "Constant": _constant,
-    "LinearFunction": _linear,
+    LINEAR: _linear,
     "PolynomialFunction": _polynomial,
     "PiecewiseLinearFunction": _through_points(piecewise_linear),
     "SimmSpline": _through_points(simm_spline),
