@@ -30,11 +30,10 @@ def named_body(text: str, robot: LoadedRobot) -> tuple[str, str]:
     return name, body
 
 
-def told_apart(what: str, names: Sequence[str], others: Sequence[str]) -> None:
+def told_apart(
+    what: str, names: Sequence[str], others: Sequence[str], mend: str = "tell them apart as NAME:BODY"
+) -> None:
     """Raise LinkwiseError for a name that stands twice, or that another thing has."""
     twice = [name for name, count in Counter(names).items() if count > 1 or name in others]
     if twice:
-        raise LinkwiseError(
-            f"{what} {listed(map(repr, twice))}: another has that name; tell them apart as NAME:BODY,"
-            " or by their names in the file"
-        )
+        raise LinkwiseError(f"{what} {listed(map(repr, twice))}: another has that name; {mend}")

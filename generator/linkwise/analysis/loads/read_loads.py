@@ -38,7 +38,7 @@ def placed_loads(
     for path in wanted.paths:
         for columns in _listed(path, robot, ignore_extra):
             loads.append(_read(columns, path, wanted.cutoff, robot, motion, progress, buffer))
-    told_apart("load", [load.name for load in loads], ())
+    told_apart("load", [load.name for load in loads], (), "tell them apart as NAME:BODY, or by name= in XML")
     return tuple(loads)
 
 
