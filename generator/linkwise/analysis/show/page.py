@@ -81,7 +81,14 @@ def page_data(result: AnalysisResult) -> str:
         "total": result.total,
         "stride": result.stride,
         "convention": result.processing.convention,
-        "joints": [{"name": printable(robot.joints[i]), "unit": robot.units[i]} for i in robot.driven],
+        "joints": [
+            {
+                "name": printable(robot.joints[i]),
+                "shown": printable(robot.plot_joints[i]),
+                "unit": robot.units[i],
+            }
+            for i in robot.driven
+        ],
         "links": list(map(printable, robot.links)),
         "columns": [
             {
