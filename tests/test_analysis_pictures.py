@@ -52,7 +52,7 @@ def test_shares_fill_the_bars(analysis):
 
 
 def test_shares_of_many_joints_are_their_own_the_largest_other_ones_and_the_rest(analysis, monkeypatch):
-    monkeypatch.setattr("linkwise.analysis.show.shares_figure.MANY", 2)
+    monkeypatch.setattr("linkwise.analysis.show.share_parts.MANY", 2)
     figure = analysis.figure("shares")
     assert [axis.get_title(loc="left") for axis in figure.axes[:2]] == [
         "everything, gravity too",
@@ -160,7 +160,7 @@ def test_a_joint_that_bears_one_load_has_the_phases_of_that_load(pushed, analysi
 
 
 def test_many_causes_are_named_by_size_and_the_rest_is_one(analysis, monkeypatch):
-    monkeypatch.setattr("linkwise.analysis.show.causes_figure.MOST", 1)
+    monkeypatch.setattr("linkwise.analysis.show.cause_curves.MOST", 1)
     rows, shown = bars(analysis.figure("causes:joint1"))
     assert rows[-1] == "motion of 2 others"
     means, _ = shown["the whole movement"]

@@ -2,15 +2,13 @@
 
 import math
 import textwrap
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.analysis.joint_causes import causes_of, curves
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import load_unit
-from linkwise.analysis.show.largest_few import largest_few
+from linkwise.analysis.show.cause_curves import CauseCurve, cause_curves, largest, rms
 from linkwise.analysis.show.shown_phases import ShownPhase, asked_phases, phases_of
 from linkwise.extras import extra
 from linkwise.package.load import Array
@@ -19,21 +17,8 @@ from linkwise.plotstyle import BLUE, INK, colour, drawn
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST = 10
-"""Joints whose motion has bars of its own; of others the sum has one."""
-NOTHING = 1e-9
-"""Of the largest cause, below which one is but rounding."""
 GAP = 9.0
 """Between a bar, its label and the panel's edge together, in points of the figure's own resolution."""
-
-
-@dataclass(frozen=True, eq=False)
-class CauseCurve:
-    """What one cause asks of the joint, (S,) in its unit; a motion has acceleration and velocity in one."""
-
-    label: str
-    values: Array
-    is_motion: bool = False
 
 
 def causes(result: AnalysisResult, i: int) -> "Figure":
@@ -72,37 +57,9 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     return figure  # type: ignore[no-any-return]
 
 
-def cause_curves(result: AnalysisResult, i: int) -> list[CauseCurve]:
-    """All causes of joint i's torque that ask anything of it."""
-    causes = causes_of(result, result.robot.plot_joints, drawn)
-    every = curves(result, causes, i)
-    peaks = np.abs(every).max(axis=1, initial=0.0)
-    there = peaks > NOTHING * peaks.max()
-    return [
-        CauseCurve(cause.label, values, cause.is_motion)
-        for cause, values, is_there in zip(causes, every, there, strict=True)
-        if is_there
-    ]
-
-
-def largest(every: list[CauseCurve]) -> list[CauseCurve]:
-    """The largest over the movement first; of many motions the small ones are one, the last."""
-    order = sorted(every, key=lambda one: -_rms(one.values))
-    motions = [one for one in order if one.is_motion]
-    small = [motions[at] for at in largest_few([_rms(one.values) for one in motions], MOST)[1]]
-    if not small:
-        return order
-    rest = CauseCurve(f"motion of {len(small)} others", np.sum([one.values for one in small], axis=0))
-    return [*(one for one in order if one not in small), rest]
-
-
 def _torque(result: AnalysisResult, i: int) -> Array:
     found: Array = result.torque[:, i]
     return found
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _over_time(panel: Any, result: AnalysisResult, i: int, phases: list[ShownPhase]) -> None:
@@ -126,7 +83,7 @@ def _over_time(panel: Any, result: AnalysisResult, i: int, phases: list[ShownPha
 
 def _both_bars(means: Any, sizes: Any, rows: list[CauseCurve], phases: list[ShownPhase], unit: str) -> None:
     _bars(means, rows, phases, np.mean)
-    _bars(sizes, rows, phases, _rms)
+    _bars(sizes, rows, phases, rms)
     means.set_title(f"mean ({unit})")
     sizes.set_title(f"root mean square ({unit})")
     means.set_yticks(range(len(rows)), [row.label for row in rows])

@@ -1,42 +1,23 @@
 """What loads each joint over the whole movement, as stacked bars."""
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.analysis.joint_causes import causes_of, sizes
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.share_parts import SharePart, fixed_parts, moving_parts
 from linkwise.extras import extra
-from linkwise.package.load import Array
-from linkwise.plotstyle import BLUE, GRAVITY, SKY, VERMILION, drawn, tone
+from linkwise.plotstyle import drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-MANY = 12
-"""Joints above which a bar has the joint's own motion, the largest other one, and the rest."""
-HATCHES = {"acceleration": "", "velocity": "////", "own": "....", "load": "xx"}
-LARGEST = "largest motion of another joint"
-
-
-@dataclass(frozen=True, eq=False)
-class _SharePart:
-    """A part of every joint's bar, of mean magnitudes (joints,), and how it looks."""
-
-    label: str
-    sizes: Array
-    fill: str
-    hatch: str = ""
-    names: tuple[str, ...] = ()
-    """Of what the part is, where that differs from joint to joint."""
 
 
 def shares(result: AnalysisResult, _: int) -> "Figure":
     """Two bars for each joint: every cause, and those of the movement alone, in % of mean magnitudes."""
     robot = result.robot
-    movement = _few(result) if len(robot.driven) > MANY else _each(result)
-    every = [*_fixed(result), *movement]
+    movement = moving_parts(result)
+    every = [*fixed_parts(result), *movement]
     rows = -(-len(every) // 3)
     figure = extra("matplotlib.figure").Figure(
         figsize=(8.4, 1.3 + (0.42 if len(movement) > 3 else 0.3) * len(robot.driven) + 0.2 * rows),
@@ -73,48 +54,7 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     return figure  # type: ignore[no-any-return]
 
 
-def _fixed(result: AnalysisResult) -> list[_SharePart]:
-    """Gravity, loads, and what joints have of their own."""
-    causes = [cause for cause in causes_of(result, result.robot.plot_joints, drawn) if not cause.is_motion]
-    own = [cause for cause in causes if cause.kind == "own"]
-    tones = [*own, *(cause for cause in causes if cause.kind == "load")]  # as the page has them
-    out = []
-    for cause, values in zip(causes, sizes(result, causes), strict=True):
-        if cause.kind == "gravity":
-            out.append(_SharePart(cause.label, values, GRAVITY))
-        else:
-            fill = tone(len(result.robot.driven) + tones.index(cause))
-            out.append(_SharePart(cause.label, values, fill, HATCHES[cause.kind]))
-    return out
-
-
-def _each(result: AnalysisResult) -> list[_SharePart]:
-    """Acceleration and velocity of each joint."""
-    every = causes_of(result, result.robot.plot_joints, drawn, together=False)
-    causes = [cause for cause in every if cause.is_motion]
-    place = {k: at for at, k in enumerate(result.robot.driven)}
-    return [
-        _SharePart(cause.label, values, tone(place[cause.number or 0]), HATCHES[cause.kind])
-        for cause, values in zip(causes, sizes(result, causes), strict=True)
-    ]
-
-
-def _few(result: AnalysisResult) -> list[_SharePart]:
-    """Of many joints: each one's own motion, the largest other motion, and the rest."""
-    driven, names = result.robot.driven, result.robot.plot_joints
-    by = sizes(result, [cause for cause in causes_of(result, names) if cause.is_motion]).T
-    own = by.diagonal()
-    others = by * (1.0 - np.eye(len(driven)))
-    largest = others.max(axis=1)
-    first = tuple(drawn(names[driven[k]]) for k in others.argmax(axis=1))
-    return [
-        _SharePart("its own motion", own, VERMILION),
-        _SharePart(LARGEST, largest, BLUE, names=first),
-        _SharePart("motion of all other joints", others.sum(axis=1) - largest, SKY),
-    ]
-
-
-def _name_beside(axis: Any, part: _SharePart) -> None:
+def _name_beside(axis: Any, part: SharePart) -> None:
     """Of which joint the part is, in every row, on the right."""
     beside = axis.twinx()
     beside.set_ylim(axis.get_ylim())
@@ -124,7 +64,7 @@ def _name_beside(axis: Any, part: _SharePart) -> None:
     beside.grid(False)
 
 
-def _bars(axis: Any, parts: list[_SharePart]) -> list[Any]:
+def _bars(axis: Any, parts: list[SharePart]) -> list[Any]:
     wholes = np.sum([part.sizes for part in parts], axis=0)
     wholes[wholes == 0.0] = 1.0
     starts = np.zeros(len(wholes))
