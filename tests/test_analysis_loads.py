@@ -154,7 +154,7 @@ def test_tables_record_and_pictures_have_each_load(arm: Path, tmp_path: Path) ->
     power = result["tau_load/cd/tool"] * result.qd[:, 2]
     np.testing.assert_allclose(borne["cd"], np.trapezoid(power, result.time), rtol=1e-9)
     labels = [text.get_text() for text in result.figure("shares").legends[0].get_texts()]
-    assert labels[-1] == "load tool"
+    assert labels[:2] == ["gravity", "load tool"]
 
 
 def test_a_low_pass_is_run_over_the_whole_log_of_loads(arm: Path, tmp_path: Path) -> None:

@@ -72,5 +72,5 @@ def test_every_file_and_picture_has_them(analysed, tmp_path):
     meanings = {column["name"]: column["meaning"] for column in record["columns"]}
     assert meanings["tau_spring/bc"] == "what the joint takes for its own spring"
     labels = [text.get_text() for text in result.figure("shares").legends[0].get_texts()]
-    assert labels[-3:] == ["spring", "damping", "friction"]
+    assert labels[:4] == ["gravity", "own spring", "own damping", "own friction"]
     assert {"tau_spring", "tau_damping"} <= {c["quantity"] for c in json.loads(page_data(result))["columns"]}

@@ -1,5 +1,6 @@
 """Figures and the stick figure."""
 
+import json
 import re
 from dataclasses import replace
 
@@ -8,6 +9,8 @@ import pytest
 from linkwise.analysis import Load, Reading, analyze
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.result_columns import Column
+from linkwise.analysis.show.largest_few import largest_few
+from linkwise.analysis.show.page import page_data
 from linkwise.analysis.show.poses import poses
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
@@ -49,9 +52,9 @@ def test_shares_fill_the_bars(analysis):
 
 
 def test_shares_of_many_joints_are_their_own_the_largest_other_ones_and_the_rest(analysis, monkeypatch):
-    monkeypatch.setattr("linkwise.analysis.show.shares_figure.MANY", 2)
+    monkeypatch.setattr("linkwise.analysis.show.share_parts.MANY", 2)
     figure = analysis.figure("shares")
-    assert [axis.get_title(loc="left") for axis in figure.axes] == [
+    assert [axis.get_title(loc="left") for axis in figure.axes[:2]] == [
         "everything, gravity too",
         "the movement alone, without gravity",
     ]
@@ -60,9 +63,37 @@ def test_shares_of_many_joints_are_their_own_the_largest_other_ones_and_the_rest
     for column, mean in zip(analysis.columns, analysis.totals.mean, strict=True):
         if column.quantity in ("tau_qdd", "tau_qd"):
             sizes[column.joint, column.cause] += mean
+    first = (sizes - np.diag(sizes.diagonal())).argmax(axis=1)
+    beside = figure.axes[2]
+    assert [text.get_text() for text in beside.get_yticklabels()] == [JOINTS[k] for k in first]
+    assert beside.get_ylim() == figure.axes[1].get_ylim()
     others = np.sort(sizes[~np.eye(3, dtype=bool)].reshape(3, 2), axis=1)
     expected = np.array([sizes.diagonal(), others[:, 1], others[:, 0]])
     np.testing.assert_allclose(widths, 100 * expected / sizes.sum(axis=1))
+
+
+def test_gravity_and_loads_stand_before_motions_in_the_shares(pushed):
+    path, push, _ = pushed
+    result = analyze(path, PLANAR3, Reading(ignore_extra=True), loads=[push])
+    labels = [text.get_text() for text in result.figure("shares").legends[0].get_texts()]
+    kinds = ("acceleration", "velocity")
+    assert labels == ["gravity", "load push", *(f"{joint} {kind}" for joint in JOINTS for kind in kinds)]
+
+
+def test_pictures_and_the_page_leave_out_an_ending_that_all_joints_have(analysis):
+    def shown(*joints):
+        result = replace(analysis, robot=replace(analysis.robot, joints=joints))
+        rows, _ = bars(result.figure(f"causes:{joints[1]}"))
+        power, shares = result.figure("power").axes[0], result.figure("shares").axes[0]
+        found = [text.get_text() for text in power.get_legend().get_texts()]
+        assert [text.get_text() for text in shares.get_yticklabels()] == found
+        assert {row for row in rows if row.endswith("motion")} == {f"{name} motion" for name in found}
+        assert [joint["shown"] for joint in json.loads(page_data(result))["joints"]] == found
+        return found
+
+    assert shown("hip_joint", "Knee_Joint", "toe-joint") == ["hip", "Knee", "toe"]
+    assert shown("hip_joint", "knee_joint", "toe") == ["hip_joint", "knee_joint", "toe"]
+    assert shown("hip_joint", "hip-joint", "toe_joint") == ["hip_joint", "hip-joint", "toe_joint"]
 
 
 def bars(figure):
@@ -129,11 +160,25 @@ def test_a_joint_that_bears_one_load_has_the_phases_of_that_load(pushed, analysi
 
 
 def test_many_causes_are_named_by_size_and_the_rest_is_one(analysis, monkeypatch):
-    monkeypatch.setattr("linkwise.analysis.show.causes_figure.MOST", 1)
+    monkeypatch.setattr("linkwise.analysis.show.cause_curves.MOST", 1)
     rows, shown = bars(analysis.figure("causes:joint1"))
     assert rows[-1] == "motion of 2 others"
     means, _ = shown["the whole movement"]
     assert sum(means[1:]) == pytest.approx(means[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("joint", range(3))
+def test_numbers_beside_bars_stay_within_their_panel(analysis, joint):
+    names = tuple(f"{joint}_{'a' * 22}" for joint in "123")
+    for sign in (1, -1):
+        result = replace(analysis, values=sign * analysis.values, robot=replace(analysis.robot, joints=names))
+        figure = result.figure(f"causes:{names[joint]}")
+        figure.draw_without_rendering()
+        for panel in figure.axes[1:]:
+            inside = panel.get_window_extent()
+            for label in panel.texts:
+                assert inside.x0 < label.get_window_extent().x0
+                assert label.get_window_extent().x1 < inside.x1
 
 
 @pytest.mark.parametrize(
@@ -164,6 +209,31 @@ def test_power_figure_draws_joint_power_and_work_by_link(analysis):
     np.testing.assert_allclose(bars.lines[0].get_xdata(), ends, atol=1e-12)
     assert [text.get_text() for text in bars.get_legend().get_texts()] == ["net", "link1", "link2", "link3"]
     figure.draw_without_rendering()
+
+
+def test_power_of_many_joints_names_the_largest_and_adds_up_the_rest(analysis, monkeypatch):
+    monkeypatch.setattr("linkwise.analysis.show.power_figure.MOST", 1)
+    monkeypatch.setattr("linkwise.analysis.show.power_figure.LINKS", 1)
+    curves, bars = analysis.figure("power").axes
+    work = analysis.joint_work
+    most = int((work.given + work.taken).argmax())
+    order = [most, *(i for i in range(3) if i != most)]
+    drawn = curves.lines[:-1]
+    np.testing.assert_array_equal([line.get_ydata() for line in drawn], analysis.joint_power.T[order])
+    assert len({line.get_color() for line in drawn}) == 2
+    assert [text.get_text() for text in curves.get_legend().get_texts()] == [JOINTS[most], "2 others"]
+    sizes = analysis.work.given + analysis.work.taken
+    link = int((sizes / sizes.sum(axis=1, keepdims=True)).sum(axis=0).argmax())
+    named = ["net", f"link{link + 1}", "2 others"]
+    assert [text.get_text() for text in bars.get_legend().get_texts()] == named
+    given = np.array([[patch.get_width() for patch in bar] for bar in bars.containers[:2]])
+    rest = np.delete(analysis.work.given, link, axis=1).sum(axis=1)
+    np.testing.assert_allclose(given, [analysis.work.given[:, link], rest], rtol=1e-14)
+
+
+def test_others_are_never_one_alone():
+    assert largest_few([3, 1, 2], 1) == ([0], [1, 2])
+    assert largest_few([3, 1, 2], 2) == ([0, 1, 2], [])
 
 
 def test_unknown_figures_are_named(analysis):

@@ -18,6 +18,8 @@ LONGEST_NAME = 60
 MARKUP = re.compile(r"(?<![0-9A-Za-z])_|_(?![0-9A-Za-z])|[\\`*\[\]|~$#^!:<>&]")
 """What Markdown may take for markup; an underscore within a word is none."""
 ENTITIES = {"<": "&lt;", ">": "&gt;", "&": "&amp;"}
+ENDING = re.compile(r"[_-](joint|link)$", re.IGNORECASE)
+"""What names of joints and links often end in."""
 GREEK = re.compile(
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|iota|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|upsilon|phi|chi"
     "|psi|omega|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Upsilon|Phi|Psi|Omega"
@@ -44,6 +46,16 @@ def short(text: str, most: int = 24) -> str:
         return text
     tail = (most - 1) // 2
     return f"{text[: most - 1 - tail]}…{text[-tail:]}"
+
+
+def without_ending(names: Sequence[str]) -> tuple[str, ...]:
+    """The names without the "_joint", or "_link", that all end in.
+
+    As they are where one has no such ending, or would be empty or another's without.
+    """
+    bare = tuple(ENDING.sub("", name) for name in names)
+    cut = all(map(ENDING.search, names)) and all(bare) and len(set(bare)) == len(bare)
+    return bare if cut else tuple(names)
 
 
 def listed(items: Iterable[object], most: int = 8, longest: int = LONGEST_NAME) -> str:

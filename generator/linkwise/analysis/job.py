@@ -61,7 +61,7 @@ class Analysis(AnalysisResult):
         return named_result(self)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: of each joint its torque and work, and through which link most comes."""
+        """What a notebook shows: of each joint its torque, its work and the largest cause."""
         return result_table(self)
 
     def record(self) -> dict[str, Any]:

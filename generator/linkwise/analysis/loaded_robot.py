@@ -13,6 +13,7 @@ from linkwise.analysis.follower_columns import FollowingJoint
 from linkwise.analysis.settings import Payload
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
+from linkwise.escape import without_ending
 from linkwise.package.load import Model, Package, open_package
 from linkwise.package.manifest import FILE, BodyEntry, PassiveEntry
 
@@ -79,6 +80,16 @@ class LoadedRobot:
     def driven_joints(self) -> tuple[str, ...]:
         """Their names."""
         return tuple(self.joints[i] for i in self.driven)
+
+    @property
+    def plot_joints(self) -> tuple[str, ...]:
+        """All joints' names as pictures and the page show them: without the "_joint" that all may end in."""
+        return without_ending(self.joints)
+
+    @property
+    def plot_links(self) -> tuple[str, ...]:
+        """Links' names likewise, without "_link"."""
+        return without_ending(self.links)
 
     @property
     def moving_itself(self) -> tuple[int, ...]:

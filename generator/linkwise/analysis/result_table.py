@@ -1,35 +1,39 @@
-"""An analysis as a notebook shows it: each joint's torque and work, and through which link most comes."""
+"""An analysis as a notebook shows it: each joint's torque and work, and what loads it most."""
 
 import numpy as np
 
+from linkwise.analysis.joint_causes import causes_of, sizes
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import load_unit
 from linkwise.analysis.work import Work
 from linkwise.runtime.html_tables import page_part, remark, table
 
-HEAD = ("joint", "peak |τ|", "mean |τ|", "most through link", "peak of it", "gave", "took back")
+HEAD = ("joint", "peak |τ|", "mean |τ|", "largest cause", "its share", "gave", "took back")
 
 
 def result_table(result: AnalysisResult) -> str:
-    """HTML of a result; peaks, means and work are over all samples of the movement."""
-    peaks: dict[tuple[str, int | None, int | None], float] = {}
-    means: dict[int | None, float] = {}
-    for column, mean, peak in zip(result.columns, result.totals.mean, result.totals.peak, strict=True):
-        peaks[column.quantity, column.joint, column.link] = float(peak)
-        if column.quantity == "tau":
-            means[column.joint] = float(mean)
+    """HTML of a result; peaks, means, shares and work are over all samples of the movement.
+
+    Shares are those of `--figure shares`, a joint's acceleration and velocity together.
+    """
+    joints, totals = result.robot.joints, result.totals
+    torques = {
+        column.joint: (float(mean), float(peak))
+        for column, mean, peak in zip(result.columns, totals.mean, totals.peak, strict=True)
+        if column.quantity == "tau"
+    }
+    causes = causes_of(result, joints)
     rows = []
-    for i in result.robot.driven:
-        unit = load_unit(result.robot.units[i])
-        through = {j: peaks.get(("tau_link", i, j), 0.0) for j in range(len(result.robot.links))}
-        most = max(through, key=lambda j: through[j])
+    for i, loading in zip(result.robot.driven, sizes(result, causes).T, strict=True):
+        unit, (mean, peak) = load_unit(result.robot.units[i]), torques[i]
+        most, whole = int(loading.argmax()), float(loading.sum())
         rows.append(
             (
-                result.robot.joints[i],
-                f"{peaks['tau', i, None]:.4g} {unit}",
-                f"{means[i]:.4g} {unit}",
-                result.robot.links[most] if through[most] else "",
-                f"{through[most]:.4g} {unit}",
+                joints[i],
+                f"{peak:.4g} {unit}",
+                f"{mean:.4g} {unit}",
+                causes[most].label if whole else "",
+                f"{100 * loading[most] / whole:.0f} %" if whole else "",
                 *_work(result.joint_work, i),
             )
         )

@@ -2,19 +2,14 @@
 
 import math
 import textwrap
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from linkwise.analysis.loads.placed_load import moving_joints
-from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import load_unit
-from linkwise.analysis.result_quantities import PASSIVE, Quantity
-from linkwise.errors import LinkwiseError
-from linkwise.escape import printable
+from linkwise.analysis.show.cause_curves import CauseCurve, cause_curves, largest, rms
+from linkwise.analysis.show.shown_phases import ShownPhase, asked_phases, phases_of
 from linkwise.extras import extra
 from linkwise.package.load import Array
 from linkwise.plotstyle import BLUE, INK, colour, drawn
@@ -22,49 +17,22 @@ from linkwise.plotstyle import BLUE, INK, colour, drawn
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST = 10
-"""Joints whose motion has bars of its own; of others the sum has one."""
-NOTHING = 1e-9
-"""Of the largest cause, below which one is but rounding."""
-
-
-@dataclass(frozen=True, eq=False)
-class CauseCurve:
-    """What one cause asks of the joint, (S,) in its unit; a motion has acceleration and velocity in one."""
-
-    label: str
-    values: Array
-    is_motion: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class ShownPhase:
-    """A phase, and which samples (S,) are in it."""
-
-    label: str
-    on: NDArray[np.bool_]
+GAP = 9.0
+"""Between a bar, its label and the panel's edge together, in points of the figure's own resolution."""
 
 
 def causes(result: AnalysisResult, i: int) -> "Figure":
     """The joint's torque over time, and bars of each cause's mean and r.m.s. in each phase."""
-    phases, curves = phases_of(result, i), largest(cause_curves(result, i))
-    height = (0.17 * len(phases) + 0.13) * (len(curves) + 1)
+    phases = phases_of(result, i)
+    rows = [CauseCurve("all causes together", _torque(result, i)), *largest(cause_curves(result, i))]
+    height = (0.17 * len(phases) + 0.13) * len(rows)
     figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.3 + height), layout="constrained")
     grid = figure.add_gridspec(2, 2, height_ratios=(1.3, height))
     over_time = figure.add_subplot(grid[0, :])
     means = figure.add_subplot(grid[1, 0])
     sizes = figure.add_subplot(grid[1, 1], sharey=means)
-    unit = load_unit(result.robot.units[i])
     _over_time(over_time, result, i, phases)
-    rows = [CauseCurve("all causes together", _torque(result, i)), *curves]
-    _bars(means, rows, phases, np.mean)
-    _bars(sizes, rows, phases, _rms)
-    means.set_title(f"mean ({unit})")
-    sizes.set_title(f"root mean square ({unit})")
-    means.set_yticks(range(len(rows)), [row.label for row in rows])
-    means.get_yticklabels()[0].set_fontweight("bold")
-    means.invert_yaxis()
-    sizes.tick_params(labelleft=False)
+    _both_bars(means, sizes, rows, phases, load_unit(result.robot.units[i]))
     over_time.legend(
         *means.get_legend_handles_labels(),
         loc="lower right",
@@ -80,97 +48,18 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
         ha="left",
         fontsize=11,
     )
-    told = [phase.told for phase in _asked(result, i)] if len(phases) > 1 else []
+    told = [phase.told for phase in asked_phases(result, i)] if len(phases) > 1 else []
     foot = " · ".join(["motion: acceleration and velocity together", *told, result.provenance])
     figure.supxlabel(textwrap.fill(foot, 140), x=0.01, ha="left", fontsize=7, color="#5A6270")
+    figure.draw_without_rendering()  # places the panels, so that labels have a width in their numbers
+    for panel in (means, sizes):
+        _make_room(panel)
     return figure  # type: ignore[no-any-return]
-
-
-def cause_curves(result: AnalysisResult, i: int) -> list[CauseCurve]:
-    """All causes of joint i's torque: gravity, what it has of its own, loads, and each joint's motion."""
-
-    def of(*quantities: Quantity, cause: int | None = None) -> Array:
-        out = np.zeros(len(result.time))
-        for column, values in zip(result.columns, result.values, strict=True):
-            if column.quantity in quantities and column.joint == i and column.cause == cause:
-                out += values
-        return out
-
-    robot = result.robot
-    found = [CauseCurve("gravity", of("tau_gravity"))]
-    found += [CauseCurve(drawn(label), of("tau_load", cause=e)) for e, label in enumerate(result.load_labels)]
-    found += [CauseCurve(f"own {name.removeprefix('tau_')}", of(name)) for name in PASSIVE]
-    for k in robot.driven:
-        label = f"{drawn(robot.joints[k])} motion"
-        found.append(CauseCurve(label, of("tau_qdd", "tau_qd", cause=k), is_motion=True))
-    most = max(float(np.abs(one.values).max(initial=0.0)) for one in found)
-    return [one for one in found if float(np.abs(one.values).max(initial=0.0)) > NOTHING * most]
-
-
-def largest(curves: list[CauseCurve]) -> list[CauseCurve]:
-    """The largest over the movement first; of many motions the small ones are one, the last."""
-    order = sorted(curves, key=lambda one: -_rms(one.values))
-    small = [one for one in order if one.is_motion][MOST:]
-    if len(small) < 2:
-        return order
-    rest = CauseCurve(f"motion of {len(small)} others", np.sum([one.values for one in small], axis=0))
-    return [*(one for one in order if one not in small), rest]
-
-
-def phases_of(result: AnalysisResult, i: int) -> list[ShownPhase]:
-    """Phases that were asked for; else while the one load or contact that joint i bears acts, and while not.
-
-    Raises LinkwiseError for a phase that has no sample.
-    """
-    made = not result.phases
-    contacts = np.array(
-        [v for c, v in zip(result.columns, result.values, strict=True) if c.quantity == "contact"]
-    )
-    found = []
-    for phase in _asked(result, i):
-        on = phase.on(result.robot, result.time, result.q, contacts)
-        found.append(ShownPhase(drawn(phase.name, 34), on))
-        if phase.rest:
-            found.append(ShownPhase(drawn(phase.rest, 34), ~on))
-    empty = [phase.label for phase in found if not phase.on.any()]
-    if empty and not made:
-        raise LinkwiseError(f"--phase: {empty[0]} has no sample between {_span(result)}")
-    whole = ShownPhase("the whole movement", np.ones(len(result.time), dtype=np.bool_))
-    return [whole] if made and (empty or not found) else found
-
-
-def _span(result: AnalysisResult) -> str:
-    return f"{result.time[0]:.4g} and {result.time[-1]:.4g} s"
-
-
-def _asked(result: AnalysisResult, i: int) -> tuple[PlacedPhase, ...]:
-    """Phases that were given; else while the one load or contact that the joint bears acts."""
-    if result.phases:
-        return result.phases
-    ground, tree = result.robot.contacts, result.robot.package.manifest.tree
-    loads = [one for one in result.loads if i in one.seat.joints]
-    held: list[int] = []
-    if ground is not None and tree is not None:
-        body = {frame.name: frame.body for frame in tree.frames}
-        moved = [moving_joints(tree, body[str(one.frame)]) for one in ground.contacts]
-        held = [number for number, joints in enumerate(moved) if i in joints]
-    if len(loads) + len(held) != 1:
-        return ()
-    if loads:
-        name = printable(f"load {loads[0].name}")
-        return (PlacedPhase(f"{name} acts", f"{name} does not act", load=loads[0]),)
-    assert ground is not None
-    name = printable(ground.names[held[0]])
-    return (PlacedPhase(f"{name} stands", f"{name} does not stand", contact=held[0]),)
 
 
 def _torque(result: AnalysisResult, i: int) -> Array:
     found: Array = result.torque[:, i]
     return found
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _over_time(panel: Any, result: AnalysisResult, i: int, phases: list[ShownPhase]) -> None:
@@ -192,6 +81,17 @@ def _over_time(panel: Any, result: AnalysisResult, i: int, phases: list[ShownPha
     panel.set_xlim(result.time[0], result.time[-1])
 
 
+def _both_bars(means: Any, sizes: Any, rows: list[CauseCurve], phases: list[ShownPhase], unit: str) -> None:
+    _bars(means, rows, phases, np.mean)
+    _bars(sizes, rows, phases, rms)
+    means.set_title(f"mean ({unit})")
+    sizes.set_title(f"root mean square ({unit})")
+    means.set_yticks(range(len(rows)), [row.label for row in rows])
+    means.get_yticklabels()[0].set_fontweight("bold")
+    means.invert_yaxis()
+    sizes.tick_params(labelleft=False)
+
+
 def _bars(panel: Any, rows: list[CauseCurve], phases: list[ShownPhase], number: Any) -> None:
     """A group of bars for each cause, one bar for each phase, with its number at its end."""
     thick = 0.8 / len(phases)
@@ -207,5 +107,17 @@ def _bars(panel: Any, rows: list[CauseCurve], phases: list[ShownPhase], number: 
         )
     panel.axvline(0, color=INK, linewidth=0.8)
     panel.axhline(0.5, color="#9AA3AF", linewidth=0.8)
-    panel.margins(x=0.14)
     panel.grid(axis="y", visible=False)
+
+
+def _make_room(panel: Any) -> None:
+    """Widen the panel's range until the labels beside its bars stand within it."""
+    ends = [float(label.xy[0]) for label in panel.texts]
+    low, high = min(0.0, *ends), max(0.0, *ends)
+    whole = panel.get_window_extent().width
+    shares = [(label.get_window_extent().width + GAP) / whole for label in panel.texts]
+    left = max((share for end, share in zip(ends, shares, strict=True) if end < 0.0), default=0.0)
+    right = max((share for end, share in zip(ends, shares, strict=True) if end >= 0.0), default=0.0)
+    if high > low and left + right < 1.0:
+        span = (high - low) / (1.0 - left - right)
+        panel.set_xlim(low - left * span, high + right * span)

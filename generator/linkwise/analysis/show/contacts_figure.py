@@ -6,6 +6,7 @@ import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import load_unit
+from linkwise.analysis.show.largest_few import largest_few
 from linkwise.extras import extra
 from linkwise.package.load import Array
 from linkwise.plotstyle import GRAVITY, INK, drawn, tone
@@ -117,7 +118,7 @@ def _joints(result: AnalysisResult, contact: int) -> list[int]:
 def _largest(force: list[Array]) -> list[int]:
     """Links that ask most of the ground."""
     means = np.sum([np.abs(cube).sum(axis=(0, 2)) for cube in force], axis=0)[:-1]
-    return sorted(sorted(range(len(means)), key=lambda j: -float(means[j]))[:MOST])
+    return largest_few(means, MOST)[0]
 
 
 def _draw_force(
@@ -127,7 +128,7 @@ def _draw_force(
     contact, axis = place
     _shade(panel, result, contact)
     parts = force[axis]
-    areas = [(drawn(result.robot.links[j]), tone(at), parts[j]) for at, j in enumerate(alone)]
+    areas = [(drawn(result.robot.plot_links[j]), tone(at), parts[j]) for at, j in enumerate(alone)]
     rest = [j for j in range(len(parts)) if j not in alone]
     if rest and np.abs(parts[rest]).max() > 0.0:
         areas.append(("all else", GRAVITY, parts[rest].sum(axis=0)))
@@ -155,7 +156,7 @@ def _draw_measured(panel: Any, result: AnalysisResult, contact: int, axis: int) 
 
 def _draw_torque(panel: Any, result: AnalysisResult, contact: int, i: int) -> None:
     _shade(panel, result, contact)
-    name, unit = drawn(result.robot.joints[i]), load_unit(result.robot.units[i])
+    name, unit = drawn(result.robot.plot_joints[i]), load_unit(result.robot.units[i])
     for column, values in zip(result.columns, result.values, strict=True):
         if column.joint == i and column.quantity == "tau":
             panel.plot(result.time, values, color=INK, linewidth=1.6, label="found from the motion")

@@ -81,7 +81,7 @@ def page_data(result: AnalysisResult) -> str:
         "total": result.total,
         "stride": result.stride,
         "convention": result.processing.convention,
-        "joints": [{"name": printable(robot.joints[i]), "unit": robot.units[i]} for i in robot.driven],
+        "joints": _joints(result),
         "links": list(map(printable, robot.links)),
         "columns": [
             {
@@ -109,6 +109,16 @@ def page_data(result: AnalysisResult) -> str:
         "induced": [_induced(result, point) for point in range(len(result.induced))],
     }
     return script_data(data)
+
+
+def _joints(result: AnalysisResult) -> list[dict[str, str]]:
+    """Joints with torques: their names, these as plots show them, and units."""
+    robot = result.robot
+    every = list(zip(robot.joints, robot.plot_joints, robot.units, strict=True))
+    return [
+        {"name": printable(name), "shown": printable(shown), "unit": unit}
+        for name, shown, unit in (every[i] for i in robot.driven)
+    ]
 
 
 def _bodies(result: AnalysisResult) -> dict[str, Any] | None:

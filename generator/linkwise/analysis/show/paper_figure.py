@@ -30,8 +30,8 @@ class _Panel:
 def paper(result: AnalysisResult, i: int) -> "Figure":
     """Coordinates, τ_i, and for joint i: τ_ij, τp_ij(q̇_j), τp_ij(q̈_j), j's own coordinate."""
     robot, panels = result.robot, _panels(result, i)
-    carried = (*robot.links, *result.load_labels)
-    named = (("Joints", robot.joints), ("Links and loads" if result.loads else "Links", carried))
+    carried = (*robot.plot_links, *result.load_labels)
+    named = (("Joints", robot.plot_joints), ("Links and loads" if result.loads else "Links", carried))
     legends = [_legend_rows(names) for _, names in named]
     heights = [PANEL] * len(panels) + [LINE * (rows + 1) for rows in legends]
     figure = extra("matplotlib.figure").Figure(figsize=(7.6, sum(heights) + 0.9), layout="constrained")
@@ -146,7 +146,7 @@ def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
 def _left_out(result: AnalysisResult) -> str:
     """What the last two panels do not show."""
     own, robot = own_joints(result), result.robot
-    others = [robot.joints[at] for at in robot.driven if at not in own]
+    others = [robot.plot_joints[at] for at in robot.driven if at not in own]
     text = "The last two panels show each link's own joint only; the table and the page have every joint."
     if others:
         text += f" Not in them, as they carry no link with mass directly: {', '.join(map(drawn, others))}."

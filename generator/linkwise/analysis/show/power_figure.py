@@ -6,51 +6,65 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.largest_few import largest_few
 from linkwise.analysis.work import Work
 from linkwise.extras import extra
 from linkwise.package.load import Array
-from linkwise.plotstyle import COLOURS, INK, colour, dash, drawn
+from linkwise.plotstyle import INK, colour, dash, drawn, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-HATCHES = ("", "////", "....")
-"""For the links that share a colour."""
-
-LEGEND = 12
-"""Names that one column of a legend holds beside its axis."""
+MOST, LINKS = 7, 10
+"""Joints with a curve in colour, links and loads with a part of their own; what others have is grey."""
+REST = "#B4BAC4"
+NOTHING = 1e-9
+"""Of the largest joint's work, below which one is but rounding."""
+MANY = 12
+"""Joints above which rows stand closer."""
 
 
 def power(result: AnalysisResult, _: int) -> "Figure":
     """Curves of P_i = τ_i q̇_i in W; bars of work in J of each joint and contact, into links and loads."""
     robot = result.robot
-    joints, driven = [drawn(name) for name in robot.driven_joints], list(robot.driven)
+    joints = [drawn(robot.plot_joints[i]) for i in robot.driven]
     ground = () if robot.contacts is None else robot.contacts.names
     givers = [*joints, *(drawn(f"ground at {name}") for name in ground)]
-    height = 0.9 + 0.34 * len(givers)
+    height = 0.9 + (0.34 if len(givers) <= MANY else 0.26) * len(givers)
     figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.4 + height), layout="constrained")
     curves, bars = figure.subplots(2, 1, height_ratios=(2.4, height))
-    for i, values in enumerate(result.joint_power.T[driven]):
-        curves.plot(result.time, values, label=joints[i], color=colour(i), linestyle=dash(i))
-    curves.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
-    curves.set_title("Power of each joint")
-    curves.set_ylabel("W")
-    curves.set_xlabel("time (s)")
-    curves.set_xlim(result.time[0], result.time[-1])
-    _legend(curves, "joint", len(joints))
-    targets = [drawn(name) for name in (*robot.links, *result.load_labels)]
-    _bars(bars, _every_work(result, driven), targets)
+    _curves(curves, result, joints)
+    targets = [drawn(name) for name in (*robot.plot_links, *result.load_labels)]
+    _bars(bars, _every_work(result, list(robot.driven)), targets)
     into = "links and loads" if result.loads else "links"
     bars.set_title(f"Work: taken back out of {into}, and given to them")
     bars.set_yticks(range(len(givers)), givers)
-    bars.invert_yaxis()
+    bars.set_ylim(len(givers) - 0.4, -0.6)
     bars.set_xlabel("J")
     bars.grid(axis="y", visible=False)
-    _legend(bars, "link or load" if result.loads else "link", len(targets) + 1)
+    _legend(bars, "link or load" if result.loads else "link")
     figure.suptitle(f"{drawn(robot.name, 40)} · {drawn(result.source, 50)}", x=0.01, ha="left", fontsize=11)
     made = textwrap.fill(result.provenance, 140)
     figure.supxlabel(made, x=0.01, ha="left", fontsize=7, color="#5A6270")
     return figure  # type: ignore[no-any-return]
+
+
+def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> None:
+    """Joints that give and take most in colour, the others thin and grey behind them."""
+    driven, work = list(result.robot.driven), result.joint_work
+    named, rest = largest_few((work.given + work.taken)[driven], MOST)
+    values = result.joint_power.T[driven]
+    for at, i in enumerate(named):
+        panel.plot(result.time, values[i], label=joints[i], color=colour(at), linestyle=dash(at))
+    for at, i in enumerate(rest):
+        label = f"{len(rest)} others" if at == 0 else None
+        panel.plot(result.time, values[i], label=label, color=REST, linewidth=0.7, zorder=1.5)
+    panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+    panel.set_title("Power of each joint")
+    panel.set_ylabel("W")
+    panel.set_xlabel("time (s)")
+    panel.set_xlim(result.time[0], result.time[-1])
+    _legend(panel, "joint")
 
 
 def _every_work(result: AnalysisResult, driven: list[int]) -> Work:
@@ -68,28 +82,30 @@ def _every_work(result: AnalysisResult, driven: list[int]) -> Work:
 def _bars(axis: Any, work: Work, targets: list[str]) -> None:
     """Stacked from zero outwards, by link and load; a mark stands at the net of each joint."""
     at = range(len(work.given))
+    named, rest = largest_few(_prominence(work.given + work.taken), LINKS)
+    parts = [(targets[j], tone(place), [j]) for place, j in enumerate(named)]
+    if rest:
+        parts.append((f"{len(rest)} others", REST, rest))
     for side in (work.given, -work.taken):
         starts: Array = np.zeros(len(work.given))
-        for j, name in enumerate(targets):
+        for name, fill, members in parts:
             label = name if side is work.given else None
-            fill = {
-                "color": colour(j),
-                "hatch": HATCHES[j // len(COLOURS) % 3],
-                "edgecolor": "white",
-                "linewidth": 0.6,
-            }
-            axis.barh(at, side[:, j], left=starts, height=0.64, label=label, **fill)
-            starts = starts + side[:, j]
+            width = side[:, members].sum(axis=1)
+            axis.barh(
+                at, width, left=starts, height=0.64, label=label, color=fill, edgecolor="white", linewidth=0.6
+            )
+            starts = starts + width
     axis.plot(work.net.sum(axis=1), at, "D", color=INK, markersize=5, markeredgecolor="white", label="net")
     axis.axvline(0, color=INK, linewidth=0.8)
 
 
-def _legend(axis: Any, title: str, names: int) -> None:
-    axis.legend(
-        title=title,
-        loc="upper left",
-        bbox_to_anchor=(1.01, 1),
-        fontsize=8,
-        ncols=-(-names // LEGEND),
-        handlelength=2,
-    )
+def _prominence(sizes: Array) -> Array:
+    """Shares in the work of every joint added up, for each link and load: few names tell something of all."""
+    wholes = sizes.sum(axis=1, keepdims=True)
+    least = NOTHING * wholes.max(initial=0.0)
+    found: Array = np.divide(sizes, wholes, out=np.zeros_like(sizes), where=wholes > least).sum(axis=0)
+    return found
+
+
+def _legend(axis: Any, title: str) -> None:
+    axis.legend(title=title, loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8, handlelength=2)

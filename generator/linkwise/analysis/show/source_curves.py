@@ -9,6 +9,7 @@ import numpy as np
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import Column
 from linkwise.analysis.result_quantities import Quantity
+from linkwise.analysis.show.largest_few import largest_few
 from linkwise.package.load import Array
 
 MOST = 8
@@ -55,14 +56,14 @@ def source_curves(result: AnalysisResult, point: int, rows: Sequence[int]) -> It
     every = result.robot.driven
     yield SourceCurve("sum", "all together", 0, _sum(result, point, rows, ("acc",)))
     torques = [_sum(result, point, rows, ("acc_tau",), i) for i in every]
-    order = sorted(range(len(every)), key=lambda at: -float(np.abs(torques[at]).sum()))
-    order = [at for at in order if torques[at].any()]  # contacts may leave none to a base
-    alone, others = sorted(order[:MOST]), order[MOST:]
+    there = [at for at in range(len(every)) if torques[at].any()]  # contacts may leave none to a base
+    named, rest = largest_few([float(np.abs(torques[at]).sum()) for at in there], MOST)
+    alone, others = [there[at] for at in named], [there[at] for at in rest]
     for at in alone:
-        yield SourceCurve("torque", f"torque of {result.robot.joints[every[at]]}", at, torques[at])
+        yield SourceCurve("torque", f"torque of {result.robot.plot_joints[every[at]]}", at, torques[at])
     if others:
-        rest = np.sum([torques[at] for at in others], axis=0)
-        yield SourceCurve("torques", f"torques of {len(others)} others", 0, rest)
+        together = np.sum([torques[at] for at in others], axis=0)
+        yield SourceCurve("torques", f"torques of {len(others)} others", 0, together)
     yield SourceCurve("gravity", "gravity", 0, _sum(result, point, rows, ("acc_gravity",)))
     yield SourceCurve("velocity", "velocities", 0, _sum(result, point, rows, MOTION))
     if any(c.quantity in LOSSES for c in result.columns):

@@ -1,0 +1,78 @@
+"""What loads joints, cause by cause: the same causes in every picture and in the notebook."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.result_quantities import PASSIVE, Quantity
+from linkwise.package.load import Array
+
+MOTIONS: dict[str, tuple[Quantity, ...]] = {
+    "acceleration": ("tau_qdd",),
+    "velocity": ("tau_qd",),
+    "motion": ("tau_qdd", "tau_qd"),
+}
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One cause of joints' torques, and which columns are of it."""
+
+    kind: Literal["gravity", "load", "own", "acceleration", "velocity", "motion"]
+    label: str
+    quantities: tuple[Quantity, ...]
+    number: int | None = None
+    """Of the load, or of the joint that moves."""
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether it is a joint's motion, or a part of that."""
+        return self.kind in MOTIONS
+
+
+def causes_of(
+    result: AnalysisResult,
+    joints: Sequence[str],
+    shown: Callable[[str], str] = str,
+    together: bool = True,
+) -> tuple[Cause, ...]:
+    """Gravity, loads, what joints have of their own, and each joint's motion, in this order.
+
+    joints: what they are called, (n,), and shown: how a name is written. together: a motion is one cause,
+    else its acceleration and its velocity are two.
+    """
+    there = {column.quantity for column in result.columns}
+    found = [Cause("gravity", "gravity", ("tau_gravity",))]
+    found += [Cause("load", shown(name), ("tau_load",), e) for e, name in enumerate(result.load_labels)]
+    found += [Cause("own", f"own {name.removeprefix('tau_')}", (name,)) for name in PASSIVE if name in there]
+    kinds: tuple[Any, ...] = ("motion",) if together else ("acceleration", "velocity")
+    for k in result.robot.driven:
+        found += [Cause(kind, f"{shown(joints[k])} {kind}", MOTIONS[kind], k) for kind in kinds]
+    return tuple(found)
+
+
+def sizes(result: AnalysisResult, causes: Sequence[Cause]) -> Array:
+    """Mean magnitudes over all samples on every joint with torques, (causes, joints), links added up."""
+    place: dict[int | None, int] = {i: at for at, i in enumerate(result.robot.driven)}
+    return _summed(result, causes, place, result.totals.mean)
+
+
+def curves(result: AnalysisResult, causes: Sequence[Cause], i: int) -> Array:
+    """What each cause asks of joint i, (causes, S), in its unit."""
+    return _summed(result, causes, {i: 0}, result.values)[:, 0]
+
+
+def _summed(
+    result: AnalysisResult, causes: Sequence[Cause], place: Mapping[int | None, int], numbers: Array
+) -> Array:
+    """Of the numbers (columns, ...) those of each cause on each joint that has a place."""
+    rows = {(name, one.number): row for row, one in enumerate(causes) for name in one.quantities}
+    out = np.zeros((len(causes), len(place), *numbers.shape[1:]))
+    for column, number in zip(result.columns, numbers, strict=True):
+        row = rows.get((column.quantity, column.cause))
+        if row is not None and column.joint in place:
+            out[row, place[column.joint]] += number
+    return out
