@@ -7,15 +7,13 @@ from typing import Annotated
 import typer
 
 from linkwise.analysis import Analysis
-from linkwise.analysis.job import Wanted
-from linkwise.analysis.loads import Loads
+from linkwise.analysis.analysis_choices import AnalysisChoices
 from linkwise.analysis.payload import carrying
-from linkwise.analysis.phases import Phase
 from linkwise.analysis.run import analyze_to
-from linkwise.analysis.settings import Convention, Reading
+from linkwise.analysis.settings import Convention
 from linkwise.analysis.tables import Format
 from linkwise.cli import Json, tell
-from linkwise.cli.contact_options import Held, Measured, Threshold, Unactuated, While, chosen_contacts
+from linkwise.cli.contact_options import Held, Measured, Threshold, Unactuated, While
 from linkwise.cli.log_options import (
     UNITS,
     AngleUnits,
@@ -34,11 +32,6 @@ from linkwise.cli.log_options import (
     Time,
     Topic,
     Window,
-    carried,
-    chosen_lowpass,
-    chosen_processing,
-    constant_loads,
-    pairs,
 )
 from linkwise.cli.options import reads_robot
 from linkwise.cli.robot_option import RobotOption, opened_robot
@@ -149,30 +142,42 @@ def analyze(
     as_json: Json = False,
 ) -> None:
     """Who loads whom: every torque term of a recorded movement, as a table, figures and a page."""
-    reading = Reading(
-        units, time, pairs("--map", mapping or []), ignore_extra, resample, loop_tolerance, topic
+    chosen = AnalysisChoices(
+        units,
+        time,
+        topic,
+        tuple(mapping or ()),
+        ignore_extra,
+        resample,
+        loop_tolerance,
+        derivative,
+        window,
+        degree,
+        cutoff,
+        filter_order,
+        padding,
+        edges,
+        convention,
+        tuple(phase or ()),
+        power_terms,
+        tuple(payload or ()),
+        tuple(load or ()),
+        tuple(map(str, loads or ())),
+        loads_cutoff,
+        tuple(contact or ()),
+        tuple(contact_while or ()),
+        tuple(map(str, contact_loads or ())),
+        contact_threshold,
+        tuple(unactuated or ()),
+        tuple(induced or ()),
     )
-    processing = chosen_processing(
-        derivative, window, degree, chosen_lowpass(cutoff, filter_order, padding), edges, convention
-    )
-    phases = tuple(map(Phase.of, phase or ()))
-    wanted = Wanted(format, tuple(figure or ()), page, power_terms, tuple(induced or ()), phases)
+    how = chosen.reading, chosen.processing, chosen.wanted(format, figure or (), page)
     with shown_progress() as progress:
         package = opened_robot(robot, backend, options, progress)
-    package = carrying(package, carried(payload or [], package))
-    held = chosen_contacts(
-        contact or [],
-        contact_while or [],
-        contact_loads or [],
-        contact_threshold,
-        loads_cutoff,
-        unactuated or [],
-        package,
-    )
-    of_loads = None if contact_loads and not loads else loads_cutoff
-    borne = Loads.of([*constant_loads(load or [], package), *(loads or [])], of_loads)
+    package = carrying(package, chosen.payloads(package))
+    put = chosen.borne(package), chosen.contacts(package)
     with shown_progress(UNITS) as progress:
-        analysis, files = analyze_to(out, log, package, reading, processing, wanted, progress, borne, held)
+        analysis, files = analyze_to(out, log, package, *how, progress, *put)
     for warning in analysis.warnings:
         tell(f"warning: {log}: {warning}", err=True)
     for warning in analysis.load_warnings:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from linkwise.analysis.settings import Reading, choices
+from linkwise.analysis.written_choices import chosen_lowpass, chosen_processing, pairs
 from linkwise.cli import Json, tell
 from linkwise.cli.log_options import (
     UNITS,
@@ -26,9 +27,6 @@ from linkwise.cli.log_options import (
     Time,
     Topic,
     Window,
-    chosen_lowpass,
-    chosen_processing,
-    pairs,
 )
 from linkwise.cli.options import reads_robot
 from linkwise.cli.robot_option import RobotOption, opened_robot
