@@ -1,8 +1,12 @@
 """Columns matched to joints, units, time and gaps."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from linkwise.analysis.column_matching import select
+from linkwise.analysis.disk_rows import collected, let_go
 from linkwise.analysis.even_time import resampled
 from linkwise.analysis.logs import open_log
 from linkwise.analysis.samples import read_samples
@@ -306,3 +310,17 @@ def test_splines_that_overflow_are_told(tmp_path):
     )
     with pytest.raises(LinkwiseError, match=message):
         read_samples(open_log(path), ("joint1",), ("rad",), Reading(resample=50.0), silent)
+
+
+def test_rows_that_are_let_go_are_in_their_file_and_not_in_memory(tmp_path: Path) -> None:
+    def held() -> int:
+        """KiB of files' pages that this process has."""
+        return int(re.search(r"RssFile:\s+(\d+)", Path("/proc/self/status").read_text())[1])
+
+    rows = collected((np.full((1 << 16, 8), float(k)) for k in range(16)), 8, tmp_path)
+    rows[5] = 7.5
+    assert rows[-1, -1] == 15.0
+    total, before = rows.sum(), held()
+    let_go(rows)
+    assert before - held() > 60_000
+    assert (rows.sum(), rows[5, 3]) == (total, 7.5)

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from linkwise.analysis.constrained_model import ConstrainedModel
-from linkwise.analysis.samples import Samples, collected
+from linkwise.analysis.disk_rows import collected
+from linkwise.analysis.samples import Samples
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 from linkwise.progress import Progress

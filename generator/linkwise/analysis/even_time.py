@@ -33,16 +33,17 @@ def usual_step(time: Array, first_row: int, gap: float = GAP) -> float:
     Raises LinkwiseError that names the rows for time that does not increase, and for steps longer than `gap`
     usual ones.
     """
-    if np.abs(time).max() > EXTREME:
-        raise LinkwiseError(f"time column: it comes to {np.abs(time).max():.3g} s; give seconds")
+    if (largest := max(-time.min(), time.max())) > EXTREME:
+        raise LinkwiseError(f"time column: it comes to {largest:.3g} s; give seconds")
     steps = np.diff(time)
     _refuse_backwards(time, steps, first_row)
-    usual = float(np.median(steps))
     worst = int(np.argmax(steps))
-    if steps[worst] > gap * usual:
+    longest = steps[worst]
+    usual = float(np.median(steps, overwrite_input=True))  # a log may be long, and a copy too much
+    if longest > gap * usual:
         raise LinkwiseError(
             f"rows {first_row + worst} to {first_row + worst + 1}, time column: a gap of"
-            f" {steps[worst]:.6g} s where steps are {usual:.6g} s; fill it or cut the log there"
+            f" {longest:.6g} s where steps are {usual:.6g} s; fill it or cut the log there"
         )
     return usual
 
@@ -59,23 +60,25 @@ def even_rate(
     if len(time) < 2:
         raise LinkwiseError(f"{len(time)} samples; a movement needs 5 or more")
     usual = usual_step(time, first_row, GAP_BEFORE_RESAMPLING)
-    steps = np.diff(time)
     mean = (time[-1] - time[0]) / (len(time) - 1)
     if mean < 1 / EXTREME:
         raise LinkwiseError(f"time column: steps of {mean:.3g} s; give seconds")
-    off = np.abs(steps - mean)
+    off = np.diff(time)
+    off -= mean
+    np.abs(off, out=off)
     if strict and off.max() > TOLERANCE * mean:
         step = _rounded_step(time)
         if step is not None:
             return 1 / step
         at = int(np.argmax(off))
-        if steps[at] > GAP * usual:
+        worst = time[at + 1] - time[at]
+        if worst > GAP * usual:
             raise LinkwiseError(
                 f"rows {first_row + at} to {first_row + at + 1}, time column: a gap of"
-                f" {steps[at]:.6g} s where steps are {usual:.6g} s; fill it, or {mend} {1 / usual:.6g}"
+                f" {worst:.6g} s where steps are {usual:.6g} s; fill it, or {mend} {1 / usual:.6g}"
             )
         raise LinkwiseError(
-            f"row {first_row + at + 1}, time column: a step of {steps[at]:.6g} s where the mean is"
+            f"row {first_row + at + 1}, time column: a step of {worst:.6g} s where the mean is"
             f" {mean:.6g} s; {mend} {1 / mean:.6g}"
         )
     return float(1 / mean)

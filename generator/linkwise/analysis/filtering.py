@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.settings import Lowpass
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
@@ -49,6 +50,7 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: s
     _, state = _passed(sos, front, state)
     for start, stop in blocks:
         q[start:stop], state = _passed(sos, q[start:stop], state)
+        let_go(q)
     back, _ = _passed(sos, back, state)
 
     state = rest * (back[-1] if pad else q[-1])
@@ -56,6 +58,7 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: s
     for start, stop in reversed(blocks):
         backwards, state = _passed(sos, q[start:stop][::-1], state)
         q[start:stop] = backwards[::-1]
+        let_go(q)
 
 
 def padding_length(sos: Array, samples: int) -> int:

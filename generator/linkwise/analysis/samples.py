@@ -1,7 +1,5 @@
 """A log brought to evenly spaced joint coordinates in SI units, checked row by row."""
 
-import mmap
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from linkwise.analysis.column_matching import Peak, far_warnings, radians_per_unit, select, unit_warnings
+from linkwise.analysis.disk_rows import collected, first_column
 from linkwise.analysis.even_time import TOLERANCE, even_rate, resampled
 from linkwise.analysis.follower_columns import FollowerColumns, FollowingJoint
 from linkwise.analysis.logs import Log
@@ -16,7 +15,6 @@ from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.package.load import Array
 from linkwise.progress import Progress
-from linkwise.runtime.native.native_system import system_here
 
 SLOW = 5.0
 """Hz; hardly any movement is recorded so slowly, and milliseconds taken for seconds look like it."""
@@ -73,12 +71,14 @@ def read_samples(
             yield block
 
     samples = collected(in_si(), width, buffer)
+    time = first_column(samples)
     with within(str(log.path)):
-        rate = even_rate(samples[:, 0], log.first_row, strict=reading.resample is None)
+        rate = even_rate(time, log.first_row, strict=reading.resample is None)
         warnings = (*log.warnings, *slowness(rate), *following.warnings(), *_thinned(rate, reading.resample))
         if reading.resample is not None:
             rate = reading.resample
             samples = collected(resampled(samples, rate, progress=progress), width, buffer)
+            time = first_column(samples)
     by_unit: dict[str, list[Peak]] = {"rad": [], "m": []}
     for at, unit in enumerate(joint_units):
         size = peaks[at + 1], reach[at] if reach else np.inf
@@ -86,7 +86,7 @@ def read_samples(
     with within(str(log.path)):
         warnings += unit_warnings(log, reading, by_unit["rad"]) + far_warnings(by_unit["m"])
     first_row = log.first_row if reading.resample is None else None
-    return Samples(samples[:, 0], samples[:, 1:], rate, selection.ignored, warnings, first_row)
+    return Samples(time, samples[:, 1:], rate, selection.ignored, warnings, first_row)
 
 
 def finite_blocks(
@@ -123,20 +123,3 @@ def _thinned(rate: float, wanted: float | None) -> tuple[str, ...]:
         f"--resample {wanted:g} of {rate:.6g} samples a second: what moves faster than {wanted / 2:g} Hz"
         f" comes out as something slower; resample at {rate:.6g} or more",
     )
-
-
-def collected(blocks: Iterator[Array], width: int, directory: Path | None) -> Array:
-    """All rows of blocks (any, width) as one writable array, in memory or in a file in `directory`."""
-    if directory is None:
-        return np.concatenate([np.empty((0, width)), *blocks])
-    # The file has no name from the start: the system removes it with its last user, however that ends. Where
-    # an open file keeps a name, that must not be among results.
-    place = None if system_here().keeps_open_files else directory
-    with tempfile.TemporaryFile(dir=place) as file:
-        for block in blocks:
-            file.write(np.ascontiguousarray(block).tobytes())
-        file.flush()
-        if not file.tell():
-            return np.empty((0, width))
-        # The array holds the file behind it, and outlives this function.
-        return np.frombuffer(mmap.mmap(file.fileno(), 0)).reshape(-1, width)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from linkwise.analysis.derivatives import derivatives
+from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.result import Totals
 from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
@@ -111,6 +112,7 @@ def stream(
             if pending is not None:
                 pending.result()
             pending = writer.submit(sink, block)
+            let_go(samples.q)
             progress("analysing", last - start, stop - start)
         if pending is not None:
             pending.result()

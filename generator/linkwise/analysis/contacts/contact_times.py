@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from linkwise.analysis.column_matching import time_column
 from linkwise.analysis.contacts.given_contacts import Contacts, WhileColumn
+from linkwise.analysis.disk_rows import collected
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.given_loads import FORCE
 from linkwise.analysis.loads.placed_load import PlacedLoad, Wrench, model_pose
 from linkwise.analysis.loads.read_loads import placed_loads
 from linkwise.analysis.logs import Log
-from linkwise.analysis.samples import collected, finite_blocks
+from linkwise.analysis.samples import finite_blocks
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed

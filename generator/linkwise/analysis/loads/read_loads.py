@@ -7,6 +7,7 @@ import numpy as np
 
 from linkwise.analysis.body_names import told_apart
 from linkwise.analysis.column_matching import FAR
+from linkwise.analysis.disk_rows import collected
 from linkwise.analysis.even_time import even_rate, usual_step
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot
@@ -15,7 +16,7 @@ from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WIDTH, Loa
 from linkwise.analysis.loads.load_columns import PARTS, LoadColumns, load_columns
 from linkwise.analysis.loads.placed_load import PlacedLoad, Seat, seat_of
 from linkwise.analysis.logs import open_log
-from linkwise.analysis.samples import collected, finite_blocks, slowness
+from linkwise.analysis.samples import finite_blocks, slowness
 from linkwise.analysis.settings import Lowpass
 from linkwise.errors import LinkwiseError, within
 from linkwise.package.load import Array

@@ -47,7 +47,8 @@ class ParquetLog:
         """
         arrow = extra("pyarrow")
         names, done = [self.columns[column] for column in columns], 0
-        with extra("pyarrow.parquet").ParquetFile(self.path) as file:
+        # A buffer ahead of the reader would keep all of the file in memory until its end.
+        with extra("pyarrow.parquet").ParquetFile(self.path, pre_buffer=False) as file:
             batches = file.iter_batches(rows, columns=names)
             while (batch := self._next(batches, done)) is not None:
                 block = np.empty((batch.num_rows, len(names)))
