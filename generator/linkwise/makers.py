@@ -7,6 +7,8 @@ read the robot.
 
 import sys
 from collections.abc import Iterator
+from functools import cache
+from hashlib import sha256
 from importlib import import_module, metadata
 from pathlib import Path
 
@@ -15,22 +17,38 @@ HOMES = ("linkwise", "linkwise.templates")
 MAKERS = ("linkwise", "sympy", "mujoco")
 
 
+@cache
+def fingerprint() -> str:
+    """Hash of linkwise's own files by content: the same on every machine that has this linkwise."""
+    digest = sha256()
+    for path in _own_files():
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+@cache
+def _own_files() -> tuple[Path, ...]:
+    folders = [Path(str(import_module(home).__file__)).parent for home in HOMES]
+    return tuple(path for folder in folders for path in sorted(folder.rglob("*")) if path.suffix in SUFFIXES)
+
+
 def generator_files() -> Iterator[str]:
     """Paths of linkwise's own files, and of the records of what took part."""
-    for home in HOMES:
-        folder = Path(str(import_module(home).__file__)).parent
-        found = (path for path in folder.rglob("*") if path.suffix in SUFFIXES)
-        yield from (path.as_posix() for path in sorted(found))
+    yield from (path.as_posix() for path in _own_files())
     for name in MAKERS:
         if name in sys.modules:
             yield from _record(name)
 
 
-def _record(distribution: str) -> Iterator[str]:
+@cache
+def _record(distribution: str) -> tuple[str, ...]:
     """METADATA of an installed package; nothing of one that was never installed.
 
     Beside the record there may be what setuptools leaves in a source tree, which has none.
     """
-    for found in metadata.distributions(name=distribution):
-        records = (file for file in found.files or [] if file.name == "METADATA" and len(file.parts) == 2)
-        yield from (Path(str(found.locate_file(file))).as_posix() for file in records)
+    return tuple(
+        Path(str(found.locate_file(file))).as_posix()
+        for found in metadata.distributions(name=distribution)
+        for file in found.files or []
+        if file.name == "METADATA" and len(file.parts) == 2
+    )

@@ -94,7 +94,7 @@ def _key(robot: str | Path, backends: Sequence[str], options: Options) -> str:
 
 
 def _parts(robot: str | Path, backends: Sequence[str], options: Options) -> Iterator[str]:
-    yield from (str(robot), *backends, repr(options))
+    yield from (Path(robot).name, *backends, repr(options))
     for path in robot_files(robot, options):
         if path.is_file():
             yield hashlib.sha256(path.read_bytes()).hexdigest()
