@@ -22,6 +22,7 @@ DASHES = ("solid", "dashed", "dotted", "dashdot")
 SETTINGS = {
     "svg.hashsalt": "linkwise",
     "svg.fonttype": "path",
+    "pdf.fonttype": 42,  # fonts as they are, which every program can edit
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
     "axes.edgecolor": INK,
@@ -84,8 +85,12 @@ def styled() -> Iterator[Any]:
 
 
 def saved(figure: Any, kind: str, dpi: int = 200) -> bytes:
-    """Bytes of a figure as "svg" or "png", without the date or the program that would tell runs apart."""
+    """Bytes of a figure as "svg", "pdf" or "png", without date or program, which would tell runs apart."""
     out = io.BytesIO()
-    nameless = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
+    nameless = {
+        "svg": {"Date": None, "Creator": None},
+        "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+        "png": {"Software": None},
+    }[kind]
     figure.savefig(out, format=kind, dpi=dpi, metadata=nameless)
     return out.getvalue()

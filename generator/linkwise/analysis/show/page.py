@@ -1,7 +1,5 @@
 """`report.html`: the analysis as one file that needs no network."""
 
-import base64
-import gzip
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,12 +10,11 @@ from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import Column
 from linkwise.analysis.result_quantities import FORCES, GROUND, INDUCED, TORQUE_OF
 from linkwise.analysis.show.induced_figure import TITLES
+from linkwise.analysis.show.packed_page import encoded, packed, plotly_parts
 from linkwise.analysis.show.poses import poses
 from linkwise.analysis.show.source_curves import components, numbers_of_curves, source_curves
 from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
-from linkwise.extras import extra
-from linkwise.package.load import Array
 from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
 
 NUMBERS, SAMPLES = 500_000, 1500
@@ -34,16 +31,11 @@ def report(result: AnalysisResult) -> str:
 
 
 def view(result: AnalysisResult) -> dict[str, str]:
-    """What the template needs: a title (escaped there), the data, and plotly's script with its notice.
-
-    Both are packed, for the script is most of a page: 4.8 MB, and 2.0 as gzip in base64.
-    """
-    script = extra("plotly.offline").get_plotlyjs()
+    """What the template needs: a title (escaped there), the data, and plotly's script with its notice."""
     return {
         "title": f"{result.robot.name} · {result.source}",
-        "data": _packed(page_data(result)),
-        "notice": " ".join(script[: script.find("*/")].replace("*", " ").strip("/ \n").split()),
-        "plotly": _packed(script),
+        "data": packed(page_data(result)),
+        **plotly_parts(),
     }
 
 
@@ -96,7 +88,7 @@ def page_data(result: AnalysisResult) -> str:
             }
             for c in (result.columns[at] for at in shown)
         ],
-        "values": _encode(result.values[shown]),
+        "values": encoded(result.values[shown]),
         "mean": result.totals.mean[shown].tolist(),
         "peak": result.totals.peak[shown].tolist(),
         "work": _work(result),
@@ -137,8 +129,8 @@ def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
         "links": [place.get(body.link, -1) for body in bodies],
         "coordinates": [order.index(body.coordinate) if body.ratio else -1 for body in bodies],
         "up": list(result.robot.up),
-        "origins": _encode(origins),
-        "centres": _encode(centres),
+        "origins": encoded(origins),
+        "centres": encoded(centres),
     }
 
 
@@ -147,7 +139,7 @@ def _loads(result: AnalysisResult) -> list[dict[str, str]]:
     pose = model_pose(result.robot.model)
     wrenches = [borne.wrench(result.time, result.q, pose) for borne in result.loads]
     return [
-        {"name": printable(label), "places": _encode(at.place), "forces": _encode(at.force)}
+        {"name": printable(label), "places": encoded(at.place), "forces": encoded(at.force)}
         for label, at in zip(result.load_labels, wrenches, strict=True)
     ]
 
@@ -171,8 +163,8 @@ def _reactions(result: AnalysisResult) -> list[dict[str, str]]:
             centre = place + ground.touch(c)
         powers = [v for col, v in zip(result.columns, result.values, strict=True) if _feeds(col, c)]
         label = printable(f"ground at {ground.names[c]}")
-        arrow = {"name": label, "places": _encode(centre), "forces": _encode(force)}
-        out.append(arrow | {"powers": _encode(np.array(powers))})
+        arrow = {"name": label, "places": encoded(centre), "forces": encoded(force)}
+        out.append(arrow | {"powers": encoded(np.array(powers))})
     return out
 
 
@@ -191,7 +183,7 @@ def _induced(result: AnalysisResult, point: int) -> dict[str, Any]:
                 "kind": curve.kind,
                 "label": printable(curve.label),
                 "at": curve.number,
-                "values": _encode(curve.values),
+                "values": encoded(curve.values),
             }
             for curve in source_curves(result, point, list(rows))
         ],
@@ -214,11 +206,3 @@ def _work(result: AnalysisResult) -> list[dict[str, float]]:
         i = len(place) + (c.cause or 0) if c.quantity == "power_contact" else place[c.joint or 0]
         out.append({"i": i, "j": j, "given": given, "taken": taken})
     return out
-
-
-def _packed(text: str) -> str:
-    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
-
-
-def _encode(values: Array) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, "<f8").tobytes()).decode("ascii")
