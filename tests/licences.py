@@ -13,7 +13,9 @@ from installation import needs_of
 
 PAGE = Path(__file__).parents[1] / "docs/licences.md"
 MARK = "<!-- from here on by `make licences` -->\n"
-USERS = ("", "torch", "onnx", "mjcf", "motion", "logs", "identify", "names")
+USERS = ("", "torch", "onnx", "mjcf", "motion", "logs", "identify", "names", "study", "ray")
+BINDING = ("spm",)
+"""Extras whose packages bind the programs that use them; `all` brings none of these."""
 DEVELOPERS = ("docs", "test", "lint")
 NOT_LISTED = re.compile(r"linkwise$|(nvidia|cuda|triton)\b")
 """linkwise itself, and what PyTorch brings for GPUs of one maker, of which the page says a line."""
@@ -45,16 +47,21 @@ def packages_of(extras: Sequence[str]) -> dict[str, Distribution]:
 def rows() -> dict[str, tuple[str, str]]:
     """Of each package that is installed for linkwise, its licence and the first that brings it."""
     found: dict[str, tuple[str, str]] = {}
-    for extra in (*USERS, *DEVELOPERS):
+    for extra in (*USERS, *BINDING, *DEVELOPERS):
         for name, package in packages_of([extra]).items():
             found.setdefault(name, (licence(package), extra or "core"))
     return found
 
 
 def tables() -> str:
-    """One table of what users get, one of what linkwise's own tests and checks of style need."""
+    """Tables of what users get, of what binds them, and of what linkwise's own tests and checks need."""
     texts = []
-    for title, extras in (("What users install", ("core", *USERS[1:])), ("What developers add", DEVELOPERS)):
+    groups = {
+        "What users install": ("core", *USERS[1:]),
+        "What binds programs that use it": BINDING,
+        "What developers add": DEVELOPERS,
+    }
+    for title, extras in groups.items():
         lines = [f"## {title}\n", "| package | licence | for |", "|---|---|---|"]
         for extra in extras:
             lines += [f"| {name} | {text} | {own} |" for name, (text, own) in rows().items() if own == extra]

@@ -3,13 +3,13 @@
 import re
 
 import pytest
-from licences import DEVELOPERS, MARK, PAGE, USERS, licence, packages_of
+from licences import BINDING, DEVELOPERS, MARK, PAGE, USERS, licence, packages_of
 
 TEXT = PAGE.read_text(encoding="utf-8")
 LISTED = dict(re.findall(r"^\| ([\w-]+) \| (.+?) \| [\w-]+ \|$", TEXT.partition(MARK)[2], re.MULTILINE))
 
 
-@pytest.mark.parametrize("extra", [*USERS, *DEVELOPERS])
+@pytest.mark.parametrize("extra", [*USERS, *BINDING, *DEVELOPERS])
 def test_every_package_is_listed_as_its_metadata_say(extra: str) -> None:
     brought = packages_of([extra])
     assert brought
@@ -20,3 +20,4 @@ def test_every_package_is_listed_as_its_metadata_say(extra: str) -> None:
 
 def test_users_are_brought_no_licence_that_binds_their_own_programs() -> None:
     assert not [name for name in packages_of(USERS) if re.search(r"\bA?GPL", LISTED[name])]
+    assert not {"spm1d"} & set(packages_of(["all"])), "whose metadata do not say that it is under the GPL"

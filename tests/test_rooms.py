@@ -12,6 +12,7 @@ HOUSE = Path(__file__).parents[1] / "generator/linkwise"
 
 ROOMS = (
     "cli",
+    "study",
     "package_cache",
     "pipeline",
     "report",

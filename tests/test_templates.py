@@ -49,7 +49,7 @@ def emitted_templates() -> list[str]:
     return [
         t
         for t in loader.list_templates()
-        if t.endswith(".j2") and t.split("/")[0] not in ("analysis", "report")
+        if t.endswith(".j2") and t.split("/")[0] not in ("analysis", "report", "study")
     ]
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from linkwise.package_cache import KeptPackage, kept_package
     from linkwise.pipeline import generate, read_system
     from linkwise.robot import Coordinate, Options, read_robot
+    from linkwise.study import ProcessPool, RayCluster, StudyOutcome, run_study
     from linkwise.symbolic.system import LinkEnergy, System
     from linkwise.symbolic.user_energies import energy_system
 
@@ -46,8 +47,11 @@ __all__ = [
     "Lowpass",
     "Options",
     "Payload",
+    "ProcessPool",
     "Processing",
+    "RayCluster",
     "Reading",
+    "StudyOutcome",
     "System",
     "WhileColumn",
     "__version__",
@@ -59,6 +63,7 @@ __all__ = [
     "kept_package",
     "read_robot",
     "read_system",
+    "run_study",
     "write_package",
 ]
 
@@ -75,8 +80,11 @@ _ROOM_OF = {
     "Lowpass": "analysis",
     "Options": "robot",
     "Payload": "analysis",
+    "ProcessPool": "study",
     "Processing": "analysis",
+    "RayCluster": "study",
     "Reading": "analysis",
+    "StudyOutcome": "study",
     "System": "symbolic.system",
     "WhileColumn": "analysis",
     "analyze": "analysis",
@@ -87,6 +95,7 @@ _ROOM_OF = {
     "kept_package": "package_cache",
     "read_robot": "robot",
     "read_system": "pipeline",
+    "run_study": "study",
     "write_package": "package.write",
 }
 """A room is imported when one of its names is first used, and SymPy, NumPy and SciPy not before."""

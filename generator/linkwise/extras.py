@@ -7,14 +7,17 @@ from linkwise.errors import LinkwiseError
 
 BROUGHT_BY = {
     "clarabel": "identify",
+    "fsspec": "study",
     "h5py": "logs",
     "matplotlib": "motion",
     "mujoco": "mjcf",
     "networkx": "torch",
     "plotly": "motion",
     "pyarrow": "motion",
+    "ray": "ray",
     "rosbags": "logs",
     "scipy": "motion",
+    "spm1d": "spm",
     "torch": "torch",
     "xarray": "names",
 }

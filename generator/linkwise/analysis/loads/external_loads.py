@@ -29,20 +29,35 @@ def external_loads(path: Path) -> tuple[LoadColumns, ...]:
     Raises LinkwiseError for a file without any, data that are not there, and identifiers of other than three
     columns.
     """
+    with within(str(path)):
+        forces = _forces(path)
+        unread = [_unread(force, log) for force, log in forces]
+        return tuple(_with_columns(load, force) for load, (force, _) in zip(unread, forces, strict=True))
+
+
+def data_files(path: Path) -> tuple[Path, ...]:
+    """The files that external loads have their numbers in, each once, there or not.
+
+    Raises LinkwiseError for a file of loads without any.
+    """
+    with within(str(path)):
+        return tuple(dict.fromkeys(log for _, log in _forces(path)))
+
+
+def _forces(path: Path) -> list[tuple[Element, Path]]:
+    """The forces that are on, each with the file of its numbers."""
     from linkwise.robot.readers.xml_file import (
         parse,
     )  # its room brings SymPy, which other loads can do without
 
-    with within(str(path)):
-        require_file(path)
-        root = parse(path)
-        loads = root if root.tag == LOADS else root.find(LOADS)
-        there = [] if loads is None else loads.findall(f"objects/{FORCE}")
-        forces = [force for force in there if not _is_off(force)]
-        if not forces:
-            raise LinkwiseError("no ExternalForce that is on; give OpenSim's file of ExternalLoads")
-        unread = [_unread(force, _data_file(path, loads, force)) for force in forces]
-        return tuple(_with_columns(load, force) for load, force in zip(unread, forces, strict=True))
+    require_file(path)
+    root = parse(path)
+    loads = root if root.tag == LOADS else root.find(LOADS)
+    there = [] if loads is None else loads.findall(f"objects/{FORCE}")
+    forces = [force for force in there if not _is_off(force)]
+    if not forces:
+        raise LinkwiseError("no ExternalForce that is on; give OpenSim's file of ExternalLoads")
+    return [(force, _data_file(path, loads, force)) for force in forces]
 
 
 def _unread(force: Element, log: Path) -> LoadColumns:

@@ -1,0 +1,139 @@
+"""Two levels of a factor held against each other: t tests over whole curves (SPM), or of means."""
+
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from linkwise.errors import LinkwiseError, within
+from linkwise.escape import one_line
+from linkwise.extras import extra
+from linkwise.package.load import Array
+from linkwise.study.column_patterns import fitting
+from linkwise.study.running_moments import STATISTICS
+from linkwise.study.study_plan import Comparison
+from linkwise.study.subject_spread import Spread, columns_of_trials, spread
+from linkwise.study.trial_summary import TrialSummary
+
+FEWEST = 3
+"""Subjects on a side that a test needs."""
+MEAN = STATISTICS.index("mean")
+
+
+@dataclass(frozen=True, eq=False)
+class Cluster:
+    """A part of the cycle, in %, where curves differ, and its p."""
+
+    start: float
+    end: float
+    p: float
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """What a test says of one column."""
+
+    comparison: Comparison
+    column: str
+    unit: str
+    sides: tuple[Spread, Spread]
+    statistic: Array
+    """t at each point of the cycle, (points,); of means (1,)."""
+    threshold: float
+    """|t| above which a curve differs by chance in `alpha` of all cases; of means NaN."""
+    p: float
+    """Of means; of curves NaN, as each of their parts has its own."""
+    clusters: tuple[Cluster, ...]
+
+
+def compared(
+    comparison: Comparison, trials: Sequence[TrialSummary]
+) -> tuple[list[Compared], tuple[str, ...]]:
+    """The test of every column that is asked for, and why some could not be made.
+
+    Raises LinkwiseError for unknown columns.
+    """
+    known = columns_of_trials(trials)
+    made, told = list[Compared](), list[str]()
+    for name in compared_columns(comparison, known):
+        try:
+            with within(f"[[compare]] {comparison.factor}, {name}"):
+                made.append(_of_column(comparison, trials, name, known[name]))
+        except LinkwiseError as error:
+            told.append(str(error))
+    return made, tuple(told)
+
+
+def compared_columns(comparison: Comparison, names: Iterable[str]) -> list[str]:
+    """Those of these columns that are held against each other; raises LinkwiseError for unknown ones."""
+    return fitting("[[compare]]", names, comparison.columns)
+
+
+def _of_column(comparison: Comparison, trials: Sequence[TrialSummary], name: str, unit: str) -> Compared:
+    sides = []
+    for level in comparison.between:
+        members = [trial for trial in trials if trial.labels[comparison.factor] == level]
+        there = {t.name: t.curves[name] for t in members if name in t.curves} or {
+            t.name: t.statistics[name][MEAN : MEAN + 1] for t in members if name in t.statistics
+        }
+        sides.append(spread(members, there) if there else Spread((), np.empty((0, 1)), np.empty((0, 1))))
+    first, second = _paired(*sides) if comparison.paired else sides
+    fewest = min(len(first.each), len(second.each))
+    if fewest < FEWEST:
+        raise LinkwiseError(
+            f"{fewest} subjects{' in both' if comparison.paired else ' on a side'}; a test needs {FEWEST}"
+        )
+    return _tested(comparison, name, unit, first, second)
+
+
+def _paired(first: Spread, second: Spread) -> tuple[Spread, Spread]:
+    """Those subjects that are on both sides, in one order."""
+    both = [subject for subject in first.subjects if subject in second.subjects]
+    at = [[side.subjects.index(subject) for subject in both] for side in (first, second)]
+    one, other = (
+        Spread(tuple(both), side.every, side.each[rows])
+        for side, rows in zip((first, second), at, strict=True)
+    )
+    return one, other
+
+
+def _tested(comparison: Comparison, name: str, unit: str, first: Spread, second: Spread) -> Compared:
+    about = comparison, name, unit, (first, second)
+    if first.each.shape[1] == 1:
+        t, p = _of_means(comparison.paired, first.each[:, 0], second.each[:, 0])
+        whole = (Cluster(0.0, 100.0, p),) if p < comparison.alpha else ()
+        return Compared(*about, np.array([t]), float("nan"), p, whole)
+    field, found = _of_curves(comparison, first.each, second.each)
+    scale = 100 / (first.each.shape[1] - 1)
+    clusters = tuple(
+        Cluster(float(c.endpoints[0]) * scale, float(c.endpoints[1]) * scale, float(c.P))
+        for c in found.clusters
+    )
+    statistic = np.asarray(field.z, dtype=float)
+    return Compared(*about, statistic, float(found.zstar), float("nan"), clusters)
+
+
+def _of_means(is_paired: bool, first: Array, second: Array) -> tuple[float, float]:
+    """t and p; of unpaired subjects Welch's, whose variances need not be equal."""
+    stats = extra("scipy.stats")
+    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of numbers that are nearly equal, as is told below
+        test = (
+            stats.ttest_rel(first, second) if is_paired else stats.ttest_ind(first, second, equal_var=False)
+        )
+    if not np.isfinite(test.statistic):
+        raise LinkwiseError("subjects do not vary, so that there is nothing to test")
+    return float(test.statistic), float(test.pvalue)
+
+
+def _of_curves(comparison: Comparison, first: Array, second: Array) -> tuple[Any, Any]:
+    """The field of t, and what is inferred from it; of unpaired subjects for variances that may differ."""
+    stats = extra("spm1d").stats
+    try:
+        field = stats.ttest_paired(first, second) if comparison.paired else stats.ttest2(first, second)
+        return field, field.inference(comparison.alpha, two_tailed=True)
+    except Exception as error:  # spm1d's own, of curves that do not vary somewhere
+        reason = one_line(str(error).partition(":")[0], 200) or type(error).__name__
+        raise LinkwiseError(f"spm1d: {reason}; leave the column out") from error

@@ -1,0 +1,131 @@
+"""Cycles of a trial, gait cycles say: where each begins and ends, and its samples over 0 to 100 %."""
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwise.analysis.job import Job
+from linkwise.errors import LinkwiseError, within
+from linkwise.extras import extra
+from linkwise.package.load import Array
+from linkwise.study.study_paths import opened_here
+from linkwise.study.study_plan import Cycles
+
+AT_ONCE = 1 << 18
+MARGIN = 3
+"""Samples beyond a cycle's ends that its splines see."""
+Span = tuple[float, float]
+
+
+def cycle_spans(cycles: Cycles, job: Job, trial: str) -> list[Span]:
+    """Beginning and end of each whole cycle in s; raises LinkwiseError where there is none."""
+    time = job.samples.time
+    if cycles.table:
+        found = written_cycles(cycles.table).get(trial, [])
+    else:
+        on = _on(job)
+        up, down = (np.flatnonzero(edge) + 1 for edge in (on[1:] & ~on[:-1], ~on[1:] & on[:-1]))
+        if cycles.start:
+            found = [(float(time[a]), float(time[b])) for a, b in pairwise(up)]
+        else:
+            ends = (down[down > at] for at in up)
+            pairs = zip(up, ends, strict=True)
+            found = [(float(time[a]), float(time[some[0] - 1])) for a, some in pairs if len(some)]
+    lasting = [(a, b) for a, b in found if cycles.shortest <= b - a <= cycles.longest]
+    inside = sorted({(a, b) for a, b in lasting if time[0] <= a < b <= time[-1]})
+    if not inside:
+        what = cycles.table or cycles.what
+        between = (
+            f"none of {len(found)} that last {cycles.shortest:g} to {cycles.longest:g} s" if found else "none"
+        )
+        raise LinkwiseError(f"no whole cycle by {what!r} between {time[0]:g} and {time[-1]:g} s: {between}")
+    return inside
+
+
+def _on(job: Job) -> NDArray[np.bool_]:
+    """At which samples the phase that tells of cycles is on."""
+    (phase,) = (one for one in job.phases if one.name == "cycle")
+    samples, robot = job.samples, job.decomposer.robot
+    parts = []
+    for at in range(0, len(samples.time), AT_ONCE):
+        span = slice(at, at + AT_ONCE)
+        parts.append(phase.on(robot, samples.time[span], samples.q[span], np.zeros((0, 0))))
+    return np.concatenate(parts)
+
+
+def written_cycles(table: str) -> dict[str, list[Span]]:
+    """Cycles of each trial in a table; raises LinkwiseError that names the row for what is none."""
+    found: dict[str, list[Span]] = {}
+    with opened_here(table) as path, path.open(newline="", encoding="utf-8-sig") as file:
+        try:
+            reader = csv.DictReader(file)
+            if not {"trial", "start", "end"} <= set(reader.fieldnames or ()):
+                raise LinkwiseError(f"{table}: name its columns trial, start and end")
+            for number, row in enumerate(reader, 2):
+                with within(f"{table}, row {number}"):
+                    found.setdefault(row["trial"], []).append(_span(row["start"], row["end"]))
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise LinkwiseError(f"{table}: not a table of text in UTF-8: {error}") from error
+    return found
+
+
+def _span(start: str, end: str) -> Span:
+    try:
+        span = float(start), float(end)
+    except (TypeError, ValueError):
+        raise LinkwiseError("start and end are numbers, in s") from None
+    if not span[0] < span[1]:
+        raise LinkwiseError(f"the cycle from {start} to {end} s does not go forwards")
+    return span
+
+
+@dataclass
+class CycleSink:
+    """Takes blocks of samples in turn, and hands on each cycle at even shares of its time.
+
+    columns of blocks are in rows, the time first; spans ascend; take(number, rows) gets rows
+    (columns, points), the time among them
+    """
+
+    spans: Sequence[Span]
+    points: int
+    take: Callable[[int, Array], None]
+    _kept: list[Array] = field(default_factory=list)
+    _next: int = 0
+
+    def __call__(self, block: Array) -> None:
+        """Take a block (columns, samples)."""
+        if self._next == len(self.spans):
+            self._kept = []
+            return
+        start, end = self.spans[self._next]
+        self._kept.append(block)
+        if block[0, -1] < start:  # what lies between cycles is not kept
+            self._kept = [np.concatenate(self._kept, axis=1)[:, -2 - MARGIN :].copy()]
+        elif block[0, -1] >= end:
+            self._hand_on(MARGIN)
+
+    def finish(self) -> None:
+        """Hand on cycles that end with the last samples."""
+        self._hand_on(0)
+
+    def _hand_on(self, beyond: int) -> None:
+        """Hand on all cycles that end with so many samples beyond, and keep what later ones need."""
+        there = np.concatenate(self._kept, axis=1) if self._kept else np.empty((1, 0))
+        while self._next < len(self.spans):
+            start, end = self.spans[self._next]
+            first = max(0, int(np.searchsorted(there[0], start, side="right")) - 1 - MARGIN)
+            last = int(np.searchsorted(there[0], end)) + 1
+            if last + beyond > there.shape[1]:
+                there = there[:, first:]
+                break
+            part: Any = there[:, first : last + MARGIN]
+            spline = extra("scipy.interpolate").CubicSpline(part[0], part, axis=1)
+            self.take(self._next, spline(np.linspace(start, end, self.points)))
+            self._next += 1
+        self._kept = [there.copy()]

@@ -1,0 +1,47 @@
+"""Columns that a study asks for, held against those of a trial before any begins."""
+
+from collections.abc import Collection
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from linkwise.analysis.result_columns import Column
+from linkwise.errors import LinkwiseError, within
+from linkwise.study.band_figure import figure_columns
+from linkwise.study.comparisons import compared_columns
+from linkwise.study.study_plan import StudyPlan
+from linkwise.study.trial_files import trial_here
+from linkwise.study.trial_table import kept_columns
+from linkwise.study.trial_work import prepared_trial
+
+
+def check_columns(plan: StudyPlan, before: Collection[str]) -> None:
+    """Raise LinkwiseError for columns that the first trial whose log can be read does not have.
+
+    before: names of trials that are done. Where there are none, and no trial can be begun, it is the study's
+    fault, and the reason of the first is raised.
+    """
+    with within(str(plan.file)):
+        columns = _columns(plan, before)
+        names = [column.name for column in columns]
+        if names:
+            kept_columns(columns, plan.columns)
+            for comparison in plan.comparisons:
+                compared_columns(comparison, names)
+            for figure in plan.figures:
+                figure_columns(figure, names)
+
+
+def _columns(plan: StudyPlan, before: Collection[str]) -> tuple[Column, ...]:
+    """Of the first trial that can be prepared; what is wrong with others is told in their turn."""
+    reasons: list[LinkwiseError] = []
+    for trial in plan.trials:
+        if trial.name in before:
+            continue
+        try:
+            with within(f"trial {trial.name!r}"), trial_here(trial) as here, TemporaryDirectory() as buffer:
+                return prepared_trial(plan, here, Path(buffer)).decomposer.columns
+        except LinkwiseError as reason:
+            reasons.append(reason)
+    if reasons and not before:
+        raise reasons[0]
+    return ()

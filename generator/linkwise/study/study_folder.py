@@ -1,0 +1,78 @@
+"""The folder of a study: what is where in it, and whose it is."""
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from linkwise.errors import LinkwiseError
+from linkwise.escape import file_name, file_names
+from linkwise.runtime.native.native_system import system_here
+from linkwise.study.study_mark import StudyMark
+from linkwise.study.study_paths import removed
+from linkwise.study.study_plan import StudyPlan
+from linkwise.study.trial_ledger import MARK, is_trial
+
+TRIALS, LOCK = "trials", ".lock"
+ADDRESS = re.compile(r"\w{2,}:/")
+"""Of a store, as `Path` shortens it; one letter is a disk of Windows."""
+
+
+def trial_folders(out: Path, plan: StudyPlan) -> dict[str, Path]:
+    """The folder of each trial, by its name."""
+    names = [trial.name for trial in plan.trials]
+    folders = file_names(map(_folder_name, names))
+    return {name: out / TRIALS / folder for name, folder in zip(names, folders, strict=True)}
+
+
+def _folder_name(name: str) -> str:
+    """Of a trial; those that begin with . or _ are passed over by who reads all tables of a folder."""
+    folder = file_name(name)
+    return f"trial{folder}" if folder[:1] in ("", ".", "_") else folder
+
+
+@contextmanager
+def held_study(out: Path) -> Iterator[None]:
+    """Keep other processes away from a study's folder; raises LinkwiseError where one is at work there."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        file = (out / LOCK).open("a")
+    except OSError as error:
+        raise LinkwiseError(f"{out}: {error.strerror or error}") from error
+    with file:
+        if not _locked(file.fileno()):
+            raise LinkwiseError(f"{out}: another linkwise is at work there; wait, or give another --out")
+        yield
+
+
+def _locked(descriptor: int) -> bool:
+    """Whether no other holds it, as far as the file system knows."""
+    try:
+        return system_here().lock(descriptor)
+    except (ImportError, OSError):
+        return True
+
+
+def refuse_unless_study(out: Path, plan: StudyPlan) -> None:
+    """Raise LinkwiseError for a folder that is neither empty nor of this study."""
+    if ADDRESS.match(str(out)):
+        raise LinkwiseError(f"--out {out}: give a folder; results are written to disks only")
+    if out.exists() and not out.is_dir():
+        raise LinkwiseError(f"{out} is not a folder; give another --out")
+    there = {entry.name for entry in out.iterdir()} if out.is_dir() else set[str]()
+    mark = StudyMark.read(out)
+    if mark is None and there - {LOCK}:
+        raise LinkwiseError(f"{out}: exists and is not a former study (by its {MARK}); give another --out")
+    if mark is not None and mark.study != plan.name:
+        raise LinkwiseError(
+            f"{out}: is of the study {mark.study!r}, whose trials would go for those of {plan.name!r}; give"
+            " another --out"
+        )
+
+
+def sweep_trials(out: Path, folders: Mapping[str, Path]) -> None:
+    """Take away trials that are none of the study's any more."""
+    kept = set(folders.values())
+    for folder in (out / TRIALS).glob("*"):
+        if folder not in kept and is_trial(folder):
+            removed(folder)

@@ -1,0 +1,100 @@
+"""Paths of a study: files beside it, or addresses, s3://bucket/walk.mot, that fsspec reads."""
+
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from glob import escape, glob
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from linkwise.errors import LinkwiseError
+from linkwise.extras import extra
+from linkwise.input_file import require_file
+
+
+def is_address(path: str) -> bool:
+    """Whether a path is one that fsspec reads, and not of this machine's disks."""
+    return "://" in path
+
+
+def resolved(path: str, folder: Path) -> str:
+    """An address itself; of other paths those from a folder on."""
+    return path if is_address(path) else (folder / path).as_posix()
+
+
+def found_by_pattern(parts: Sequence[str]) -> list[str]:
+    """Files by the parts of their paths between which anything may stand, sorted."""
+    if not is_address(parts[0]):
+        return sorted(glob("*".join(map(escape, parts))))
+    files, path = _system("*".join(parts))
+    return sorted(files.unstrip_protocol(name) for name in _asked(path, lambda: files.glob(path)))
+
+
+def require_there(path: str, or_folder: bool = False) -> None:
+    """Raise LinkwiseError, with the path, for what is not a file, nor a folder where one may be."""
+    if not is_address(path):
+        if or_folder and Path(path).is_dir():
+            return
+        try:
+            require_file(Path(path))
+        except LinkwiseError as error:
+            raise LinkwiseError(f"{path}: {error}") from error
+        return
+    files, name = _system(path)
+    if not _asked(path, lambda: files.isfile(name)):
+        raise LinkwiseError(f"{path}: no such file")
+
+
+def version_of(path: str) -> str:
+    """What changes when a file does, cheap to ask for."""
+    if not is_address(path):
+        found = Path(path).stat()
+        return f"{found.st_size} {found.st_mtime_ns} {found.st_ctime_ns} {found.st_ino}"
+    files, name = _system(path)
+    return str(_asked(path, lambda: files.ukey(name)))
+
+
+@contextmanager
+def opened_here(path: str) -> Iterator[Path]:
+    """The file itself, or a copy that goes when the work is done."""
+    if not is_address(path):
+        yield Path(path)
+        return
+    with TemporaryDirectory() as folder:
+        copy = Path(folder) / path.rpartition("/")[2]
+        copied_here(path, copy)
+        yield copy
+
+
+def copied_here(address: str, copy: Path) -> None:
+    """Fetch a file; raises LinkwiseError, with the address, where that fails."""
+    files, name = _system(address)
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    _asked(address, lambda: files.get_file(name, str(copy)))
+
+
+def beside(address: str, name: str) -> str:
+    """The address of a file by its path from the folder of another."""
+    return f"{address.rpartition('/')[0]}/{name}"
+
+
+def removed(folder: Path) -> None:
+    """Take away a folder and all in it, if it is there."""
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _system(path: str) -> tuple[Any, str]:
+    try:
+        files, name = extra("fsspec.core").url_to_fs(path)
+    except (ImportError, ValueError) as error:
+        raise LinkwiseError(f"{path}: {error}") from error
+    return files, name
+
+
+def _asked(path: str, question: Any) -> Any:
+    """What a file system answers; its failures are told with the path."""
+    try:
+        return question()
+    except Exception as error:  # of whatever library serves it
+        raise LinkwiseError(f"{path}: {str(error) or type(error).__name__}") from error

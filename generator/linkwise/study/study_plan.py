@@ -1,0 +1,118 @@
+"""What a study consists of, as its file says it."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from linkwise.analysis.analysis_choices import AnalysisChoices
+from linkwise.analysis.phases import Phase
+from linkwise.errors import LinkwiseError
+from linkwise.robot import Options
+
+SUBJECT = "subject"
+"""The factor that every study has, and the first."""
+OF_FILES = ("loads", "contact_loads")
+"""Choices that are paths of files."""
+POINTS = 101
+"""Of a cycle, 0 to 100 %."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """What a trial is cut into: `start` begins a cycle each time, `during` is one as long as it lasts.
+
+    Both are written as a phase's WHAT of `linkwise analyze`. `table` is a CSV of trial, start, end in s.
+    Cycles shorter or longer than these, in s, are left out.
+    """
+
+    start: str = ""
+    during: str = ""
+    table: str = ""
+    points: int = POINTS
+    shortest: float = 0.0
+    longest: float = math.inf
+
+    def __post_init__(self) -> None:
+        if sum(map(bool, (self.start, self.during, self.table))) != 1:
+            raise LinkwiseError("[cycles] needs one of 'start', 'during' and 'table'")
+        if not 0 <= self.shortest < self.longest:
+            limits = f"'shortest' is {self.shortest:g} and 'longest' {self.longest:g}"
+            raise LinkwiseError(f"[cycles]: {limits}; give seconds, the longest the larger")
+        if not 2 <= self.points <= 10_001:
+            raise LinkwiseError(f"[cycles]: 'points' is {self.points}; give 2 to 10001")
+        if self.what:
+            Phase.of(f"cycle={self.what}")
+
+    @property
+    def what(self) -> str:
+        """What says when a cycle is."""
+        return self.start or self.during
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two levels of a factor that are held against each other by statistics, in these columns."""
+
+    factor: str
+    between: tuple[str, ...]
+    columns: tuple[str, ...]
+    paired: bool = True
+    alpha: float = 0.05
+
+    def __post_init__(self) -> None:
+        if len(self.between) != 2 or len(set(self.between)) != 2:
+            raise LinkwiseError(f"[[compare]]: 'between' is {list(self.between)}; give two levels")
+        if not self.columns:
+            raise LinkwiseError("[[compare]]: 'columns' is empty; name one or more")
+        if not 0 < self.alpha < 1:
+            raise LinkwiseError(f"[[compare]]: 'alpha' is {self.alpha:g}; give a number between 0 and 1")
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure of mean curves with bands, one for each level of a factor."""
+
+    columns: tuple[str, ...]
+    by: str = ""
+    name: str = ""
+    band: Literal["deviation", "range", "none"] = "deviation"
+
+    def __post_init__(self) -> None:
+        if not self.columns:
+            raise LinkwiseError("[[figure]]: 'columns' is empty; name one or more")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One recording: its name, labels by factor, files, and what is chosen for it alone."""
+
+    name: str
+    labels: tuple[tuple[str, str], ...]
+    """Of every factor, the subject first."""
+    log: str
+    robot: str
+    choices: AnalysisChoices
+    """With the paths of its loads as they are opened."""
+
+    def label(self, factor: str) -> str:
+        """Its level of a factor."""
+        return dict(self.labels)[factor]
+
+
+@dataclass(frozen=True)
+class StudyPlan:
+    """A study whose file has been read and found right."""
+
+    name: str
+    file: Path
+    factors: tuple[str, ...]
+    """The subject first."""
+    trials: tuple[Trial, ...]
+    options: Options = field(default_factory=Options)
+    cycles: Cycles | None = None
+    columns: tuple[str, ...] = ("**",)
+    """Patterns of the columns that tables keep."""
+    comparisons: tuple[Comparison, ...] = ()
+    figures: tuple[PaperFigure, ...] = ()
+    pages: bool = True

@@ -1,0 +1,76 @@
+"""The files of a study that are of all its trials."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from linkwise.errors import LinkwiseError
+from linkwise.progress import Progress
+from linkwise.study.band_figure import band_figures
+from linkwise.study.comparisons import Cluster, Compared, compared
+from linkwise.study.study_page import study_page
+from linkwise.study.study_plan import StudyPlan
+from linkwise.study.study_tables import curve_rows, group_rows, parquet, summary_rows
+from linkwise.study.trial_summary import summaries
+from linkwise.study.trial_work import TrialOutcome
+
+STUDY_PAGE = "study.html"
+
+
+def study_files(
+    plan: StudyPlan, folders: Mapping[str, Path], broken: Sequence[TrialOutcome], progress: Progress
+) -> tuple[dict[str, bytes], tuple[str, ...]]:
+    """Contents by name, and what could not be made; tables, tests and figures are of the trials there are."""
+    trials = summaries(plan, folders)
+    if not trials:
+        return {}, ()
+    progress("together", 0, 3)
+    files = {
+        "summary.parquet": parquet(summary_rows(trials)),
+        "groups.parquet": parquet(group_rows(trials)),
+    }
+    if plan.cycles is not None:
+        files["curves.parquet"] = parquet(curve_rows(trials, plan.cycles.points))
+    progress("together", 1, 3)
+    tests: list[Compared] = []
+    told: list[str] = []
+    for comparison in plan.comparisons:
+        try:
+            made, lacking = compared(comparison, trials)
+        except LinkwiseError as error:
+            made, lacking = [], (str(error),)
+        tests += made
+        told += lacking
+    if tests:
+        files["tests.parquet"] = parquet(_rows(tests))
+    progress("together", 2, 3)
+    try:
+        files |= dict(band_figures(plan.figures, trials, tests))
+    except LinkwiseError as error:
+        told.append(str(error))
+    files[STUDY_PAGE] = study_page(plan, trials, folders, tests, broken).encode()
+    progress("together", 3, 3)
+    return files, tuple(told)
+
+
+def _rows(tests: Sequence[Compared]) -> list[dict[str, object]]:
+    """A row for each part of a cycle that differs, and one without for a column that does not."""
+    rows: list[dict[str, object]] = []
+    for test in tests:
+        a, b = test.comparison.between
+        about = {
+            "factor": test.comparison.factor,
+            "first": a,
+            "second": b,
+            "column": test.column,
+            "unit": test.unit,
+            "first_subjects": len(test.sides[0].each),
+            "second_subjects": len(test.sides[1].each),
+            "alpha": test.comparison.alpha,
+            "t": float(test.statistic[np.abs(test.statistic).argmax()]),
+            "threshold": test.threshold,
+        }
+        parts = test.clusters or (Cluster(np.nan, np.nan, test.p),)
+        rows += [about | {"start": part.start, "end": part.end, "p": part.p} for part in parts]
+    return rows

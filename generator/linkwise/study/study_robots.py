@@ -1,0 +1,80 @@
+"""The robots of a study: each is generated before any trial begins, and all are of one kind."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.errors import LinkwiseError, within
+from linkwise.escape import listed
+from linkwise.package.manifest import FILE, Manifest
+from linkwise.package_cache import KeptPackage, kept_package
+from linkwise.progress import Progress
+from linkwise.robot import Options, is_description
+from linkwise.study.study_paths import is_address, opened_here, version_of
+from linkwise.study.study_plan import StudyPlan
+
+ROBOTS = 4
+"""Robots that a worker keeps in memory: trials of one subject follow one another."""
+
+
+def check_robots(plan: StudyPlan, progress: Progress) -> tuple[str, ...]:
+    """Make the packages of all robots; what touches their torques, in lines.
+
+    Raises LinkwiseError for what cannot be read or generated, and for a robot whose joints or links are not
+    those of the others.
+    """
+    first: tuple[str, Manifest] | None = None
+    told: list[str] = []
+    robots = list(dict.fromkeys(trial.robot for trial in plan.trials))
+    for number, robot in enumerate(robots):
+        progress("robots", number, len(robots))
+        with within(f"{plan.file}: {_owner(plan, robot)}"):
+            kept = package_of(robot, plan.options)
+            told += kept.warnings
+            manifest = Manifest.read(kept.directory)
+            if first is not None:
+                _compare(first, robot, manifest)
+        first = first or (robot, manifest)
+    progress("robots", len(robots), len(robots))
+    return tuple(told)
+
+
+def _owner(plan: StudyPlan, robot: str) -> str:
+    return f"trial {next(trial.name for trial in plan.trials if trial.robot == robot)!r}"
+
+
+def package_of(robot: str, options: Options) -> KeptPackage:
+    """The package of a trial's robot: itself, or the one that is kept of its file, address or name."""
+    if is_description(robot) and not is_address(robot) and not Path(robot).exists():
+        return kept_package(robot, options=options)
+    with opened_here(robot) as path:
+        return kept_package(path, options=options)
+
+
+def loaded_robot(robot: str, options: Options) -> LoadedRobot:
+    """A trial's robot, ready to be asked; those of the last trials are kept in memory."""
+    directory = package_of(robot, options).directory
+    return _loaded(directory, version_of(str(directory / FILE)))
+
+
+@lru_cache(ROBOTS)
+def _loaded(directory: Path, version: str) -> LoadedRobot:
+    """The robot of a package whose manifest is of that version."""
+    return load_robot(directory)
+
+
+def _compare(first: tuple[str, Manifest], robot: str, manifest: Manifest) -> None:
+    other, known = first
+    for what, own, others in (
+        ("joints", [j.name for j in manifest.joints], [j.name for j in known.joints]),
+        ("links", [link.name for link in manifest.links], [link.name for link in known.links]),
+    ):
+        if own != others:
+            apart: Sequence[str] = (
+                [n for n in own if n not in others] or [n for n in others if n not in own] or own
+            )
+            raise LinkwiseError(
+                f"robot {robot} is another one than {other}: they differ in the {what}"
+                f" {listed(map(repr, apart))}; a study is of one kind of robot"
+            )

@@ -1,0 +1,121 @@
+"""`run_study`: from a study's file to a folder of trials and what they say together."""
+
+import json
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Protocol
+
+from linkwise.makers import fingerprint
+from linkwise.output import require_writable, write_files
+from linkwise.progress import Progress, silent
+from linkwise.study.process_pool import ProcessPool
+from linkwise.study.study_columns import check_columns
+from linkwise.study.study_file import read_study
+from linkwise.study.study_folder import held_study, refuse_unless_study, sweep_trials, trial_folders
+from linkwise.study.study_mark import StudyMark
+from linkwise.study.study_paths import removed
+from linkwise.study.study_plan import StudyPlan
+from linkwise.study.study_results import study_files
+from linkwise.study.study_robots import check_robots
+from linkwise.study.trial_ledger import MARK, TrialRecord, done_before, is_trial
+from linkwise.study.trial_work import TrialOutcome, TrialTask
+
+
+class Engine(Protocol):
+    """What does trials, in any order."""
+
+    def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
+        """Outcomes of all tasks, as they come; closed before its end, it lets the rest be."""
+
+
+@dataclass(frozen=True)
+class StudyOutcome:
+    """What became of a study."""
+
+    plan: StudyPlan
+    done: tuple[str, ...]
+    """Names of the trials that are there."""
+    fresh: int
+    """How many of them were done now."""
+    samples: int
+    broken: tuple[TrialOutcome, ...]
+    warnings: tuple[str, ...]
+    files: tuple[Path, ...]
+
+
+def run_study(
+    file: str | Path, out: str | Path, engine: Engine | None = None, progress: Progress = silent
+) -> StudyOutcome:
+    """Do what of a study is not done yet, and say what all trials say together.
+
+    file: its TOML; out: its folder; engine: a `ProcessPool` with all cores if not given
+    Raises LinkwiseError, before any trial begins, for a file, a robot or a folder that cannot be.
+    """
+    plan, out = read_study(Path(file)), Path(out)
+    refuse_unless_study(out, plan)
+    require_writable(out)
+    out = out.absolute()  # workers may be in folders of their own
+    warnings = check_robots(plan, progress)
+    before = done_before(plan, trial_folders(out, plan))
+    check_columns(plan, before)
+    with held_study(out):
+        return _done(plan, out, before, engine or ProcessPool(), progress, warnings)
+
+
+def _done(
+    plan: StudyPlan,
+    out: Path,
+    before: Mapping[str, TrialRecord],
+    engine: Engine,
+    progress: Progress,
+    warnings: tuple[str, ...],
+) -> StudyOutcome:
+    folders, former = trial_folders(out, plan), StudyMark.read(out)
+    if len(before) < len(plan.trials):
+        write_files(out, {MARK: StudyMark.begun(plan, former.files if former else ()).text()})
+    sweep_trials(out, folders)
+    tasks = [
+        TrialTask(replace(plan, trials=(trial,)), folders[trial.name])
+        for trial in plan.trials
+        if trial.name not in before
+    ]
+    outcomes: list[TrialOutcome] = []
+    progress("trials", len(before), len(plan.trials))
+    with closing(engine.outcomes(tasks)) as coming:
+        for outcome in coming:
+            outcomes.append(outcome)
+            if outcome.reason and is_trial(folders[outcome.name]):
+                removed(folders[outcome.name])  # it is of other inputs
+            progress("trials", len(before) + len(outcomes), len(plan.trials))
+    broken = tuple(sorted((one for one in outcomes if one.reason), key=lambda one: one.name))
+    failed = {one.name for one in broken}
+    done = tuple(trial.name for trial in plan.trials if trial.name not in failed)
+    key = _key(plan, folders, done, broken)
+    there = former.files_in(out) if former else ()
+    if (
+        former
+        and former.key == key
+        and len(outcomes) == len(broken)
+        and all(file.is_file() for file in there)
+    ):
+        write_files(out, {MARK: former.text()})
+        return StudyOutcome(plan, done, 0, 0, broken, warnings, there)
+    content, lacking = study_files(plan, {name: folders[name] for name in done}, broken, progress)
+    mark = StudyMark.done(plan, broken, key, list(content))
+    files = write_files(out, {**content, MARK: mark.text()})
+    for file in set(there) - set(files):
+        file.unlink(missing_ok=True)
+    samples, told = sum(one.samples for one in outcomes), (*warnings, *lacking)
+    return StudyOutcome(plan, done, len(outcomes) - len(broken), samples, broken, told, files)
+
+
+def _key(
+    plan: StudyPlan, folders: Mapping[str, Path], done: Sequence[str], broken: Sequence[TrialOutcome]
+) -> str:
+    """Hash of all that tables, tests, figures and the page are made of."""
+    records = [TrialRecord.read(folders[name]) for name in done]
+    keys = [record.key for record in records if record is not None]
+    return sha256(json.dumps([repr(plan), keys, repr(broken), fingerprint()]).encode()).hexdigest()

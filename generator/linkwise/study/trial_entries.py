@@ -1,0 +1,71 @@
+"""The trials of a study's file: each with its labels, files and what is chosen for it alone."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from linkwise.analysis.analysis_choices import AnalysisChoices
+from linkwise.errors import LinkwiseError, within
+from linkwise.robot.readers.toml_table import tables
+from linkwise.study.study_paths import is_address, resolved
+from linkwise.study.study_plan import OF_FILES, SUBJECT, Trial
+from linkwise.study.trial_patterns import expanded
+from linkwise.study.typed_tables import filled, given_text, known_keys
+
+OWN = ("name", "subject", "log", "robot")
+"""Keys of a trial beside factors and what is chosen for it alone."""
+
+
+def trials_of(
+    data: dict[str, Any], factors: Sequence[str], chosen: AnalysisChoices, folder: Path
+) -> Iterator[Trial]:
+    """The trials of a study's file; raises LinkwiseError that names the one for what cannot be."""
+    for number, entry in enumerate(tables(data, "trial"), 1):
+        place = f"trial {entry.get('name', number)!r}"
+        known = tuple(dict.fromkeys((*OWN, *factors, *asdict(chosen))))
+        with within(place):
+            for one in expanded(entry, folder):
+                fields = {key: value for key, value in one.items() if key in known or key in entry}
+                yield _trial(place, known_keys("the entry", fields, known), factors, chosen, folder)
+
+
+def _trial(
+    place: str,
+    entry: Mapping[str, Any],
+    factors: Sequence[str],
+    chosen: AnalysisChoices,
+    folder: Path,
+) -> Trial:
+    log, robot = given_text(entry, "log"), given_text(entry, "robot")
+    labels = [
+        (factor, _label(entry, factor, place)) for factor in factors if factor in entry or factor != SUBJECT
+    ]
+    name = given_text(entry, "name", Path(log).stem)
+    if SUBJECT not in entry:
+        labels = [(SUBJECT, name), *labels]
+    own = {key: value for key, value in entry.items() if key in asdict(chosen)}
+    choices = filled(AnalysisChoices, place, own, vars(chosen))
+    files: dict[str, Any] = {
+        key: tuple(resolved(path, folder) for path in getattr(choices, key)) for key in OF_FILES
+    }
+    return Trial(name, tuple(labels), resolved(log, folder), _robot(robot, folder), replace(choices, **files))
+
+
+def _robot(given: str, folder: Path) -> str:
+    """A built-in robot by name; a file or package from the study's folder on."""
+    there = resolved(given, folder)
+    return (
+        given if not is_address(given) and not Path(there).exists() and Path(given).name == given else there
+    )
+
+
+def _label(entry: Mapping[str, Any], factor: str, place: str) -> str:
+    if factor not in entry:
+        raise LinkwiseError(f"needs {factor!r}, one of the study's factors")
+    value = entry[factor]
+    if isinstance(value, bool) or not isinstance(value, (str, int)):
+        raise LinkwiseError(f"{factor!r} is {value!r}; give a text")
+    if not (label := str(value).strip()):
+        raise LinkwiseError(f"{factor!r} is empty; give a text")
+    return label

@@ -1,0 +1,62 @@
+"""What a trial's result depends on, as one hash: its files by content, its choices, and linkwise itself."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import NamedTuple
+
+from linkwise.makers import fingerprint
+from linkwise.study.study_paths import opened_here, version_of
+from linkwise.study.study_plan import OF_FILES, StudyPlan, Trial
+from linkwise.study.trial_files import trial_files
+
+CHUNK = 1 << 20
+
+
+class SeenFile(NamedTuple):
+    """A file as it was when it was hashed."""
+
+    version: str
+    sha256: str
+
+
+class TrialKey(NamedTuple):
+    """The hash, and the files that it is of, by path."""
+
+    key: str
+    files: dict[str, SeenFile]
+
+
+def trial_key(
+    plan: StudyPlan, trial: Trial, known: Mapping[str, SeenFile], here: Trial | None = None
+) -> TrialKey:
+    """The key of a trial; files whose version is known are not read again.
+
+    here: the same trial with its files on this machine
+    """
+    files: dict[str, SeenFile] = {}
+    for path, copy in zip(trial_files(plan, trial), trial_files(plan, here or trial), strict=True):
+        version = version_of(path)
+        seen = known.get(path)
+        files[path] = seen if seen is not None and seen.version == version else SeenFile(version, _hash(copy))
+    told = [
+        trial.name,
+        trial.labels,
+        {**asdict(trial.choices), **{key: len(getattr(trial.choices, key)) for key in OF_FILES}},
+        plan.options.request(),
+        None if plan.cycles is None else asdict(plan.cycles),
+        plan.columns,
+        plan.pages,
+        [seen.sha256 for seen in files.values()],
+        fingerprint(),
+    ]
+    return TrialKey(hashlib.sha256(json.dumps(told, default=str).encode()).hexdigest(), files)
+
+
+def _hash(path: str) -> str:
+    digest = hashlib.sha256()
+    with opened_here(path) as file, file.open("rb") as content:
+        while chunk := content.read(CHUNK):
+            digest.update(chunk)
+    return digest.hexdigest()

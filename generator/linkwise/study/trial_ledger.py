@@ -1,0 +1,102 @@
+"""Which trials of a study are done: a folder for each, whose record says of what it is."""
+
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from linkwise.errors import LinkwiseError
+from linkwise.study.study_plan import StudyPlan, Trial
+from linkwise.study.trial_key import SeenFile, trial_key
+
+MARK = "study.json"
+"""In the folder of a study, what tells that it is one."""
+RECORD, TABLE, CURVES, SUMMARY, PAGE = (
+    "_record.json",
+    "samples.parquet",
+    "_curves.npz",
+    "_summary.npz",
+    "_report.html",
+)
+"""In a trial's folder; names with _ are passed over by who reads all tables of the folder above."""
+
+
+@dataclass(frozen=True)
+class TrialRecord:
+    """What is known of a trial that is done."""
+
+    name: str
+    key: str
+    files: dict[str, SeenFile]
+    samples: int
+    cycles: int
+    rate: float
+    seconds: float
+    warnings: tuple[str, ...]
+    outputs: dict[str, int]
+    """Bytes of the other files of its folder, by name."""
+
+    def text(self) -> str:
+        """As JSON."""
+        return json.dumps(asdict(self), indent=1) + "\n"
+
+    @classmethod
+    def read(cls, folder: Path) -> "TrialRecord | None":
+        """That of a folder; None where there is none that can be read."""
+        try:
+            data = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+            files = {path: SeenFile(*seen) for path, seen in data.pop("files").items()}
+            return cls(files=files, **data | {"warnings": tuple(data["warnings"])})
+        except (OSError, ValueError, TypeError, KeyError, AttributeError):
+            return None
+
+
+def done_before(plan: StudyPlan, folders: Mapping[str, Path]) -> dict[str, TrialRecord]:
+    """Records of trials that are done, of the same inputs."""
+    found = {}
+    for trial in plan.trials:
+        record = TrialRecord.read(folders[trial.name])
+        folder = folders[trial.name]
+        if (
+            record is not None
+            and outputs_in(folder) == record.outputs
+            and record.key == _key(plan, trial, record)
+        ):
+            found[trial.name] = record
+    return found
+
+
+def outputs_in(folder: Path) -> dict[str, int]:
+    """Bytes of the files of a trial's folder, by name, but for its record."""
+    return {path.name: path.stat().st_size for path in folder.iterdir() if path.name != RECORD}
+
+
+def is_trial(folder: Path) -> bool:
+    """Whether a folder holds what trials do, and nothing else."""
+    there = {path.name for path in folder.iterdir()} if folder.is_dir() else set[str]()
+    return bool(there) and there <= {RECORD, TABLE, CURVES, SUMMARY, PAGE}
+
+
+def _key(plan: StudyPlan, trial: Trial, record: TrialRecord) -> str:
+    """The key as it is now; empty where an input cannot be read."""
+    try:
+        return trial_key(plan, trial, record.files).key
+    except (LinkwiseError, OSError):
+        return ""
+
+
+def require_seen(folder: Path) -> None:
+    """Raise LinkwiseError where this machine does not see the study that a trial's folder is to be in."""
+    out = folder.parents[1]
+    if not (out / MARK).is_file():
+        raise LinkwiseError(
+            f"machine {platform.node()} does not see {out}; give --out on a disk that all nodes share"
+        )
+
+
+def refuse_unless_trial(folder: Path) -> None:
+    """Raise LinkwiseError for a folder in the place of a trial's that is none."""
+    is_empty = folder.is_dir() and not any(folder.iterdir())
+    if not is_empty and not is_trial(folder):
+        raise LinkwiseError(f"{folder}: exists and is not a trial of a study; move it away")

@@ -1,0 +1,48 @@
+"""What is kept of each trial for what all say together."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from linkwise.package.load import Array
+from linkwise.study.study_plan import StudyPlan
+from linkwise.study.trial_ledger import CURVES, SUMMARY
+
+
+@dataclass(frozen=True, eq=False)
+class TrialSummary:
+    """One trial: its labels, and of each column, by name, its unit, STATISTICS and mean curve over cycles."""
+
+    name: str
+    labels: dict[str, str]
+    units: dict[str, str]
+    statistics: dict[str, Array]
+    curves: dict[str, Array]
+    """(points,) each; none without cycles."""
+    cycles: int
+
+    @classmethod
+    def read(cls, name: str, labels: Mapping[str, str], folder: Path) -> "TrialSummary":
+        """What a trial left in its folder."""
+        with np.load(folder / SUMMARY) as data:
+            names = data["names"].tolist()
+            units = dict(zip(names, data["units"].tolist(), strict=True))
+            statistics = dict(zip(names, data["statistics"].T, strict=True))
+        curves: dict[str, Array] = {}
+        cycles = 0
+        if (folder / CURVES).is_file():
+            with np.load(folder / CURVES) as data:
+                curves = dict(zip(data["names"].tolist(), data["curves"][0], strict=True))
+                cycles = int(data["cycles"])
+        return cls(name, dict(labels), units, statistics, curves, cycles)
+
+
+def summaries(plan: StudyPlan, folders: Mapping[str, Path]) -> list[TrialSummary]:
+    """Summaries of the trials that are there, in the study's order."""
+    return [
+        TrialSummary.read(trial.name, dict(trial.labels), folders[trial.name])
+        for trial in plan.trials
+        if trial.name in folders
+    ]

@@ -1,0 +1,45 @@
+"""Cycles of a trial: in order, wherever blocks of samples end, and without what lies between them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from linkwise import LinkwiseError
+from linkwise.study.cycles import CycleSink, written_cycles
+
+TIME = np.arange(0, 60, 0.01)
+ROWS = np.stack([TIME, np.sin(TIME), TIME**2])
+
+
+@pytest.mark.parametrize("size", [37, 500, 6000])
+def test_cycles_are_the_same_wherever_blocks_end(size: int) -> None:
+    spans = [(0.0, 1.3), (1.3, 2.0), (1.5, 2.5), (20.004, 31.006), (55.0, TIME[-1])]
+    found: dict[int, np.ndarray] = {}
+    sink = CycleSink(spans, 11, found.__setitem__)
+    most = 0
+    for at in range(0, len(TIME), size):
+        sink(ROWS[:, at : at + size])
+        most = max(most, sum(block.shape[1] for block in sink._kept))
+    sink.finish()
+    for number, (start, end) in enumerate(spans):
+        at = np.linspace(start, end, 11)
+        np.testing.assert_allclose(found[number], [at, np.sin(at), at**2], atol=1e-8)
+    assert most <= 1200 + 2 * size, "the longest cycle, and not what lies between"
+
+
+BAD = {
+    "no header": ("a,b\n", "name its columns trial, start and end"),
+    "a word": ("trial,start,end\na,x,2\n", "row 2: start and end are numbers"),
+    "backwards": ("trial,start,end\na,0,1\na,2,1\n", "row 3: the cycle from 2 to 1 s does not go forwards"),
+    "no number": ("trial,start,end\na,nan,2\n", "row 2: the cycle from nan to 2 s does not go forwards"),
+    "latin": ("trial,start,end\n\xe4,1,2\n", "not a table of text in UTF-8"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_table_that_is_none_is_told_with_its_row(case: str, tmp_path: Path) -> None:
+    text, message = BAD[case]
+    table = tmp_path / "cycles.csv"
+    table.write_text(text, encoding="latin-1")
+    with pytest.raises(LinkwiseError, match=message):
+        written_cycles(str(table))

@@ -1,0 +1,101 @@
+"""Studies that cannot be: each is told in a line before any work begins."""
+
+from pathlib import Path
+
+import pytest
+from linkwise import LinkwiseError
+from linkwise.study import run_study
+from studies import CHOICES, HEAD, TRIALS, Here, write_study
+
+BAD: dict[str, tuple[tuple[str, ...], str]] = {
+    "unknown key": ((HEAD, "speed = 1\n", TRIALS), "the file has the unknown key 'speed'; known are "),
+    "unknown choice": (
+        (HEAD, "[analysis]\ncut = 6\n", TRIALS),
+        "[analysis] has the unknown key 'cut'; known are ",
+    ),
+    "wrong type": (
+        (HEAD, "[analysis]\ncutoff = '6'\n", TRIALS),
+        "[analysis]: 'cutoff' is '6'; give a number",
+    ),
+    "impossible choice": (
+        (HEAD, "[analysis]\ncutoff = -6\n", TRIALS),
+        "--cutoff -6: give a frequency in Hz above 0",
+    ),
+    "one name": ((HEAD, TRIALS.replace("-{trial}", "")), "two trials are called 'S1-fast'; name each"),
+    "no log": (
+        (HEAD, '[[trial]]\nname = "a"\nlog = "gone.csv"\nrobot = "planar3"\ncondition = "x"\n'),
+        "gone.csv: no such file",
+    ),
+    "no pattern": (
+        (HEAD, TRIALS.replace(".csv", ".mot")),
+        "no log is called data/{subject}/{condition}_{trial}.mot",
+    ),
+    "two ways": (
+        (HEAD, TRIALS.replace("{condition}_{trial}", "{condition}{trial}")),
+        "fits the pattern in two ways, subject=S1, condition=f, trial=ast_1 and "
+        "subject=S1, condition=fast_, trial=1; put folders",
+    ),
+    "no robot": ((HEAD, TRIALS.replace("planar3", "gone.urdf")), "gone.urdf: no such file"),
+    "no factor": ((HEAD.replace("condition", "speed"), TRIALS), "needs 'speed', one of the study's factors"),
+    "no column": (
+        (HEAD, 'columns = ["tua/*"]\n', CHOICES, TRIALS),
+        "'columns' has 'tua/*', which no column is called; nearest are 'tau/",
+    ),
+    "no figure": (
+        (HEAD, CHOICES, '[[figure]]\ncolumns = ["tau_gravity/**", "tau_qd/**"]\n', TRIALS),
+        "[[figure]]: 20 columns; 12 are legible, so give fewer",
+    ),
+    "no payload": (
+        (HEAD, CHOICES, 'payload = ["x"]\n', TRIALS),
+        "trial 'S1-fast-1': --payload x: ",
+    ),
+    "no limits": (
+        (HEAD, '[cycles]\nduring = "stands"\nshortest = 2.0\nlongest = 1.0\n', TRIALS),
+        "[cycles]: 'shortest' is 2 and 'longest' 1; give seconds",
+    ),
+    "a column's name": (
+        (HEAD.replace("condition", "Time"), TRIALS),
+        "factor 'Time' has a name that is taken",
+    ),
+    "no level": (
+        (HEAD, '[[compare]]\nfactor = "condition"\nbetween = ["slow", "mad"]\ncolumns = ["tau/*"]\n', TRIALS),
+        "no trial has the condition 'mad'; there are 'fast', 'slow'",
+    ),
+    "another robot": (
+        (
+            HEAD,
+            TRIALS,
+            '[[trial]]\nname = "a"\nlog = "data/S1/slow_1.csv"\nrobot = "puma560"\ncondition = "x"\n',
+        ),
+        "robot puma560 is another one than planar3: they differ in the joints ",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_is_told_in_a_line_before_any_work(case: str, tmp_path: Path) -> None:
+    parts, message = BAD[case]
+    file, engine = write_study(tmp_path, *parts, trials=1 if case != "one name" else 2), Here()
+    with pytest.raises(LinkwiseError) as caught:
+        run_study(file, tmp_path / "out", engine)
+    assert str(caught.value).startswith(f"{file}: ")
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert (engine.given, (tmp_path / "out").exists()) == ([], False)
+
+
+def test_a_folder_of_something_else_stays(tmp_path: Path) -> None:
+    file = write_study(tmp_path, HEAD, TRIALS, subjects=1, trials=1)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/mine.txt").touch()
+    with pytest.raises(LinkwiseError, match="exists and is not a former study"):
+        run_study(file, tmp_path / "out", Here())
+
+
+def test_a_folder_of_another_study_stays(tmp_path: Path) -> None:
+    file, other = write_study(tmp_path, HEAD, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "other.toml"
+    run_study(file, tmp_path / "out", Here())
+    other.write_text(file.read_text().replace('name = "arms"', 'name = "legs"'))
+    with pytest.raises(LinkwiseError, match="is of the study 'arms', whose trials would go"):
+        run_study(other, tmp_path / "out", Here())
+    assert len(list((tmp_path / "out/trials").iterdir())) == 2

@@ -1,0 +1,122 @@
+"""Studies that are ended in the midst of their work, by others or by their own trials."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from linkwise import LinkwiseError
+from linkwise.study import run_study
+from linkwise.study.study_folder import held_study
+from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
+
+pd = pytest.importorskip("pandas")
+
+
+def begun(file: Path, out: Path, **environment: str) -> subprocess.Popen[str]:
+    """The command at work, with all its processes in a group of their own."""
+    command = [sys.executable, "-m", "linkwise", "study", str(file), "--out", str(out), "--workers", "2"]
+    return subprocess.Popen(
+        command,
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | environment,
+    )
+
+
+def records(out: Path) -> list[Path]:
+    return sorted((out / "trials").glob("*/_record.json"))
+
+
+def wait_for(many: int, study: subprocess.Popen[str], out: Path) -> None:
+    """Until so many trials are done."""
+    while study.poll() is None and len(records(out)) < many:
+        time.sleep(0.01)
+
+
+def test_a_study_killed_at_any_instant_goes_on_where_it_was(tmp_path: Path) -> None:
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=3)
+    out = tmp_path / "out"
+    for many, wait in ((0, 1.5), (1, 0.1)):
+        study = begun(file, out)
+        wait_for(many, study, out)
+        time.sleep(wait)
+        study.kill()
+        study.communicate(timeout=20)  # its processes hold these pipes, and end with it
+    before = {path: path.stat().st_mtime_ns for path in records(out)}
+    assert len(before) >= 1
+    found = run_study(file, out, Here())
+    assert len(found.done) == 12
+    assert found.fresh == 12 - len(before)
+    assert all(path.stat().st_mtime_ns == when for path, when in before.items())
+    counts = pd.read_parquet(tmp_path / "out/trials").groupby("trial", observed=True).size()
+    assert sorted(counts.index) == [
+        f"S{s}-{c}-{k}" for s in (1, 2, 3) for c in ("fast", "slow") for k in (1, 2)
+    ]
+    assert set(counts) == {300}
+
+
+def test_an_interrupt_is_told_in_a_line_and_leaves_what_is_done(tmp_path: Path) -> None:
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=3), tmp_path / "out"
+    study = begun(file, out)
+    wait_for(2, study, out)
+    os.killpg(study.pid, signal.SIGINT)
+    _, told = study.communicate(timeout=30)
+    assert (study.returncode, told.splitlines()[-1]) == (130, "linkwise: interrupted")
+    assert "Traceback" not in told
+    assert not list(out.rglob(".linkwise-*"))
+    assert 2 <= len(records(out)) < 12
+
+
+def test_a_script_may_run_a_study_as_it_stands(tmp_path: Path) -> None:
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1)
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import linkwise\n"
+        f"found = linkwise.run_study({str(file)!r}, {str(tmp_path / 'out')!r}, linkwise.ProcessPool(2))\n"
+        "print(found.fresh, found.broken)\n"
+    )
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    assert done.stdout == "4 ()\n", done.stderr
+
+
+def test_one_study_at_a_time_is_at_work_in_a_folder(tmp_path: Path) -> None:
+    file, engine = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS), Here()
+    with (
+        held_study(tmp_path / "out"),
+        pytest.raises(LinkwiseError, match="another linkwise is at work there"),
+    ):
+        run_study(file, tmp_path / "out", engine)
+    assert engine.given == []
+    assert run_study(file, tmp_path / "out", engine).fresh == 8
+
+
+KILLER = """
+import multiprocessing, os, pathlib, signal
+
+opened = pathlib.Path.open
+
+def deadly(self, mode="r", *rest, **more):
+    if self.name == "fast_1.csv" and mode == "rb" and multiprocessing.parent_process():
+        os.kill(os.getpid(), signal.SIGKILL)
+    return opened(self, mode, *rest, **more)
+
+pathlib.Path.open = deadly
+"""
+
+
+def test_a_process_that_dies_takes_its_trial_alone(tmp_path: Path) -> None:
+    """A worker is killed whenever it opens one of the logs, as the system does where memory ends."""
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1)
+    out = tmp_path / "out"
+    (tmp_path / "sitecustomize.py").write_text(KILLER)
+    study = begun(file, out, PYTHONPATH=str(tmp_path))
+    said, told = study.communicate()
+    assert study.returncode == 1, told
+    assert "broken: S1-fast-1: its process died" in told
+    assert said.startswith("1 trials done, 0 of them before, 1 broken")
