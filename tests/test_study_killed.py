@@ -5,11 +5,14 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
+from typing import Any
 
 import pytest
 from linkwise import LinkwiseError
-from linkwise.study import run_study
+from linkwise.study import ProcessPool, run_study
 from linkwise.study.study_folder import held_study
 from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 
@@ -94,6 +97,24 @@ def test_one_study_at_a_time_is_at_work_in_a_folder(tmp_path: Path) -> None:
         run_study(file, tmp_path / "out", engine)
     assert engine.given == []
     assert run_study(file, tmp_path / "out", engine).fresh == 8
+
+
+def test_a_process_that_dies_while_none_is_waited_for_loses_no_trial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    submitted = iter((False, True, False, False, False))
+    submit = ProcessPoolExecutor.submit
+
+    def breaking(pool: ProcessPoolExecutor, *work: Any) -> Any:
+        if next(submitted):
+            raise BrokenProcessPool
+        return submit(pool, *work)
+
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", breaking)
+    file, before = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), dict(os.environ)
+    found = run_study(file, tmp_path / "out", ProcessPool(2))
+    assert (found.done, found.broken) == (("S1-fast-1", "S1-slow-1"), ())
+    assert dict(os.environ) == before, "the caller's own"
 
 
 KILLER = """

@@ -9,12 +9,11 @@ import numpy as np
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names
 from linkwise.extras import extra
-from linkwise.package.load import Array
 from linkwise.plotstyle import INK, colour, dash, drawn, saved, styled
 from linkwise.study.column_patterns import fitting
-from linkwise.study.comparisons import MEAN, Compared
+from linkwise.study.comparisons import Compared
 from linkwise.study.study_plan import PaperFigure
-from linkwise.study.subject_spread import Spread, columns_of_trials, spread
+from linkwise.study.subject_spread import Spread, columns_of_trials, spread, values_of
 from linkwise.study.trial_summary import TrialSummary
 
 MOST = 12
@@ -77,13 +76,6 @@ def _levels(figure: PaperFigure, trials: Sequence[TrialSummary], name: str) -> d
         level: spread(members, values)
         for level, members in found.items()
         if (values := values_of(members, name))
-    }
-
-
-def values_of(trials: Sequence[TrialSummary], name: str) -> dict[str, Array]:
-    """A column's curve of each trial; of trials without cycles its mean, (1,)."""
-    return {one.name: one.curves[name] for one in trials if name in one.curves} or {
-        one.name: one.statistics[name][MEAN : MEAN + 1] for one in trials if name in one.statistics
     }
 
 

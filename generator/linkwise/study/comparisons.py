@@ -12,14 +12,12 @@ from linkwise.escape import one_line
 from linkwise.extras import extra
 from linkwise.package.load import Array
 from linkwise.study.column_patterns import fitting
-from linkwise.study.running_moments import STATISTICS
 from linkwise.study.study_plan import Comparison
-from linkwise.study.subject_spread import Spread, columns_of_trials, spread
+from linkwise.study.subject_spread import Spread, columns_of_trials, spread, values_of
 from linkwise.study.trial_summary import TrialSummary
 
 FEWEST = 3
 """Subjects on a side that a test needs."""
-MEAN = STATISTICS.index("mean")
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +73,7 @@ def _of_column(comparison: Comparison, trials: Sequence[TrialSummary], name: str
     sides = []
     for level in comparison.between:
         members = [trial for trial in trials if trial.labels[comparison.factor] == level]
-        there = {t.name: t.curves[name] for t in members if name in t.curves} or {
-            t.name: t.statistics[name][MEAN : MEAN + 1] for t in members if name in t.statistics
-        }
+        there = values_of(members, name)
         sides.append(spread(members, there) if there else Spread((), np.empty((0, 1)), np.empty((0, 1))))
     first, second = _paired(*sides) if comparison.paired else sides
     fewest = min(len(first.each), len(second.each))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.job import Job
 from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
@@ -55,6 +56,7 @@ def _on(job: Job) -> NDArray[np.bool_]:
     for at in range(0, len(samples.time), AT_ONCE):
         span = slice(at, at + AT_ONCE)
         parts.append(phase.on(robot, samples.time[span], samples.q[span], np.zeros((0, 0))))
+        let_go(samples.q)
     return np.concatenate(parts)
 
 

@@ -26,8 +26,6 @@ class ProcessPool:
 
     def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
         """Outcomes of all tasks, as they come; what is at work ends when nobody wants them any more."""
-        for name in ONE_THREAD:
-            os.environ.setdefault(name, "1")
         waiting = list(reversed(tasks))
         while waiting:
             lost: list[TrialTask] = []
@@ -47,8 +45,13 @@ class ProcessPool:
             while waiting or running:
                 while waiting and len(running) < workers:
                     task = waiting.pop()
-                    with _born_apart():
-                        running[pool.submit(run_trial, task)] = task
+                    try:
+                        with _born_apart():
+                            running[pool.submit(run_trial, task)] = task
+                    except BrokenProcessPool:  # one died just now, while none was waited for
+                        waiting.append(task)
+                        lost += running.values()
+                        return
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     try:
                         yield future.result()
@@ -91,9 +94,13 @@ def _born_apart() -> Iterator[None]:
     main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
     is_main = threading.current_thread() is threading.main_thread()  # which alone may speak of signals
     former = signal.signal(signal.SIGINT, signal.SIG_IGN) if is_main else None
+    unset = [name for name in ONE_THREAD if name not in os.environ]
+    os.environ.update(dict.fromkeys(unset, "1"))
     try:
         yield
     finally:
+        for name in unset:
+            del os.environ[name]
         sys.modules["__main__"] = main
         if former is not None:
             signal.signal(signal.SIGINT, former)

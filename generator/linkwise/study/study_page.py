@@ -11,11 +11,10 @@ from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
 from linkwise.package.load import Array
 from linkwise.plotstyle import COLOURS, ON_DARK
-from linkwise.study.band_figure import values_of
 from linkwise.study.comparisons import Compared
 from linkwise.study.study_folder import TRIALS
 from linkwise.study.study_plan import StudyPlan
-from linkwise.study.subject_spread import columns_of_trials
+from linkwise.study.subject_spread import columns_of_trials, values_of
 from linkwise.study.trial_ledger import PAGE, TrialRecord
 from linkwise.study.trial_summary import TrialSummary
 from linkwise.study.trial_work import TrialOutcome

@@ -101,7 +101,8 @@ def _done(
         and len(outcomes) == len(broken)
         and all(file.is_file() for file in there)
     ):
-        write_files(out, {MARK: former.text()})
+        if outcomes:
+            write_files(out, {MARK: former.text()})
         return StudyOutcome(plan, done, 0, 0, broken, warnings, there)
     content, lacking = study_files(plan, {name: folders[name] for name in done}, broken, progress)
     mark = StudyMark.done(plan, broken, key, list(content))

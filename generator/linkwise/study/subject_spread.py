@@ -6,8 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from linkwise.package.load import Array
+from linkwise.study.running_moments import STATISTICS
 from linkwise.study.study_plan import SUBJECT
 from linkwise.study.trial_summary import TrialSummary
+
+MEAN = STATISTICS.index("mean")
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,3 +85,10 @@ def columns_of_trials(trials: Sequence[TrialSummary]) -> dict[str, str]:
     for trial in trials:
         found |= {name: unit for name, unit in trial.units.items() if name != "time"}
     return found
+
+
+def values_of(trials: Sequence[TrialSummary], name: str) -> dict[str, Array]:
+    """A column's curve of each trial; of trials without cycles its mean, (1,)."""
+    return {one.name: one.curves[name] for one in trials if name in one.curves} or {
+        one.name: one.statistics[name][MEAN : MEAN + 1] for one in trials if name in one.statistics
+    }

@@ -45,7 +45,7 @@ def trial_key(
         trial.labels,
         {**asdict(trial.choices), **{key: len(getattr(trial.choices, key)) for key in OF_FILES}},
         plan.options.request(),
-        None if plan.cycles is None else asdict(plan.cycles),
+        None if plan.cycles is None else {**asdict(plan.cycles), "table": bool(plan.cycles.table)},
         plan.columns,
         plan.pages,
         [seen.sha256 for seen in files.values()],
