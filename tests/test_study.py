@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -187,3 +188,15 @@ def test_curves_that_do_not_vary_are_told_and_the_rest_is_made(tmp_path: Path) -
     assert all(" spm1d: Zero variance" in warning for warning in found.warnings)
     tests = pd.read_parquet(tmp_path / "out/tests.parquet")
     assert set(tests.column) == {"tau/joint1", "tau/joint2", "tau/joint3"}
+
+
+def test_what_was_lacking_is_made_once_it_can_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compare = '\n[[compare]]\nfactor = "condition"\nbetween = ["slow", "fast"]\ncolumns = ["tau/joint1"]\n'
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, CYCLES, compare, TRIALS, subjects=3, trials=1)
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "spm1d", None)
+        for _ in range(2):
+            assert "pip install 'linkwise[spm]'" in run_study(file, tmp_path / "out", Here()).warnings[0]
+    assert not (tmp_path / "out/tests.parquet").exists()
+    assert run_study(file, tmp_path / "out", Here()).warnings == ()
+    assert (tmp_path / "out/tests.parquet").is_file()

@@ -105,7 +105,8 @@ def _done(
             write_files(out, {MARK: former.text()})
         return StudyOutcome(plan, done, 0, 0, broken, warnings, there)
     content, lacking = study_files(plan, {name: folders[name] for name in done}, broken, progress)
-    mark = StudyMark.done(plan, broken, key, list(content))
+    # What is lacking, a library say, may be there next time; till then it is told each time.
+    mark = StudyMark.done(plan, broken, "" if lacking else key, list(content))
     files = write_files(out, {**content, MARK: mark.text()})
     for file in set(there) - set(files):
         file.unlink(missing_ok=True)
