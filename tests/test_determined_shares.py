@@ -1,4 +1,4 @@
-"""Which shares joint torques determine, whatever the links weigh: docs/method.md says it with these numbers."""
+"""Which shares joint torques determine, whatever links weigh: docs/method.md says it with these numbers."""
 
 from collections.abc import Callable, Iterator
 from types import ModuleType
@@ -33,7 +33,7 @@ class Determined:
 
 
 def shares(rows: Any) -> Iterator[Any]:
-    """Of rows (samples, …, N, 10) those of one link each that are not zero, with the other links' left out."""
+    """Of rows (samples, …, N, 10) those of one link each that are not zero, and the other links' left out."""
     samples, links = len(rows), rows.shape[-2]
     for each in np.moveaxis(rows.reshape(samples, -1, links, 10), 1, 0):
         for j in range(links):
