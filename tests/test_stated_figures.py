@@ -94,6 +94,16 @@ def test_counts_of_the_corpus_are_those_that_make_corpus_holds() -> None:
     assert error <= LIMIT <= 10 * error
 
 
+def test_bounds_of_a_long_chain_are_those_of_its_values() -> None:
+    links, values, arithmetic, memory = stated(
+        r"A chain of (\d+), of ([\d,]+) values, .*? alone would take (\d+\.\d) and memory alone (\d+\.\d)"
+    )
+    # of link j: c2 of i <= k, c1 of i and k, g and tau of i
+    assert values == sum(j * (j + 1) / 2 + j * j + 2 * j for j in range(1, int(links) + 1))
+    each = stated(r"that is ([\d.]+) ns of arithmetic and ([\d.]+) ns of memory a value")
+    assert [round(values * ns / 1000, 1) for ns in each] == [arithmetic, memory]
+
+
 def test_the_history_of_speed_has_the_columns_that_the_bench_prints(monkeypatch: pytest.MonkeyPatch) -> None:
     tests = Path(__file__).parent
     monkeypatch.syspath_prepend(str(tests / "benchmarks"))
