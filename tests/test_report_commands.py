@@ -79,6 +79,13 @@ def test_a_held_joint_leaves_the_range_that_was_asked_for(report: Report) -> Non
     assert [point["dof"] for point in json.loads(run.stdout)["points"]] == list(range(1, 11))
 
 
+def test_where_no_range_is_asked_for_all_links_are_counted(report: Report) -> None:
+    for asked, links in ((("--robot", "planar3"), 3), (("--tip", "link5"), 5)):
+        run = report("reduction", *asked, "--json")
+        assert run.returncode == 0, run.stderr
+        assert [point["dof"] for point in json.loads(run.stdout)["points"]] == list(range(1, links + 1))
+
+
 def test_a_page_shows_the_pictures_that_lie_beside_it_and_no_others(report: Report, tmp_path: Path) -> None:
     printed = report("reduction", "--robot", "planar3", "--dof", "1..3").stdout
     assert "](" not in printed

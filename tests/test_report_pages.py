@@ -90,6 +90,8 @@ def test_measured_seconds_are_held_against_the_terms() -> None:
     said = seconds_markdown(result, seconds_json("arm", timings, DERIVED))
     assert "**Closed form**: at 2 DoF extracting saves 50.0% of the time, weaker than the 57.1%" in said
     assert "**Autograd**: at 2 DoF extracting saves 90.0% of the time, stronger than the 57.1%" in said
+    longer = seconds_json("arm", [Timing(2, "autograd", 12.8, 10.0, 11.0)], DERIVED)
+    assert "at 2 DoF extracting saves no time: it takes 28.0% more." in seconds_markdown(result, longer)
 
 
 def test_an_arm_whose_first_joint_moves_no_inertia_is_refused() -> None:

@@ -246,6 +246,7 @@ def test_the_comparison_is_titled_by_what_is_shown_and_its_legend_tells_dashes()
     result = study("arm", planar(9), 1, 4, 9, 10**6, silent)
     timings = [Timing(n, method, 1.0, 2.0, 3.0) for n in (1, 2) for method in ("closed form", "autograd")]
     assert drawn(savings_lines(result)).get_title("left") == "arm: savings in terms and operations"
+    assert not [line.label for line in savings_lines(result) if "paper" in line.label]  # it names no form
     measured = drawn(savings_lines(result, timings))
     assert measured.get_title("left") == "arm: savings in terms, operations and seconds"
     legend = measured.get_legend()
@@ -259,7 +260,10 @@ def test_the_study_says_where_the_claim_holds() -> None:
     said = " ".join(verdicts(study("planar arm", planar(14), 1, 10, 14, 10**6, silent)))
     assert "Holds: the curve" in said
     assert "Stronger: 5 DoF.** 5.2 redundant" in said
+    assert "the paper says about 3, and its curve gives 5.4." in said
     assert "Holds: 10 DoF.** 15.9 redundant" in said
+    assert "the paper says about 16, and its curve gives 15.2." in said
+    assert "The paper does not say how it counted: that it was as above is inferred" in said
     assert "falls like 10/n^2" in said
     assert "it ends at A = 0.95, which y passes at 12 DoF." in said
     assert "Weaker: emitted code" in said

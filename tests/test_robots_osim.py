@@ -215,7 +215,7 @@ WRONG: Mapping[str, tuple[str, str]] = {
     ),
     "format": (
         fault().replace("40500", "30512"),
-        "format '30512' is not read; open the file in OpenSim",
+        "Version '30512' is not read, but 20000 to 30499 (OpenSim 2 and 3) and from 30517 on (OpenSim 4)",
     ),
     "coupled in a circle": (
         fault(
@@ -247,6 +247,19 @@ def test_what_is_not_modelled_is_refused_by_its_place(text: str, message: str, t
         robot_of(tmp_path, text)
     assert message in str(refused.value)
     assert str(refused.value).startswith(str(tmp_path / "model.osim"))
+
+
+def test_versions_are_read_as_the_page_says(tmp_path: Path) -> None:
+    page = " ".join((Path(__file__).parents[1] / "docs/robots.md").read_text(encoding="utf-8").split())
+    (bounds,) = re.findall(r"Its `Version` is (\d+) to (\d+), or from (\d+) on", page)
+    first, last, later = map(int, bounds)
+    old, new = chain([KNEE], old=True), chain([KNEE])
+    for version in (first, last):
+        assert robot_of(tmp_path, old.replace("30000", str(version))) == robot_of(tmp_path, old)
+    assert robot_of(tmp_path, new.replace("40500", str(later))) == robot_of(tmp_path, new)
+    for version in (first - 1, last + 1, later - 1):
+        with pytest.raises(LinkwiseError, match=f"Version '{version}' is not read"):
+            robot_of(tmp_path, new.replace("40500", str(version)))
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The house keeps its order: imports run downwards, no circle, and every name stands for one thing."""
 
 import ast
+import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
@@ -92,6 +93,14 @@ def all_files() -> list[Path]:
 
 def test_every_room_is_in_the_list() -> None:
     assert {room_of(name_of(path)) for path in all_files()} - FACE <= set(ROOMS)
+
+
+def test_the_page_shows_the_rooms_in_this_order() -> None:
+    page = (HOUSE.parents[1] / "docs/house.md").read_text(encoding="utf-8")
+    table = [line.split("|") for line in page.splitlines() if line.startswith("| `") and "`make " not in line]
+    rooms = {name.removesuffix(".py"): row[2] for row in table for name in re.findall(r"`([\w.]+)`", row[1])}
+    assert tuple(rooms) == ROOMS
+    assert re.findall(r"`(\w+)`", rooms["runtime"]) == [*filter(None, RUNTIME), "c"]
 
 
 def test_what_is_installed_has_every_room() -> None:

@@ -93,7 +93,9 @@ def test_joints_obey_the_target_equation(arm: Arm, form: str) -> None:
     gains = [positive(n, size, seed) for seed, size in enumerate((2.0, 4.0, 30.0))]
     force = np.array([3.0, -2.0, 1.0, 0.5, -0.4, 0.2])
     given = gains
-    if form == "by link":  # any split over the links is the same controller: Eq. 20 is a choice of gauge
+    if (
+        form == "by link"
+    ):  # any split over the links is the same controller: the paper's equation by link is a gauge
         shares = np.zeros((n, arm.robot.N, n))
         shares[*arm.robot.layout.velocity.T] = np.random.default_rng(5).uniform(
             size=len(arm.robot.layout.velocity)

@@ -37,7 +37,7 @@ def graph(
     out: Annotated[Path | None, typer.Option(help="Directory that gets the files")] = None,
     as_json: Json = False,
 ) -> None:
-    """Show autograd's graph of a partial torque, or of the part that one motion needs."""
+    """Show the operations that autograd takes for a partial torque, or for a part of it, as a graph."""
     _check("--order", order, ("all", "0", "1", "2"))
     _check("--fold", fold, ("auto", *FOLDS))
     wanted = formats or ["svg", "graphml", "json"]

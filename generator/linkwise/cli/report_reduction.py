@@ -33,6 +33,8 @@ from linkwise.symbolic.system import System, rigid_system
 CHECKED_TO = 14
 """A planar arm is counted at least to here: the paper's ten joints, and four to confirm."""
 PLANAR_ARM = "planar arm"
+ASKED_FOR = 10
+"""Degrees of freedom at most where nobody says how many: as many as the paper's."""
 
 app = typer.Typer(add_completion=False)
 
@@ -45,7 +47,10 @@ def reduction(
         str,
         typer.Option(help=f"planar: an arm as the paper's; or a serial robot: {DESCRIPTIONS}"),
     ] = "planar",
-    dof: Annotated[str, typer.Option(help="Degrees of freedom, FIRST..LAST")] = "1..10",
+    dof: Annotated[
+        str | None,
+        typer.Option(help=f"Degrees of freedom, FIRST..LAST; else from 1 on, to {ASKED_FOR} at most"),
+    ] = None,
     graphs: Annotated[
         bool, typer.Option("--graphs", help="Count nodes of autograd's graphs too; needs torch")
     ] = False,
@@ -56,8 +61,10 @@ def reduction(
     as_json: Json = False,
 ) -> None:
     """Draw the share of terms of τ_1 that its q̈_1 part does not need (the paper's Fig. 15)."""
-    first, last = dof_range(dof)
+    first, last = (1, ASKED_FOR) if dof is None else dof_range(dof)
     name, system, beyond = _arm(robot, last, options)
+    if dof is None:
+        last = min(last, len(system.links))
     found = None if seconds is None else read_seconds(seconds)
     if out is not None:
         refuse_inside_package(out)
@@ -90,11 +97,11 @@ def dof_range(text: str) -> tuple[int, int]:
 
 
 def _arm(robot: str, last: int, options: Options) -> tuple[str, System, int]:
-    """Name of the arm, the arm, and up to how many degrees of freedom to count it."""
+    """Name of the arm, the arm, and up to how many degrees of freedom to count it beyond those asked for."""
     if robot == "planar":
         arm = read_robot(f"planar{_planar_joints(last, len(options.lock))}", options)
         return PLANAR_ARM, rigid_system(replace(arm, name=PLANAR_ARM)), CHECKED_TO
-    return Path(robot).stem, read_system(robot, options), last
+    return Path(robot).stem, read_system(robot, options), 0
 
 
 def _planar_joints(last: int, locked: int) -> int:

@@ -85,7 +85,7 @@ def savings_lines(result: Study, timings: Sequence[Timing] = ()) -> tuple[Saving
     long = (0, (5, 1))
     pairs = tuple(pair.reduction for pair in result.uncombined)
     lines = [
-        SavingsLine("terms", "terms, as in the paper", dof, terms, BLUE, "o", "-"),
+        SavingsLine("terms", "terms, sin² + cos² = 1", dof, terms, BLUE, "o", "-"),
         SavingsLine("operations", "operations, nothing shared", dof, written, SKY, "v", long),
         SavingsLine("operations", "operations as emitted", dof, emitted, VERMILION, "s", "--"),
     ]

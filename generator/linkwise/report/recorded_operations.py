@@ -1,4 +1,4 @@
-"""The curve in the paper's own mechanism: operations of the graphs that autograd makes of τ_1.
+"""The curve in the paper's own mechanism: operations that autograd takes for τ_1, recorded.
 
 For the arm of the first n links, recorded from its generated package: all of τ_1 = Σ_j D_1 L_j, against
 (Σ_j ∂²K_j/∂q̇_1²) q̈_1. Operations are those on numbers, equal ones counted once; what hangs on parameters

@@ -1,6 +1,7 @@
 """Verdicts on the paper's claim in words: where counts hold it, and where they are weaker or stronger."""
 
 from collections.abc import Iterator
+from math import exp
 
 from linkwise.report.curve_fit import (
     PAPER_A,
@@ -84,9 +85,10 @@ def _no_share(found: Saturation) -> str:
 def _redundancy_verdict(point: CurvePoint) -> str:
     stated, found = PAPER_REDUNDANT[point.dof], point.redundant_per_kept
     verdict = "Holds" if round(found) == stated else "Stronger" if found > stated else "Weaker"
+    y = PAPER_A * (1 - exp(-PAPER_RATE * point.dof))
     return (
         f"**{verdict}: {point.dof} DoF.** {found:.1f} redundant terms for each kept one; "
-        f"the paper says about {stated}."
+        f"the paper says about {stated}, and its curve gives {y / (1 - y):.1f}."
     )
 
 
@@ -128,7 +130,7 @@ def _convention_verdict(result: Study) -> str:
         f"**By another convention**, which leaves sin² + cos² as two terms: {pairs[last].reduction:.1%} of "
         f"{pairs[last].total} terms are not needed at {last} DoF"
         + "".join(f"; {text}" for text in told)
-        + "."
+        + ". The paper does not say how it counted: that it was as above is inferred from its curve."
     )
 
 

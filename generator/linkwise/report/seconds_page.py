@@ -124,9 +124,10 @@ def seconds_markdown(result: Study, found: dict[str, Any], pictures: bool = Fals
 def _verdict(result: Study, timings: Sequence[Timing]) -> str:
     last = timings[-1]
     terms = {p.dof: p.reduction for p in result.points}.get(last.dof)
-    text = (
-        f"**{last.method.capitalize()}**: at {last.dof} DoF extracting saves {last.reduction:.1%} of the time"
-    )
+    text = f"**{last.method.capitalize()}**: at {last.dof} DoF extracting "
+    if last.reduction <= 0:
+        return f"{text}saves no time: it takes {-last.reduction:.1%} more."
+    text += f"saves {last.reduction:.1%} of the time"
     if terms is None:
         return text + "."
     verdict = "weaker" if last.reduction < terms else "stronger"

@@ -30,7 +30,7 @@ class ControllerCalls:
         frame: FrameImpedance | None = None,
         passive: bool = True,
     ) -> PartialImpedance[Array]:
-        """A controller under which shares of inertia, damping and stiffness are as asked (Eq. 18, 19).
+        """A controller under which shares of inertia, damping and stiffness are as asked.
 
         inertia, damping, stiffness: targets, each one of
             Natural(scale, plus)            c2_ijk or c1_ijk as they are, or scaled by alpha_ij, and more

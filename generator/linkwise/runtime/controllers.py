@@ -56,7 +56,7 @@ class Target(NamedTuple):
 class PartialImpedance(Generic[Array]):
     """Torques under which the robot obeys its targets; `Dynamics.partial_impedance` makes it.
 
-    With e = q - q_d and f, what acts on the joints from outside (Eq. 19 of the paper, summed over j):
+    With e = q - q_d and f, what acts on the joints from outside (the paper's equation, summed over j):
 
         M* (qdd - qdd_d) + B* (qd - qd_d) + K* e = f     M* = sum_j M_ijk, B* and K* likewise
         u = M qdd + C qd + g - f, where qdd follows from the line above

@@ -1,6 +1,6 @@
 """An OpenSim model (.osim): bodies, joints and couplings of coordinates; what else it has is noted.
 
-Format 4 has a JointSet, and frames for the ends of joints; in format 3 each body holds its joint.
+OpenSim 4 writes a JointSet, and frames for the ends of joints; before it each body held its joint.
 """
 
 from collections import Counter
@@ -73,7 +73,7 @@ def _joints(model: Element, frames: Frames) -> Iterator[OsimJoint]:
 
 
 def _joints_in_bodies(bodies: list[Element]) -> Iterator[OsimJoint]:
-    """Joints of format 3: a body's own one leads to it from its <parent_body>."""
+    """Joints as before OpenSim 4: a body's own one leads to it from its <parent_body>."""
     for body in bodies:
         holder = body.find("Joint")
         for joint in holder if holder is not None else ():

@@ -1,4 +1,4 @@
-"""An OpenSim document: what XML it needs to be, which format it has, and where components stand in it."""
+"""An OpenSim document: what XML it needs to be, which version it has, and where components stand in it."""
 
 import re
 from collections.abc import Iterator
@@ -17,7 +17,10 @@ CLASS_OF_CLASS = re.compile(rb"(</?\w+)::")
 """As in <HuntCrossleyForce::ContactParametersSet>, which OpenSim writes and XML forbids."""
 
 OLDEST, JOINTS_BY_THEMSELVES, SOCKETS = 20000, 30500, 30517
-"""Versions: the first one read, with joints in bodies; of those in a JointSet, and of those with sockets."""
+"""Versions: the first one read, with joints in bodies; of those in a JointSet, and of those with sockets.
+
+Those between the last two were written by previews of OpenSim 4, which changed the layout many times.
+"""
 ENDS = {
     "BodySet": ("Body",),
     "JointSet": ("Joint",),
@@ -40,7 +43,10 @@ def read_document(path: Path) -> tuple[Element, bool]:
     text = root.get("Version", "")
     version = int(text) if text.isdecimal() else 0
     if version < OLDEST or JOINTS_BY_THEMSELVES <= version < SOCKETS:
-        raise LinkwiseError(f"format {text!r} is not read; open the file in OpenSim and save it")
+        raise LinkwiseError(
+            f"Version {text!r} is not read, but {OLDEST} to {JOINTS_BY_THEMSELVES - 1} (OpenSim 2 and 3) and "
+            f"from {SOCKETS} on (OpenSim 4); open the file in OpenSim 4 and save it"
+        )
     units = text_of(model, "length_units", "meters")
     if units.lower() not in ("meters", "m"):
         raise LinkwiseError(f"the model's lengths are in {units}; give them in meters")

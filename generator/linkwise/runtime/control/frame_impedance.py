@@ -1,4 +1,4 @@
-"""The impedance of a frame, which has precedence over that of the joints (Eq. 18 of the paper).
+"""The impedance of a frame, which has precedence over that of the joints (the paper's target impedance).
 
 With r rows of the frame's Jacobian J, its velocity nu = J qd, and H, C, f as for joints:
 
