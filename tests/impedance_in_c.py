@@ -10,7 +10,8 @@ from compiled import compile_library, name_of
 from linkwise.package.manifest import Manifest
 
 Given = Mapping[str, Any]
-"""keep_inertia, inertia, keep_velocity, damping, stiffness, regular; of a frame also rows and point."""
+"""keep_inertia, inertia, keep_velocity, damping, stiffness, regular, friction_width; of a frame also rows and
+point."""
 
 
 class ImpedanceInC:
@@ -70,7 +71,7 @@ def formula(model: Any, q: Any, qd: Any, given: Given, to: Any, task: Any, exter
     natural = Natural(model, q, qd)
     force = natural.zeros if external is None else external
     qdd = natural.followed(given, to, force if task is None else force + task)
-    return qdd, natural.torque(qdd) - force
+    return qdd, natural.torque(qdd, given) - force
 
 
 def frame_formula(
@@ -102,7 +103,7 @@ def frame_formula(
     wanted = (0.0 if acceleration is None else acceleration[chosen]) + np.linalg.solve(wanted_inertia, pull)
     first = natural.followed(posture, to, force)
     qdd = first + dual @ (wanted - rate @ qd - j @ first)
-    return qdd, natural.torque(qdd) - force
+    return qdd, natural.torque(qdd, posture) - force
 
 
 class Natural:
@@ -113,7 +114,7 @@ class Natural:
         stiffness, pull, damping, friction, armature = map(np.array, model.structure.passive_sums)
         self.q, self.qd, self.zeros, self.armature = q, qd, np.zeros(len(q)), np.diag(armature)
         self.inertia, self.velocity = self.c2.sum(1) + self.armature, self.c1.sum(1)
-        self.rest = g.sum(1) + stiffness * q + pull + damping * qd + friction * np.sign(qd)
+        self.rest, self.friction = g.sum(1) + stiffness * q + pull + damping * qd, friction
 
     def followed(self, given: Given, to: Any, force: Any) -> Any:
         """q̈* of what is wanted of the joints."""
@@ -126,9 +127,11 @@ class Natural:
             pull = pull - given["stiffness"] @ (self.q - q_d)
         return qdd_d + np.linalg.solve(inertia + given.get("inertia", 0.0), pull)
 
-    def torque(self, qdd: Any) -> Any:
-        """What the motion asks of the joints."""
-        return self.inertia @ qdd + self.velocity @ self.qd + self.rest
+    def torque(self, qdd: Any, given: Given) -> Any:
+        """What the motion asks of the joints, and of their friction what is wanted."""
+        width = given.get("friction_width", 0.0)
+        rubbed = self.friction * np.tanh(self.qd / width) if width else 0.0
+        return self.inertia @ qdd + self.velocity @ self.qd + self.rest + rubbed
 
 
 def rotation_vector(turn: Any) -> Any:
@@ -167,10 +170,12 @@ def joint_struct(given: Given | None, dtype: Any) -> tuple[Any, list[Any]]:
     if given is None:
         return None, []
     names, kept = ("keep_inertia", "inertia", "keep_velocity", "damping", "stiffness"), list[Any]()
+    real = ctypes.c_float if dtype == np.float32 else ctypes.c_double
     fields = [*((name, ctypes.c_void_p) for name in names), ("regular", ctypes.c_int)]
+    fields += [("friction_width", real)]  # which C has where joints have anything of their own
     kind = type("Impedance", (ctypes.Structure,), {"_fields_": fields})
     pointers = [pointer_to(given.get(name), dtype, kept) for name in names]
-    return kind(*pointers, given.get("regular", 0)), kept
+    return kind(*pointers, given.get("regular", 0), given.get("friction_width", 0.0)), kept
 
 
 def frame_struct(frame: int, given: Given, dtype: Any) -> tuple[Any, list[Any]]:

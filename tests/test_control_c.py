@@ -2,10 +2,12 @@
 
 import ctypes
 import json
+import re
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +15,11 @@ from answers import random_states, relative_error
 from compiled import WARNED, compile_library, name_of
 from conftest import DATA, needs_compiler
 from linkwise import Options, generate, read_system, write_package
+from linkwise.check.compiled_c import declared
 from linkwise.package.load import import_package
+from linkwise.runtime.controllers import ROWS
 from test_emitted_c import COMPILERS, strict
+from test_passive_torque import HAND
 from urdf_text import joint, link, robot
 
 pytestmark = needs_compiler
@@ -29,6 +34,13 @@ WRIST = robot(
     joint("turn", "cross", "hand", **ROLL),
 )
 """Three axes through a point, and mass behind the last alone."""
+KINDS = {
+    "curved": f"{DATA / 'knee.osim'} loops",
+    "following": f"{CRANE} loops",
+    "parameters": "planar3 symbolic",
+    "energies": str(DATA / "turntable.py"),
+}
+GEAR = '[[constraint]]\nname = "gear"\ntype = "coupling"\nterms = { a = 1, c = -2 }\n'
 
 
 @pytest.mark.parametrize("robot", ["torso", f"{CRANE} loops"], ids=["straight", "loops"])
@@ -147,3 +159,98 @@ def test_where_a_sliding_base_is_does_not_matter(tmp_path: Path) -> None:
         answers.append((mass, qdd))
     for here, there in zip(*answers, strict=True):
         assert (here == there).all()
+
+
+FREE = {"forward_dynamics", "forward_dynamics_of_links", "partial_impedance", "frame_partial_impedance"}
+"""What moves joints that nothing ties."""
+OF_PASSIVE = {"forward_dynamics_of_links", "passive_torque"}
+"""What only robots have a use for whose joints have anything of their own."""
+
+
+@pytest.fixture(scope="module")
+def kinds(directory_of: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A package of each kind of robot."""
+    made, folder = (
+        {kind: directory_of(robot) for kind, robot in KINDS.items()},
+        tmp_path_factory.mktemp("kinds"),
+    )
+    tied = (DATA / "fourbar.toml").read_text()
+    for kind, file, text in (
+        ("tied", "tied.toml", tied),
+        ("coupled", "coupled.toml", tied.partition("[[constraint]]")[0] + GEAR),
+        ("passive", "passive.urdf", HAND),
+        (
+            "tied and passive",
+            "both.toml",
+            tied.replace('child = "rocker"', 'child = "rocker", armature = 0.1'),
+        ),
+    ):
+        (folder / file).write_text(text, encoding="utf-8")
+        made[kind] = folder / kind.replace(" ", "_")
+        write_package(generate(read_system(folder / file), ["c", "numpy"], kernel="loops"), made[kind])
+    return made
+
+
+def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
+    """What answers in Python as each function of C does."""
+    q = 0.3 + 0.1 * np.arange(robot.n)
+    frame = robot.link_names[-1]
+
+    def of_frame() -> Any:
+        row = ROWS[np.abs(robot.kinematics.jacobian(q, frame)).max(1).argmax()]
+        return robot.partial_impedance(frame=package.FrameImpedance(frame, rows=(row,)))(q, q)
+
+    return {
+        "decomposition": lambda: robot.packed(q, q, q),
+        "decomposition_blocks": lambda: robot.packed(q, q, q),
+        "torque": lambda: robot.packed(q, q, q),
+        "partial_torque": lambda: robot.partial_torque(q, q, q),
+        "inverse_dynamics": lambda: robot.inverse_dynamics(q, q, q),
+        "coefficients": lambda: robot.coefficients(q, q),
+        "propagation": lambda: robot.propagation(q, q, q),
+        "gradient_propagation": lambda: robot.propagation(q, q, q, convention="gradient"),
+        "position_gradient": lambda: robot.position_gradient(q, q, q),
+        "dense_position_gradient": lambda: robot.position_gradient(q, q, q),
+        "regressor": lambda: robot.regressor(q, q, q),
+        "coefficient_regressors": lambda: robot.coefficient_regressors(q, q),
+        "pose": lambda: robot.kinematics.pose(q, frame),
+        "jacobian": lambda: robot.kinematics.jacobian(q, frame),
+        "jacobian_rate": lambda: robot.kinematics.jacobian_rate(q, q, frame),
+        "mass_matrix": lambda: robot.mass_matrix(q),
+        "passive_torque": lambda: robot.passive_torque(q, q, q),
+        "forward_dynamics": lambda: robot.forward_dynamics(q, q, q),
+        "forward_dynamics_of_links": lambda: robot.forward_dynamics(q, q, q, passive=False),
+        "partial_impedance": lambda: robot.partial_impedance()(q, q),
+        "frame_partial_impedance": of_frame,
+    }
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "tied", "coupled", "passive", "tied and passive"])
+def test_c_offers_nothing_that_python_refuses(kind: str, kinds: dict[str, Path]) -> None:
+    """And names what it lacks; that what it offers answers as Python does is what check holds."""
+    name, package = name_of(kinds[kind]), import_package(kinds[kind])
+    robot = package.load("numpy")
+    header = (kinds[kind] / "c" / f"{name}.h").read_text(encoding="utf-8")
+    functions = {function.removeprefix(f"{name}_") for function in declared(name, header)}
+    offered = {function for function in functions if not re.fullmatch(r"link_\d+f?|.*f", function)}
+    assert functions == {of + end for of in offered for end in ("", "f")} | {
+        f"link_{j + 1}{end}" for j in range(robot.N) for end in ("", "f")
+    }
+    calls, refused = in_python(package, robot), set()
+    assert offered <= calls.keys(), "a new function of C is held against a call in Python"
+    for function, call in calls.items():
+        try:
+            call()
+        except ValueError:
+            refused.add(function)
+    assert not offered & refused
+    tied = "tied" in kind or kind == "coupled"
+    assert FREE & calls.keys() <= refused if tied else not {"forward_dynamics", "partial_impedance"} & refused
+    if robot.backend.tree is not None:  # of energies C has less
+        assert offered == calls.keys() - refused - (set() if robot.structure.passive else OF_PASSIVE)
+    told = [
+        f"There is no {name}_forward_dynamics",
+        "robot.constraints",
+        "'gear'" if kind == "coupled" else "'pin'",
+    ]
+    assert [words in header for words in told] == [tied] * 3

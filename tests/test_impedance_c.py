@@ -82,8 +82,8 @@ def wishes(generator: np.random.Generator, n: int, links: int) -> dict[str, dict
     turning = turning - turning.T
     return {
         "natural": {},
-        "stiff": {"damping": damping, "stiffness": stiffness},
-        "added": {"inertia": inertia, "damping": damping, "stiffness": stiffness},
+        "stiff": {"damping": damping, "stiffness": stiffness, "friction_width": 0.2},
+        "added": {"friction_width": 0.7, "inertia": inertia, "damping": damping, "stiffness": stiffness},
         "scaled": {"keep_inertia": by_link, "keep_velocity": by_link, "stiffness": stiffness},
         "set": {"keep_inertia": 0.0 * by_link, "inertia": inertia, "keep_velocity": 0.0 * by_link},
         "damped by entries": {"keep_velocity": by_entry, "damping": damping},

@@ -173,7 +173,7 @@ def test_units_are_those_in_which_every_number_of_every_call_is(packages: tuple[
         for larger, small in told:
             assert same(small, larger), (name, larger.name)
         seen.add(name)
-    variants = {name for name in QUANTITIES if name.endswith(("_by_link", "_with_passive"))}
+    variants = {name for name in QUANTITIES if name.endswith(("_by_link", "_of_links"))}
     assert QUANTITIES.keys() - variants - seen == {"gradient_propagation", "forward_dynamics"}
 
 

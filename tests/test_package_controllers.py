@@ -15,6 +15,7 @@ from linkwise.package.load import import_package
 torch = pytest.importorskip("torch")
 
 Packages = Callable[[str], ModuleType]
+Q = np.array([0.3, -0.5])
 BACKENDS = ("numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler))
 CRANE = f"{DATA / 'crane.urdf'} loops"
 SPRUNG = """schema = 1
@@ -49,7 +50,7 @@ armature = 0.1
 def sprung(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     folder = tmp_path_factory.mktemp("sprung")
     (folder / "sprung.toml").write_text(SPRUNG, encoding="utf-8")
-    write_package(generate(read_system(folder / "sprung.toml"), ["numpy"]), folder / "sprung")
+    write_package(generate(read_system(folder / "sprung.toml")), folder / "sprung")
     return import_package(folder / "sprung")
 
 
@@ -179,19 +180,53 @@ def test_joints_own_torques_are_compensated_and_armature_is_kept(sprung: ModuleT
         return model.forward_dynamics(q, qd, torque, passive=True)
 
     pull = force - 2.0 * qd - 5.0 * (q - at)
-    whole = model.partial_impedance(4.0, 2.0, 5.0)
+    smooth = {"friction_width": 1e-3}  # so narrow that all of it is compensated
+    whole = model.partial_impedance(4.0, 2.0, 5.0, **smooth)
     assert relative_error(accelerated(whole), pull / 4.0) <= 1e-12
     shares = np.zeros((2, 2, 2))
     shares[0, 1, 0] = shares[1, 1, 1] = 4.0
-    beside = model.partial_impedance(shares, 2.0, 5.0)
+    beside = model.partial_impedance(shares, 2.0, 5.0, **smooth)
     assert relative_error(accelerated(beside), np.linalg.solve(4.0 * np.eye(2) + armature, pull)) <= 1e-12
-    natural = model.partial_impedance(damping=2.0, stiffness=5.0)
+    natural = model.partial_impedance(damping=2.0, stiffness=5.0, **smooth)
     assert relative_error(natural(q, qd, at), natural(q, qd, at, force)) <= 1e-12  # no force need be measured
     mass = model.mass_matrix(q) + armature
     assert relative_error(accelerated(natural), np.linalg.solve(mass, pull)) <= 1e-12
     bare = model.partial_impedance(4.0, 2.0, 5.0, passive=False)
-    alone = model.forward_dynamics(q, qd, bare(q, qd, at, force) + force)
+    alone = model.forward_dynamics(q, qd, bare(q, qd, at, force) + force, passive=False)
     assert relative_error(alone, pull / 4.0) <= 1e-12
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_friction_is_compensated_only_as_smoothly_as_is_asked_for(backend: str, sprung: ModuleType) -> None:
+    """At rest the sign of a velocity is that of a sensor's noise."""
+    model, kinds = sprung.load(backend), {}
+    frame = sprung.FrameImpedance("two", damping=3.0, rows=("x",))
+    for name, given in (("natural", {}), ("whole", {"inertia": 4.0}), ("frame", {"frame": frame})):
+        kinds[name] = lambda qd, given=given, **how: np.asarray(
+            model.partial_impedance(damping=2.0, **given, **how)(*as_kind(backend, Q, qd))
+        )
+    kinds["cancel"] = lambda qd, **how: np.asarray(
+        model.cancel({("a", "two", None, 1)}, **how)(*as_kind(backend, Q, qd))
+    )
+    noise, fast = np.array([0.3, 1e-9]), np.array([0.3, 0.4])
+    flip = np.array([1.0, -1.0])
+    for name, torque in kinds.items():
+        for how in ({}, {"friction_width": 0.02}):
+            assert np.abs(torque(noise, **how) - torque(flip * noise, **how)).max() < 1e-6, (name, how)
+        for width in (0.02, 1.0):
+            compensated = torque(fast, friction_width=width) - torque(fast)
+            np.testing.assert_allclose(compensated, [0.0, 0.4 * np.tanh(0.4 / width)], atol=1e-12)
+
+
+@pytest.mark.parametrize("width", [0.0, -1.0, np.nan, np.inf, True, "wide"])
+def test_a_width_that_is_no_velocity_is_refused(width: Any, sprung: ModuleType) -> None:
+    model = sprung.load()
+    for made in (model.partial_impedance, lambda **how: model.cancel({(0, 0, 0, 1)}, **how)):
+        with pytest.raises(ValueError, match=r"^friction_width is .*; give a velocity above 0") as caught:
+            made(friction_width=width)
+        assert "\n" not in str(caught.value)
+        with pytest.raises(ValueError, match=r"^friction_width is given, and passive=False takes friction"):
+            made(friction_width=0.1, passive=False)
 
 
 def test_hand_written_energies_are_controlled_too(package_of: Packages) -> None:

@@ -1,6 +1,8 @@
 """What joints take for springs, damping, friction and armature of their own, on every back end."""
 
+import ctypes
 import hashlib
+import inspect
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from answers import random_states, relative_error
+from compiled import compile_library, name_of
 from conftest import PANDA, needs_compiler
 from linkwise import generate, read_system, write_package
 from linkwise.check.checks import check_package
@@ -98,19 +101,138 @@ ARM = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body name="upper">
 <geom type="capsule" size=".03" fromto="0 0 0 .2 0 .1"/></body></body></worldbody></mujoco>"""
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_what_actuators_give_moves_joints_as_mujoco_moves_them(backend: str, tmp_path: Path) -> None:
+FOUR_BAR = """<mujoco><option gravity="0 0 -9.81" jacobian="dense"/><worldbody>
+<body name="crank" pos="0 0 .5"><joint name="a" axis="0 1 0" damping=".1" armature=".002"/>
+<geom type="capsule" fromto="0 0 0 .12 0 0" size=".02" mass=".4"/>
+<body name="rod" pos=".12 0 0"><joint name="b" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 .31 0 0" size=".015" mass=".9"/></body></body>
+<body name="rocker" pos=".28 0 .5"><joint name="c" axis="0 1 0" stiffness="1" springref="17"/>
+<geom type="capsule" fromto="0 0 0 0 0 .24" size=".02" mass=".7"/></body></worldbody>
+<equality><connect name="pin" body1="rod" body2="rocker" anchor=".31 0 0"/></equality></mujoco>"""
+Q, QD, TAU = np.array([[0.4, -0.7], [1.5, -2.0], [0.3, -0.1]])
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("arm")
+    (folder / "arm.xml").write_text(ARM)
+    write_package(generate(read_system(folder / "arm.xml")), folder / "arm")
+    return folder / "arm"
+
+
+@pytest.fixture(scope="module")
+def four_bar(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    folder = tmp_path_factory.mktemp("four_bar")
+    (folder / "four_bar.xml").write_text(FOUR_BAR)
+    write_package(generate(read_system(folder / "four_bar.xml")), folder / "four_bar")
+    return import_package(folder / "four_bar")
+
+
+def in_mujoco(text: str, q: Any, qd: Any, tau: Any) -> tuple[Any, Any]:
+    """MuJoCo's model and data of a state under torques of actuators."""
     mujoco = pytest.importorskip("mujoco")
-    (tmp_path / "arm.xml").write_text(ARM)
-    write_package(generate(read_system(tmp_path / "arm.xml")), tmp_path / "arm")
-    robot = import_package(tmp_path / "arm").load(backend)
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:], data.qfrc_applied[:] = [0.4, -0.7], [1.5, -2.0], [0.3, -0.1]
+    data.qpos[:], data.qvel[:], data.qfrc_applied[:] = q, qd, tau
     mujoco.mj_forward(model, data)
-    motion = taken(robot, [data.qpos.copy(), data.qvel.copy(), data.qfrc_applied.copy()])
-    assert relative_error(robot.forward_dynamics(*motion, passive=True), data.qacc) <= 1e-13
-    assert relative_error(robot.forward_dynamics(*motion), data.qacc) > 0.1
+    return model, data
+
+
+def inertia(model: Any, data: Any) -> Any:
+    """MuJoCo's mass matrix, which has armature."""
+    mujoco, columns = pytest.importorskip("mujoco"), np.eye(model.nv)
+    for column, unit in zip(columns, np.eye(model.nv), strict=True):
+        mujoco.mj_mulM(model, data, column, unit)
+    return columns
+
+
+def test_calls_that_move_the_robot_count_what_joints_have_unless_told_otherwise(four_bar: ModuleType) -> None:
+    robot = four_bar.load("numpy")
+    found = {}
+    for owner, prefix in ((robot, ""), (robot.constraints, "constraints.")):
+        for name in dir(owner):
+            call = getattr(owner, name, None)
+            if not name.startswith("_") and callable(call):
+                passive = inspect.signature(call).parameters.get("passive")
+                found |= {f"{prefix}{name}": passive.default} if passive else {}
+    assert found == dict.fromkeys(
+        (
+            *("forward_dynamics", "induced_accelerations", "induced_reactions", "simulate"),
+            *("partial_impedance", "cancel", "constraints.forward_dynamics"),
+        ),
+        True,
+    )
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_actuators_give_moves_joints_as_mujoco_moves_them(backend: str, arm: Path) -> None:
+    robot = import_package(arm).load(backend)
+    model, data = in_mujoco(ARM, Q, QD, TAU)
+    q, qd, tau, qdd = taken(robot, [Q, QD, TAU, data.qacc.copy()])
+    assert relative_error(robot.forward_dynamics(q, qd, tau), data.qacc) <= 1e-13
+    shares = robot.induced_accelerations(q, qd, tau)
+    assert relative_error(shares.total, data.qacc) <= 1e-13
+    asked = robot.induced_accelerations(q, qd, qdd=qdd)
+    assert relative_error(asked.actuators, np.asarray(shares.actuators)) <= 1e-12
+    moved = robot.simulate(q, qd, [0.0, 1e-4, 2e-4], tau).qd
+    rate = (4.0 * moved[1] - 3.0 * moved[0] - moved[2]) / 2e-4
+    assert relative_error(rate, data.qacc) <= 1e-4
+    # Controllers that follow a motion give the torques with which MuJoCo makes it; armature is of no link.
+    armature = np.diag(model.dof_armature)
+    target, (task,) = import_package(arm).Target(q, qd, qdd), taken(robot, [armature @ data.qacc])
+    assert relative_error(robot.partial_impedance(stiffness=3.0)(q, qd, target), TAU) <= 1e-12
+    assert relative_error(robot.cancel({(None,) * 4})(q, qd, task, qdd=qdd), TAU) <= 1e-12
+    # What is split by links has none of it.
+    assert relative_error(robot.mass_matrix(q), inertia(model, data) - armature) <= 1e-13
+    links = TAU + data.qfrc_passive - armature @ data.qacc
+    assert relative_error(robot.inverse_dynamics(q, qd, qdd), links) <= 1e-12
+    alone = np.linalg.solve(inertia(model, data) - armature, TAU - data.qfrc_bias)
+    assert relative_error(robot.forward_dynamics(q, qd, tau, passive=False), alone) <= 1e-13
+
+
+@needs_compiler
+@pytest.mark.parametrize(("dtype", "bound"), [("f8", 1e-13), ("f4", 1e-5)])
+def test_c_moves_them_so_too(dtype: str, bound: float, arm: Path, tmp_path: Path) -> None:
+    model, data = in_mujoco(ARM, Q, QD, TAU)
+    compile_library(arm, tmp_path / "arm.so")
+    library, suffix = ctypes.CDLL(str(tmp_path / "arm.so")), "f" if dtype == "f4" else ""
+
+    def answer(function: str, *given: Any) -> Any:
+        arrays = [*(np.array(a, dtype) for a in given), np.full(2, np.nan, dtype)]
+        getattr(library, f"{name_of(arm)}_{function}{suffix}")(
+            *(ctypes.c_void_p(a.ctypes.data) for a in arrays)
+        )
+        return arrays[-1]
+
+    assert relative_error(answer("forward_dynamics", Q, QD, TAU), data.qacc) <= bound
+    armature = np.diag(model.dof_armature)
+    alone = np.linalg.solve(inertia(model, data) - armature, TAU - data.qfrc_bias)
+    assert relative_error(answer("forward_dynamics_of_links", Q, QD, TAU), alone) <= bound
+    own = armature @ data.qacc - data.qfrc_passive
+    assert relative_error(answer("passive_torque", Q, QD, data.qacc), own) <= bound
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_loops_move_as_mujocos_matrices_say(backend: str, four_bar: ModuleType) -> None:
+    loop = four_bar.load("numpy").constraints
+    q = loop.closed(np.array([0.3, -0.3, 0.3]))
+    qd, tau = loop.velocity(q, np.array([2.0])), np.array([1.0, -0.2, 0.3])
+    model, data = in_mujoco(FOUR_BAR, q, qd, tau)
+    ahead, behind = (
+        in_mujoco(FOUR_BAR, q + s * qd, qd, tau)[1].efc_J[:9].reshape(3, 3) for s in (1e-5, -1e-5)
+    )
+    rows, drift = data.efc_J[:9].reshape(3, 3), (ahead - behind) @ qd / 2e-5
+    whole = np.block([[inertia(model, data), -rows.T], [rows, np.zeros((3, 3))]])
+    force = tau + data.qfrc_passive - data.qfrc_bias
+    expected = np.linalg.lstsq(whole, np.r_[force, -drift], rcond=1e-9)[0][:3]
+    robot = four_bar.load(backend)
+    q, qd, tau = taken(robot, [q, qd, tau])
+    assert relative_error(robot.constraints.forward_dynamics(q, qd, tau).qdd, expected) <= 1e-7
+    assert relative_error(robot.induced_accelerations(q, qd, tau).total, expected) <= 1e-7
+    # Without ties, if that is asked for, each is free.
+    free = robot.simulate(q, qd, [0.0, 1e-4, 2e-4], tau, constraints=False).qd
+    alone = np.linalg.solve(inertia(model, data), force)
+    assert relative_error((4.0 * free[1] - 3.0 * free[0] - free[2]) / 2e-4, alone) <= 1e-3
 
 
 def test_motion_and_out_are_refused_by_name(hand: ModuleType) -> None:
@@ -162,6 +284,8 @@ def test_armature_is_that_of_pinocchios_inverse_dynamics(tmp_path: Path) -> None
     expected = [pinocchio.rnea(model, data, *state) for state in zip(*states, strict=True)]
     found = arm.inverse_dynamics(*states) + arm.passive_torque(*states).total
     assert relative_error(found, expected) <= 1e-13
+    expected = [pinocchio.aba(model, data, *state) for state in zip(*states, strict=True)]
+    assert relative_error(arm.forward_dynamics(*states), expected) <= 1e-12
 
 
 def test_check_holds_them_against_the_manifest(tmp_path: Path) -> None:

@@ -207,7 +207,7 @@ def _torque(space: Any, copy: Copy, q: Any, qd: Any, t: float) -> Any:
     if not copy.loop.ahead:
         return tau
     ahead = PERIOD * (0.5 + copy.loop.late)
-    qdd = space.robot.forward_dynamics(q, qd, tau + space.external(q, force), passive=True)
+    qdd = space.robot.forward_dynamics(q, qd, tau + space.external(q, force))
     trend = (force - course.pushed(t - PERIOD, m)) / PERIOD
     expected = q + ahead * qd + ahead**2 / 2 * qdd, qd + ahead * qdd, force + ahead * trend
     return asked(t + ahead, *expected)

@@ -70,7 +70,7 @@ def test_rows_and_their_rates_are_pinocchios(closed: Closed) -> None:
 
 
 def test_joints_move_and_ties_bear_as_in_one_system_of_equations(closed: Closed) -> None:
-    found = closed.constraints.forward_dynamics(closed.q, closed.qd, closed.tau)
+    found = closed.constraints.forward_dynamics(closed.q, closed.qd, closed.tau, passive=False)
     state = closed.q, closed.qd, closed.tau
     both = [closed.each(lambda *a, part=part: closed.oracle.motion(*a)[part], *state) for part in (0, 1)]
     assert relative_error(found.qdd, both[0]) <= LIMIT
@@ -81,7 +81,7 @@ def test_joints_move_and_ties_bear_as_in_one_system_of_equations(closed: Closed)
 @pytest.mark.parametrize("name", ["fourbar", "held_arm"])
 def test_joints_move_as_pinocchios_constraint_dynamics_says(name: str, tmp_path: Path) -> None:
     closed = Closed(name, tmp_path)
-    found = closed.constraints.forward_dynamics(closed.q, closed.qd, closed.tau)
+    found = closed.constraints.forward_dynamics(closed.q, closed.qd, closed.tau, passive=False)
     motion = closed.q, closed.qd, closed.tau
     expected = closed.each(lambda *state: constraint_dynamics(closed.oracle, *state), *motion)
     assert relative_error(found.qdd, expected) <= LIMIT
@@ -252,7 +252,7 @@ def test_a_floating_robot_with_feet_on_the_ground_moves_as_pinocchios(name: str,
     back = np.linalg.inv(own.tie)
     settings = pin.ProximalSettings(1e-14, 1e-10, 200)
     expected = back @ pin.constraintDynamics(model, data, *state[:2], back.T @ tau, models, datas, settings)
-    found = constraints.forward_dynamics(q, qd, tau)
+    found = constraints.forward_dynamics(q, qd, tau, passive=False)
     assert relative_error(found.qdd, expected) <= LIMIT
     # What nobody drives follows: coordinates of the base are not among the independent ones.
     assert not [joint for joint in constraints.independent if joint.startswith("base")]

@@ -68,9 +68,13 @@ def test_what_control_needs_is_pinocchios(robot: str, tmp_path: Path) -> None:
         mass = oracle.mass(q)
         held("mass_matrix", mass, q)
         if "allow_unphysical" not in OPTIONS[robot]:
-            moved = held("forward_dynamics", oracle.acceleration(q, qd, tau), q, qd, tau)
+            alone = "forward_dynamics_of_links" if tree.passive else "forward_dynamics"
+            moved = held(alone, oracle.acceleration(q, qd, tau), q, qd, tau)
             taken = float((np.abs(mass) @ np.abs(moved)).max())
             close("torques of accelerations", oracle.torque(q, qd, moved), tau, taken)
+            plant = Plant(oracle, tree, q, qd)
+            left = tau - plant.felt(qd) - plant.other - plant.friction * np.sign(qd)
+            held("forward_dynamics", np.linalg.solve(plant.inertia, left), q, qd, tau)
     assert max(errors.values()) <= LARGEST_ERROR, errors
 
 
@@ -81,7 +85,7 @@ class Plant:
         stiffness, pull, damping, friction, armature = map(np.array, passive_sums(tree.passive, oracle.n))
         self.oracle, self.q, self.qd, self.rest = oracle, q, qd, 0.0 * q
         self.inertia = oracle.mass(q) + np.diag(armature)
-        self.other = oracle.gravity(q) + stiffness * q + pull + damping * qd + friction * np.sign(qd)
+        self.other, self.friction = oracle.gravity(q) + stiffness * q + pull + damping * qd, friction
 
     def felt(self, velocity: Any) -> Any:
         """C v, bilinear in qd and v: a quarter of what qd + v asks for, less that of qd - v."""

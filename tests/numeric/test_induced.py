@@ -106,8 +106,8 @@ def test_every_source_alone_moves_a_robot_that_stands_as_pinocchio_says(tmp_path
     generator = np.random.default_rng(4)
     qd = standing.velocity(q, generator.uniform(-1.0, 1.0, robot.n - 9))
     tau, rest = generator.uniform(-1.0, 1.0, robot.n), 0 * q
-    shares = robot.induced_accelerations(q, qd, tau, constraints=standing)
-    forces = robot.induced_reactions(q, qd, tau, constraints=standing)
+    shares = robot.induced_accelerations(q, qd, tau, passive=False, constraints=standing)
+    forces = robot.induced_reactions(q, qd, tau, passive=False, constraints=standing)
     units = [oracle.answer(q, rest, torque, False) for torque in np.diag(tau)]
     for found, k in ((shares, 0), (forces, 1)):
         own = found.velocity.sum((-2, -1)) + found.constraints.sum(-1)
@@ -118,7 +118,7 @@ def test_every_source_alone_moves_a_robot_that_stands_as_pinocchio_says(tmp_path
             (found.total, oracle.answer(q, qd, tau, True)[k]),
         ):
             assert relative_error(value, expected) <= LARGEST_ERROR
-    foot = robot.induced_accelerations(q, qd, tau, frame=feet[1], constraints=standing)
+    foot = robot.induced_accelerations(q, qd, tau, passive=False, frame=feet[1], constraints=standing)
     assert np.abs(foot.total[3:]).max() <= LARGEST_ERROR, "a foot that is held does not accelerate"
 
 
@@ -133,7 +133,7 @@ def test_every_source_alone_accelerates_as_pinocchio_says(name: str, tmp_path: P
     point, moment, force = np.random.default_rng(3).uniform(-9.0, 9.0, (3, 3))
     hand = robot.link_names[-1]
     loads = [module.AppliedLoad(hand, force, moment, point)]
-    found = robot.induced_accelerations(q, qd, tau, loads=loads)
+    found = robot.induced_accelerations(q, qd, tau, loads=loads, passive=False)
     rest = 0 * q[0]
     for s, (at, speed, torque) in enumerate(zip(q, qd, tau, strict=True)):
         inverse = np.linalg.inv(oracle.mass(at))

@@ -72,7 +72,7 @@ def answers_of(robot: Any) -> dict[str, Any]:
         "mass_matrix": robot.mass_matrix(q),
         "coriolis_matrix": robot.coriolis_matrix(q, qd),
         "gravity_torque": robot.gravity_torque(q),
-        "forward_dynamics": robot.forward_dynamics(q, qd, tau),
+        "forward_dynamics": robot.forward_dynamics(q, qd, tau, passive=False),
         "energy": robot.energy(q, qd),
     }
 

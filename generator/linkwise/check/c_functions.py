@@ -205,7 +205,7 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
         for name, counted, outputs in functions
     ]
     if manifest.tree is not None:
-        every_kind += [f for real, suffix in kinds for f in control_prototypes(real, suffix, inputs)]
+        every_kind += [f for real, suffix in kinds for f in control_prototypes(manifest, real, suffix)]
     for real, suffix in kinds:
         every_kind += impedance_prototypes(manifest, real, suffix)
     return every_kind

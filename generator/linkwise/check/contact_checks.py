@@ -95,7 +95,7 @@ def _compared(
     basis = np.linalg.svd(rows[..., rest])[0][..., : len(rest)]
     onto = np.swapaxes(basis, -1, -2)
     moved, forces = held_motion(held.recursion, replace(states, qd=qd), onto @ rows, onto @ rates, tau)
-    answer = made.forward_dynamics(q, qd, tau)
+    answer = made.forward_dynamics(q, qd, tau, passive=False)
     yield loop_entries(what + "qdd", answer.qdd, moved)
     forces = (basis @ forces[..., None])[..., 0]
     size = float(np.abs(forces).max(initial=0.0))

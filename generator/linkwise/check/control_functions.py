@@ -1,6 +1,6 @@
-"""Functions of C for one sample: frames, mass matrix and forward dynamics, against the reference."""
+"""Functions of C for one sample: frames, mass matrix, forward dynamics, joints' own torques."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,8 +8,11 @@ import numpy as np
 from linkwise.check.compare import Entries
 from linkwise.check.compiled_c import Numbers, Prototype
 from linkwise.check.frame_reference import FrameReference
+from linkwise.check.passive_reference import passive_reference
 from linkwise.check.reference import Reference
+from linkwise.check.states import States
 from linkwise.check.sum_checks import REGULAR, acceleration_scales, regular
+from linkwise.package.entries import PassiveEntry
 from linkwise.package.manifest import Manifest
 
 CONTROL = {
@@ -17,7 +20,9 @@ CONTROL = {
     "jacobian": ("frame", ("point",), ("q",), "jacobian"),
     "jacobian_rate": ("frame", ("point",), ("q", "qd"), "rate"),
     "mass_matrix": ("", (), ("q",), "mass"),
+    "passive_torque": ("", (), ("q", "qd", "qdd"), "torque"),
     "forward_dynamics": ("", (), ("q", "qd", "tau"), "qdd"),
+    "forward_dynamics_of_links": ("", (), ("q", "qd", "tau"), "qdd"),
 }
 """Functions by name: what is asked for by number, what stands before the motion, that motion, the output."""
 
@@ -30,28 +35,43 @@ Call = Callable[..., dict[str, Numbers]]
 """A function, its number, what it is given, sizes of its outputs, and their place beside a cache line."""
 
 
-def control_prototypes(real: str, suffix: str, inputs: tuple[str, ...]) -> list[Prototype]:
-    """These functions of one number type; `inputs` are the arrays of those that take all of them."""
-    parameters = tuple(what for what in inputs if what == "p")
+def control_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototype]:
+    """These functions of one number type: those that the robot's links and joints have a use for."""
+    parameters = ("p",) if manifest.parameters else ()
     return [
         Prototype(
             name + suffix,
             real,
             asked,
-            (*before, *motion, *parameters),
+            (*before, *motion, *(() if name == "passive_torque" else parameters)),
             (output,),
-            "int" if name == "forward_dynamics" else "void",
+            "int" if name.startswith("forward_dynamics") else "void",
         )
         for name, (asked, before, motion, output) in CONTROL.items()
+        if _has(manifest, name)
     ]
+
+
+def _has(manifest: Manifest, name: str) -> bool:
+    """Joints that are tied move as their open tree does not; most have nothing of their own."""
+    tree = manifest.tree
+    if tree is None or (tree.tied and name.startswith("forward_dynamics")):
+        return False
+    return bool(tree.passive) or name not in ("passive_torque", "forward_dynamics_of_links")
 
 
 def control_calls(
     call: Call, function: Prototype, manifest: Manifest, reference: Reference, frames: FrameReference | None
 ) -> Iterator[Entries]:
     """Calls of one of these functions."""
-    if function.counted != "frame":
-        yield from _sums(call, function, reference)
+    passive = manifest.tree.passive if manifest.tree is not None else ()
+    if function.short == "mass_matrix":
+        yield from _masses(call, function, reference)
+    elif function.short == "passive_torque":
+        yield from _passive_torques(call, function, reference, passive)
+    elif function.counted != "frame":
+        own = passive if function.short == "forward_dynamics" else ()
+        yield from _accelerations(call, function, reference, own)
     elif frames is not None and manifest.tree is not None:
         numbers = {frame.name: f for f, frame in enumerate(manifest.tree.frames)}
         if function.short == "pose":
@@ -60,23 +80,43 @@ def control_calls(
             yield from _of_points(call, function, numbers, frames)
 
 
-def _sums(call: Call, function: Prototype, reference: Reference) -> Iterator[Entries]:
-    """Mass matrices; of forward dynamics, accelerations of the reference's torques."""
-    states, mass = reference.states, function.short == "mass_matrix"
+def _masses(call: Call, function: Prototype, reference: Reference) -> Iterator[Entries]:
+    n = reference.states.q.shape[-1]
+    for row in _some(np.arange(len(reference.states.q))):
+        found = call(function, 0, {"q": reference.states.q[row]}, {"mass": n * n}, int(row) % 2)
+        value, scale = (kept["c2"][row].sum(1) for kept in (reference.values, reference.scales))
+        yield Entries("M", found["mass"].reshape(1, n, n), value[None], scale[None])
+
+
+def _passive_torques(
+    call: Call, function: Prototype, reference: Reference, joints: Sequence[PassiveEntry]
+) -> Iterator[Entries]:
+    for row in _some(np.arange(len(reference.states.q))):
+        state = reference.states.at(np.array([row]))
+        given = dict(zip(("q", "qd", "qdd"), (a[0] for a in state.motion), strict=True))
+        found = call(function, 0, given, {"torque": state.q.shape[-1]}, int(row) % 2)
+        value, scale = (shares.sum(0) for shares in passive_reference(joints, state))
+        yield Entries("p", found["torque"][None], value, scale)
+
+
+def _accelerations(
+    call: Call, function: Prototype, reference: Reference, joints: Sequence[PassiveEntry]
+) -> Iterator[Entries]:
+    """Accelerations of the reference's torques, and of those of `joints`."""
     least = SINGLE if function.real == "float" else REGULAR
-    every = np.arange(len(states.q)) if mass else np.flatnonzero(regular(reference, least))
-    n = states.q.shape[-1]
-    for row in every[:: max(1, len(every) // MOST)]:
-        state = states.at(row)
-        given = {"q": state.q, "qd": state.qd, "tau": reference.values["tau"][row].sum(-1)}
-        found = call(function, 0, given, {function.outputs[0]: n * n if mass else n}, int(row) % 2)
-        if mass:
-            value, scale = (kept["c2"][row].sum(1) for kept in (reference.values, reference.scales))
-            yield Entries("M", found["mass"].reshape(1, n, n), value[None], scale[None])
-        else:
-            yield Entries(
-                "qdd", found["qdd"][None], state.qdd[None], acceleration_scales(reference, row)[None]
-            )
+    for row in _some(np.flatnonzero(regular(reference, least))):
+        state = reference.states.at(np.array([row]))
+        taken, sizes = (shares.sum(0)[0] for shares in passive_reference(joints, state))
+        q, qd, qdd = (a[0] for a in state.motion)
+        given = {"q": q, "qd": qd, "tau": reference.values["tau"][row].sum(-1) + taken}
+        found = call(function, 0, given, {"qdd": len(q)}, int(row) % 2)["qdd"]
+        armature = passive_reference(joints, States(state.q, state.qd, np.ones_like(state.q)))[0][3, 0]
+        scale = acceleration_scales(reference, row, np.diag(armature), sizes)
+        yield Entries("qdd", found[None], qdd[None], scale[None])
+
+
+def _some(rows: Numbers) -> Numbers:
+    return rows[:: max(1, len(rows) // MOST)]
 
 
 def _poses(

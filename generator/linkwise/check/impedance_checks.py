@@ -13,6 +13,9 @@ from linkwise.check.sum_checks import is_tied, regular
 from linkwise.package.entries import PassiveEntry
 from linkwise.package.load import Array, Model
 
+WIDTH = 0.5
+"""Of the friction that is compensated."""
+
 
 def impedance_calls(
     name: str,
@@ -56,11 +59,15 @@ def _shaped(
     force = reference.values["tau"][rows].sum(-1)
     shares = np.broadcast_to(kept, (n, links))
     controller = model.partial_impedance(
-        inertia=natural(shares), damping=natural(shares, plus=more), stiffness=stiffness
+        inertia=natural(shares),
+        damping=natural(shares, plus=more),
+        stiffness=stiffness,
+        friction_width=WIDTH,
     )
     qdd, tau = (np.asarray(call(q, qd, at, force)) for call in (controller.acceleration, controller))
-    (*lost, armature), (*sizes, armature_size) = passive_reference(joints, States(q, qd, qdd))
-    rest, rest_size = sum(lost), sum(sizes)
+    parts, sizes = passive_reference(joints, States(q, qd, qdd))
+    rest, rest_size = parts[:2].sum(0) + parts[2] * np.tanh(np.abs(qd) / WIDTH), sizes[:3].sum(0)
+    armature, armature_size = parts[3], sizes[3]
 
     def along(matrix: Array, vector: Array) -> Array:
         product: Array = np.einsum("sik,sk->si", matrix, vector)
@@ -88,5 +95,6 @@ def _cancelled(model: Model, joints: Sequence[PassiveEntry], reference: Referenc
     sums = [source["g"][rows].sum(-1) for source in (reference.values, reference.scales)]
     sums[0][:, i] += (reference.values["c1"][rows, i, j] * qd).sum(-1)
     sums[1][:, i] += (reference.scales["c1"][rows, i, j] * np.abs(qd)).sum(-1)
-    rest, size = (a[:3].sum(0) for a in passive_reference(joints, States(q, qd, 0.0 * qd)))
+    # springs and damping: friction is not compensated unless it is asked for
+    rest, size = (a[:2].sum(0) for a in passive_reference(joints, States(q, qd, 0.0 * qd)))
     return Entries("cancelling torque", tau, sums[0] + rest + task, sums[1] + size + np.abs(task))

@@ -7,7 +7,7 @@ import numpy as np
 
 from linkwise.check.compare import Entries
 from linkwise.check.compiled_c import Numbers, Prototype
-from linkwise.check.passive_reference import passive_reference
+from linkwise.check.passive_reference import SHARES, passive_reference
 from linkwise.check.reference import Reference
 from linkwise.package.manifest import Manifest
 
@@ -62,5 +62,7 @@ def impedance_calls(
         value, scale = (kept["tau"][row].sum(-1) for kept in (reference.values, reference.scales))
         if passive:
             taken, sizes = passive_reference(passive, states.at(np.array([row])))
-            value, scale = value + taken.sum(0)[0], scale + sizes.sum(0)[0]
+            friction = SHARES.index("friction")  # which nobody asks to be compensated
+            value = value + (taken.sum(0) - taken[friction])[0]
+            scale = scale + sizes.sum(0)[0]
         yield Entries("tau", found[None], value[None], scale[None])

@@ -76,7 +76,7 @@ def _given(
     """Of torques, with what joints have of their own."""
     sources = _sources(reference, rows, joints)
     motion: list[Any] = [a.astype(kind) for a in sources.states.motion]
-    found: Any = model.induced_accelerations(*motion, passive=True, constraints=False)
+    found: Any = model.induced_accelerations(*motion, constraints=False)
     for source, (value, scale) in sources.accelerations().items():
         yield Entries(source, getattr(found, source), value, scale)
 
@@ -87,7 +87,7 @@ def _asked(model: Model, reference: Reference, rows: NDArray[np.intp]) -> Iterat
     torque, size = (a["tau"][rows].sum(-1) for a in (reference.values, reference.scales))
     sources = _sources(reference, rows, ())
     own = _Sources(states, sources.mass, {"actuators": (diagonal(torque), diagonal(size))})
-    found = model.induced_accelerations(states.q, states.qd, qdd=states.qdd, constraints=False)
+    found = model.induced_accelerations(states.q, states.qd, qdd=states.qdd, passive=False, constraints=False)
     yield Entries("actuators asked for", found.actuators, *own.accelerations()["actuators"])
 
 
@@ -110,7 +110,14 @@ def _of_a_point(
     load = load_of(frame, force, moment, point)
     q, qd, tau = sources.states.motion
     found: Any = model.induced_accelerations(
-        q, qd, tau, loads=(load, [load, load]), frame=frame, point=point, constraints=False
+        q,
+        qd,
+        tau,
+        loads=(load, [load, load]),
+        passive=False,
+        frame=frame,
+        point=point,
+        constraints=False,
     )
     for source, (value, scale) in sources.accelerations().items():
         moved = jacobian @ flat(value)

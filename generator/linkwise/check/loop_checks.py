@@ -67,7 +67,7 @@ def _forces(constraints: Any, reference: LoopReference) -> Iterator[Entries]:
     q, qd, _ = motion
     forces = reference.link_forces
     yield loop_entries("lambda of links", constraints.forces(*motion), forces)
-    found = constraints.forward_dynamics(q, qd, reference.tau)
+    found = constraints.forward_dynamics(q, qd, reference.tau, passive=False)
     yield loop_entries("qdd", found.qdd, reference.qdd)
     yield loop_entries("lambda", found.forces, reference.forces)
 

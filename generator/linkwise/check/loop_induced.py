@@ -27,8 +27,8 @@ def induced_loop_calls(name: str, model: Model, reference: LoopReference) -> Ite
     q, qd, _ = reference.states.motion
     accelerations, forces = _shares(reference)
     found = {
-        "induced accelerations": calls.induced_accelerations(q, qd, reference.tau),
-        "induced reactions": calls.induced_reactions(q, qd, reference.tau),
+        "induced accelerations": calls.induced_accelerations(q, qd, reference.tau, passive=False),
+        "induced reactions": calls.induced_reactions(q, qd, reference.tau, passive=False),
     }
     for (what, shares), expected in zip(found.items(), (accelerations, forces), strict=True):
         yield compare(f"{name}: {what} {TOLD}", _compared(shares, expected))

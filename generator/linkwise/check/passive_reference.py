@@ -43,7 +43,7 @@ def _torques_of_accelerations(model: Model, joints: Sequence[PassiveEntry], stat
     q, qd, qdd = states.motion
     values, scales = passive_reference(joints, states)
     tau = model.inverse_dynamics(q, qd, qdd) + values.sum(0)
-    found = model.forward_dynamics(q, qd, tau, passive=True)
+    found = model.forward_dynamics(q, qd, tau)
     taken, sizes = passive_reference(joints, States(q, qd, found))
     links = model.inverse_dynamics(q, qd, found)
     inertial = np.abs(model.mass_matrix(q)) @ (np.abs(qdd) + np.abs(found))[..., None]

@@ -107,7 +107,7 @@ def _accelerations(model: Model, reference: Reference, at: Any) -> Iterator[Entr
     if is_tied(model):
         return
     q, qd, qdd = reference.states.at(at).motion
-    found = model.forward_dynamics(q, qd, reference.values["tau"][at].sum(-1))
+    found = model.forward_dynamics(q, qd, reference.values["tau"][at].sum(-1), passive=False)
     yield _flat("qdd", found, qdd, acceleration_scales(reference, at), np.ndim(at))
 
 
@@ -117,10 +117,15 @@ def is_tied(model: Model) -> bool:
     return tree is not None and tree.tied
 
 
-def acceleration_scales(reference: Reference, at: Any) -> Array:
-    """What the accelerations of some samples are summed from: |M^-1| times what their torques are."""
-    mass = reference.values["c2"][at].sum(np.ndim(at) + 1)
-    noise = reference.scales["tau"][at].sum(-1)[..., None]
+def acceleration_scales(
+    reference: Reference, at: Any, armature: Array | float = 0.0, own: Array | float = 0.0
+) -> Array:
+    """What the accelerations of some samples are summed from: |M^-1| times what their torques are.
+
+    armature (n, n) stands beside M; own (n) are sizes of what joints take of their own.
+    """
+    mass = reference.values["c2"][at].sum(np.ndim(at) + 1) + armature
+    noise = (reference.scales["tau"][at].sum(-1) + own)[..., None]
     qdd = np.abs(reference.states.at(at).qdd)[..., None]
     noise = noise + reference.scales["c2"][at].sum(np.ndim(at) + 1) @ qdd
     scale: Array = (np.abs(np.linalg.inv(mass)) @ noise)[..., 0]

@@ -1,5 +1,6 @@
 """The coordinates of a robot that move all others under its constraints: as asked for, or by pivoting."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 from linkwise.emit.definition import rigid_tree
@@ -27,10 +28,15 @@ def constrained_system(system: System) -> System:
     assert tree is not None  # of rigid links there is one
     loops = closed_loops(tree, len(robot.coordinates))
     chosen = _independent(robot, loops.rows)
-    notes = [Note("constraint", tie.name, _about_tie(tie, robot), BESIDE) for tie in robot.ties]
-    notes += [Note("constraint", c.name, _about_coupling(c, robot), BESIDE) for c in robot.couplings]
+    notes = [Note("constraint", name, about, BESIDE) for name, about in constraints_of(robot)]
     notes += [Note("redundant", name, "", LEAST) for name in redundant_names(loops.rows, loops.owners)]
     return replace(system, robot=replace(robot, independent=chosen, notes=(*robot.notes, *notes)))
+
+
+def constraints_of(robot: Robot) -> Iterator[tuple[str, str]]:
+    """Names of what ties joints, and what it holds, in words; none of an open tree."""
+    yield from ((tie.name, _about_tie(tie, robot)) for tie in robot.ties)
+    yield from ((coupling.name, _about_coupling(coupling, robot)) for coupling in robot.couplings)
 
 
 def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:

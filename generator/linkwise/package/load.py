@@ -88,7 +88,7 @@ class Model(Protocol):
     def gravity_torque(self, q: Array, by_link: bool = False) -> Array:
         """g (..., n), or by link (..., n, N)."""
 
-    def forward_dynamics(self, q: Array, qd: Array, tau: Array, passive: bool = False) -> Array:
+    def forward_dynamics(self, q: Array, qd: Array, tau: Array, passive: bool = True) -> Array:
         """qdd (..., n)."""
 
     def induced_accelerations(self, q: Array, qd: Array, tau: Array | None = None, **how: Any) -> Any:

@@ -67,8 +67,9 @@ class PartialImpedance(Generic[Array]):
     With a frame, that has precedence: of all accelerations with which the frame moves as asked, the joints
     take the one nearest to what the lines above ask for, by Gauss's principle of least constraint.
 
-    M is the inertia of links and armatures. Arguments, batches and errors are as for `Dynamics`; gradients
-    flow through motion, targets and gains.
+    M is the inertia of links and armatures. Friction of the joints brakes them beside f, but for what is
+    compensated, which is never more than there is. Arguments, batches and errors are as for `Dynamics`;
+    gradients flow through motion, targets and gains.
 
     target: positions q_d (..., n) to stay at, or a `Target`
     external: what the surroundings put on the joints, (..., n), in N m or N: J^T (n, f) of a moment and a
@@ -115,7 +116,8 @@ class PartialImpedance(Generic[Array]):
 class Cancellation(Generic[Array]):
     """Torques that cancel chosen motion propagation torques and leave the others; see `Dynamics.cancel`.
 
-    u = tau + sum over the cancelled c_m,ijk q_k^(m) + g, under which the robot obeys
+    u = tau + sum over the cancelled c_m,ijk q_k^(m) + g, and what joints have of their own, as
+    `partial_impedance` compensates it, under which the robot obeys
 
         (M - M_S) qdd + (C - C_S) qd = tau + f
 
@@ -141,7 +143,8 @@ class Cancellation(Generic[Array]):
 
         tau: what the task asks for, (..., n); nothing unless given
         qdd: acceleration at which the cancelled torques are taken, measured or wanted; unless given, the one
-        that follows. With all of them cancelled and a wanted one this is computed torque.
+        that follows. With all of them cancelled and a wanted one this is computed torque, but for
+        armature, which is of no link.
         """
         torque: Array = self._answers.cancelling(q, qd, tau, external, qdd)
         return torque

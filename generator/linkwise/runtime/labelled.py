@@ -16,7 +16,7 @@ from .named_arrays import Part, alone, dataset, xarray
 from .quantity_axes import CONSTRAINTS, QUANTITIES
 from .robot_axes import NamedAxis, axes_of, tied_axes
 
-VARIANTS = ("_by_link", "_with_passive")
+VARIANTS = ("_by_link", "_of_links")
 """Ends of names of what the arguments of a call choose."""
 TIED = "constraints."
 

@@ -21,7 +21,7 @@ class MotionCalls:
         tau: Array | None = None,
         qdd: Array | None = None,
         loads: Any = (),
-        passive: bool = False,
+        passive: bool = True,
         frame: str | int | None = None,
         point: Array | None = None,
         constraints: Any = None,
@@ -32,7 +32,7 @@ class MotionCalls:
         qdd: a motion's acceleration: the actuators then give what it asks of them, less what loads do
         loads: what acts from outside, each an `AppliedLoad`, or a list of them for one source, such as a
         muscle's two ends
-        passive: whether springs, damping, friction and armature of the joints count, as in forward_dynamics
+        passive: as in `forward_dynamics`
         frame: what accelerates: the coordinates unless given, or a frame, with its `point`, as
         `robot.kinematics` takes them, or "centre of mass"
         constraints: what the motion keeps, the file's ties unless given, else what `robot.constrained`
@@ -67,7 +67,7 @@ class MotionCalls:
         tau: what the actuators give: nothing unless given; (..., n), or a function of (t, q, qd) that is
         called wherever the method evaluates, also between steps
         loads: as in `induced_accelerations`, or a function of (t, q, qd) that gives them
-        passive: whether springs, damping, friction and armature of the joints count
+        passive: as in `forward_dynamics`
         step: of RK4 the longest, in s; from instant to instant unless given; of the others a bound
         method: "RK4", of fixed steps, order 4, through which gradients flow; or one of SciPy's solve_ivp,
         RK45, DOP853, Radau, ..., whose steps keep rtol and atol, and with which all starts step together
@@ -88,7 +88,7 @@ class MotionCalls:
         tau: Array | None = None,
         qdd: Array | None = None,
         loads: Any = (),
-        passive: bool = False,
+        passive: bool = True,
         constraints: Any = None,
     ) -> InducedAccelerations[Array]:
         """What each source puts on the constraints: shares of lambda, (..., C, ...), by their rows.

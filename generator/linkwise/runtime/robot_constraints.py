@@ -205,11 +205,12 @@ class Constraints(Generic[Array]):
         return forces
 
     def forward_dynamics(
-        self, q: Array, qd: Array, tau: Array, passive: bool = False
+        self, q: Array, qd: Array, tau: Array, passive: bool = True
     ) -> ConstrainedMotion[Array]:
-        """qdd (..., n) and lambda (..., C) of M qdd + h + g = tau + A^T lambda; tau (..., n) on all joints.
+        """qdd (..., n) and lambda (..., C) of M qdd + h + g + p = tau + A^T lambda, tau on all joints.
 
-        passive: as `Dynamics.forward_dynamics` has it
+        tau: (..., n)
+        passive: as `Dynamics.forward_dynamics` has it, with p
         """
         answer: ConstrainedMotion[Array] = self._answers.forward_dynamics(q, qd, tau, passive)
         return answer

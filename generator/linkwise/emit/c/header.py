@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise.emit.c.sizes import Span
+from linkwise.emit.constrained_system import constraints_of
 from linkwise.emit.definition import joint_entries
 from linkwise.escape import c_comment, identifiers
 from linkwise.runtime.native.native_compiler import FLAGS, TUNING
@@ -77,6 +78,13 @@ def joint_lines(system: System) -> Iterator[str]:
     """Return a table: each joint, its unit and its name."""
     rows = [[str(k), c.unit, c_comment(c.name)] for k, c in enumerate(system.coordinates, 1)]
     return aligned([["joint", "unit", "name"], *rows])
+
+
+def tie_lines(system: System) -> list[str]:
+    """Return a table: what ties joints, by name, and what it holds; empty for an open tree."""
+    found = constraints_of(system.robot) if isinstance(system, RigidSystem) else ()
+    rows = [[c_comment(word) for word in row] for row in found]
+    return list(aligned(rows)) if rows else []
 
 
 def limit_tables(system: System) -> Iterator[LimitTable]:

@@ -27,6 +27,7 @@ FIXED = (
     "dense_rows.h",
     "destinations.h",
     "elimination.h",
+    "forward_dynamics.h",
     "frame_impedance.h",
     "frame_rotation.h",
     "frames.h",

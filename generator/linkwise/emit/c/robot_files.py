@@ -88,6 +88,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "links": list(header.link_lines(system, links)),
         "joints": list(header.joint_lines(system)),
         "names": [c_string(c.name) for c in system.coordinates],
+        "ties": list(header.tie_lines(system)),
         "limits": list(header.limit_tables(system)),
         "parameters": header.parameter_lines(system),
         "blocks": tuple(header.BLOCK.values()),

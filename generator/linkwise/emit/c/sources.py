@@ -47,6 +47,7 @@ FIXED = (
 FIXED_OF_RIGID = (
     "curves.h",
     "blocks.h",
+    "forward_dynamics.h",
     "frame_impedance.h",
     "frame_rotation.h",
     "frames.h",

@@ -125,7 +125,7 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
     const API(frame_impedance) * wanted, const real *pose_d, const real *velocity_d, const real *acceleration_d,
     const real *external, real *tau)
 {
-    const API(impedance) natural = {NULL, NULL, NULL, NULL, NULL, 0};
+    const API(impedance) natural = all_natural();
     const int rows = wanted->rows;
     struct deviation from;
     struct frame_motion frame;
@@ -161,6 +161,7 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
     join_force(force, qdd);
     answer(&s, qdd, qd, 1, torque);
     add_passive(q, qd, qdd, torque);
+    add_smooth_friction(qd, posture->friction_width, torque);
     for (int i = 0; external && i < N; ++i)
         torque[i] -= external[i];
     return command(torque, tau);

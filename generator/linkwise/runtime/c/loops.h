@@ -267,4 +267,5 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
 #if PART(CONTROL)
 #include "frames.h"
 #include "moving_links.h"
+#include "passive.h"
 #endif

@@ -129,10 +129,10 @@ class ConstraintAnswers:
         return self._solved(place, mass, force, place.bias(qd))
 
     def _driven(self, q: Any, qd: Any, tau: Any, passive: bool) -> tuple[Any, Any]:
-        """M and tau - h - g."""
+        """M and tau - h - g, of joints and of links or of links alone."""
         robot, rest = self.robot, 0.0 * qd
         mass, force = robot.mass_matrix(q), tau - robot.inverse_dynamics(q, qd, rest)
-        if not passive:
+        if not (passive and robot.structure.passive):
             return mass, force
         armature = robot.backend.constant(robot.structure.passive_sums.armature, q)
         return mass + namespace(q).diag(armature), force - robot.passive_torque(q, qd, rest).total

@@ -42,7 +42,7 @@ def source_forces(robot: Any, q: Any, qd: Any, loads: Sequence[Any], passive: bo
     kinds = [-(c1 * qd[..., None, None, :]).reshape(*q.shape, links * n), -gravity]
     mass, rest = c2.sum(-2), 0.0 * q
     identity = side.constant(np.eye(n), q)
-    if passive:
+    if passive and robot.structure.passive:
         shares = robot.passive_torque(q, qd, rest)[:3]
         mass = mass + side.constant(np.diag(own.armature), q)
     else:
