@@ -17,9 +17,12 @@ WORD = re.compile(r" [-+*/] |x\.\w|p\[at")
 NUMBER = re.compile(r"\bR\(")
 LINK = re.compile(r"^void \w+_link_\d+\(", re.MULTILINE)
 
-STRAIGHT, LOOPS, ENERGIES, IMPEDANCE = (11_900, 10_800), (14_200, 12_600), (3_700, 3_700), (5_500, 5_400)
+STRAIGHT, LOOPS, ENERGIES = (9_000, 8_300), (12_450, 10_900), (3_700, 3_700)
 """Bytes, in double and in float, of what every robot of rigid links has, with closed forms or in loops; of
-one of energies; and of controllers of rigid links."""
+one of energies."""
+
+FREE_STRAIGHT, FREE_LOOPS = (8_400, 7_900), (7_250, 7_100)
+"""Of forward dynamics and controllers, which rigid links have whose joints nothing ties."""
 
 OPERATION, SETTING, OWN = (6.6, 5.35), (18, 15), (140, 135)
 """Of an operation of closed forms, with what it loads and keeps; of a word of what sets numbers by
@@ -36,10 +39,10 @@ def code_size(name: str, files: Mapping[str, str]) -> CodeSize | None:
     links = len(LINK.findall(header)) // 2  # of double and float
     settings, numbers = len(WORD.findall(tree)), len(NUMBER.findall(tree))
     base = ENERGIES if not tree else STRAIGHT if kernels else LOOPS
-    controlled = bool(tree) and "frame_partial_impedance" in header
+    free = (FREE_STRAIGHT if kernels else FREE_LOOPS) if "frame_partial_impedance(" in header else (0, 0)
     double, single = (
         base[at]
-        + IMPEDANCE[at] * controlled
+        + free[at]
         + round(OPERATION[at] * operations)
         + SETTING[at] * settings
         + OWN[at] * links

@@ -7,6 +7,7 @@ bytes, 8 samples in double or 16 in float. Beside them a kernel keeps some kB of
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from linkwise.emit.c.robot_files import free
 from linkwise.emit.c.robot_tables import columns, path_spans
 from linkwise.emit.c.sizes import Span, most_counts, tile, waiting_counts, whole
 from linkwise.symbolic.system import RigidSystem, System
@@ -103,9 +104,11 @@ def _control_values(system: System, links: tuple[Span, ...]) -> int:
     matrices = 2 * n * n + 3 * max(n, 6) ** 2 + 60 * n + 250
     if not isinstance(system, RigidSystem):
         return whole(links).size.total + matrices
-    bodies = 34 * len(system.links) + 31 * (len(system.robot.links) + 1) + 18 * _longest(system)
-    offsets = 3 * len(system.robot.named_frames)
-    return _moved(system) + bodies + matrices + _numbers(system) + offsets
+    composites, offsets = 31 * (len(system.robot.links) + 1), 3 * len(system.robot.named_frames)
+    frames = _moved(system) + composites + _numbers(system) + offsets
+    if not free(system):  # frames and the mass matrix alone, which stands in the caller's memory
+        return frames + 20 * n + 60
+    return frames + 34 * len(system.links) + 18 * _longest(system) + matrices
 
 
 def straight_stack(system: System, links: tuple[Span, ...]) -> int:
