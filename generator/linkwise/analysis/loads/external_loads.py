@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -20,6 +21,8 @@ LOADS, FORCE = "ExternalLoads", "ExternalForce"
 """Elements; what stands among <defaults> is no load."""
 NONE = ("", "Unassigned")
 """What OpenSim writes where there is nothing."""
+AXES = ("xyz", "123")
+"""What the names of three columns differ in: the second where OpenSim has flattened a table of vectors."""
 IDENTIFIERS = {"force": "force_identifier", "moment": "torque_identifier", "point": "point_identifier"}
 
 
@@ -85,15 +88,18 @@ def _with_columns(load: LoadColumns, force: Element) -> LoadColumns:
 
 
 def _three(load: LoadColumns, key: str, identifier: str, columns: Sequence[str]) -> tuple[int, ...]:
-    exact = [at for axis in "xyz" for at, name in enumerate(columns) if name == identifier + axis]
-    if len(exact) == 3:
-        return tuple(exact)
-    found = [at for at, name in enumerate(columns) if name.startswith(identifier)]
-    ends = "".join(columns[at][-1:].lower() for at in found)
-    if len(found) == 3 and sorted(ends) == ["x", "y", "z"] and ends != "xyz":
+    """The columns of x, y and z, whose names say so; OpenSim takes three in whatever order they stand."""
+    found = [at for at, name in enumerate(columns) if name in {identifier + axis for axis in "xyz"}]
+    if len(found) != 3:
+        found = [at for at, name in enumerate(columns) if name.startswith(identifier)]
+    names = [columns[at] for at in found]
+    if len(found) == 3 and (parts := _parts(names)) not in AXES:
+        how = "bring them into the order x, y, z"
+        if "".join(sorted(parts)) not in AXES:
+            how = "name one of them x, one y and one z, as in force_vx, force_vy, force_vz"
         raise LinkwiseError(
             f"load {load.name!r}: the columns of {load.log.name} that begin with {key} {identifier!r} stand"
-            f" as {listed(map(repr, (columns[at] for at in found)))}; bring them into the order x, y, z"
+            f" as {listed(map(repr, names))}; {how}"
         )
     if len(found) != 3:
         there = f"{len(found)} columns of {load.log.name} begin so"
@@ -102,6 +108,12 @@ def _three(load: LoadColumns, key: str, identifier: str, columns: Sequence[str])
             f" {listed(map(repr, nearest_first(identifier, columns)))}"
         )
     return tuple(found)
+
+
+def _parts(names: Sequence[str]) -> str:
+    """In what names differ, in small letters: xyz of Fx_left, Fy_left and Fz_left."""
+    beside = zip_longest(*names, fillvalue=" ")
+    return "".join("".join(letters) for letters in beside if len(set(letters)) > 1).lower()
 
 
 def _data_file(path: Path, loads: Element | None, force: Element) -> Path:
