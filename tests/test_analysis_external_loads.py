@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from linkwise import Load, generate, read_system, write_package
+from linkwise import Contact, Load, generate, read_system, write_package
 from linkwise.analysis import analyze
+from linkwise.analysis.contacts import Contacts
 from linkwise.errors import LinkwiseError
 from motion_logs import LEG, smooth, write_csv, write_mot
 
@@ -162,3 +163,28 @@ def test_forces_ask_of_joints_what_the_jacobian_says(leg: Path, names: list[str]
     turning = arm_x * y[:, None] - arm_y * x[:, None]
     expected = -np.column_stack([x, y, turning])
     np.testing.assert_allclose(result.load_torque.sum(-1), expected, rtol=0, atol=1e-6)
+
+
+def test_forces_that_are_switched_off_are_told(leg: Path) -> None:
+    off = {"name": "off", "body": "foot", "switch": "<isDisabled>true</isDisabled>"}
+    gone = {"name": "", "body": "shank", "switch": "<appliesForce>false</appliesForce>"}
+    result = analyze(leg / "walk.csv", leg / "leg", loads=[write_loads(leg, off, RIGHT, gone)])
+    assert result.load_warnings == tuple(
+        f"grf.xml: force {name!r} is switched off there, and left out" for name in ("off", "shank")
+    )
+
+
+def test_columns_that_two_loads_are_from_are_told(leg: Path) -> None:
+    path = write_loads(leg, RIGHT, {"name": "left", "body": "shank"})
+    result = analyze(leg / "walk.csv", leg / "leg", loads=[path])
+    assert result.load_warnings == tuple(
+        f"grf.mot: the {part} of load 'left' is from the columns of 'right': is one body's given for two?"
+        for part in ("force", "moment")
+    )
+
+
+def test_what_is_noticed_in_files_of_contacts_loads_is_told_too(leg: Path) -> None:
+    off = {"name": "off", "body": "foot", "switch": "<isDisabled>true</isDisabled>"}
+    contacts = Contacts((Contact("foot"),), loads=(write_loads(leg, RIGHT, off),))
+    result = analyze(leg / "walk.csv", leg / "leg", contacts=contacts)
+    assert result.load_warnings == ("grf.xml: force 'off' is switched off there, and left out",)

@@ -27,15 +27,17 @@ IDENTIFIERS = {"force": "force_identifier", "moment": "torque_identifier", "poin
 
 
 def external_loads(path: Path) -> tuple[LoadColumns, ...]:
-    """The forces that are not switched off, each with the columns of its data file.
+    """The forces that are not switched off, each with the columns of its data file; warns of the others.
 
     Raises LinkwiseError for a file without any, data that are not there, and identifiers of other than three
     columns.
     """
     with within(str(path)):
-        forces = _forces(path)
+        forces, off = _forces(path)
         unread = [_unread(force, log) for force, log in forces]
-        return tuple(_with_columns(load, force) for load, (force, _) in zip(unread, forces, strict=True))
+        found = [_with_columns(load, force) for load, (force, _) in zip(unread, forces, strict=True)]
+    told = tuple(f"{path.name}: force {name!r} is switched off there, and left out" for name in off)
+    return (replace(found[0], warnings=told), *found[1:])
 
 
 def data_files(path: Path) -> tuple[Path, ...]:
@@ -44,11 +46,11 @@ def data_files(path: Path) -> tuple[Path, ...]:
     Raises LinkwiseError for a file of loads without any.
     """
     with within(str(path)):
-        return tuple(dict.fromkeys(log for _, log in _forces(path)))
+        return tuple(dict.fromkeys(log for _, log in _forces(path)[0]))
 
 
-def _forces(path: Path) -> list[tuple[Element, Path]]:
-    """The forces that are on, each with the file of its numbers."""
+def _forces(path: Path) -> tuple[list[tuple[Element, Path]], list[str]]:
+    """The forces that are on, each with the file of its numbers; and the names of those that are not."""
     from linkwise.robot.readers.xml_file import (
         parse,
     )  # its room brings SymPy, which other loads can do without
@@ -60,18 +62,23 @@ def _forces(path: Path) -> list[tuple[Element, Path]]:
     forces = [force for force in there if not _is_off(force)]
     if not forces:
         raise LinkwiseError("no ExternalForce that is on; give OpenSim's file of ExternalLoads")
-    return [(force, _data_file(path, loads, force)) for force in forces]
+    off = [_name(force) for force in there if _is_off(force)]
+    return [(force, _data_file(path, loads, force)) for force in forces], off
 
 
 def _unread(force: Element, log: Path) -> LoadColumns:
     body = _body(force, "applied_to_body", "")
-    name = force.get("name", "").strip() or body
+    name = _name(force)
     if not body:
         raise LinkwiseError(f"load {name!r} has no applied_to_body; name the body there")
     axes, point_in = (_body(force, f"{what}_expressed_in_body", GROUND) for what in ("force", "point"))
     return LoadColumns(
         name, body, log, 0, {}, _world(axes), _world(point_in) if _told(force, "point_identifier") else None
     )
+
+
+def _name(force: Element) -> str:
+    return force.get("name", "").strip() or _body(force, "applied_to_body", "")
 
 
 def _with_columns(load: LoadColumns, force: Element) -> LoadColumns:
