@@ -130,6 +130,20 @@ def test_the_friction_of_a_joint_that_follows_counts_in_that_of_the_other(tmp_pa
     assert b'<dynamics damping="0" friction="0"/>' in (tmp_path / "out/arm.urdf").read_bytes()
 
 
+def test_friction_that_the_file_has_no_place_for_is_told(tmp_path: Path) -> None:
+    text = robot(*map(link, "abc"), joint("ab", "a", "b"), joint("bc", "b", "c", type="planar"))
+    (tmp_path / "arm.urdf").write_text(text)
+    arm = load_robot(generate_package(tmp_path / "arm.urdf", tmp_path / "arm"))
+    t, q, qd, qdd = swings(4, 20, 100)
+    torque = arm.model.inverse_dynamics(q, qd, qdd) + 0.5 * qd
+    names = [*arm.joints, *(f"tau/{name}" for name in arm.joints)]
+    log = write_csv(tmp_path / "log.csv", np.column_stack([t, q, torque]), names)
+    record = identified(log, tmp_path / "arm.urdf", tmp_path / "out")
+    told = "arm.urdf has no place for the friction of {}, part of a joint of several axes"
+    assert record["warnings"] == [told.format(name) for name in arm.joints[1:]]
+    assert "## Not in the robot's file" in (tmp_path / "out/identified.md").read_text()
+
+
 def test_mujoco_takes_every_link_of_the_file_as_a_body_that_can_exist(written: Path) -> None:
     """It refuses a body whose moments break the triangle inequality; here no link is merged."""
     extension = b'<mujoco><compiler fusestatic="false" balanceinertia="false"/></mujoco></robot>'
