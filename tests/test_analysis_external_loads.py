@@ -1,11 +1,13 @@
 """OpenSim's ExternalLoads: forces of a storage file on bodies, as the file of XML says."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from linkwise import Load, generate, read_system, write_package
+from linkwise import Contact, Load, generate, read_system, write_package
 from linkwise.analysis import analyze
+from linkwise.analysis.contacts import Contacts
 from linkwise.errors import LinkwiseError
 from motion_logs import LEG, smooth, write_csv, write_mot
 
@@ -109,15 +111,80 @@ def test_what_stands_among_defaults_is_no_load(leg: Path) -> None:
     )
 
 
-def test_columns_that_stand_in_another_order_than_x_y_z_are_refused(leg: Path) -> None:
-    table = smooth(481, 3, rate=600)
-    write_mot(leg / "turned.mot", table, ["push_v_z", "push_v_y", "push_v_x"])
-    force = {"name": "right", "body": "foot"}
-    path = write_loads(leg, force, data="turned.mot")
-    text = path.read_text().replace("ground_force_v", "push_v")
+def forces_alone(folder: Path, identifier: str, names: Sequence[str]) -> Path:
+    """A file of loads whose one force on the foot is at its origin, and its data, smooth(481, …)."""
+    write_mot(folder / "plate.mot", smooth(481, len(names), rate=600), names)
+    path = write_loads(folder, RIGHT, data="plate.mot")
+    text = path.read_text().replace("ground_force_v", identifier)
     for other in ("point", "torque"):
         start, end = f"<{other}_identifier>", f"</{other}_identifier>"
         text = text[: text.index(start)] + text[text.index(end) + len(end) :]
     path.write_text(text)
-    with pytest.raises(LinkwiseError, match="'push_v_z', 'push_v_y', 'push_v_x'; bring them into the order"):
-        analyze(leg / "walk.csv", leg / "leg", loads=[path])
+    return path
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (["push_v_z", "push_v_y", "push_v_x"], "stand as .*; bring them into the order x, y, z"),
+        (["push_vz", "push_vy", "push_vx"], "stand as .*; bring them into the order x, y, z"),
+        (["push_vx", "push_vx", "push_vy"], "plate.mot: columns 2 and 3 are both named 'push_vx'; rename"),
+        (["push_vx", "push_vx2", "push_vy"], "stand as .*; name one of them x, one y and one z"),
+        (["push_v", "push_vy", "push_vz"], "stand as .*; name one of them x, one y and one z"),
+        (["push_vx", "push_vy"], "and 2 columns of plate.mot begin so; it needs three"),
+    ],
+)
+def test_forces_that_are_not_one_of_x_y_and_z_each_are_refused(
+    leg: Path, names: list[str], message: str
+) -> None:
+    with pytest.raises(LinkwiseError, match=message):
+        analyze(leg / "walk.csv", leg / "leg", loads=[forces_alone(leg, "push_v", names)])
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["push_vx", "push_vy", "push_vz"],
+        ["push_v_1", "push_v_2", "push_v_3"],
+        ["push_vX_left", "push_vY_left", "push_vZ_left"],
+        ["push_v_of_wall", "push_vx", "push_vy", "push_vz"],
+    ],
+)
+def test_forces_ask_of_joints_what_the_jacobian_says(leg: Path, names: list[str]) -> None:
+    """The joints are two slides, along x and y, and four that turn about z: -Jᵀ f of the foot's origin."""
+    result = analyze(leg / "walk.csv", leg / "leg", loads=[forces_alone(leg, "push_v", names)])
+    table = smooth(481, len(names), rate=600)[:, [0, -3, -2, -1]]
+    x, y, _ = (np.interp(result.time, table[:, 0], column) for column in table[:, 1:].T)
+    turns = np.cumsum(result.q[:, 2:5], axis=1)
+    lengths = np.array([0.07, 0.429, 0.43])  # pelvis to hip, to knee, to ankle
+    places = np.zeros((2, len(x), 4))
+    places[..., 1:] = np.cumsum(lengths * np.stack([np.sin(turns), -np.cos(turns)]), axis=-1)
+    arm_x, arm_y = places[..., -1:] - places
+    turning = arm_x * y[:, None] - arm_y * x[:, None]
+    expected = -np.column_stack([x, y, turning])
+    np.testing.assert_allclose(result.load_torque.sum(-1), expected, rtol=0, atol=1e-6)
+
+
+def test_forces_that_are_switched_off_are_told(leg: Path) -> None:
+    off = {"name": "off", "body": "foot", "switch": "<isDisabled>true</isDisabled>"}
+    gone = {"name": "", "body": "shank", "switch": "<appliesForce>false</appliesForce>"}
+    result = analyze(leg / "walk.csv", leg / "leg", loads=[write_loads(leg, off, RIGHT, gone)])
+    assert result.load_warnings == tuple(
+        f"grf.xml: force {name!r} is switched off there, and left out" for name in ("off", "shank")
+    )
+
+
+def test_columns_that_two_loads_are_from_are_told(leg: Path) -> None:
+    path = write_loads(leg, RIGHT, {"name": "left", "body": "shank"})
+    result = analyze(leg / "walk.csv", leg / "leg", loads=[path])
+    assert result.load_warnings == tuple(
+        f"grf.mot: the {part} of load 'left' is from the columns of 'right': is one body's given for two?"
+        for part in ("force", "moment")
+    )
+
+
+def test_what_is_noticed_in_files_of_contacts_loads_is_told_too(leg: Path) -> None:
+    off = {"name": "off", "body": "foot", "switch": "<isDisabled>true</isDisabled>"}
+    contacts = Contacts((Contact("foot"),), loads=(write_loads(leg, RIGHT, off),))
+    result = analyze(leg / "walk.csv", leg / "leg", contacts=contacts)
+    assert result.load_warnings == ("grf.xml: force 'off' is switched off there, and left out",)

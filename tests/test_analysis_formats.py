@@ -2,6 +2,7 @@
 
 import contextlib
 import sqlite3
+import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -309,3 +310,32 @@ def test_positions_that_cannot_be_are_named(tmp_path: Path, q: NDArray[Any], tol
     np.savez(tmp_path / "a.npz", time=TIME, q=q)
     with pytest.raises(LinkwiseError, match=rf"a.npz: array 'q' is {told}; positions are numbers, \("):
         analyze(tmp_path / "a.npz", PLANAR3)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("time", "columns 1 and 3 are both named 'time'"),
+        ("recorded", "columns 2 and 3 are both named 'recorded'"),
+        ("joint2/velocity", "columns 3 and 7 are both named 'joint2/velocity'"),
+    ],
+)
+def test_a_joint_of_a_bag_that_is_called_as_another_column_is_refused(
+    tmp_path: Path, name: str, message: str
+) -> None:
+    names = (name, *JOINTS[1:])
+    messages = [replace(said, velocity=said.position) for said in states(TABLE, names)]
+    with pytest.raises(LinkwiseError, match=message):
+        open_log(write_bag(tmp_path / "bag", messages))
+
+
+def test_arrays_of_one_name_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, time=TIME, q=Q)
+    with zipfile.ZipFile(path, "a") as file, pytest.warns(UserWarning, match="Duplicate name"):
+        file.writestr("q.npy", file.read("q.npy"))
+    with pytest.raises(LinkwiseError, match=r"a\.npz: arrays 2 and 3 are both named 'q'; rename one"):
+        open_log(path, joints=JOINTS)
+    np.savez(path, clock=TIME, q=Q, names=["clock", *JOINTS[1:]])
+    with pytest.raises(LinkwiseError, match=r"a\.npz: columns 1 and 2 are both named 'clock'; rename one"):
+        open_log(path, Reading(time="clock"), ("clock", *JOINTS[1:]))

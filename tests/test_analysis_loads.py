@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyarrow
 import pytest
 from conftest import DATA
 from linkwise import Load, generate, read_system, write_package
@@ -16,6 +17,7 @@ from linkwise.analysis.run import analyze_to
 from linkwise.errors import LinkwiseError
 from linkwise.progress import silent
 from motion_logs import LEG, smooth, write_csv, write_mot
+from pyarrow import parquet
 from scipy.signal import butter, sosfiltfilt
 from urdf_text import joint, link, robot
 
@@ -262,3 +264,17 @@ def test_values_that_are_no_load_are_refused(arm: Path) -> None:
         LinkwiseError, match="--loads-cutoff goes with --loads, or with --contact-loads; add one"
     ):
         Loads.of([], 5.0)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".mot", ".parquet"])
+def test_a_column_of_a_load_that_is_given_twice_is_refused(arm: Path, tmp_path: Path, suffix: str) -> None:
+    names, path = [*FORCE, FORCE[0]], tmp_path / f"plate{suffix}"
+    if suffix == ".parquet":
+        columns = [pyarrow.array(column) for column in measured(columns=4).T]
+        parquet.write_table(pyarrow.Table.from_arrays(columns, names=["time", *names]), path)
+    else:
+        (write_csv if suffix == ".csv" else write_mot)(path, measured(columns=4), names)
+    with pytest.raises(
+        LinkwiseError, match=rf"^{path}: columns 2 and 5 are both named 'tool/force_x'; rename"
+    ):
+        analyze(arm / "log.csv", arm / "arm", loads=[path])

@@ -95,6 +95,32 @@ def test_missing_header(tmp_path, text, message):
         open_log(tmp_path / "a.csv")
 
 
+@pytest.mark.parametrize(
+    ("fact", "lie", "message"),
+    [
+        ("nRows=5", "datarows 9", r"promises nRows=9 but 5 rows follow"),
+        ("nColumns=2", "datacolumns 4", "2 column names where the header promises nColumns=4"),
+        (
+            "nColumns=2",
+            "nColumns=4\nnColumns=2",
+            r"row 5: the header says nColumns twice, '4' before, '2' here",
+        ),
+        (
+            "inDegrees=yes",
+            "inDegrees=no\ninDegrees=yes",
+            "the header says inDegrees twice, 'no' before, 'yes' here",
+        ),
+    ],
+)
+def test_headers_of_simm_and_headers_that_say_two_things_are_held_to_them(
+    tmp_path: Path, fact: str, lie: str, message: str
+) -> None:
+    path = write_mot(tmp_path / "a.mot", smooth(5, 1), ("hip",))
+    path.write_text(path.read_text().replace(fact, lie))
+    with pytest.raises(LinkwiseError, match=message):
+        list(open_log(path).read((0, 1)))
+
+
 def test_cut_off_files(tmp_path):
     path = write_mot(tmp_path / "a.mot", smooth(5, 1), ("hip",), nRows="9")
     with pytest.raises(LinkwiseError, match=r"nRows=9 but 5 rows follow \(the last is row 15\)"):

@@ -113,7 +113,6 @@ def test_angles_of_many_turns_want_their_unit_told(tmp_path):
         (("time", "joint1", "joint2"), {}, "no column for joint 'joint3' .found none.; name it with --map C"),
         (("time", *JOINTS, "emg"), {}, "no joint for column 'emg'; .* --ignore-extra"),
         (("stamp", *JOINTS), {}, "no column 'time' .* --time COLUMN"),
-        (("time", *JOINTS, "joint1"), {}, "column 'joint1' stands twice"),
         (("time", *JOINTS), {"mapping": (("a", "joint1"),)}, "the log has no column 'a'"),
         (("time", *JOINTS), {"mapping": (("joint1", "x"),)}, "the robot has no joint 'x'"),
         (("time", *JOINTS[1:]), {"mapping": (("time", "joint1"),)}, "'time' is asked to be"),

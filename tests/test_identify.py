@@ -311,6 +311,13 @@ BAD: dict[str, tuple[Callable[[LoadedRobot, Path], dict[str, Any]], str]] = {
         },
         "--unmeasured elbow: there is no such joint; there are 'joint1', 'joint2', 'joint3'",
     ),
+    "two columns told for a joint": (
+        lambda robot, folder: {
+            "log": planar_log(robot, folder),
+            "fitting": Fitting((("tau/joint1", "joint1"), ("tau/joint2", "joint1"))),
+        },
+        "--torque tau/joint2=joint1: column 'tau/joint1' is that joint's already; keep one",
+    ),
     "a torque of a joint that has none": (
         lambda robot, folder: {
             "log": planar_log(robot, folder),

@@ -36,6 +36,7 @@ BAD = {
     "a word": ("trial,start,end\na,x,2\n", "row 2: start and end are numbers"),
     "backwards": ("trial,start,end\na,0,1\na,2,1\n", "row 3: the cycle from 2 to 1 s does not go forwards"),
     "no number": ("trial,start,end\na,nan,2\n", "row 2: the cycle from nan to 2 s does not go forwards"),
+    "a column twice": ("trial,start,end,start\na,1,2,0\n", "columns 2 and 4 are both named 'start'"),
     "latin": ("trial,start,end\n\xe4,1,2\n", "not a table of text in UTF-8"),
 }
 

@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -56,12 +55,11 @@ def select(
     brought: columns that the log's format has of itself, and coupled: joints that follow others by the
     robot's file, whose columns may be left out unasked
 
+    columns: the names of a log's, each once
+
     Raises LinkwiseError for a joint without a column, a column used twice, and a column without a joint
     where that was not allowed.
     """
-    twice = [name for name, count in Counter(columns).items() if count > 1]
-    if twice:
-        raise LinkwiseError(f"column {twice[0]!r} stands twice in the header; rename one")
     time = time_column(columns, reading)
     source = _mapped(columns, joints, reading)
     at_column = {column: at for at, column in enumerate(columns)}

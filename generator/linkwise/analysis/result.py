@@ -154,7 +154,8 @@ class AnalysisResult:
     @property
     def load_warnings(self) -> tuple[str, ...]:
         """What was noticed in the files of loads, each with its file."""
-        return tuple(dict.fromkeys(warning for borne in self.loads for warning in borne.warnings))
+        every = (*self.loads, *(() if self.times is None else self.times.loads))
+        return tuple(dict.fromkeys(warning for load in every for warning in load.warnings))
 
     @property
     def provenance(self) -> str:

@@ -33,14 +33,14 @@ from linkwise.cli.robot_option import RobotOption, opened_robot
 from linkwise.escape import json_text, listed
 from linkwise.identification import Fitting, Identification
 from linkwise.identification import identify as identified
-from linkwise.identification.identified_files import identified_files, record
-from linkwise.identification.urdf_file import lost_gravity
+from linkwise.identification.identified_files import identified_files, lost, record
+from linkwise.identification.own_urdf import OwnUrdf
 from linkwise.output import require_writable, write_files
 from linkwise.package.write import refuse_inside_package
 from linkwise.progress import progress as shown_progress
 from linkwise.robot import Options
 
-Out = Annotated[Path, typer.Option(help="Directory to write to: a page, a record, and the robot as URDF")]
+Out = Annotated[Path, typer.Option(help="Directory to write to: a page, a record, and the robot")]
 Torque = Annotated[
     list[str] | None,
     typer.Option("--torque", metavar="COLUMN=JOINT", help="Column of a joint's torque; may be repeated"),
@@ -92,6 +92,9 @@ def identify(
     processing = chosen_processing(derivative, window, degree, lowpass, "trim")
     without = tuple(unmeasured or [])
     fitting = Fitting(pairs("--torque", torque or []), torque_factor, friction, unseen, without)
+    own = OwnUrdf.of(robot)
+    if own is not None:
+        own.refuse_to_overwrite(out)
     with shown_progress() as progress:
         package = opened_robot(robot, backend, options, progress)
     refuse_inside_package(out)
@@ -99,11 +102,9 @@ def identify(
     with shown_progress(UNITS) as progress:
         found = identified(log, package, reading, processing, fitting, progress)
     manifest = package.package.manifest
-    assert manifest.tree is not None
-    if lost := lost_gravity(manifest.tree):
-        found = replace(found, warnings=(*found.warnings, lost))
+    found = replace(found, warnings=(*found.warnings, *lost(found, manifest, own)))
     chosen = choices(reading, processing) | {"fitting": asdict(fitting)}
-    files = write_files(out, identified_files(found, manifest, chosen))
+    files = write_files(out, identified_files(found, manifest, chosen, own))
     for warning in found.warnings:
         tell(f"warning: {log}: {warning}", err=True)
     if found.log.ignored:

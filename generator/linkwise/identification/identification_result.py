@@ -62,6 +62,19 @@ class Identification:
         rubs = self.bearings.rubs[len(self.log.measured) :]
         return tuple(joint for joint, own in zip(self.followers, rubs, strict=True) if not own)
 
+    @property
+    def frictions(self) -> dict[str, Array]:
+        """Viscous and Coulomb friction by joint, (2,) each: 0 where it counts in that of another joint.
+
+        Joints of which none was fitted are not there.
+        """
+        fitted = zip((*self.joints, *self.followers), self.bearings.rubs, self.physical.friction, strict=True)
+        found = {joint: own for joint, rubs, own in fitted if rubs or joint in self.shared_friction}
+        for body in self.robot.bodies or ():
+            if self.robot.joints[body.coordinate] in found:
+                found.setdefault(body.joint, np.zeros(2))
+        return found
+
     def errors(self, equations: JointEquations) -> dict[str, Array]:
         """Root mean square error of each joint's torque: of the fit, of its bodies, and of the package."""
         combinations, none = self.base.combinations, np.zeros_like(self.fit.friction)

@@ -1,6 +1,9 @@
-"""The files of an identification: a record, a page, and the robot as a URDF file, its loops beside it."""
+"""The files of an identification: a record, a page, and the robot.
 
-from collections.abc import Iterator
+The robot is the user's own URDF file written back, or else one of the package, its loops beside it.
+"""
+
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +12,7 @@ from linkwise.escape import json_text, markdown
 from linkwise.identification.base_parameters import NAMES, UNITS
 from linkwise.identification.constraint_file import constraint_text
 from linkwise.identification.identification_result import Identification
+from linkwise.identification.own_urdf import OwnUrdf
 from linkwise.identification.pseudo_inertia import central
 from linkwise.identification.urdf_file import lost_gravity, urdf_text
 from linkwise.package.manifest import Manifest
@@ -17,22 +21,37 @@ COEFFICIENTS = {"rad": ("N m s/rad", "N m"), "m": ("N s/m", "N")}
 """Units of viscous and Coulomb friction, by that of the joint."""
 
 
-def identified_files(found: Identification, manifest: Manifest, choices: dict[str, Any]) -> dict[str, bytes]:
-    """The files, by name; `choices` are recorded."""
+def identified_files(
+    found: Identification, manifest: Manifest, choices: dict[str, Any], own: OwnUrdf | None = None
+) -> dict[str, bytes]:
+    """The files, by name; `choices` are recorded, and `own` is the file that the package was made of."""
     assert manifest.tree is not None
-    pi = dict(zip(found.robot.links, found.physical.pi, strict=True))
-    every = zip((*found.joints, *found.followers), found.physical.friction, strict=True)
-    friction = {joint: own for joint, own in every if joint not in found.floating}
-    urdf = urdf_text(manifest.name, manifest.tree, manifest.joints, pi, friction)
     about = record(found) | {"gravity": list(manifest.tree.gravity), "choices": choices}
     texts = {
         "identified.json": json_text(about, indent=1) + "\n",
-        "identified.md": page(found, lost_gravity(manifest.tree)),
-        f"{manifest.name}.urdf": urdf,
+        "identified.md": page(found, lost(found, manifest, own)),
     }
+    pi = dict(zip(found.robot.links, found.physical.pi, strict=True))
+    friction = found.frictions
+    files = {name: text.encode() for name, text in texts.items()}
+    if own is not None:
+        return files | {own.path.name: own.identified(manifest.tree, pi, friction)}
+    urdf = urdf_text(manifest.name, manifest.tree, manifest.joints, pi, friction)
+    files[f"{manifest.name}.urdf"] = urdf.encode()
     if manifest.tree.tied:
-        texts[f"{manifest.name}.toml"] = constraint_text(manifest.tree, manifest.joints)
-    return {name: text.encode() for name, text in texts.items()}
+        files[f"{manifest.name}.toml"] = constraint_text(manifest.tree, manifest.joints).encode()
+    return files
+
+
+def lost(found: Identification, manifest: Manifest, own: OwnUrdf | None = None) -> tuple[str, ...]:
+    """What the robot's file does not say of what was identified, in words."""
+    assert manifest.tree is not None
+    if own is None:
+        return tuple(filter(None, [lost_gravity(manifest.tree)]))
+    return tuple(
+        f"{own.path.name} has no place for the friction of {joint}, part of a joint of several axes"
+        for joint in own.unwritten(found.frictions)
+    )
 
 
 def record(found: Identification) -> dict[str, Any]:
@@ -87,9 +106,9 @@ def record(found: Identification) -> dict[str, Any]:
     }
 
 
-def page(found: Identification, lost: str) -> str:
-    """The page, in Markdown."""
-    return "\n".join([*_head(found), *_joints(found), *_base(found), *_links(found), *_lost(lost), ""])
+def page(found: Identification, without: Sequence[str]) -> str:
+    """The page, in Markdown; `without` is what the robot's file does not say."""
+    return "\n".join([*_head(found), *_joints(found), *_base(found), *_links(found), *_lost(without), ""])
 
 
 def _head(found: Identification) -> Iterator[str]:
@@ -161,8 +180,8 @@ def _base(found: Identification) -> Iterator[str]:
     yield ""
     yield (
         f"{', '.join(NAMES)}(link): mass, first moment, and inertia about the origin of the link's frame, "
-        f"in its axes; {', '.join(dict.fromkeys(UNITS))}. The frames are those of the URDF file beside this "
-        "page."
+        f"in its axes; {', '.join(dict.fromkeys(UNITS))}. The frames are those of the package, z on the "
+        "joint's axis."
     )
 
 
@@ -183,6 +202,7 @@ def _links(found: Identification) -> Iterator[str]:
     )
 
 
-def _lost(gravity: str) -> Iterator[str]:
-    if gravity:
-        yield from ("", "## Gravity", "", f"{markdown(gravity[0].upper() + gravity[1:])}.")
+def _lost(without: Sequence[str]) -> Iterator[str]:
+    if without:
+        yield from ("", "## Not in the robot's file", "")
+        yield from (f"- {markdown(text[0].upper() + text[1:])}." for text in without)

@@ -31,9 +31,23 @@ def pseudo_inertia(pi: Array) -> Array:
     return j
 
 
+def pseudo_inertia_of(mass: float, com: Array, inertia: Array) -> Array:
+    """J (4, 4) of a mass, its centre (3,) and its inertia about that (3, 3)."""
+    j = np.zeros((4, 4))
+    j[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia + mass * np.outer(com, com)
+    j[:3, 3] = j[3, :3] = mass * com
+    j[3, 3] = mass
+    return j
+
+
 def central(pi: Array) -> tuple[float, Array, Array]:
     """Mass, centre of mass (3,) and inertia about it (3, 3) of parameters (10,); a mass above 0."""
-    j = pseudo_inertia(pi)
-    mass, h = float(j[3, 3]), j[:3, 3]
-    second = j[:3, :3] - np.outer(h, h) / mass
-    return mass, h / mass, np.trace(second) * np.eye(3) - second
+    return central_of(pseudo_inertia(pi))
+
+
+def central_of(j: Array) -> tuple[float, Array, Array]:
+    """The same of J (4, 4); what has inertia and no mass is at the origin."""
+    mass = float(j[3, 3])
+    com = j[:3, 3] / mass if mass else np.zeros(3)
+    second = j[:3, :3] - mass * np.outer(com, com)
+    return mass, com, np.trace(second) * np.eye(3) - second

@@ -163,7 +163,12 @@ def _torque_columns(
     columns: Sequence[str], joints: Sequence[str], measured: Sequence[str], torques: Sequence[tuple[str, str]]
 ) -> list[str]:
     """Name of the torque column of each joint that is measured, in order."""
-    given = {joint: column for column, joint in torques}
+    given: dict[str, str] = {}
+    for column, joint in torques:
+        if given.setdefault(joint, column) != column:
+            raise LinkwiseError(
+                f"--torque {column}={joint}: column {given[joint]!r} is that joint's already; keep one"
+            )
     for joint, column in given.items():
         if joint not in joints or column not in columns:
             missing_joint = joint not in joints

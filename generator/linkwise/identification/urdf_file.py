@@ -1,19 +1,23 @@
 """A package's robot as a URDF file, for which `generate` makes the same torques.
 
-Links and joints have their own names and the frames of the package: z on the joint's axis.
+Links and joints have their own names and the frames of the package: z on the joint's axis. Joints have the
+limits of the robot's file, and its other named frames are links without mass.
 """
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from linkwise.escape import printable
 from linkwise.identification.pseudo_inertia import central
-from linkwise.package.entries import BodyEntry, JointEntry, PassiveEntry, RigidTree
+from linkwise.package.entries import BodyEntry, FrameEntry, JointEntry, PassiveEntry, RigidTree
 from linkwise.package.load import Array
 
+ENDLESS = 1e9
+"""What URDF has to have for a limit, where there is none."""
 STANDARD = 9.81
 """m/s^2 along -z: a URDF file says nothing of gravity, and this is what it is read with."""
 
@@ -37,48 +41,87 @@ def urdf_text(
     pi: Mapping[str, Array],
     friction: Mapping[str, Array],
 ) -> str:
-    """The file; pi: inertial parameters (10,) by link, friction: viscous and Coulomb (2,) by joint."""
-    base, root = _base(tree), root_link(tree)
+    """The file; pi: inertial parameters (10,) by link, friction: viscous and Coulomb (2,) by joint.
+
+    Joints that have none there keep the package's own.
+    """
+    root, turn = root_link(tree), _upright(tree)
     lines = [
         '<?xml version="1.0"?>',
         *([f"<!-- Gravity is lost: {lost}. -->"] if (lost := lost_gravity(tree)) else []),
         f"<robot name={_attribute(name)}>",
-        f"  <link name={_attribute(base)}/>",
     ]
-    if (turn := _upright(tree)) is not None:
-        lines += [f"  <link name={_attribute(root)}/>"]
-        mount = _unused("mount", [body.joint for body in tree.bodies])
+    if turn is not None:
+        base, mount = (
+            _unused(wanted, [*_links(tree), root, *(body.joint for body in tree.bodies)])
+            for wanted in (f"{root}_upright", "mount")
+        )
+        lines += [f"  <link name={_attribute(base)}/>"]
         lines += _joint(mount, "fixed", base, root, (0.0, 0.0, 0.0), turn, [])
+    lines += [f"  <link name={_attribute(root)}/>"]
     masters = [joint.name for joint in joints]
+    own = {entry.joint: np.array([entry.damping, entry.friction]) for entry in tree.passive}
     for body in tree.bodies:
         lines += _link(body, pi)
         parent = root if body.parent is None else tree.bodies[body.parent].link
         more = ['<axis xyz="0 0 1"/>', *_follows(body, masters)]
-        if body.joint in friction:
-            viscous, coulomb = friction[body.joint].tolist()
+        rubs = friction.get(body.joint, own.get(body.joint))
+        if rubs is not None and (rubs.any() or body.joint in masters):
+            viscous, coulomb = rubs.tolist()
             more.append(f'<dynamics damping="{viscous:.6g}" friction="{coulomb:.6g}"/>')
-        kind = "prismatic" if body.kind == "prismatic" else "continuous"
-        limits = (
-            ['<limit lower="-1e9" upper="1e9" effort="1e9" velocity="1e9"/>'] if kind == "prismatic" else []
-        )
-        turn = np.array(body.rotation)
-        lines += _joint(body.joint, kind, parent, body.link, body.translation, turn, more + limits)
+        kind, limits = _limits(body, joints[body.coordinate])
+        place = body.translation, np.array(body.rotation)
+        lines += _joint(body.joint, kind, parent, body.link, *place, [*more, *limits])
+    lines += [line for frame in _frames(tree) for line in _frame(frame, tree)]
     lines += [line for entry in tree.passive for line in _passive(entry)]
     return "\n".join([*lines, "</robot>", ""])
 
 
 def root_link(tree: RigidTree) -> str:
-    """The file's link that stands on the ground in the axes of the package's base."""
-    base = _base(tree)
-    return base if _upright(tree) is None else _unused(f"{base}_upright", [body.link for body in tree.bodies])
+    """The file's link on the ground, in the axes of the package's base: as the robot's file calls it."""
+    upright = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    for frame in tree.frames:
+        if frame.body is None and frame.rotation == upright and not any(frame.translation):
+            return frame.name
+    return _unused("base", _links(tree))
 
 
-def _base(tree: RigidTree) -> str:
-    return _unused("base", [body.link for body in tree.bodies])
+def _links(tree: RigidTree) -> list[str]:
+    """Names that links of the file have."""
+    return [*(body.link for body in tree.bodies), *(frame.name for frame in tree.frames)]
+
+
+def _frames(tree: RigidTree) -> list[FrameEntry]:
+    """Those of the robot's file that no link here is called."""
+    taken = [root_link(tree), *(body.link for body in tree.bodies)]
+    return [frame for frame in tree.frames if frame.name not in taken]
+
+
+def _frame(frame: FrameEntry, tree: RigidTree) -> list[str]:
+    parent = root_link(tree) if frame.body is None else tree.bodies[frame.body].link
+    joint = _unused(f"{frame.name}_fixed", [body.joint for body in tree.bodies])
+    turn = np.array(frame.rotation)
+    return [
+        f"  <link name={_attribute(frame.name)}/>",
+        *_joint(joint, "fixed", parent, frame.name, frame.translation, turn, []),
+    ]
+
+
+def _limits(body: BodyEntry, joint: JointEntry) -> tuple[str, list[str]]:
+    """The type of a body's joint, and its limits; of one that follows another nothing is known."""
+    given = asdict(joint) if joint.name == body.joint else {}
+    ends = [given.get(end) for end in ("lower", "upper")]
+    kind = "prismatic" if body.kind == "prismatic" else "continuous" if ends == [None, None] else "revolute"
+    said = {end: sign * ENDLESS for end, sign in (("lower", -1), ("upper", 1)) if kind != "continuous"}
+    said |= dict.fromkeys(("effort", "velocity"), ENDLESS)
+    said |= {what: value for what in said if (value := given.get(what)) is not None}
+    if kind == "continuous" and set(said.values()) == {ENDLESS}:
+        return kind, []
+    return kind, ["<limit " + " ".join(f'{what}="{value!r}"' for what, value in said.items()) + "/>"]
 
 
 def _passive(entry: PassiveEntry) -> list[str]:
-    """Spring and armature of a joint, as extensions of simulators say them; friction was found anew."""
+    """Spring and armature of a joint, as extensions of simulators say them."""
     joint = _attribute(entry.joint)
     lines = []
     if entry.stiffness:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.job import Job
+from linkwise.analysis.logs.named_once import named_once
 from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
 from linkwise.package.load import Array
@@ -66,7 +67,9 @@ def written_cycles(table: str) -> dict[str, list[Span]]:
     with opened_here(table) as path, path.open(newline="", encoding="utf-8-sig") as file:
         try:
             reader = csv.DictReader(file)
-            if not {"trial", "start", "end"} <= set(reader.fieldnames or ()):
+            with within(table):
+                names = named_once(reader.fieldnames or ())
+            if not {"trial", "start", "end"} <= set(names):
                 raise LinkwiseError(f"{table}: name its columns trial, start and end")
             for number, row in enumerate(reader, 2):
                 with within(f"{table}, row {number}"):

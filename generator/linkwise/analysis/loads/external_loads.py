@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -20,19 +21,23 @@ LOADS, FORCE = "ExternalLoads", "ExternalForce"
 """Elements; what stands among <defaults> is no load."""
 NONE = ("", "Unassigned")
 """What OpenSim writes where there is nothing."""
+AXES = ("xyz", "123")
+"""What the names of three columns differ in: the second where OpenSim has flattened a table of vectors."""
 IDENTIFIERS = {"force": "force_identifier", "moment": "torque_identifier", "point": "point_identifier"}
 
 
 def external_loads(path: Path) -> tuple[LoadColumns, ...]:
-    """The forces that are not switched off, each with the columns of its data file.
+    """The forces that are not switched off, each with the columns of its data file; warns of the others.
 
     Raises LinkwiseError for a file without any, data that are not there, and identifiers of other than three
     columns.
     """
     with within(str(path)):
-        forces = _forces(path)
+        forces, off = _forces(path)
         unread = [_unread(force, log) for force, log in forces]
-        return tuple(_with_columns(load, force) for load, (force, _) in zip(unread, forces, strict=True))
+        found = [_with_columns(load, force) for load, (force, _) in zip(unread, forces, strict=True)]
+    told = tuple(f"{path.name}: force {name!r} is switched off there, and left out" for name in off)
+    return (replace(found[0], warnings=told), *found[1:])
 
 
 def data_files(path: Path) -> tuple[Path, ...]:
@@ -41,11 +46,11 @@ def data_files(path: Path) -> tuple[Path, ...]:
     Raises LinkwiseError for a file of loads without any.
     """
     with within(str(path)):
-        return tuple(dict.fromkeys(log for _, log in _forces(path)))
+        return tuple(dict.fromkeys(log for _, log in _forces(path)[0]))
 
 
-def _forces(path: Path) -> list[tuple[Element, Path]]:
-    """The forces that are on, each with the file of its numbers."""
+def _forces(path: Path) -> tuple[list[tuple[Element, Path]], list[str]]:
+    """The forces that are on, each with the file of its numbers; and the names of those that are not."""
     from linkwise.robot.readers.xml_file import (
         parse,
     )  # its room brings SymPy, which other loads can do without
@@ -57,18 +62,23 @@ def _forces(path: Path) -> list[tuple[Element, Path]]:
     forces = [force for force in there if not _is_off(force)]
     if not forces:
         raise LinkwiseError("no ExternalForce that is on; give OpenSim's file of ExternalLoads")
-    return [(force, _data_file(path, loads, force)) for force in forces]
+    off = [_name(force) for force in there if _is_off(force)]
+    return [(force, _data_file(path, loads, force)) for force in forces], off
 
 
 def _unread(force: Element, log: Path) -> LoadColumns:
     body = _body(force, "applied_to_body", "")
-    name = force.get("name", "").strip() or body
+    name = _name(force)
     if not body:
         raise LinkwiseError(f"load {name!r} has no applied_to_body; name the body there")
     axes, point_in = (_body(force, f"{what}_expressed_in_body", GROUND) for what in ("force", "point"))
     return LoadColumns(
         name, body, log, 0, {}, _world(axes), _world(point_in) if _told(force, "point_identifier") else None
     )
+
+
+def _name(force: Element) -> str:
+    return force.get("name", "").strip() or _body(force, "applied_to_body", "")
 
 
 def _with_columns(load: LoadColumns, force: Element) -> LoadColumns:
@@ -85,15 +95,18 @@ def _with_columns(load: LoadColumns, force: Element) -> LoadColumns:
 
 
 def _three(load: LoadColumns, key: str, identifier: str, columns: Sequence[str]) -> tuple[int, ...]:
-    exact = [at for axis in "xyz" for at, name in enumerate(columns) if name == identifier + axis]
-    if len(exact) == 3:
-        return tuple(exact)
-    found = [at for at, name in enumerate(columns) if name.startswith(identifier)]
-    ends = "".join(columns[at][-1:].lower() for at in found)
-    if len(found) == 3 and sorted(ends) == ["x", "y", "z"] and ends != "xyz":
+    """The columns of x, y and z, whose names say so; OpenSim takes three in whatever order they stand."""
+    found = [at for at, name in enumerate(columns) if name in {identifier + axis for axis in "xyz"}]
+    if len(found) != 3:
+        found = [at for at, name in enumerate(columns) if name.startswith(identifier)]
+    names = [columns[at] for at in found]
+    if len(found) == 3 and (parts := _parts(names)) not in AXES:
+        how = "bring them into the order x, y, z"
+        if "".join(sorted(parts)) not in AXES:
+            how = "name one of them x, one y and one z, as in force_vx, force_vy, force_vz"
         raise LinkwiseError(
             f"load {load.name!r}: the columns of {load.log.name} that begin with {key} {identifier!r} stand"
-            f" as {listed(map(repr, (columns[at] for at in found)))}; bring them into the order x, y, z"
+            f" as {listed(map(repr, names))}; {how}"
         )
     if len(found) != 3:
         there = f"{len(found)} columns of {load.log.name} begin so"
@@ -102,6 +115,12 @@ def _three(load: LoadColumns, key: str, identifier: str, columns: Sequence[str])
             f" {listed(map(repr, nearest_first(identifier, columns)))}"
         )
     return tuple(found)
+
+
+def _parts(names: Sequence[str]) -> str:
+    """In what names differ, in small letters: xyz of Fx_left, Fy_left and Fz_left."""
+    beside = zip_longest(*names, fillvalue=" ")
+    return "".join("".join(letters) for letters in beside if len(set(letters)) > 1).lower()
 
 
 def _data_file(path: Path, loads: Element | None, force: Element) -> Path:

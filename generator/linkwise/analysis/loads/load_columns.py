@@ -30,6 +30,8 @@ class LoadColumns:
     axes: str = WORLD
     point_in: str | None = None
     """None for the loaded body, at the origin of which a force without a point acts."""
+    warnings: tuple[str, ...] = ()
+    """What was noticed in the file that says so, which each names."""
 
 
 def load_columns(

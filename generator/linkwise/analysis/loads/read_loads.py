@@ -1,6 +1,7 @@
 """From files and values of loads to what a robot bears, checked against its bodies and the motion's time."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,9 +37,9 @@ def placed_loads(
     Raises LinkwiseError that names file, row and column for what is not there, has gaps or is too short.
     """
     loads = [_given(load, robot, motion) for load in wanted.given]
-    for path in wanted.paths:
-        for columns in _listed(path, robot, ignore_extra):
-            loads.append(_read(columns, path, wanted.cutoff, robot, motion, progress, buffer))
+    listed = [(one, path) for path in wanted.paths for one in _listed(path, robot, ignore_extra)]
+    for columns, path in _with_doubles_told(listed):
+        loads.append(_read(columns, path, wanted.cutoff, robot, motion, progress, buffer))
     told_apart("load", [load.name for load in loads], (), "tell them apart as NAME:BODY, or by name= in XML")
     return tuple(loads)
 
@@ -49,6 +50,20 @@ def _listed(path: Path, robot: LoadedRobot, ignore_extra: bool) -> tuple[LoadCol
     log = open_log(path)
     with within(str(path)):
         return load_columns(path, log.columns, robot, ignore_extra)
+
+
+def _with_doubles_told(loads: Sequence[tuple[LoadColumns, Path]]) -> Iterator[tuple[LoadColumns, Path]]:
+    """The loads, with a warning for each that has its force or moment from the columns of another."""
+    first: dict[tuple[Path, tuple[int, ...]], str] = {}
+    for load, path in loads:
+        told = []
+        for part in ("force", "moment"):
+            if part in load.columns:
+                other = first.setdefault((load.log.resolve(), load.columns[part]), load.name)
+                if other != load.name:
+                    what = f"the {part} of load {load.name!r} is from the columns of {other!r}"
+                    told.append(f"{load.log.name}: {what}: is one body's given for two?")
+        yield replace(load, warnings=(*load.warnings, *told)), path
 
 
 def _given(load: Load, robot: LoadedRobot, motion: Array) -> PlacedLoad:
@@ -93,7 +108,7 @@ def _read(
             lowpass(table[:, 1:7], rate, Lowpass(cutoff), flag="--loads-cutoff")
     noticed = (*log.warnings, *slowness(1 / usual_step(table[:, 0], log.first_row)))
     noticed += _far(load, table)
-    warnings = tuple(f"{load.log.name}: {warning}" for warning in noticed)
+    warnings = (*load.warnings, *(f"{load.log.name}: {warning}" for warning in noticed))
     return PlacedLoad(load.name, seat, table, load.log.name, cutoff, warnings)
 
 

@@ -8,6 +8,7 @@ from linkwise.analysis.logs.array_log import ArrayLog
 from linkwise.analysis.logs.bag import BagLog
 from linkwise.analysis.logs.hdf5 import Hdf5Arrays
 from linkwise.analysis.logs.headers import open_delimited, open_storage
+from linkwise.analysis.logs.named_once import named_once
 from linkwise.analysis.logs.npz import NpzArrays
 from linkwise.analysis.logs.parquet import ParquetLog
 from linkwise.analysis.settings import Reading
@@ -32,7 +33,7 @@ class Log(Protocol):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Column names, in the file's order."""
+        """Column names, in the file's order, each once."""
 
     @property
     def brought(self) -> frozenset[str]:
@@ -68,18 +69,22 @@ def open_log(path: Path, reading: Reading = AS_IT_IS, joints: Sequence[str] = ()
     reading: which topic or group has the joints, and which array the time, where the format has such
     joints: what columns of arrays are, in this order, where the file names none
 
-    Raises LinkwiseError for a missing file, an unknown suffix, or a header that cannot be read.
+    Raises LinkwiseError for a missing file, an unknown suffix, a header that cannot be read, or one that
+    names two columns alike.
     """
     with within(str(path)):
         if not path.is_dir():
             require_file(path)
         opened = _opener(path, reading, joints)
     try:
-        return opened()
+        log = opened()
     except UnicodeDecodeError as error:
         raise LinkwiseError(f"{path}: not UTF-8 text; save it as UTF-8") from error
     except OSError as error:
         raise LinkwiseError(f"{path}: cannot be read: {error.strerror}") from error
+    with within(str(path)):
+        named_once(log.columns)
+    return log
 
 
 def _opener(path: Path, reading: Reading, joints: Sequence[str]) -> Callable[[], Log]:

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from linkwise.analysis.logs.array_columns import WORDS, Place, StoredArray, array_columns
+from linkwise.analysis.logs.named_once import named_once
 from linkwise.analysis.settings import Reading
 from linkwise.errors import within
 from linkwise.escape import listed
@@ -47,8 +48,9 @@ class ArrayLog:
         found = source.found()
         with within(str(source.path)):
             columns = array_columns(found, reading.time, reading.topic, joints)
-            time = {reading.time or columns.time.rpartition("/")[2]: Place(columns.time, 0)}
-            places = time | columns.places | time
+            time = reading.time or columns.time.rpartition("/")[2]
+            named_once((time, *columns.places))
+            places = {time: Place(columns.time, 0)} | columns.places
             columns.check()
             degrees = columns.degrees
         told = tuple(

@@ -9,7 +9,8 @@ from typing import Any
 
 from linkwise.analysis.logs.damaged_files import read_as
 from linkwise.analysis.logs.joint_states import ENDINGS, RECORDED, STAMPED, Cell, JointMessage, rows_of
-from linkwise.errors import LinkwiseError
+from linkwise.analysis.logs.named_once import named_once
+from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed, short
 from linkwise.extras import extra
 from linkwise.package.load import Array
@@ -51,8 +52,11 @@ class BagLog:
             columns = _columns(states)
         is_stamped = bool(states[0].stamp)
         told = () if is_stamped else (f"messages of {name} have no stamps: the time is that of recording",)
-        times = {"time": Cell(STAMPED if is_stamped else RECORDED), RECORDED: Cell(RECORDED)}
-        return cls(path, name, times | columns | times, size, told)
+        times = [("time", Cell(STAMPED if is_stamped else RECORDED)), (RECORDED, Cell(RECORDED))]
+        cells = [*times, *columns]
+        with within(str(path)):
+            named_once([column for column, _ in cells])
+        return cls(path, name, dict(cells), size, told)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -136,11 +140,11 @@ def _states(bag: Any, topic: str) -> Iterator[JointMessage]:
         yield JointMessage(number, recorded, stamp, tuple(message.name), arrays)
 
 
-def _columns(states: Sequence[JointMessage]) -> dict[str, Cell]:
+def _columns(states: Sequence[JointMessage]) -> list[tuple[str, Cell]]:
     """Columns of all joints that messages carry, in the order in which these name them."""
     found: dict[str, dict[str, Cell]] = {quantity: {} for quantity in ENDINGS}
     for state in states:
         for quantity, ending in ENDINGS.items():
             if state.has(quantity):
                 found[quantity] |= {f"{joint}{ending}": Cell(quantity, joint) for joint in state.names}
-    return {column: cell for some in found.values() for column, cell in some.items()}
+    return [named for some in found.values() for named in some.items()]

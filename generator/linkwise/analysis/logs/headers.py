@@ -8,6 +8,10 @@ from linkwise.analysis.logs.text import SHOWN, TextLog, is_number, split_cells, 
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import short
 
+READ = {name.lower(): name for name in ("inDegrees", "nRows", "nColumns", "DataType")}
+"""What counts of a header."""
+SIMM = {"datacolumns": "ncolumns", "datarows": "nrows"}
+"""How motions of SIMM, which OpenSim reads too, say the same."""
 MOST_FACTS, MOST_DIGITS = 10_000, 15
 """Lines above `endheader`, and digits of a count: no recording has as many."""
 TAIL = 1 << 16
@@ -33,6 +37,8 @@ def open_delimited(path: Path) -> TextLog:
 
 def open_storage(path: Path) -> TextLog:
     """Open an OpenSim .mot or .sto file with what its header says: inDegrees, nRows and nColumns.
+
+    The last two are datarows and datacolumns in motions of SIMM.
 
     Raises LinkwiseError for a header that is cut off or contradicts itself.
     """
@@ -66,11 +72,22 @@ def _storage_header(path: Path) -> tuple[dict[str, str], str, int]:
     with path.open(encoding="utf-8-sig") as handle:
         lines = whole_lines(handle, path, 1)
         for row, line in enumerate(islice(lines, MOST_FACTS), 1):
-            key, _, value = line.partition("=")
-            facts[key.strip().lower()] = value.strip()
             if line.strip().lower() == "endheader":
                 return facts, next(lines, ""), row + 1
+            key, value = _fact(line)
+            if key in READ and facts.setdefault(key, value).lower() != value.lower():
+                both = f"{short(facts[key], SHOWN)!r} before, {short(value, SHOWN)!r} here"
+                raise LinkwiseError(f"{path}: row {row}: the header says {READ[key]} twice, {both}; keep one")
     raise LinkwiseError(f"{path}: no line 'endheader'; the file is cut off or not OpenSim's")
+
+
+def _fact(line: str) -> tuple[str, str]:
+    """Key, in lower case, and value of a line of a header; SIMM writes no equals sign."""
+    key, equals, value = line.partition("=")
+    if equals:
+        return key.strip().lower(), value.strip()
+    key, _, value = line.strip().partition(" ")
+    return SIMM.get(key.lower(), ""), value.strip()
 
 
 def _columns(path: Path, row: int, line: str, delimiter: str | None) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from linkwise.analysis.logs.array_columns import NUMBERS, StoredArray, names_joints
 from linkwise.analysis.logs.damaged_files import read_as
+from linkwise.analysis.logs.named_once import named_once
 from linkwise.errors import LinkwiseError
 
 
@@ -21,13 +22,17 @@ class NpzArrays:
     path: Path
 
     def found(self) -> Mapping[str, StoredArray]:
-        """Shapes of all arrays, from their headers; raises LinkwiseError for names that are pickled."""
+        """Shapes of all arrays, from their headers.
+
+        Raises LinkwiseError for names of joints that are pickled, and for two arrays of one name.
+        """
         found = {}
         with self.opened() as get, zipfile.ZipFile(self.path) as file:
-            for member in file.namelist():
+            members = file.namelist()
+            names = named_once([member.removesuffix(".npy") for member in members], "arrays")
+            for name, member in zip(names, members, strict=True):
                 with file.open(member) as array:
                     shape, kind = _header(array)
-                name = member.removesuffix(".npy")
                 texts: tuple[str, ...] = ()
                 if names_joints(name, shape) and kind == "O":
                     raise LinkwiseError(
