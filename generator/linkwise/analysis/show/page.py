@@ -112,6 +112,7 @@ def page_data(result: AnalysisResult) -> str:
         "largestPower": _largest_power(result),
         "colours": list(COLOURS),
         "coloursDark": list(ON_DARK),
+        "potential": robot.potential,
         "gravityColour": GRAVITY,
         "bodies": _bodies(instants),
         "largestForce": largest.force,

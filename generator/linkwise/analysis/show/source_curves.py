@@ -95,7 +95,7 @@ def _sources(result: AnalysisResult, point: int, rows: Sequence[int]) -> list[_S
     if rest:
         others = tuple(every[at] for at in rest)
         found.append(_Source("torques", f"torques of {len(rest)} others", 0, ("acc_tau",), others))
-    found.append(_Source("gravity", "gravity", 0, ("acc_gravity",)))
+    found.append(_Source("gravity", result.robot.potential, 0, ("acc_gravity",)))
     found.append(_Source("velocity", "velocities", 0, MOTION))
     if any(c.quantity in LOSSES for c in result.columns):
         found.append(_Source("passive", "springs and losses", 0, LOSSES))
