@@ -14,7 +14,6 @@ from linkwise import progress
 from linkwise.analysis import analyze, tables
 from linkwise.analysis import run as run_module
 from linkwise.analysis.settings import Lowpass, Processing
-from linkwise.analysis.stream import KeptSamples, stride_for
 from linkwise.cli.app import app
 from linkwise.errors import LinkwiseError
 from motion_logs import PLANAR3, smooth, write_csv
@@ -216,17 +215,6 @@ def test_warnings_and_left_out_columns_are_told(call, tmp_path):
     result = call("analyze", log, *ROBOT, "--out", tmp_path / "out", *asked)
     assert "if that is degrees, pass --units deg" in result.stderr
     assert "left out: emg" in result.stderr
-
-
-def test_long_logs_are_thinned_evenly():
-    values = np.arange(2000.0).reshape(2, 1000)
-    keep = KeptSamples(2, 7)
-    for start in range(0, 1000, 13):
-        keep(values[:, start : start + 13])
-    np.testing.assert_array_equal(keep.values, values[:, ::7])
-    assert stride_for(1000, 10, 500_000, 1500) == 1
-    assert stride_for(1501, 10, 500_000, 1500) == 2
-    assert stride_for(10_000, 1000, 500_000, 1500) == 20
 
 
 def test_importing_the_commands_needs_no_extra():

@@ -12,7 +12,11 @@ import pytest
 from command_line import run_linkwise
 from linkwise import analyze, kept_package
 from linkwise.study import run_study
+from linkwise.study.comparisons import compared
+from linkwise.study.study_plan import Comparison
+from linkwise.study.trial_summary import TrialSummary
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
 from studies import CHOICES, CYCLES, HEAD, NAMES, QUICK, TRIALS, Here, write_study
 
 pd = pytest.importorskip("pandas")
@@ -90,6 +94,30 @@ def test_levels_are_compared_over_whole_curves(arms: Path) -> None:
     tests = pd.read_parquet(arms / "out/tests.parquet")
     assert tests.threshold.iloc[0] == pytest.approx(expected.zstar, rel=1e-6)
     np.testing.assert_allclose(tests.p, [cluster.P for cluster in expected.clusters], rtol=1e-4)
+
+
+@pytest.mark.parametrize(("seed", "shift"), [(7, 0.3), (16, 0.6), (30, 0.8)])
+def test_only_what_has_a_p_below_alpha_of_its_own_differs(seed: int, shift: float) -> None:
+    """Rough curves pass the threshold of t for moments that chance makes more often than alpha says."""
+    spm1d = pytest.importorskip("spm1d")
+    noise = np.random.default_rng(seed)
+    first, second = (gaussian_filter1d(noise.standard_normal((10, 101)), 1, axis=1) for _ in range(2))
+    first += shift
+    above = spm1d.stats.ttest_paired(first, second).inference(0.05, two_tailed=True).clusters
+    surely = [(*cluster.endpoints, cluster.P) for cluster in above if cluster.P < 0.05]
+    assert len(surely) < len(above)
+    trials = [
+        TrialSummary(
+            f"{level}{at}", {"subject": f"S{at}", "pace": level}, {"tau": "N·m"}, {}, {"tau": curve}, 1
+        )
+        for level, curves in (("slow", first), ("fast", second))
+        for at, curve in enumerate(curves)
+    ]
+    ((found,), told) = compared(Comparison("pace", ("slow", "fast"), ("tau",)), trials)
+    assert told == ()
+    shown = [(part.start, part.end, part.p) for part in found.clusters]
+    np.testing.assert_allclose(np.reshape(shown, (-1, 3)), np.reshape(surely, (-1, 3)), rtol=1e-9)
+    assert all(start < end and p < 0.05 for start, end, p in shown)
 
 
 def test_figures_for_papers_hold_their_fonts(arms: Path) -> None:

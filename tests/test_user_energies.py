@@ -1,5 +1,6 @@
 """Link energies that a user writes in SymPy, against equations of motion written by hand."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -19,8 +20,17 @@ from linkwise import (
     read_system,
     write_package,
 )
+from linkwise.analysis import analyze
+from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.show.page import page_data
+from linkwise.emit.c.quantity_table import potential, quantity_lines
+from linkwise.graphs import overlay, part_label
 from linkwise.package.load import import_package
+from linkwise.progress import silent
+from linkwise.report import TermQuery, terms_markdown, terms_report
 from linkwise.symbolic.system import EnergySystem
+from matplotlib.text import Text
+from motion_logs import smooth, write_csv
 
 CART, TURNTABLE = str(DATA / "cart_pendulum.py"), str(DATA / "turntable.py")
 BACKENDS = ("numpy", "torch", "autograd", *(pytest.param(b, marks=needs_compiler) for b in ("c", "native")))
@@ -329,3 +339,36 @@ def test_the_header_explains_linear_terms_where_there_are_some(file: str, told: 
     system = read_system(str(DATA / file))
     table = generate(system, ["c"])[f"c/{system.name}.h"].partition("An array holds")[0]
     assert ("what energies linear in qd add to c1" in table) == told
+
+
+@pytest.mark.parametrize(("robot", "word"), [(CART, "potential energy"), ("planar3", "gravity")])
+def test_what_energies_give_at_rest_is_called_gravity_only_where_it_is(
+    robot: str, word: str, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    package = directory_of(robot)
+    joints = load_robot(package).joints
+    log = write_csv(tmp_path / "log.csv", smooth(40, len(joints)), joints)
+    analysis = analyze(log, package, induced=["joints"])
+    symbolic = read_system(robot)
+    model = import_package(package).load("autograd")
+    graph = overlay(model, 0, 0, model.graph_parts(0, 0))
+    query = TermQuery(joint=None, order=0)
+    page = json.loads(page_data(analysis))
+    said = {name: _texts(analysis.figure(name)) for name in ("causes", "shares", "induced")} | {
+        "page": [page["potential"]],
+        "page, induced": [curve["label"] for curve in page["induced"][0]["curves"]],
+        "notebook": [analysis._repr_html_().replace("<td>", " ")],
+        "graph": [part_label(graph, at) for at in range(len(graph.parts))],
+        "terms": [terms_markdown(terms_report(symbolic, query, 10**6, False, silent))],
+        "C": [*quantity_lines(symbolic, linear=False), potential(symbolic)],
+    }
+    for place, texts in said.items():
+        if place != "notebook":  # which has the largest cause alone
+            assert any(word in text for text in texts), place
+        assert word == "gravity" or not any("gravity" in text for text in texts), place
+    meanings = [column["meaning"] for column in analysis.record()["columns"]]
+    assert all("other potentials" in meaning for meaning in meanings if "gravity" in meaning)
+
+
+def _texts(figure: Any) -> list[str]:
+    return [text.get_text() for text in figure.findobj(Text)]

@@ -4,6 +4,8 @@ import mmap
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 
@@ -17,10 +19,7 @@ def collected(blocks: Iterator[Array], width: int, directory: Path | None) -> Ar
     """All rows of blocks (any, width) as one writable array, in memory or in a file in `directory`."""
     if directory is None:
         return np.concatenate([np.empty((0, width)), *blocks])
-    # The file has no name from the start: the system removes it with its last user, however that ends. Where
-    # an open file keeps a name, that must not be among results.
-    place = None if system_here().keeps_open_files else directory
-    with tempfile.TemporaryFile(dir=place) as file:
+    with _nameless(directory) as file:
         for block in blocks:
             file.write(np.ascontiguousarray(block).tobytes())
         file.flush()
@@ -28,6 +27,56 @@ def collected(blocks: Iterator[Array], width: int, directory: Path | None) -> Ar
             return np.empty((0, width))
         # The array holds the file behind it, and outlives this function.
         return np.frombuffer(mmap.mmap(file.fileno(), 0)).reshape(-1, width)
+
+
+class EverySample:
+    """A sink that keeps all samples as one array (columns, samples), in memory or in a file in `directory`.
+
+    To be closed by `with`; `values` is read before, and outlives it.
+    """
+
+    def __init__(self, columns: int, samples: int, directory: Path | None = None) -> None:
+        self._shape, self._seen = (columns, samples), 0
+        self._file = None if directory is None else _nameless(directory)
+        self._held = np.empty(self._shape) if directory is None else None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def __call__(self, block: Array) -> None:
+        """Take a block (columns, any)."""
+        first, self._seen = self._seen, self._seen + block.shape[1]
+        if self._held is not None:
+            self._held[:, first : self._seen] = block
+            return
+        assert self._file is not None
+        for row, values in enumerate(block):
+            self._file.seek(8 * (row * self._shape[1] + first))
+            self._file.write(values.tobytes())
+
+    @property
+    def values(self) -> Array:
+        """All samples, (columns, samples), to be read."""
+        if self._held is not None:
+            return self._held
+        assert self._file is not None
+        self._file.flush()
+        mapped = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
+        return np.frombuffer(mapped).reshape(self._shape)
+
+
+def _nameless(directory: Path) -> Any:
+    """A file without a name from the start: the system removes it with its last user, however that ends.
+
+    Where an open file keeps a name, that must not be among results.
+    """
+    return tempfile.TemporaryFile(dir=None if system_here().keeps_open_files else directory)
 
 
 def let_go(rows: Array) -> None:

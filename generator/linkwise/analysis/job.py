@@ -23,11 +23,12 @@ from linkwise.analysis.result_table import result_table
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
-from linkwise.analysis.stream import KeptSamples, Sink, Streamed, span_of, stream
+from linkwise.analysis.stream import Sink, Streamed, span_of, stream
 from linkwise.analysis.tables import Format
 from linkwise.analysis.torques import Decomposer
 from linkwise.errors import within
 from linkwise.extras import extra
+from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 if TYPE_CHECKING:
@@ -121,8 +122,8 @@ class Job:
         start, stop = span_of(self.samples, self.processing)
         return stop - start
 
-    def analysis(self, done: Streamed, kept: KeptSamples) -> Analysis:
-        """The samples kept, with what is known of them all."""
+    def analysis(self, done: Streamed, values: Array) -> Analysis:
+        """All samples (columns, S), with what is known of them."""
         return Analysis(
             self.decomposer.robot,
             self.reading,
@@ -130,7 +131,7 @@ class Job:
             self.source,
             self.samples.rate,
             self.decomposer.columns,
-            kept.values,
+            values,
             done.totals,
             done.work,
             done.joint_work,
@@ -142,7 +143,6 @@ class Job:
             self.samples.ignored,
             (*self.samples.warnings, *self._twice_borne(), *self._never_on(done)),
             done.samples,
-            kept.stride,
             self.closed,
             self.decomposer.times,
             self.phases,

@@ -39,13 +39,13 @@ def causes_of(
     shown: Callable[[str], str] = str,
     together: bool = True,
 ) -> tuple[Cause, ...]:
-    """Gravity, loads, what joints have of their own, and each joint's motion, in this order.
+    """Gravity or potential energy, loads, what joints have of their own, and each joint's motion, in order.
 
     joints: what they are called, (n,), and shown: how a name is written. together: a motion is one cause,
     else its acceleration and its velocity are two.
     """
     there = {column.quantity for column in result.columns}
-    found = [Cause("gravity", "gravity", ("tau_gravity",))]
+    found = [Cause("gravity", result.robot.potential, ("tau_gravity",))]
     found += [Cause("load", shown(name), ("tau_load",), e) for e, name in enumerate(result.load_labels)]
     found += [Cause("own", f"own {name.removeprefix('tau_')}", (name,)) for name in PASSIVE if name in there]
     kinds: tuple[Any, ...] = ("motion",) if together else ("acceleration", "velocity")

@@ -16,6 +16,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import without_ending
 from linkwise.package.load import Model, Package, open_package
 from linkwise.package.manifest import FILE, BodyEntry, PassiveEntry
+from linkwise.package.potential_word import potential_word
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,11 @@ class LoadedRobot:
 
     contacts: GroundContacts | None = None
     """Where the robot stands on the ground."""
+
+    @property
+    def potential(self) -> str:
+        """What the shares g_ij are called."""
+        return potential_word(self.package.manifest.tree is not None)
 
     @property
     def followers(self) -> tuple[FollowingJoint, ...]:

@@ -1,11 +1,14 @@
 """The result of an analysis: named arrays, and the record of how they were made."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.contact_times import ContactTimes
+from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.phases import PlacedPhase
@@ -18,6 +21,9 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, printable
 from linkwise.package.load import Array
 from linkwise.runtime.chosen_names import nearest_first
+
+PART_BYTES, LEAST = 4 << 20, 256
+"""Size of a part of a result, about, and its fewest samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +38,8 @@ class Totals:
 class AnalysisResult:
     """Who loads whom: S samples of every torque term, SI units; index order joint, link, cause.
 
-    `values` (columns, S) holds what `columns` names; terms that are identically 0 have no column.
-    With a `stride` above 1 only every stride-th of `total` samples is kept; `totals`, `work` and `closure`
-    cover all of them. n joints, N links.
+    `values` (columns, S) holds what `columns` names, of every sample, in memory or in a file behind it;
+    terms that are identically 0 have no column. n joints, N links.
     """
 
     robot: LoadedRobot
@@ -63,7 +68,6 @@ class AnalysisResult:
     """Columns of the log that no joint has."""
     warnings: tuple[str, ...]
     total: int
-    stride: int = 1
     closed: ClosedLog | None = None
     """How far positions of the log were off, where joints are tied; None where none are."""
     times: ContactTimes | None = None
@@ -84,6 +88,16 @@ class AnalysisResult:
     def table(self) -> dict[str, Array]:
         """All columns (S,) by their names: pandas.DataFrame(result.table), polars.DataFrame(result.table)."""
         return {column.name: values for column, values in zip(self.columns, self.values, strict=True)}
+
+    def parts(self) -> Iterator[Self]:
+        """Results of some samples each, one after the other: all samples, of which memory holds few.
+
+        Totals, work and closure of each are those of the whole movement.
+        """
+        most = max(LEAST, PART_BYTES // (8 * len(self.columns)))
+        for at in range(0, self.values.shape[1], most):
+            yield replace(self, values=self.values[:, at : at + most])
+            let_go(self.values)
 
     @property
     def time(self) -> Array:
@@ -178,8 +192,6 @@ class AnalysisResult:
         if self.robot.contacts is not None:
             parts.append(printable(f"contacts {listed(self.robot.contacts.names)}"))
         parts += [f"loads filtered at {cutoff:g} Hz" for cutoff in cutoffs]
-        if self.stride > 1:
-            parts.append(f"one sample in {self.stride} shown")
         return " · ".join(parts)
 
     @property

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing_robot import standing_on
+from linkwise.analysis.disk_rows import EverySample
 from linkwise.analysis.job import Analysis, Wanted, prepared
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.analysis.loads import Load, Loads
@@ -14,8 +15,7 @@ from linkwise.analysis.payload import carrying
 from linkwise.analysis.phases import Phase
 from linkwise.analysis.settings import Payload, Processing, Reading
 from linkwise.analysis.show import check_figure, figure_png
-from linkwise.analysis.show.page import NUMBERS, SAMPLES, numbers_on_page, report
-from linkwise.analysis.stream import KeptSamples, stride_for
+from linkwise.analysis.show.page import report
 from linkwise.analysis.tables import open_table
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names, json_text
@@ -64,8 +64,8 @@ def analyze(
         (reading or Reading(), processing or Processing()),
     )
     job = prepared(Path(log), loaded, *made, borne, held, progress, wanted)
-    kept = KeptSamples(len(job.decomposer.columns), 1)
-    return job.analysis(job.run(kept, progress), kept)
+    with EverySample(len(job.decomposer.columns), job.count) as kept:
+        return job.analysis(job.run(kept, progress), kept.values)
 
 
 def analyze_to(
@@ -81,8 +81,9 @@ def analyze_to(
 ) -> tuple[Analysis, Sequence[Path]]:
     """Analyse a log of any length with flat memory; `out` appears when everything is done.
 
-    Returns the analysis thinned to what a page shows, and the files written. Raises LinkwiseError, as
-    `analyze` does, and where `out` holds something else than a former result or cannot be written.
+    Returns the analysis, whose samples are in a file without a name where figures or a page are wanted and
+    else are none, and the files written. Raises LinkwiseError, as `analyze` does, and where `out` holds
+    something else than a former result or cannot be written.
     """
     robot = standing_on(robot, contacts)
     for name in wanted.figures:
@@ -94,16 +95,19 @@ def analyze_to(
     with whole_directory(out, _refuse_unless_result) as draft:
         job = prepared(log, robot, reading, processing, loads, contacts, progress, wanted, draft)
         columns = job.decomposer.columns
-        stride = stride_for(job.count, numbers_on_page(columns), NUMBERS, SAMPLES)
-        kept = KeptSamples(len(columns), stride)
         note = json_text(job.note())
-        with open_table(draft / f"analysis.{wanted.table}", columns, note) as table:
+        keep = (job.count, draft) if wanted.page or wanted.figures else (0, None)
+        with (
+            open_table(draft / f"analysis.{wanted.table}", columns, note) as table,
+            EverySample(len(columns), *keep) as kept,
+        ):
 
             def sink(block: Array) -> None:
-                kept(block)
                 table(block)
+                if keep[0]:
+                    kept(block)
 
-            analysis = job.analysis(job.run(sink, progress), kept)
+            analysis = job.analysis(job.run(sink, progress), kept.values)
         _write_beside_table(draft, analysis, wanted)
         names = sorted(file.name for file in draft.iterdir())
     return analysis, [out / name for name in names]

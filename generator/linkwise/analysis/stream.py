@@ -28,31 +28,6 @@ BLOCK_BYTES = 48 << 20
 """Size of a block handed on, about: some three of them are in memory at any time."""
 
 
-class KeptSamples:
-    """A sink that keeps every `stride`-th sample, the first of all included."""
-
-    def __init__(self, columns: int, stride: int) -> None:
-        self.stride = stride
-        self._blocks: list[Array] = [np.empty((columns, 0))]
-        self._seen = 0
-
-    def __call__(self, block: Array) -> None:
-        """Take a block (columns, samples)."""
-        first = -self._seen % self.stride
-        self._seen += block.shape[1]
-        self._blocks.append(block if self.stride == 1 else block[:, first :: self.stride].copy())
-
-    @property
-    def values(self) -> Array:
-        """All samples kept so far, (columns, kept)."""
-        return np.concatenate(self._blocks, axis=1)
-
-
-def stride_for(samples: int, columns: int, numbers: int, most: int) -> int:
-    """Smallest stride that keeps at most `most` samples and `numbers` numbers in all."""
-    return max(1, -(-samples // max(2, min(most, numbers // columns))))
-
-
 @dataclass(frozen=True)
 class Streamed:
     """What is known once every block is done."""

@@ -26,7 +26,8 @@ def graph(
     link: Annotated[str, typer.Option(help="Link j: its name, its number from 1, or all")] = "all",
     coordinate: Annotated[str, typer.Option(help="Joint k, whose motion is followed, or all")] = "all",
     order: Annotated[
-        str, typer.Option(help="2 acceleration, 1 velocity, 0 gravity (of a joint: position), or all")
+        str,
+        typer.Option(help="2 acceleration, 1 velocity, 0 potential energy (of a joint: position), or all"),
     ] = "all",
     fold: Annotated[
         str, typer.Option(help="What a picture draws as one node: none, line, link, or auto")

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from linkwise.package.potential_word import potential_word
+
 if TYPE_CHECKING:
     from linkwise.runtime.lagrangians.torque_graph import TorqueGraph
 
@@ -29,6 +31,8 @@ class Overlay:
     links: tuple[str, ...]
     """Names of the links through which it is loaded: one, or all."""
     link: int | None
+    potential: str
+    """What the part without any motion is called."""
     parts: tuple[TorqueGraph, ...]
     nodes: dict[str, Any]
     users: dict[str, tuple[int, ...]]
@@ -67,17 +71,27 @@ def overlay(robot: Any, joint: int, link: int | None, parts: Sequence[TorqueGrap
         joint,
         tuple(robot.link_names) if link is None else (robot.link_names[link],),
         link,
+        potential_word(_is_rigid(robot)),
         tuple(parts),
         nodes,
         {key: tuple(numbers) for key, numbers in users.items()},
     )
 
 
+def _is_rigid(robot: Any) -> bool:
+    """Whether a robot has bodies that are somewhere; links of energies are nowhere."""
+    try:
+        robot.kinematics  # noqa: B018
+    except ValueError:
+        return False
+    return True
+
+
 def part_label(graph: Overlay, part: int) -> str:
     """A part as it is written: c2 q̈_1, or gravity."""
     order, k = graph.parts[part].order, graph.coordinate(part)
     if k is None:
-        return {None: graph.torque, 0: "gravity", 1: "all velocities", 2: "all accelerations"}[order]
+        return {None: graph.torque, 0: graph.potential, 1: "all velocities", 2: "all accelerations"}[order]
     if order is None:
         return f"motion of joint {k + 1}"
     through = "" if graph.link is None else f"{graph.link + 1},"

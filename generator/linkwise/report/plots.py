@@ -150,7 +150,7 @@ def _draw_terms(figure: Any, report: TermsReport) -> None:
     axes.grid(visible=False)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
-    axes.set_title(f"{drawn(report.robot)}: terms of τᵢⱼ\nin brackets: those for the {report.query}")
+    axes.set_title(f"{drawn(report.robot)}: terms of τᵢⱼ\nin brackets: those for the {report.kept}")
 
 
 def _draw_cell(axes: Any, x: int, y: int, row: TorqueTerms, shade: float) -> None:

@@ -17,7 +17,7 @@ def terms_json(report: TermsReport) -> dict[str, Any]:
         "schema": 1,
         "robot": report.robot,
         "form": report.form,
-        "kept": str(report.query),
+        "kept": report.kept,
         "joints": list(report.joints),
         "links": list(report.links),
         "complete": report.complete,
@@ -66,7 +66,8 @@ def terms_markdown(report: TermsReport) -> str:
     view = {
         "robot": report.robot,
         "form": report.form,
-        "kept": str(report.query),
+        "potential": report.potential,
+        "kept": report.kept,
         "progress": progress_line(report),
         "summary": [_summary(row, report.links) for row in report.rows],
         "coordinates": [k + 1 for k in moving],

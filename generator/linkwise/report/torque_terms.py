@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
+from linkwise.package.potential_word import potential_word
 from linkwise.progress import Progress
 from linkwise.report.expanded_torques import form_of, link_torques
 from linkwise.report.laurent import BudgetExceededError
 from linkwise.report.operations import LinkOperations, Operations, link_operations, summed
 from linkwise.report.term_count import RunningCount, TermCount, TermQuery
-from linkwise.symbolic.system import System
+from linkwise.symbolic.system import EnergySystem, System
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class TermsReport:
     robot: str
     query: TermQuery
     form: str
+    potential: str
+    """What terms without any motion are called."""
     joints: tuple[str, ...]
     links: tuple[str, ...]
     counted: int
@@ -44,6 +47,11 @@ class TermsReport:
     rows: tuple[TorqueTerms, ...]
     operations: tuple[LinkOperations, ...]
     sums: dict[int, tuple[Operations, Operations]]
+
+    @property
+    def kept(self) -> str:
+        """What is kept, in words."""
+        return str(self.query) if self.query.order else self.potential
 
     @property
     def complete(self) -> bool:
@@ -71,6 +79,7 @@ def terms_report(
         system.name,
         query,
         form_of(system),
+        potential_word(not isinstance(system, EnergySystem)),
         tuple(c.name for c in system.coordinates),
         system.link_names,
         counted,

@@ -22,7 +22,7 @@ FEWEST = 3
 
 @dataclass(frozen=True, eq=False)
 class Cluster:
-    """A part of the cycle, in %, where curves differ, and its p."""
+    """A part of the cycle, in %, where curves differ, and its p; means differ over the whole."""
 
     start: float
     end: float
@@ -44,6 +44,7 @@ class Compared:
     p: float
     """Of means; of curves NaN, as each of their parts has its own."""
     clusters: tuple[Cluster, ...]
+    """Parts that differ: each of some width, and of a p of its own below `alpha`."""
 
 
 def compared(
@@ -99,16 +100,25 @@ def _tested(comparison: Comparison, name: str, unit: str, first: Spread, second:
     about = comparison, name, unit, (first, second)
     if first.each.shape[1] == 1:
         t, p = _of_means(comparison.paired, first.each[:, 0], second.each[:, 0])
-        whole = (Cluster(0.0, 100.0, p),) if p < comparison.alpha else ()
+        whole = _that_differ(comparison, [Cluster(0.0, 100.0, p)])
         return Compared(*about, np.array([t]), float("nan"), p, whole)
     field, found = _of_curves(comparison, first.each, second.each)
     scale = 100 / (first.each.shape[1] - 1)
-    clusters = tuple(
+    above = [
         Cluster(float(c.endpoints[0]) * scale, float(c.endpoints[1]) * scale, float(c.P))
         for c in found.clusters
-    )
+    ]
     statistic = np.asarray(field.z, dtype=float)
-    return Compared(*about, statistic, float(found.zstar), float("nan"), clusters)
+    differ = _that_differ(comparison, above)
+    return Compared(*about, statistic, float(found.zstar), float("nan"), differ)
+
+
+def _that_differ(comparison: Comparison, parts: Sequence[Cluster]) -> tuple[Cluster, ...]:
+    """Those of some width and of a p below alpha.
+
+    A curve may pass the threshold for so short a while that as short a while is found by chance more often.
+    """
+    return tuple(part for part in parts if part.start < part.end and part.p < comparison.alpha)
 
 
 def _of_means(is_paired: bool, first: Array, second: Array) -> tuple[float, float]:

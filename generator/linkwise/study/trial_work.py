@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from linkwise.analysis.contacts.standing_robot import standing_on
+from linkwise.analysis.disk_rows import EverySample
 from linkwise.analysis.job import Job, prepared
 from linkwise.analysis.payload import carrying
 from linkwise.analysis.phases import Phase
-from linkwise.analysis.show.page import NUMBERS, SAMPLES, numbers_on_page, report
-from linkwise.analysis.stream import KeptSamples, stride_for
+from linkwise.analysis.show.page import report
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
 from linkwise.output import whole_directory
@@ -86,7 +86,8 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         columns = job.decomposer.columns
         kept = kept_columns(columns, plan.columns)
         labels = {"trial": trial.name, **dict(trial.labels)}
-        thinned = KeptSamples(len(columns), stride_for(job.count, numbers_on_page(columns), NUMBERS, SAMPLES))
+        every = EverySample(len(columns), *((job.count, draft) if plan.pages else (0, None)))
+        files.enter_context(every)
         moments = RunningMoments(len(columns))
         table = files.enter_context(
             TrialTable(draft / TABLE, labels, [columns[at] for at in kept], plan.cycles is not None)
@@ -96,7 +97,7 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         def sink(block: Array) -> None:
             moments(block)
             if plan.pages:
-                thinned(block)
+                every(block)
             if plan.cycles is None:
                 table(block[kept])
             else:
@@ -104,13 +105,13 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
 
         done = job.run(sink, silent)
         cycles.finish(draft)
+        analysis = job.analysis(done, every.values)
     np.savez(
         draft / SUMMARY,
         statistics=moments.table,
         names=[c.name for c in columns],
         units=[c.unit for c in columns],
     )
-    analysis = job.analysis(done, thinned)
     if plan.pages:
         (draft / PAGE).write_bytes(report(analysis).encode())
     seconds = time.monotonic() - began

@@ -1,12 +1,14 @@
-"""Curves of what loads one joint, cause by cause, the largest first."""
+"""Numbers of what loads one joint in each phase of the movement, cause by cause, the largest first."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.analysis.joint_causes import causes_of, curves
+from linkwise.analysis.joint_causes import Cause, causes_of, curves
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.largest_few import largest_few
+from linkwise.analysis.show.shown_phases import ShownPhase, require_samples, shown_phases
 from linkwise.package.load import Array
 from linkwise.plotstyle import drawn
 
@@ -17,38 +19,85 @@ NOTHING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class CauseCurve:
-    """What one cause asks of the joint, (S,) in its unit; a motion has acceleration and velocity in one."""
+class PhaseNumbers:
+    """A phase, and the mean and root mean square of each row in it, (rows,)."""
 
-    label: str
-    values: Array
-    is_motion: bool = False
+    phase: ShownPhase
+    mean: Array
+    rms: Array
 
 
-def cause_curves(result: AnalysisResult, i: int) -> list[CauseCurve]:
-    """All causes of joint i's torque that ask anything of it."""
+@dataclass(frozen=True, eq=False)
+class CauseNumbers:
+    """What loads the joint: all causes together, the first row, and then each."""
+
+    labels: tuple[str, ...]
+    phases: tuple[PhaseNumbers, ...]
+    apart: bool
+    """Whether no two phases share a sample."""
+
+
+class _Tally:
+    """Sums of curves and of their products in turn over the samples of a phase."""
+
+    def __init__(self, curves: int) -> None:
+        self.count, self.sums, self.products = 0, np.zeros(curves), np.zeros((curves, curves))
+
+    def __call__(self, values: Array) -> None:
+        self.count += values.shape[1]
+        self.sums += values.sum(axis=1)
+        self.products += values @ values.T
+
+    def mean(self, rows: Array) -> Array:
+        """Of sums of curves; rows (rows, curves) say of which, by ones."""
+        mean: Array = rows @ self.sums / self.count
+        return mean
+
+    def rms(self, rows: Array) -> Array:
+        """Root mean square of the same."""
+        squares = np.einsum("ra,ab,rb->r", rows, self.products, rows)
+        root: Array = np.sqrt(np.maximum(squares, 0.0) / self.count)
+        return root
+
+
+def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
+    """Of joint i, over every sample of the movement. Raises LinkwiseError for a phase that has none."""
     causes = causes_of(result, result.robot.plot_joints, drawn)
-    every = curves(result, causes, i)
-    peaks = np.abs(every).max(axis=1, initial=0.0)
-    there = peaks > NOTHING * peaks.max()
-    return [
-        CauseCurve(cause.label, values, cause.is_motion)
-        for cause, values, is_there in zip(causes, every, there, strict=True)
-        if is_there
-    ]
+    asked = shown_phases(result, i)
+    every, tallies = _Tally(1 + len(causes)), [_Tally(1 + len(causes)) for _ in asked]
+    peaks, apart = np.zeros(len(causes)), True
+    for part in result.parts():
+        values = np.concatenate([torque_curve(part, i), curves(part, causes, i)])
+        on = [phase.on(part) for phase in asked]
+        np.maximum(peaks, np.abs(values[1:]).max(axis=1), out=peaks)
+        apart &= not on or int(np.sum(on, axis=0).max()) <= 1
+        for tally, here in zip(tallies, on, strict=True):
+            tally(values[:, here])
+        every(values)
+    shown = require_samples(result, asked, [tally.count for tally in tallies])
+    labels, rows = _rows(causes, every, peaks > NOTHING * peaks.max(initial=0.0))
+    found = zip(shown, tallies if shown == asked else [every], strict=True)
+    numbers = tuple(PhaseNumbers(phase, tally.mean(rows), tally.rms(rows)) for phase, tally in found)
+    return CauseNumbers(labels, numbers, apart)
 
 
-def largest(every: list[CauseCurve]) -> list[CauseCurve]:
+def torque_curve(result: AnalysisResult, i: int) -> Array:
+    """The joint's torque, (1, S) in its unit."""
+    found: Array = result.torque[:, [i]].T
+    return found
+
+
+def _rows(causes: Sequence[Cause], every: _Tally, there: Array) -> tuple[tuple[str, ...], Array]:
     """The largest over the movement first; of many motions the small ones are one, the last."""
-    order = sorted(every, key=lambda one: -rms(one.values))
-    motions = [one for one in order if one.is_motion]
-    small = [motions[at] for at in largest_few([rms(one.values) for one in motions], MOST)[1]]
-    if not small:
-        return order
-    rest = CauseCurve(f"motion of {len(small)} others", np.sum([one.values for one in small], axis=0))
-    return [*(one for one in order if one not in small), rest]
-
-
-def rms(values: Array) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
+    alone = np.eye(1 + len(causes))
+    sizes = every.rms(alone)[1:]
+    order = sorted(np.flatnonzero(there).tolist(), key=lambda at: -float(sizes[at]))
+    motions = [at for at in order if causes[at].is_motion]
+    small = [motions[at] for at in largest_few(sizes[motions], MOST)[1]]
+    named = [at for at in order if at not in small]
+    labels = ["all causes together", *(causes[at].label for at in named)]
+    rows = [alone[0], *(alone[1 + at] for at in named)]
+    if small:
+        labels.append(f"motion of {len(small)} others")
+        rows.append(alone[[1 + at for at in small]].sum(axis=0))
+    return tuple(labels), np.array(rows)

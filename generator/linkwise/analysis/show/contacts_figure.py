@@ -1,11 +1,13 @@
 """What the ground bears at each contact, link by link, and the torques of the joints that stand on it."""
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import load_unit
+from linkwise.analysis.show.drawn_curves import drawn_curves, foot
 from linkwise.analysis.show.largest_few import largest_few
 from linkwise.extras import extra
 from linkwise.package.load import Array
@@ -29,9 +31,9 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
     """A column of panels for each contact: forces, what links ask of it as areas, then joints' torques."""
     ground = result.robot.contacts
     assert ground is not None
-    force = _forces(result)
-    shown = _components(result, force)
-    alone = _largest(force)
+    peaks, asked = _sizes(result)
+    shown = _components(result, peaks)
+    alone = largest_few(asked.sum(axis=(0, 1))[:-1], MOST)[0]
     joints = [_joints(result, c) for c in range(len(ground.names))]
     count = len(shown) + max(map(len, joints))
     figure = extra("matplotlib.figure").Figure(
@@ -41,7 +43,7 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
     for c, name in enumerate(ground.names):
         panels[0, c].set_title(drawn(name))
         for panel, axis in zip(panels[:, c], shown, strict=False):
-            _draw_force(panel, result, force[c], (c, axis), alone)
+            _draw_force(panel, result, (c, axis), alone, np.flatnonzero(asked[c, axis]).tolist())
         for panel, i in zip(panels[len(shown) :, c], joints[c], strict=False):
             _draw_torque(panel, result, c, i)
         drawn_here = len(shown) + len(joints[c])
@@ -58,7 +60,14 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     figure.legend(
-        handles.values(), handles.keys(), loc="outside lower center", ncols=4, handlelength=2, fontsize=8
+        handles.values(),
+        handles.keys(),
+        loc="outside lower center",
+        ncols=4,
+        handlelength=2,
+        fontsize=8,
+        title=textwrap.fill(foot(result), round(15 * float(figure.get_figwidth()))),
+        title_fontsize=7,
     )
     figure.suptitle(
         f"What the ground bears · {drawn(result.robot.name, 40)} · {drawn(result.source, 50)}",
@@ -69,12 +78,12 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
     return figure  # type: ignore[no-any-return]
 
 
-def _forces(result: AnalysisResult) -> list[Array]:
-    """Of each contact what each link asks of the ground, and last what else does, (3, N + 1, S)."""
+def _forces(result: AnalysisResult) -> Array:
+    """Of each contact what each link asks of the ground, and last what else does, (contacts, 3, N + 1, S)."""
     robot, ground = result.robot, result.robot.contacts
     assert ground is not None
     first = len(robot.constraint_rows) - len(ground.rows)
-    out = [np.zeros((3, len(robot.links) + 1, len(result.time))) for _ in ground.names]
+    out = np.zeros((len(ground.names), 3, len(robot.links) + 1, len(result.time)))
     for column, values in zip(result.columns, result.values, strict=True):
         row = (column.cause or 0) - first
         if column.quantity not in ("force", "force_link") or row < 0:
@@ -90,9 +99,22 @@ def _forces(result: AnalysisResult) -> list[Array]:
     return out
 
 
-def _components(result: AnalysisResult, force: list[Array]) -> list[int]:
+def _sizes(result: AnalysisResult) -> tuple[Array, Array]:
+    """Largest magnitudes (contacts, 3) of forces, and magnitudes by link added up, (contacts, 3, N + 1)."""
+    ground = result.robot.contacts
+    assert ground is not None
+    shape = len(ground.names), len(PARTS)
+    peaks, asked = np.zeros(shape), np.zeros((*shape, len(result.robot.links) + 1))
+    for part in result.parts():
+        forces = _forces(part)
+        np.maximum(peaks, np.abs(forces.sum(axis=2)).max(axis=-1), out=peaks)
+        asked += np.abs(forces).sum(axis=-1)
+    return peaks, asked
+
+
+def _components(result: AnalysisResult, peaks: Array) -> list[int]:
     """Axes along which the ground bears anything, the upright one first."""
-    sizes = np.max([np.abs(cube.sum(axis=1)).max(axis=-1) for cube in force], axis=0)
+    sizes = peaks.max(axis=0)
     up = int(np.abs(result.robot.up).argmax())
     order = [up, *(axis for axis in range(3) if axis != up)]
     return [axis for axis in order if sizes[axis] > LITTLE * sizes.max()] or [up]
@@ -115,30 +137,30 @@ def _joints(result: AnalysisResult, contact: int) -> list[int]:
     return found[:JOINTS]
 
 
-def _largest(force: list[Array]) -> list[int]:
-    """Links that ask most of the ground."""
-    means = np.sum([np.abs(cube).sum(axis=(0, 2)) for cube in force], axis=0)[:-1]
-    return largest_few(means, MOST)[0]
-
-
 def _draw_force(
-    panel: Any, result: AnalysisResult, force: Array, place: tuple[int, int], alone: list[int]
+    panel: Any, result: AnalysisResult, place: tuple[int, int], alone: list[int], there: list[int]
 ) -> None:
-    """place: contact and axis; alone: links with areas of their own."""
+    """place: contact and axis; alone: links with areas of their own; there: what asks anything at all."""
     contact, axis = place
     _shade(panel, result, contact)
-    parts = force[axis]
-    areas = [(drawn(result.robot.plot_links[j]), tone(at), parts[j]) for at, j in enumerate(alone)]
-    rest = [j for j in range(len(parts)) if j not in alone]
-    if rest and np.abs(parts[rest]).max() > 0.0:
-        areas.append(("all else", GRAVITY, parts[rest].sum(axis=0)))
-    for sign in (1.0, -1.0):
-        base = np.zeros(len(result.time))
-        for label, ink, values in areas:
-            top = base + sign * np.maximum(sign * values, 0.0)
-            panel.fill_between(result.time, base, top, color=ink, alpha=0.55, linewidth=0, label=label)
+    rest = [j for j in range(len(result.robot.links) + 1) if j not in alone]
+    groups = [[j] for j in alone] + ([rest] if set(rest) & set(there) else [])
+    looks = [(drawn(result.robot.plot_links[j]), tone(at)) for at, j in enumerate(alone)]
+    looks.append(("all else", GRAVITY))
+
+    def stacked(part: AnalysisResult) -> Array:
+        parts = _forces(part)[contact, axis]
+        areas = np.array([parts[members].sum(axis=0) for members in groups])
+        ends = [np.cumsum(some, axis=0) for some in (np.maximum(areas, 0.0), np.minimum(areas, 0.0))]
+        return np.concatenate([*ends, parts.sum(axis=0)[None]])
+
+    found = drawn_curves(result, stacked)
+    for edges in (found.greatest[: len(groups)], found.least[len(groups) : -1]):
+        base = np.zeros(len(found.middle))
+        for (label, ink), top in zip(looks, edges, strict=False):
+            panel.fill_between(found.middle, base, top, color=ink, alpha=0.55, linewidth=0, label=label)
             base = top
-    panel.plot(result.time, parts.sum(axis=0), color=INK, linewidth=1.6, label="found from the motion")
+    panel.plot(found.time[-1], found.values[-1], color=INK, linewidth=1.6, label="found from the motion")
     _draw_measured(panel, result, contact, axis)
     panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
 
@@ -147,33 +169,43 @@ def _draw_measured(panel: Any, result: AnalysisResult, contact: int, axis: int) 
     ground = result.robot.contacts
     assert ground is not None
     first = len(result.robot.constraint_rows) - len(ground.rows)
-    for column, values in zip(result.columns, result.values, strict=True):
+    for at, column in enumerate(result.columns):
         row = (column.cause or 0) - first
         mine = column.quantity == "force_measured" and ground.owners[row] == contact
         if mine and ground.rows[row].endswith(f" force_{PARTS[axis]}"):
-            panel.plot(result.time, values, color="#C21E56", linestyle="dashed", label="measured")
+            _draw_column(panel, result, at, color="#C21E56", linestyle="dashed", label="measured")
 
 
 def _draw_torque(panel: Any, result: AnalysisResult, contact: int, i: int) -> None:
     _shade(panel, result, contact)
     name, unit = drawn(result.robot.plot_joints[i]), load_unit(result.robot.units[i])
-    for column, values in zip(result.columns, result.values, strict=True):
+    for at, column in enumerate(result.columns):
         if column.joint == i and column.quantity == "tau":
-            panel.plot(result.time, values, color=INK, linewidth=1.6, label="found from the motion")
+            _draw_column(panel, result, at, color=INK, linewidth=1.6, label="found from the motion")
         if column.joint == i and column.quantity == "tau_as_loads":
-            panel.plot(result.time, values, color="#C21E56", linestyle="dotted", label="by what was measured")
+            _draw_column(panel, result, at, color="#C21E56", linestyle="dotted", label="by what was measured")
     panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
     panel.set_title(f"torque of {name} ({unit})", fontsize=9)
 
 
+def _draw_column(panel: Any, result: AnalysisResult, at: int, **look: Any) -> None:
+    found = drawn_curves(result, lambda part: part.values[[at]])
+    panel.plot(found.time[0], found.values[0], **look)
+
+
 def _shade(panel: Any, result: AnalysisResult, contact: int) -> None:
     """Shade when a contact is on, darker where another is too, so that who bears what is a choice."""
-    on = np.array([v for c, v in zip(result.columns, result.values, strict=True) if c.quantity == "contact"])
-    mine = on[contact] > 0
-    several = mine & ((on > 0).sum(axis=0) > 1)
-    for where, ink, label in ((mine, SHADE, "stands"), (several, SHARED, "others stand too")):
+    rows = [row for row, column in enumerate(result.columns) if column.quantity == "contact"]
+
+    def stands(part: AnalysisResult) -> Array:
+        on = part.values[rows] > 0.0
+        return np.array([on[contact], on[contact] & (on.sum(axis=0) > 1)], dtype=float)
+
+    found = drawn_curves(result, stands)
+    looks = ((SHADE, "stands"), (SHARED, "others stand too"))
+    for where, (ink, label) in zip(found.greatest > 0.0, looks, strict=True):
         panel.fill_between(
-            result.time,
+            found.middle,
             0,
             1,
             where=where,

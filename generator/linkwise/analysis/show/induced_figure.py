@@ -1,9 +1,11 @@
 """Accelerations of a point, or of the joints, and the shares of what causes them, over time."""
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.induced_points import CENTRE, JOINTS
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.drawn_curves import foot
 from linkwise.analysis.show.source_curves import SourceCurve, components, source_curves
 from linkwise.extras import extra
 from linkwise.plotstyle import BROWN, GRAVITY, INK, colour, dash, drawn
@@ -20,11 +22,12 @@ def induced(result: AnalysisResult, point: int) -> "Figure":
     shown = components(result, point, angular=False)
     figure = extra("matplotlib.figure").Figure(figsize=(8.4, 1.2 + 1.7 * len(shown)), layout="constrained")
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    curves = list(source_curves(result, point, list(shown)))
+    curves = source_curves(result, point, list(shown))
     for at, (panel, (component, unit)) in enumerate(zip(panels, shown.values(), strict=True)):
         for curve in curves:
             look = _look(curve, len(result.robot.driven))
-            panel.plot(result.time, curve.values[at], label=drawn(curve.label, 34), **look)
+            line = curve.drawn.time[at], curve.drawn.values[at]
+            panel.plot(*line, label=drawn(curve.label, 34), **look)
         panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
         panel.set_ylabel(f"{drawn(component)} ({unit})")
     panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8, handlelength=2.6)
@@ -37,7 +40,7 @@ def induced(result: AnalysisResult, point: int) -> "Figure":
         ha="left",
         fontsize=11,
     )
-    figure.supxlabel(result.provenance, x=0.01, ha="left", fontsize=7, color="#5A6270")
+    figure.supxlabel(textwrap.fill(foot(result), 140), x=0.01, ha="left", fontsize=7, color="#5A6270")
     return figure  # type: ignore[no-any-return]
 
 

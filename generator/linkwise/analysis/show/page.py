@@ -1,6 +1,7 @@
 """`report.html`: the analysis as one file that needs no network."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,19 @@ from linkwise.analysis.result_columns import Column
 from linkwise.analysis.result_quantities import FORCES, GROUND, INDUCED, TORQUE_OF
 from linkwise.analysis.show.induced_figure import TITLES
 from linkwise.analysis.show.packed_page import encoded, packed, plotly_parts
+from linkwise.analysis.show.page_curves import (
+    CurveSums,
+    at_instants,
+    curve_data,
+    page_pieces,
+    point_data,
+    stride_for,
+)
 from linkwise.analysis.show.poses import poses
 from linkwise.analysis.show.source_curves import components, numbers_of_curves, source_curves
 from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
+from linkwise.package.load import Array
 from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
 
 NUMBERS, SAMPLES = 500_000, 1500
@@ -26,7 +36,7 @@ TEMPLATE = "analysis/report.html.j2"
 
 
 def report(result: AnalysisResult) -> str:
-    """HTML of the page for a result already thinned to what a page can hold."""
+    """HTML of the page."""
     return render(TEMPLATE, view(result))
 
 
@@ -56,10 +66,16 @@ def numbers_on_page(columns: Sequence[Column]) -> int:
 def page_data(result: AnalysisResult) -> str:
     """JSON with numbers as base64 of little-endian float64: the table's, to the last bit.
 
+    Of long movements the page has evenly spaced instants, and beside them the curves' least and greatest
+    values; numbers that it states are of all samples.
+
     Names are as people read them, but for those of columns, which are the table's. Joints that follow others
     are left out.
     """
     robot = result.robot
+    stride = stride_for(result.total, numbers_on_page(result.columns), NUMBERS, SAMPLES)
+    instants = replace(result, values=at_instants(result, stride))
+    largest = _largest_forces(result)
     place = {i: at for at, i in enumerate(robot.driven)}
     shown = [
         at for at, c in enumerate(result.columns) if on_page(c) and (c.joint is None or c.joint in place)
@@ -69,9 +85,9 @@ def page_data(result: AnalysisResult) -> str:
         "log": printable(result.source),
         "provenance": result.provenance,
         "rate": result.rate,
-        "samples": len(result.time),
+        "samples": len(instants.time),
         "total": result.total,
-        "stride": result.stride,
+        "stride": stride,
         "convention": result.processing.convention,
         "joints": _joints(result),
         "links": list(map(printable, robot.links)),
@@ -88,17 +104,21 @@ def page_data(result: AnalysisResult) -> str:
             }
             for c in (result.columns[at] for at in shown)
         ],
-        "values": encoded(result.values[shown]),
+        "values": encoded(instants.values[shown]),
         "mean": result.totals.mean[shown].tolist(),
         "peak": result.totals.peak[shown].tolist(),
+        "curves": curve_data(result, stride > 1),
         "work": _work(result),
+        "largestPower": _largest_power(result),
         "colours": list(COLOURS),
         "coloursDark": list(ON_DARK),
+        "potential": robot.potential,
         "gravityColour": GRAVITY,
-        "bodies": _bodies(result),
-        "loads": _loads(result),
-        "reactions": _reactions(result),
-        "induced": [_induced(result, point) for point in range(len(result.induced))],
+        "bodies": _bodies(instants),
+        "largestForce": largest.force,
+        "loads": _loads(instants),
+        "reactions": _reactions(instants, largest.pressed),
+        "induced": [_induced(result, point, stride > 1) for point in range(len(result.induced))],
     }
     return script_data(data)
 
@@ -144,20 +164,54 @@ def _loads(result: AnalysisResult) -> list[dict[str, str]]:
     ]
 
 
-def _reactions(result: AnalysisResult) -> list[dict[str, str]]:
+@dataclass(frozen=True, eq=False)
+class _LargestForces:
+    """Over all samples, in N: any load's or contact's force, and of each contact what presses upright."""
+
+    force: float
+    pressed: Array
+
+
+def _largest_forces(result: AnalysisResult) -> _LargestForces:
+    up, ground, pose = _upright(result), result.robot.contacts, model_pose(result.robot.model)
+    force, pressed = 0.0, np.zeros(0 if ground is None else len(ground.names))
+    if not result.loads and ground is None:
+        return _LargestForces(force, pressed)
+    for part in result.parts():
+        borne = [load.wrench(part.time, part.q, pose).force for load in result.loads]
+        forces = part.contact_wrench[..., 3:]
+        every = np.concatenate([*(one[:, None] for one in borne), forces], axis=1)
+        force = max(force, float(np.linalg.norm(every, axis=-1).max(initial=0.0)))
+        np.maximum(pressed, np.abs(forces @ up).max(axis=0, initial=0.0), out=pressed)
+    return _LargestForces(force, pressed)
+
+
+def _largest_power(result: AnalysisResult) -> float:
+    """Of any joint or contact into any link, or against any load, over all samples, in W."""
+    kinds = ("power_link", "power_load", "power_contact")
+    peaks = zip(result.columns, result.totals.peak, strict=True)
+    return max((float(peak) for column, peak in peaks if column.quantity in kinds), default=0.0)
+
+
+def _upright(result: AnalysisResult) -> Array:
+    up: Array = np.array(result.robot.up) / np.linalg.norm(result.robot.up)
+    return up
+
+
+def _reactions(result: AnalysisResult, largest: Array) -> list[dict[str, str]]:
     """The same of contacts, and what they feed into links, (N, samples) in W.
 
-    A frame that is held bears where the moment has no share along the ground.
+    A frame that is held bears where the moment has no share along the ground. largest: what presses upright
+    at each contact, in N
     """
     ground = result.robot.contacts
     if ground is None:
         return []
-    up = np.array(result.robot.up) / np.linalg.norm(result.robot.up)
-    out = []
+    up, out = _upright(result), []
     for c, place in enumerate(ground.places(result.robot.model, result.q)):
         moment, force = result.contact_wrench[:, c, :3], result.contact_wrench[:, c, 3:]
         pressed = force @ up
-        firm = np.abs(pressed) > FIRM * np.abs(pressed).max(initial=0.0)
+        firm = np.abs(pressed) > FIRM * largest[c]
         centre = place + np.cross(up, moment) / np.where(firm, pressed, np.inf)[:, None]
         if ground.contacts[c].kind == "rolling":
             centre = place + ground.touch(c)
@@ -172,9 +226,10 @@ def _feeds(column: Column, contact: int) -> bool:
     return column.quantity == "power_contact" and column.cause == contact
 
 
-def _induced(result: AnalysisResult, point: int) -> dict[str, Any]:
-    """Components of what accelerates, and the curves of its sources, (rows, samples) each."""
+def _induced(result: AnalysisResult, point: int, is_thinned: bool) -> dict[str, Any]:
+    """Components of what accelerates, and the curves of its sources, (rows, samples) each or thinned."""
     name, rows = result.induced[point], components(result, point)
+    pieces = page_pieces(result, CurveSums(result)) if is_thinned else result.total
     return {
         "name": printable(TITLES.get(name, name)),
         "rows": [{"name": printable(row), "unit": unit} for row, unit in rows.values()],
@@ -183,9 +238,11 @@ def _induced(result: AnalysisResult, point: int) -> dict[str, Any]:
                 "kind": curve.kind,
                 "label": printable(curve.label),
                 "at": curve.number,
-                "values": encoded(curve.values),
+                "points": point_data(result, curve.drawn, pieces)
+                if is_thinned
+                else {"values": encoded(curve.drawn.values)},
             }
-            for curve in source_curves(result, point, list(rows))
+            for curve in source_curves(result, point, list(rows), pieces)
         ],
     }
 

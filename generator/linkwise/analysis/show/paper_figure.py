@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import Column, load_unit
 from linkwise.analysis.result_quantities import Quantity
+from linkwise.analysis.show.drawn_curves import drawn_curves, foot
 from linkwise.extras import extra
 from linkwise.plotstyle import colour, dash, drawn
 
@@ -48,8 +49,8 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
     for row, (title, names) in enumerate(named, len(panels)):
         _legend(figure.add_subplot(grid[row]), title, names)
     figure.suptitle(f"{drawn(robot.name, 60)} · {drawn(result.source, 60)}", x=0.01, ha="left", fontsize=11)
-    foot = "\n".join(textwrap.wrap(_left_out(result), 125) + textwrap.wrap(result.provenance, 125))
-    figure.supxlabel(foot, x=0.01, ha="left", fontsize=7, color="#5A6270")
+    below = "\n".join(textwrap.wrap(_left_out(result), 125) + textwrap.wrap(foot(result), 125))
+    figure.supxlabel(below, x=0.01, ha="left", fontsize=7, color="#5A6270")
     return figure  # type: ignore[no-any-return]
 
 
@@ -100,12 +101,14 @@ def own_joints(result: AnalysisResult) -> tuple[int, ...]:
 
 
 def _draw(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
-    for column, values in zip(result.columns, result.values, strict=True):
-        if panel.wanted(column):
-            at = column.joint if column.link is None else column.link
-            if column.quantity == "tau_load":
-                at = len(result.robot.links) + (column.cause or 0)
-            axis.plot(result.time, values, **_style(at or 0))
+    rows = [row for row, column in enumerate(result.columns) if panel.wanted(column)]
+    found = drawn_curves(result, lambda part: part.values[rows])
+    for row, time, values in zip(rows, found.time, found.values, strict=True):
+        column = result.columns[row]
+        at = column.joint if column.link is None else column.link
+        if column.quantity == "tau_load":
+            at = len(result.robot.links) + (column.cause or 0)
+        axis.plot(time, values, **_style(at or 0))
     axis.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
     axis.set_title(panel.title)
     axis.set_ylabel(panel.symbol, fontsize=11, parse_math=True)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.drawn_curves import drawn_curves, foot
 from linkwise.analysis.show.largest_few import largest_few
 from linkwise.analysis.work import Work
 from linkwise.extras import extra
@@ -44,7 +45,7 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     bars.grid(axis="y", visible=False)
     _legend(bars, "link or load" if result.loads else "link")
     figure.suptitle(f"{drawn(robot.name, 40)} · {drawn(result.source, 50)}", x=0.01, ha="left", fontsize=11)
-    made = textwrap.fill(result.provenance, 140)
+    made = textwrap.fill(foot(result), 140)
     figure.supxlabel(made, x=0.01, ha="left", fontsize=7, color="#5A6270")
     return figure  # type: ignore[no-any-return]
 
@@ -53,12 +54,12 @@ def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> None:
     """Joints that give and take most in colour, the others thin and grey behind them."""
     driven, work = list(result.robot.driven), result.joint_work
     named, rest = largest_few((work.given + work.taken)[driven], MOST)
-    values = result.joint_power.T[driven]
+    found = drawn_curves(result, lambda part: part.joint_power.T[driven])
     for at, i in enumerate(named):
-        panel.plot(result.time, values[i], label=joints[i], color=colour(at), linestyle=dash(at))
+        panel.plot(found.time[i], found.values[i], label=joints[i], color=colour(at), linestyle=dash(at))
     for at, i in enumerate(rest):
         label = f"{len(rest)} others" if at == 0 else None
-        panel.plot(result.time, values[i], label=label, color=REST, linewidth=0.7, zorder=1.5)
+        panel.plot(found.time[i], found.values[i], label=label, color=REST, linewidth=0.7, zorder=1.5)
     panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
     panel.set_title("Power of each joint")
     panel.set_ylabel("W")

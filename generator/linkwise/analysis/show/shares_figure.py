@@ -26,7 +26,7 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 3))
     bars = _bars(left, every)
     _bars(right, movement)
-    out = "gravity and loads" if result.loads else "gravity"
+    out = f"{robot.potential} and loads" if result.loads else robot.potential
     left.set_title(f"everything, {out} too")
     right.set_title(f"the movement alone, without {out}")
     left.set_yticks(range(len(robot.driven)), [drawn(robot.plot_joints[i]) for i in robot.driven])

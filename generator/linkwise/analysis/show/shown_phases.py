@@ -1,5 +1,6 @@
 """Phases of the movement that a picture tells apart, and which samples are in each."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,32 +16,43 @@ from linkwise.plotstyle import drawn
 
 @dataclass(frozen=True, eq=False)
 class ShownPhase:
-    """A phase, and which samples (S,) are in it."""
+    """A phase or the rest of the movement beside it; without one, the whole."""
 
     label: str
-    on: NDArray[np.bool_]
+    placed: PlacedPhase | None = None
+    is_rest: bool = False
+
+    def on(self, result: AnalysisResult) -> NDArray[np.bool_]:
+        """Which samples (S,) of a result, or a part of one, are in it."""
+        if self.placed is None:
+            return np.ones(len(result.time), dtype=np.bool_)
+        contacts = np.array(
+            [v for c, v in zip(result.columns, result.values, strict=True) if c.quantity == "contact"]
+        )
+        return self.placed.on(result.robot, result.time, result.q, contacts) ^ self.is_rest
 
 
-def phases_of(result: AnalysisResult, i: int) -> list[ShownPhase]:
-    """Phases that were asked for; else while the one load or contact that joint i bears acts, and while not.
-
-    Raises LinkwiseError for a phase that has no sample.
-    """
-    made = not result.phases
-    contacts = np.array(
-        [v for c, v in zip(result.columns, result.values, strict=True) if c.quantity == "contact"]
-    )
+def shown_phases(result: AnalysisResult, i: int) -> list[ShownPhase]:
+    """Phases asked for; else while the one load or contact that joint i bears acts, and while it does not."""
     found = []
     for phase in asked_phases(result, i):
-        on = phase.on(result.robot, result.time, result.q, contacts)
-        found.append(ShownPhase(drawn(phase.name, 34), on))
+        found.append(ShownPhase(drawn(phase.name, 34), phase))
         if phase.rest:
-            found.append(ShownPhase(drawn(phase.rest, 34), ~on))
-    empty = [phase.label for phase in found if not phase.on.any()]
-    if empty and not made:
+            found.append(ShownPhase(drawn(phase.rest, 34), phase, is_rest=True))
+    return found
+
+
+def require_samples(
+    result: AnalysisResult, phases: list[ShownPhase], counts: Sequence[int]
+) -> list[ShownPhase]:
+    """The phases, by how many samples each has; the whole movement where they tell nothing apart.
+
+    Raises LinkwiseError for a phase that was asked for and has no sample.
+    """
+    empty = [phase.label for phase, count in zip(phases, counts, strict=True) if not count]
+    if empty and result.phases:
         raise LinkwiseError(f"--phase: {empty[0]} has no sample between {_span(result)}")
-    whole = ShownPhase("the whole movement", np.ones(len(result.time), dtype=np.bool_))
-    return [whole] if made and (empty or not found) else found
+    return [ShownPhase("the whole movement")] if empty or not phases else phases
 
 
 def _span(result: AnalysisResult) -> str:

@@ -1,6 +1,6 @@
 """Curves of an acceleration and of its shares: each joint's torque and each load alone, the rest by kind."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,6 +9,7 @@ import numpy as np
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import Column
 from linkwise.analysis.result_quantities import Quantity
+from linkwise.analysis.show.drawn_curves import PIECES, DrawnCurves, drawn_curves
 from linkwise.analysis.show.largest_few import largest_few
 from linkwise.package.load import Array
 
@@ -18,18 +19,19 @@ NOTHING = 1e-9
 """Of the largest component, below which one is but rounding."""
 MOTION: tuple[Quantity, ...] = ("acc_qd", "acc_constraint", "acc_kinematic")
 LOSSES: tuple[Quantity, ...] = ("acc_spring", "acc_damping", "acc_friction")
+Kind = Literal["sum", "torque", "torques", "gravity", "velocity", "passive", "load", "contact"]
 
 
 @dataclass(frozen=True)
 class SourceCurve:
     """What sources of one kind make of the components of an acceleration."""
 
-    kind: Literal["sum", "torque", "torques", "gravity", "velocity", "passive", "load", "contact"]
+    kind: Kind
     label: str
     number: int
     """Of a joint among those that have torques, of a load among loads; else 0."""
-    values: Array
-    """(rows, S)."""
+    drawn: DrawnCurves
+    """A curve for each row."""
 
 
 def components(result: AnalysisResult, point: int, angular: bool = True) -> dict[int, tuple[str, str]]:
@@ -51,28 +53,57 @@ def components(result: AnalysisResult, point: int, angular: bool = True) -> dict
     return {row: names[row] for row in moving or list(shares)[:1]}
 
 
-def source_curves(result: AnalysisResult, point: int, rows: Sequence[int]) -> Iterator[SourceCurve]:
-    """The acceleration, and what sums to it."""
-    every = result.robot.driven
-    yield SourceCurve("sum", "all together", 0, _sum(result, point, rows, ("acc",)))
-    torques = [_sum(result, point, rows, ("acc_tau",), i) for i in every]
-    there = [at for at in range(len(every)) if torques[at].any()]  # contacts may leave none to a base
-    named, rest = largest_few([float(np.abs(torques[at]).sum()) for at in there], MOST)
-    alone, others = [there[at] for at in named], [there[at] for at in rest]
-    for at in alone:
-        yield SourceCurve("torque", f"torque of {result.robot.plot_joints[every[at]]}", at, torques[at])
-    if others:
-        together = np.sum([torques[at] for at in others], axis=0)
-        yield SourceCurve("torques", f"torques of {len(others)} others", 0, together)
-    yield SourceCurve("gravity", "gravity", 0, _sum(result, point, rows, ("acc_gravity",)))
-    yield SourceCurve("velocity", "velocities", 0, _sum(result, point, rows, MOTION))
+@dataclass(frozen=True)
+class _Source:
+    """What `SourceCurve` is drawn of: columns of some kinds, and of these causes, where any are named."""
+
+    kind: Kind
+    label: str
+    number: int
+    quantities: tuple[Quantity, ...]
+    causes: tuple[int | None, ...] = ()
+
+
+def source_curves(
+    result: AnalysisResult, point: int, rows: Sequence[int], pieces: int = PIECES
+) -> list[SourceCurve]:
+    """The acceleration, and what sums to it, over all samples."""
+    sources = _sources(result, point, rows)
+
+    def curves(part: AnalysisResult) -> Array:
+        return np.concatenate([_sum(part, point, rows, source) for source in sources])
+
+    found = drawn_curves(result, curves, pieces)
+    each = [slice(at, at + len(rows)) for at in range(0, len(sources) * len(rows), len(rows))]
+    return [
+        SourceCurve(source.kind, source.label, source.number, found.only(mine))
+        for source, mine in zip(sources, each, strict=True)
+    ]
+
+
+def _sources(result: AnalysisResult, point: int, rows: Sequence[int]) -> list[_Source]:
+    every, names = result.robot.driven, result.robot.plot_joints
+    torques = [
+        _Source("torque", f"torque of {names[i]}", at, ("acc_tau",), (i,)) for at, i in enumerate(every)
+    ]
+    sizes = np.zeros(len(every))
+    for part in result.parts():
+        sizes += [float(np.abs(_sum(part, point, rows, one)).sum()) for one in torques]
+    there = np.flatnonzero(sizes)  # contacts may leave none to a base
+    alone, rest = ([int(there[at]) for at in some] for some in largest_few(sizes[there], MOST))
+    found = [_Source("sum", "all together", 0, ("acc",)), *(torques[at] for at in alone)]
+    if rest:
+        others = tuple(every[at] for at in rest)
+        found.append(_Source("torques", f"torques of {len(rest)} others", 0, ("acc_tau",), others))
+    found.append(_Source("gravity", result.robot.potential, 0, ("acc_gravity",)))
+    found.append(_Source("velocity", "velocities", 0, MOTION))
     if any(c.quantity in LOSSES for c in result.columns):
-        yield SourceCurve("passive", "springs and losses", 0, _sum(result, point, rows, LOSSES))
+        found.append(_Source("passive", "springs and losses", 0, LOSSES))
     for e, label in enumerate(result.load_labels):
-        yield SourceCurve("load", label, e, _sum(result, point, rows, ("acc_load",), e))
+        found.append(_Source("load", label, e, ("acc_load",), (e,)))
     if result.robot.contacts is not None:
-        moved = _sum(result, point, rows, ("acc_contact",))
-        yield SourceCurve("contact", "contacts that slip or turn", 0, moved)
+        found.append(_Source("contact", "contacts that slip or turn", 0, ("acc_contact",)))
+    return found
 
 
 def numbers_of_curves(columns: Sequence[Column]) -> int:
@@ -81,17 +112,11 @@ def numbers_of_curves(columns: Sequence[Column]) -> int:
     return sum(kinds.get(column.quantity, 0) for column in columns)
 
 
-def _sum(
-    result: AnalysisResult,
-    point: int,
-    rows: Sequence[int],
-    quantities: tuple[Quantity, ...],
-    cause: int | None = None,
-) -> Array:
-    """Shares (rows, S) of some kinds, of one cause or of all."""
+def _sum(result: AnalysisResult, point: int, rows: Sequence[int], source: _Source) -> Array:
+    """A source's share (rows, S)."""
     out = np.zeros((len(rows), len(result.time)))
     for column, values in zip(result.columns, result.values, strict=True):
-        asked = column.quantity in quantities and cause in (None, column.cause)
+        asked = column.quantity in source.quantities and (not source.causes or column.cause in source.causes)
         if asked and column.point == point and column.row in rows:
             out[rows.index(column.row)] += values
     return out

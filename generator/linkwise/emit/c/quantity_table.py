@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from itertools import product
 
 from linkwise.emit.c.header import aligned
+from linkwise.package.potential_word import potential_word
 from linkwise.symbolic.system import EnergySystem, System
 
 FORCES = {"rad": "N m", "m": "N"}
@@ -39,7 +40,7 @@ def quantity_lines(system: System, linear: bool) -> Iterator[str]:
         ["i, k in", *(f"{i}, {k}" for i, k in pairs), "what it is"],
         ["c2(i, j, k)", *inertias, "mass matrix of link j"],
         ["c1(i, j, k)", *dampings, _velocity(linear)],
-        ["g(i, j)", *forces, f"torque at rest: {_at_rest(system)}"],
+        ["g(i, j)", *forces, f"torque at rest: {potential(system)}"],
         ["tau(i, j)", *forces, "the sum above"],
         ["c0(i, j, k)", *(STIFFNESSES[pair] for pair in pairs), "position gradient, d(tau(i, j))/d(q_k)"],
     ]
@@ -51,8 +52,9 @@ def quantity_lines(system: System, linear: bool) -> Iterator[str]:
 
 def causes(system: System) -> str:
     """Say what a link's torques come from."""
-    potentials = ", its weight and other potentials"
-    return f"by its inertia{potentials if isinstance(system, EnergySystem) else ' and its weight'}"
+    return (
+        f"by its inertia and {'its potential energy' if isinstance(system, EnergySystem) else 'its weight'}"
+    )
 
 
 def _velocity(linear: bool) -> str:
@@ -60,5 +62,6 @@ def _velocity(linear: bool) -> str:
     return f"velocity coefficients, 1/2 d(tau)/d(qd){of}"
 
 
-def _at_rest(system: System) -> str:
-    return "gravity and other potentials" if isinstance(system, EnergySystem) else "gravity"
+def potential(system: System) -> str:
+    """What g is called."""
+    return potential_word(not isinstance(system, EnergySystem))

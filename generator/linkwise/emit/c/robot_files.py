@@ -8,7 +8,7 @@ from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
 from linkwise.emit.c.calls import LinkKernels, group_calls, link_calls, motions, total
 from linkwise.emit.c.prototypes import at_position, cost, functions, pointers, under_torque
-from linkwise.emit.c.quantity_table import causes, quantity_lines
+from linkwise.emit.c.quantity_table import causes, potential, quantity_lines
 from linkwise.emit.c.sizes import EntryCounts, Span, groups, most_counts, tile, waiting_counts, whole
 from linkwise.escape import c_string
 from linkwise.symbolic.system import RigidSystem, System
@@ -84,6 +84,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "totals": totals(robot.size),
         "full": ", ".join(array for array in ("c1", "c0", "h1") if robot.size.of(array)),
         "causes": causes(system),
+        "potential": potential(system),
         "quantities": list(quantity_lines(system, linear)),
         "links": list(header.link_lines(system, links)),
         "joints": list(header.joint_lines(system)),

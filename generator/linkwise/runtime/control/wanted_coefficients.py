@@ -70,8 +70,8 @@ def stiffness_of(given: Any, structure: Structure) -> Gain | None:
         given = entries_apart("stiffness", given, structure)[1]
     elif is_natural(given):
         raise TypeError(
-            "stiffness is Natural, but a position loads nothing by itself, and gravity is compensated; give "
-            "numbers in N m/rad or N/m"
+            "stiffness is Natural, but a position loads nothing by itself, and gravity, as any potential, is "
+            "compensated; give numbers in N m/rad or N/m"
         )
     gain = Gain("stiffness", given, structure.joint_names, structure.N)
     check_paths("stiffness", given, structure)

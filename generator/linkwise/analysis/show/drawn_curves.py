@@ -1,0 +1,84 @@
+"""Curves as they are drawn: of long movements the least and the greatest value of each piece."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from linkwise.analysis.result import AnalysisResult
+from linkwise.package.load import Array
+
+PIECES = 1500
+"""Of a figure's curve at most, about a pixel each."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnCurves:
+    """Points of curves, two of each piece where it is least and greatest; all samples of short movements."""
+
+    time: Array
+    """(curves, points) in s, ascending."""
+    values: Array
+    """(curves, points)."""
+    middle: Array
+    """Middle of each piece, (pieces,) in s."""
+    least: Array
+    """(curves, pieces)."""
+    greatest: Array
+    """(curves, pieces)."""
+
+    def only(self, rows: slice) -> "DrawnCurves":
+        """Some of the curves."""
+        return DrawnCurves(
+            self.time[rows], self.values[rows], self.middle, self.least[rows], self.greatest[rows]
+        )
+
+
+def piece_size(total: int, pieces: int) -> int:
+    """Samples of a piece, 1 where every sample is drawn."""
+    return 1 if total <= 2 * pieces else -(-total // pieces)
+
+
+def drawn_curves(
+    result: AnalysisResult, curves: Callable[[AnalysisResult], Array], pieces: int = PIECES
+) -> DrawnCurves:
+    """Curves (curves, S) of every part of the result, thinned to so many pieces where they are long."""
+    size = piece_size(result.total, pieces)
+    made = []
+    time, values = np.empty(0), np.empty((0, 0))
+    for part in result.parts():
+        found = curves(part)
+        time = np.concatenate([time, part.time])
+        values = np.concatenate([values, found], axis=1) if values.shape[1] else found
+        whole = len(time) // size * size
+        head = time[:whole], values[:, :whole]
+        made.append(_whole(*head) if size == 1 else _thinned(*head, size))
+        time, values = time[whole:].copy(), values[:, whole:].copy()
+    if len(time):
+        made.append(_thinned(time, values, len(time)))
+    fields = zip(*made, strict=True)
+    return DrawnCurves(*(np.concatenate(field, axis=-1) for field in fields))
+
+
+def _whole(time: Array, values: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """The fields of `DrawnCurves`, of every sample."""
+    return np.broadcast_to(time, values.shape), values, time, values, values
+
+
+def _thinned(time: Array, values: Array, size: int) -> tuple[Array, Array, Array, Array, Array]:
+    """The same of pieces."""
+    pieces = values.reshape(len(values), -1, size)
+    at = np.sort(np.stack([pieces.argmin(axis=-1), pieces.argmax(axis=-1)], axis=-1), axis=-1)
+    points = np.take_along_axis(pieces, at, axis=-1).reshape(len(values), -1)
+    place = (at + size * np.arange(pieces.shape[1])[:, None]).reshape(len(values), -1)
+    middle = time.reshape(-1, size).mean(axis=-1)
+    return time[place], points, middle, pieces.min(axis=-1), pieces.max(axis=-1)
+
+
+def foot(result: AnalysisResult) -> str:
+    """How the motion was derived, and how curves are drawn where they are not drawn whole."""
+    size = piece_size(result.total, PIECES)
+    if size == 1:
+        return result.provenance
+    drawn = f"curves are drawn by the least and greatest of every {size:,} samples, numbers are of all"
+    return f"{result.provenance} · {drawn}"

@@ -1,0 +1,110 @@
+"""Curves that a page can draw: their numbers over all samples, and where they are long the points drawn."""
+
+from typing import Any
+
+import numpy as np
+
+from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.result_quantities import PASSIVE, TERMS
+from linkwise.analysis.show.drawn_curves import DrawnCurves, drawn_curves, piece_size
+from linkwise.analysis.show.packed_page import encoded
+from linkwise.analysis.show.source_curves import numbers_of_curves
+from linkwise.package.load import Array
+
+PIECES, POINTS = 750, 1_000_000
+"""Of a long curve, and of all together, at most; a point takes five bytes."""
+MOTION = ("tau_qdd", "tau_qd")
+Key = tuple[str, int, int | None, int | None]
+"""Kind of cause ("motion" and "whole" are sums), joint and cause by their places, and link or all of them."""
+
+
+class CurveSums:
+    """Which columns are added up to each curve."""
+
+    def __init__(self, result: AnalysisResult) -> None:
+        place = {i: at for at, i in enumerate(result.robot.driven)}
+        rows: dict[Key, list[int]] = {}
+        for row, c in enumerate(result.columns):
+            if c.joint not in place:
+                continue
+            i, kinds = place[c.joint], _kinds(c.quantity)
+            cause = place.get(c.cause) if c.quantity in MOTION and c.cause is not None else c.cause
+            links = (None,) if c.link is None else (c.link,) if c.quantity == "tau_link" else (None, c.link)
+            for kind in kinds:
+                for link in links:
+                    rows.setdefault((kind, i, cause, link), []).append(row)
+        self.keys = tuple(rows)
+        self._rows = np.array([row for some in rows.values() for row in some], dtype=np.intp)
+        counts = np.array([len(some) for some in rows.values()], dtype=np.intp)
+        self._starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
+
+    def __call__(self, part: AnalysisResult) -> Array:
+        """The curves (curves, S) of a part of the result."""
+        sums: Array = np.add.reduceat(part.values[self._rows], self._starts, axis=0)
+        return sums
+
+
+def _kinds(quantity: str) -> tuple[str, ...]:
+    if quantity in MOTION:
+        return quantity, "motion"
+    if quantity in ("tau", "tau_link"):
+        return ("whole",)
+    return (quantity,) if quantity in (*TERMS, *PASSIVE, "tau_load") else ()
+
+
+def page_pieces(result: AnalysisResult, sums: CurveSums) -> int:
+    """Into how many pieces long curves of a page are cut."""
+    curves = len(sums.keys) + numbers_of_curves(result.columns)
+    return max(2, min(PIECES, POINTS // (2 * curves)))
+
+
+def curve_data(result: AnalysisResult, is_thinned: bool) -> dict[str, Any]:
+    """Of each curve, by its key, mean and largest magnitude over all samples, and its points if thinned.
+
+    Those of a curve that is drawn whole are the samples on the page. The instant of the largest torque by
+    motion is told, too.
+    """
+    sums = CurveSums(result)
+    mean, peak = np.zeros((2, len(sums.keys)))
+    moving = [row for row, column in enumerate(result.columns) if column.quantity in MOTION]
+    most, busiest = 0.0, float(result.time[0])
+    for part in result.parts():
+        sizes = np.abs(sums(part))
+        mean += sizes.sum(axis=1) / result.total
+        np.maximum(peak, sizes.max(axis=1), out=peak)
+        moved = np.abs(part.values[moving]).max(axis=0, initial=0.0)
+        if moved.max() > most:
+            most, busiest = float(moved.max()), float(part.time[moved.argmax()])
+    pieces = page_pieces(result, sums)
+    return {
+        "keys": [" ".join("null" if x is None else str(x) for x in key) for key in sums.keys],
+        "mean": mean.tolist(),
+        "peak": peak.tolist(),
+        "busiest": busiest,
+        "piece": piece_size(result.total, pieces) if is_thinned else 1,
+        "points": point_data(result, drawn_curves(result, sums, pieces), pieces) if is_thinned else None,
+    }
+
+
+def point_data(result: AnalysisResult, found: DrawnCurves, pieces: int) -> dict[str, str]:
+    """Points of thinned curves, float32, and where each is in its piece, in 255ths of the piece."""
+    size = piece_size(result.total, pieces)
+    per = found.values.shape[1] // max(1, len(found.middle))
+    starts = size * (np.arange(found.values.shape[1]) // per)
+    within = (found.time - float(result.time[0])) * result.rate - starts
+    offsets = np.rint(np.clip(within / max(1, size - 1), 0.0, 1.0) * 255)
+    return {"values": encoded(found.values, "<f4"), "offsets": encoded(offsets, "u1")}
+
+
+def stride_for(samples: int, columns: int, numbers: int, most: int) -> int:
+    """Smallest stride that keeps at most `most` samples and `numbers` numbers in all."""
+    return max(1, -(-samples // max(2, min(most, numbers // columns))))
+
+
+def at_instants(result: AnalysisResult, stride: int) -> Array:
+    """Every so many-th sample, the first included, (columns, kept)."""
+    seen, kept = 0, list[Array]()
+    for part in result.parts():
+        kept.append(part.values[:, -seen % stride :: stride].copy())
+        seen += part.values.shape[1]
+    return np.concatenate(kept, axis=1)
