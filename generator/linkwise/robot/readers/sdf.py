@@ -1,7 +1,8 @@
 """The dynamics of an SDFormat model, Gazebo's; what it says beyond them is noted. Meshes are never opened.
 
 A joint whose child hangs on another joint already closes a loop: it is cut and becomes a constraint, at the
-place and along the axis that it has at q = 0, which is how the file shows the model.
+place and along the axis that it has at q = 0, which is how the file shows the model. A root that no joint
+holds to the world is free, as in SDFormat. A link that is called `world` is the world.
 """
 
 import re
@@ -13,13 +14,12 @@ from xml.etree.ElementTree import Element
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot import transforms
-from linkwise.robot.description import ZERO3, Body, Description, Site
+from linkwise.robot.description import ZERO3, Body, Description, FreeRoot, Site
 from linkwise.robot.notes import Note, Omission
 from linkwise.robot.readers.sdf_joints import YES, SdfJoint, sdf_joints
 from linkwise.robot.readers.sdf_poses import (
     WORLD,
     ModelPoses,
-    Pose,
     numbers_in,
     numbers_of,
     place_of,
@@ -33,6 +33,7 @@ OF_WORLD = (0.0, 0.0, -9.8)
 """Gravity of a world that says nothing of it."""
 DOWN = (0.0, 0.0, -9.81)
 """That of a model on its own, as of a URDF file."""
+GRAVITY = ("gravity", "physics/gravity")
 
 USED = {
     "model": {"link", "joint", "frame", "pose", "static"},
@@ -49,11 +50,12 @@ def read_sdf(path: Path) -> Description:
         raise LinkwiseError(f"the root element is <{root.tag}>; an SDFormat file has <sdf>")
     version, model = _version(root), _model(root)
     links, joints = model.findall("link"), model.findall("joint")
+    links = [link for link in links if link.get("name") != WORLD]
     if not links:
         raise LinkwiseError(f"the model {model.get('name')!r} has no <link>; give one that has some")
     poses = ModelPoses(model, version)
     tree, loops = sdf_joints(joints, poses, version)
-    anchored = any(joint.parent == WORLD for joint in (*tree, *loops))
+    held = any(joint.parent == WORLD for joint in (*tree, *loops))
     places = {joint.child: joint.in_child.translation for joint in tree}
     losses = (
         *(loss for j in tree for loss in j.losses(False)),
@@ -61,13 +63,15 @@ def read_sdf(path: Path) -> Description:
     )
     return Description(
         model.get("name") or path.stem,
-        (*((Body(WORLD),) if anchored else ()), *(_body(link, places) for link in links)),
+        (*((Body(WORLD),) if held else ()), *(_body(link, places) for link in links)),
         tuple(joint.connection() for joint in tree),
-        _gravity(root, model, Pose() if anchored else _root(links, tree, poses)),
+        _gravity(root),
         notes=_ignored([model, *links, *joints]),
         ties=tuple(joint.tie() for joint in loops),
         sites=tuple(_site(frame, poses) for frame in model.findall("frame")),
         omissions=(*_unmodelled(links), *losses),
+        ground=WORLD if held else "",
+        free=None if held else _free(links, tree, poses),
     )
 
 
@@ -119,19 +123,24 @@ def _body(link: Element, places: Mapping[str, Vec3]) -> Body:
     return Body(name, numbers_in(inertial, "mass", 0.0, place), com.translation, turned, origin=origin)
 
 
-def _root(links: Iterable[Element], tree: Sequence[SdfJoint], poses: ModelPoses) -> Pose:
-    """Pose of the link that no joint carries, whose axes are those of the robot's world."""
+def _free(links: Iterable[Element], tree: Sequence[SdfJoint], poses: ModelPoses) -> FreeRoot | None:
+    """Where the file shows the link that no joint carries."""
     carried = {joint.child for joint in tree}
-    return next((poses.of(link) for link in links if link.get("name") not in carried), Pose())
+    root = next((link for link in links if link.get("name") not in carried), None)
+    if root is None:
+        return None
+    shown = poses.of_model().times(poses.of(root))
+    return FreeRoot(shown.rotation, shown.translation)
 
 
-def _gravity(root: Element, model: Element, base: Pose) -> Vec3:
-    """Gravity in the axes of the base, whose pose in the model this is."""
+def _gravity(root: Element) -> Vec3:
+    """Gravity in the world's axes; before version 1.6 it stood in the <physics> of the world."""
     world = root.find("world")
-    told = None if world is None else world.find("gravity")
-    down = (DOWN if world is None else OF_WORLD) if told is None else numbers_of(told, 3, "the world")
-    turn = pose_in(model, f"model {model.get('name')!r}").times(base).rotation
-    return transforms.rotate(transforms.transpose(turn), down)
+    if world is None:
+        return DOWN
+    told = next((found for path in GRAVITY if (found := world.find(path)) is not None), None)
+    x, y, z = OF_WORLD if told is None else numbers_of(told, 3, "the world")
+    return x, y, z
 
 
 def _site(frame: Element, poses: ModelPoses) -> Site:
