@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import DATA
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise.robot import effects
@@ -86,7 +87,7 @@ def test_the_world_of_the_file_has_its_gravity(tmp_path: Path) -> None:
     assert robot_of(tmp_path, old).gravity == (0.0, 0.0, -1.6)
 
 
-POSES = (Path(__file__).parent / "data" / "poses.sdf").read_text()
+POSES = (DATA / "poses.sdf").read_text()
 STAND = '<joint name="stand" type="fixed"><parent>world</parent><child>base</child></joint>'
 AT = "<pose>0.3 -0.2 0.5 0.1 0.2 0.3</pose>"
 PLACED = {

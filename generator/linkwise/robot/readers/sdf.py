@@ -6,8 +6,7 @@ holds to the world is free, as in SDFormat. A link that is called `world` is the
 """
 
 import re
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -15,7 +14,6 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.description import ZERO3, Body, Description, FreeRoot, Site
-from linkwise.robot.notes import Note, Omission
 from linkwise.robot.readers.sdf_joints import YES, SdfJoint, sdf_joints
 from linkwise.robot.readers.sdf_poses import (
     WORLD,
@@ -26,7 +24,9 @@ from linkwise.robot.readers.sdf_poses import (
     pose_in,
     text_of,
 )
+from linkwise.robot.readers.sdf_unmodelled import known, omissions
 from linkwise.robot.readers.xml_file import parse
+from linkwise.robot.readers.xml_names import ignored
 from linkwise.robot.robot import Vec3
 
 OF_WORLD = (0.0, 0.0, -9.8)
@@ -34,13 +34,6 @@ OF_WORLD = (0.0, 0.0, -9.8)
 DOWN = (0.0, 0.0, -9.81)
 """That of a model on its own, as of a URDF file."""
 GRAVITY = ("gravity", "physics/gravity")
-
-USED = {
-    "model": {"link", "joint", "frame", "pose", "static"},
-    "link": {"inertial", "pose", "gravity"},
-    "joint": {"parent", "child", "pose", "axis"},
-}
-"""What is read of each element; every other kind of child is noted as ignored."""
 
 
 def read_sdf(path: Path) -> Description:
@@ -53,7 +46,7 @@ def read_sdf(path: Path) -> Description:
     links = [link for link in links if link.get("name") != WORLD]
     if not links:
         raise LinkwiseError(f"the model {model.get('name')!r} has no <link>; give one that has some")
-    poses = ModelPoses(model, version)
+    notes, poses = ignored([root], known, "SDFormat"), ModelPoses(model, version)
     tree, loops = sdf_joints(joints, poses, version)
     held = any(joint.parent == WORLD for joint in (*tree, *loops))
     places = {joint.child: joint.in_child.translation for joint in tree}
@@ -66,10 +59,10 @@ def read_sdf(path: Path) -> Description:
         (*((Body(WORLD),) if held else ()), *(_body(link, places) for link in links)),
         tuple(joint.connection() for joint in tree),
         _gravity(root),
-        notes=_ignored([model, *links, *joints]),
+        notes=notes,
         ties=tuple(joint.tie() for joint in loops),
         sites=tuple(_site(frame, poses) for frame in model.findall("frame")),
-        omissions=(*_unmodelled(links), *losses),
+        omissions=(*omissions(links, joints), *losses),
         ground=WORLD if held else "",
         free=None if held else _free(links, tree, poses),
     )
@@ -89,6 +82,8 @@ def _model(root: Element) -> Element:
         names = listed(repr(model.get("name")) for model in models)
         raise LinkwiseError(f"the file has {len(models)} models{f' ({names})' if names else ''}; keep one")
     (model,) = models
+    if root.find("world/joint") is not None:
+        raise LinkwiseError("the world has a <joint>; write it in the model, with the parent world")
     for tag in ("include", "model"):
         if model.find(tag) is not None:
             raise LinkwiseError(
@@ -148,20 +143,3 @@ def _site(frame: Element, poses: ModelPoses) -> Site:
     link = poses.link_of(name, place)
     seen = poses.named(link, place).inverse().times(poses.of(frame))
     return Site(name, link, seen.rotation, seen.translation)
-
-
-def _ignored(elements: Iterable[Element]) -> tuple[Note, ...]:
-    """Return a note for each kind of child that loads no joint, with how often."""
-    counts = Counter(
-        str(child.tag) for element in elements for child in element if child.tag not in USED[element.tag]
-    )
-    return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()))
-
-
-def _unmodelled(links: Iterable[Element]) -> Iterator[Omission]:
-    for link in links:
-        name = link.get("name", "")
-        if text_of(link, "gravity").lower() in ("false", "0"):
-            yield Omission("Gazebo's switch for gravity", name, bodies=(name,))
-        if link.find("inertial/fluid_added_mass") is not None:
-            yield Omission("added mass of a fluid", name, bodies=(name,))
