@@ -82,9 +82,10 @@ def build(description: Description, options: Options) -> Robot:
     named = {body.name for body in plain.bodies if not body.invented}
     freedom = options.lock, options.free_mimic, options.independent
     held = constrained(description, ends, assembly.frames, moving, *freedom)
-    singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical)
     if numbers and all(link.massless for link in numbers):
-        raise LinkwiseError("no moving link has mass, so no torque is to be had; give one mass and inertia")
+        which = "moving link" if any(body.mass for body in plain.bodies) else "link"
+        raise LinkwiseError(f"no {which} has mass, so no torque is to be had; give one mass and inertia")
+    singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical)
     notes = (
         *description.notes,
         *unphysical,
