@@ -146,11 +146,17 @@ def test_inspect_names_what_was_merged_locked_and_ignored(linkwise: Run) -> None
     assert ("ignored", "visual") in notes
 
 
-def test_inspect_prints_a_table(linkwise: Run) -> None:
-    done = linkwise("inspect", "planar3")
-    assert done.stdout.startswith("planar3: 3 joints, 3 links\n")
-    assert "  3  link3  (0.6 kg; joint1, joint2, joint3)" in done.stdout
-    assert "  m_2 = 0.6" in done.stdout
+def test_inspect_prints_a_page_first_and_all_on_request(linkwise: Run) -> None:
+    page = linkwise("inspect", "planar40").stdout.splitlines()
+    assert page[:2] == ["planar40: 40 joints, 40 links, 24 kg that move", "base: fixed; on the ground: base"]
+    assert len(page) <= 40
+    assert max(map(len, page)) <= 110
+    assert "  3  link3  (0.6 kg; joint1, joint2, joint3)" in page
+    assert page.count("  and 32 more") == 2
+    assert page[-1] == "--details shows all"
+    whole = linkwise("inspect", "planar40", "--details").stdout.splitlines()
+    assert "  40  joint40 [rad]" in whole
+    assert any(line.startswith("  m_40 = 0.6") for line in whole)
 
 
 def arm(**changes: str) -> str:
@@ -171,7 +177,7 @@ BAD_FILES = {
     "malformed.toml": ("schema = = 1", "malformed TOML"),
     "binary.toml": ("\x00\x01", "malformed TOML"),
     "unschemed.toml": ('name = "arm"', "write schema = 1 at the top"),
-    "massless.toml": (arm(mass="0", inertia="{}"), "'hinge' moves no mass at all"),
+    "massless.toml": (arm(mass="0", inertia="{}"), "massless.toml: no link has mass, so no torque is to be"),
     "negative.toml": (arm(mass="-2"), "link 'rod' has negative mass -2 kg"),
     "triangle.toml": (
         arm(inertia="{ xx = 0.1, yy = 0.1, zz = 0.3 }"),
@@ -252,17 +258,19 @@ BAD_ARGUMENTS = {
     "lock at nan": (("planar2", "--lock", "joint1=nan"), "is not of the form JOINT=VALUE"),
     "lock of no joint": (("planar2", "--lock", "elbow=0"), "--lock 'elbow' is not a moving joint"),
     "back end": (("planar2", "--backend", "fortran"), "no back end 'fortran'; choose among numpy"),
-    "name": (("planar2", "--name", "../arm"), "as it has '.' at place 1; use up to 60 letters a-z"),
+    "name": (("planar2", "--name", "../arm"), "as it has '.' at place 1; use up to 60 letters a-z and A-Z"),
     "long name": (
         ("planar2", "--name", "a" * 61),
         "is not a usable module name, as it has 61 characters; use",
     ),
     "empty name": (("planar2", "--name", ""), "'' is not a usable module name, as it is empty; use up to 60"),
     "digit": (("planar2", "--name", "7dof"), "as it begins with the digit '7'; use up to 60 letters"),
+    "header of C": (("planar2", "--name", "Calls"), "or the name of a module or of a header of C; use up"),
+    "header of a link": (("planar2", "--name", "Link_1"), "or the name of a module or of a header of C"),
     "underscore": (("planar2", "--name", "_arm"), "as it begins or ends with '_'; use up to 60 letters"),
     "keyword": (
         ("planar2", "--name", "class"),
-        "'class' is not a usable module name, as it is a word of Python's or a module's name",
+        "'class' is not a usable module name, as it is a word of Python's, or the name of a module",
     ),
     "parameters": (
         ("planar2", "--parameters", "some"),
@@ -419,11 +427,14 @@ def test_inspect_shows_a_robot_that_generate_refuses_for_a_body_that_cannot_be(
     refused = linkwise("generate", "negative.toml", "--out", "out")
     assert refused.returncode == 2
     assert reason in refused.stderr
-    shown = linkwise("inspect", "negative.toml")
+    shown = linkwise("inspect", "negative.toml", "--details")
     assert shown.returncode == 0
     assert f"refused by generate: negative.toml: {reason}\n" in shown.stdout
     assert "  1  rod  (-2 kg; hinge)" in shown.stdout
     assert "\nunphysical\n  rod link 'rod' has negative mass -2 kg" in shown.stdout
+    page = linkwise("inspect", "negative.toml").stdout
+    assert f"\nrefused by generate: negative.toml: {reason}\n" in page
+    assert "\nunphysical: rod link 'rod' has negative mass -2 kg; accepted though physically" in page
     assert json.loads(linkwise("inspect", "negative.toml", "--json").stdout)["refused"].endswith(reason)
     accepted = linkwise("inspect", "negative.toml", "--allow-unphysical", "--json")
     assert json.loads(accepted.stdout)["refused"] == ""
@@ -458,8 +469,8 @@ def test_inspect_lists_what_each_joint_has_of_its_own_on_request(linkwise: Run, 
     pytest.importorskip("mujoco")
     (tmp_path / "hand.xml").write_text(HAND)
     told = linkwise("inspect", "hand.xml", "--free-mimic").stdout
-    assert f"\npassive\n  spring 1 ×; {APART}\n  damping 2 ×; {APART}\n" in told
-    assert "  tendon spring 1 ×; left out of the torques\n" in told
+    assert f"\npassive: spring 1 ×, damping 2 ×, armature 1 ×; {APART}\n" in told
+    assert "\nleft out: tendon spring 1 ×; left out of the torques\n" in told
     assert "N·m·s/rad" not in told
     asked = linkwise("inspect", "hand.xml", "--free-mimic", "--details").stdout
     assert f"  c 0.3 N·m·s/rad; damping {APART}\n" in asked
@@ -472,6 +483,13 @@ def test_inspect_lists_frames_on_request(linkwise: Run, tmp_path: Path) -> None:
     assert "frames" not in linkwise("inspect", "arm.urdf").stdout
     asked = linkwise("inspect", "arm.urdf", "--details").stdout
     assert "frames (of `kinematics`; on which link)\n  a  (the ground)\n  b  (b)\n  c  (b)\n" in asked
+
+
+def test_a_package_may_have_capitals_in_its_name(linkwise: Run) -> None:
+    made = linkwise("generate", "planar1", "--name", "LeftArm", "--out", "out", "--backend", "c")
+    assert made.returncode == 0, made.stderr
+    checked = linkwise("check", "out/LeftArm", "--samples", "3")
+    assert checked.returncode == 0, checked.stdout
 
 
 @pytest.mark.parametrize("report", ["terms", "reduction"])

@@ -339,7 +339,7 @@ def test_for_another_machine_nothing_of_it_is_run_nor_found_among_its_programs(t
 
 MISTAKES = {
     "linkwise_add_robot(arm ROBOT gone.urdf)": "ROBOT gone.urdf: no such file, nor one that a command before",
-    "linkwise_add_robot(Arm ROBOT planar1)": "Arm is not a name of letters a-z, digits and _; give",
+    "linkwise_add_robot(_arm ROBOT planar1)": "_arm is not a name of letters, digits and _; give",
     "linkwise_add_robot(arm)": "arm has no robot; give ROBOT and its file",
     "linkwise_add_robot(arm ROBOT planar1 --base floating)": "give those of linkwise behind OPTIONS",
     "linkwise_add_robot(arm ROBOT planar1 STATIC SHARED)": "arm cannot be both STATIC and SHARED",

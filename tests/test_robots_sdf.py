@@ -1,13 +1,17 @@
 """SDFormat models: the robot that other formats describe, whichever way its poses are written."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from linkwise import LinkwiseError, Options
+from conftest import DATA
+from linkwise import LinkwiseError, Options, generate, read_system, write_package
+from linkwise.package.load import import_package
 from linkwise.robot import effects
 from linkwise.robot.read import read_robot
+from shown_model import ShownModel
 
 URDF = """<robot name="arm">
 <link name="foot"/>
@@ -75,16 +79,64 @@ def test_poses_and_axes_of_every_version_make_the_robot_of_a_urdf_file(text: str
     assert [c.name for c in ours.coordinates] == ["hip", "slide"]
 
 
-def test_weight_points_down_in_the_axes_of_a_base_that_the_file_turns(tmp_path: Path) -> None:
-    free = IN_THE_MODEL.replace(
-        "<parent>world</parent><child>upper</child>", "<parent>stand</parent><child>upper</child>"
-    )
-    stand = f'<link name="stand"><pose>0 0 0 1.5707963267948966 0 0</pose>{LOWER}</link>'
-    turned = robot_of(tmp_path, free.replace('<link name="upper">', f'{stand}<link name="upper">'))
-    np.testing.assert_allclose(np.array(turned.gravity, dtype=float), [0.0, -9.81, 0.0], atol=1e-15)
+def test_the_world_of_the_file_has_its_gravity(tmp_path: Path) -> None:
     world = IN_THE_MODEL.replace("<model", "<world name='moon'><gravity>0 0 -1.6</gravity><model")
-    moon = robot_of(tmp_path, world.replace("</model>", "</model></world>"))
-    assert moon.gravity == (0.0, 0.0, -1.6)
+    moon = world.replace("</model>", "</model></world>")
+    assert robot_of(tmp_path, moon).gravity == (0.0, 0.0, -1.6)
+    old = re.sub("<gravity>.*?</gravity>", r"<physics type='ode'>\g<0></physics>", moon)
+    assert robot_of(tmp_path, old).gravity == (0.0, 0.0, -1.6)
+
+
+POSES = (DATA / "poses.sdf").read_text()
+STAND = '<joint name="stand" type="fixed"><parent>world</parent><child>base</child></joint>'
+AT = "<pose>0.3 -0.2 0.5 0.1 0.2 0.3</pose>"
+PLACED = {
+    "as it is": (POSES, {}),
+    "without a pose of the model": (POSES.replace(AT, ""), {}),
+    "placed by a frame": (POSES.replace("<model ", '<model placement_frame="edge" '), {}),
+    "with a link called world": (POSES.replace(STAND, f'<link name="world"/>{STAND}'), {}),
+    "held where the file shows it": (POSES.replace(STAND, ""), {"base": "fixed"}),
+}
+
+
+def loaded(folder: Path, text: str, **options: Any) -> Any:
+    """A package of the model, on NumPy, and what was said of it."""
+    (folder / "poses.sdf").write_text(text)
+    system = read_system(folder / "poses.sdf", Options(**options))
+    write_package(generate(system, ["numpy"]), folder / "poses")
+    return import_package(folder / "poses").load("numpy"), effects(system.notes)
+
+
+@pytest.mark.parametrize("place", PLACED)
+def test_the_model_stands_in_the_world_where_its_poses_say(place: str, tmp_path: Path) -> None:
+    text, options = PLACED[place]
+    (robot, _), shown = loaded(tmp_path, text, **options), ShownModel(text)
+    assert robot.joint_names == ("turn", "slide", "roll")
+    rng, point, force = np.random.default_rng(0), np.array([0.1, -0.2, 0.3]), np.array([5.0, 7.0, -9.0])
+    for q in (np.zeros(3), *rng.uniform(-1.0, 1.0, (3, 3))):
+        for frame, pose in shown.poses(q).items():
+            if frame in robot.kinematics.frames:
+                np.testing.assert_allclose(robot.kinematics.pose(q, frame), pose, atol=1e-12)
+                load = robot.kinematics.load_torque(q, frame, force, point=point)
+                np.testing.assert_allclose(-load, shown.load_torque(q, frame, point, force), atol=1e-8)
+        still = robot.inverse_dynamics(q, np.zeros(3), np.zeros(3))
+        np.testing.assert_allclose(still, shown.gravity_torque(q), atol=1e-8)
+    assert {"corner", "edge", "tip"} <= set(robot.kinematics.frames)
+
+
+def test_a_model_that_nothing_holds_falls_and_says_where_the_file_shows_it(tmp_path: Path) -> None:
+    text = POSES.replace(STAND, "")
+    robot, (told, *_) = loaded(tmp_path, text)
+    assert "free to fall, as no joint of the file holds it to the world (--base fixed holds it): base" in told
+    values = dict(re.findall(r"(base_\w+) = ([-0-9.e]+)", told))
+    q = np.array([float(values.get(name, 0.0)) for name in robot.joint_names])
+    for frame, pose in ShownModel(text).poses(q[6:]).items():
+        np.testing.assert_allclose(robot.kinematics.pose(q, frame), pose, atol=1e-5)
+    weight = robot.inverse_dynamics(q, 0 * q, 0 * q)[:3]
+    np.testing.assert_allclose(weight, [0.0, 0.0, 9.81 * 7.5], atol=1e-12)
+    (asked, _), (cut, _) = loaded(tmp_path, text, base="floating"), loaded(tmp_path, text, root="upper")
+    assert asked.n == robot.n == 9
+    assert cut.joint_names == ("slide", "roll"), "the frame of --root is the world's"
 
 
 def test_a_mimic_has_the_offset_of_its_reference(tmp_path: Path) -> None:
@@ -185,6 +237,18 @@ BAD = {
     "two axes": (
         ("<parent>top", "<axis2/><parent>top"),
         "joint 'slide' has two axes; write it as two joints",
+    ),
+    "relative to what else the world has": (
+        ('<model name="arm">', '<model name="arm"><pose relative_to="hall">0 0 1 0 0 0</pose>'),
+        "the pose of model 'arm' is relative to 'hall'; write it in the axes of the world",
+    ),
+    "no canonical link": (
+        ('<model name="arm">', '<model name="arm" canonical_link="uper">'),
+        "has the canonical_link 'uper', which is not a link; there are upper, lower",
+    ),
+    "carries the world": (
+        ("<child>upper</child>", "<child>world</child>"),
+        "joint 'hip' has the world for its child; make the world its parent",
     ),
     "no child": (("<child>lower</child>", ""), "joint 'slide' has no <child>; name the link"),
     "one name twice": (('frame name="top"', 'frame name="upper"'), "named 'upper'; rename one"),

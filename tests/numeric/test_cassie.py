@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linkwise import generate, read_system, write_package
+from linkwise import Options, generate, read_system, write_package
 from linkwise.check.loop_checks import loop_calls
 from linkwise.check.loop_reference import loop_reference
 from linkwise.check.states import random_states
@@ -58,8 +58,6 @@ class Cassie:
             carried[child] = at, here
             self.model.addBodyFrame(child, at, here.inverse() * self.links[child], 0)
         self.data = self.model.createData()
-        # linkwise's world is the pelvis, which stands upright in the model.
-        self.base = self.links["pelvis"]
 
     def order(self, names: tuple[str, ...]) -> Any:
         """Where Pinocchio has the joints of these names."""
@@ -85,7 +83,7 @@ def _inertia(link: ET.Element) -> Any:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    system = read_system(FILE)
+    system = read_system(FILE, Options(base="fixed"))
     written: Path = tmp_path_factory.mktemp("cassie") / system.name
     write_package(generate(system, backends=["numpy"], kernel="loops"), written)
     return written

@@ -2,16 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
 from linkwise import pipeline
-from linkwise.cli import Details, Json, counted
+from linkwise.cli import Json, counted
+from linkwise.cli.inspect_page import SUBJECTS, page
 from linkwise.cli.options import RobotName, reads_robot
 from linkwise.emit.definition import joint_entries, rigid_tree
 from linkwise.errors import LinkwiseError
-from linkwise.escape import json_text, printable
+from linkwise.escape import json_text, listed, printable
 from linkwise.package.entries import RigidTree
 from linkwise.robot import Options, kept_apart, left_out
 from linkwise.robot.robot import Parameter
@@ -28,13 +29,23 @@ app = typer.Typer(add_completion=False)
 def inspect(
     robot: RobotName,
     options: Options,
-    details: Details = False,
+    details: Annotated[
+        bool,
+        typer.Option("--details", help="Show every joint, link, constraint, frame, parameter and remark"),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Show a robot's joints, links, parameters, and what was merged, locked, ignored or left out."""
     system, refused = _system(robot, options)
     data = inspection(system, details, refused)
-    print(json_text(data, indent=1) if as_json else table(data))
+    if as_json:
+        print(json_text(data, indent=1))
+    elif details:
+        print(table(data))
+    else:
+        tree = rigid_tree(system)
+        ground = [frame.name for frame in tree.frames if frame.body is None] if tree else None
+        print(page(data, ground, _joint, _moved_link, _constraint))
 
 
 def _system(robot: str, options: Options) -> tuple[System, str]:
@@ -112,21 +123,19 @@ def parameters(system: System) -> tuple[Parameter, ...]:
 
 
 def table(data: dict[str, Any]) -> str:
-    """Lines for a person."""
+    """Every line for a person."""
     lines = [
         f"{data['name']}: {counted(len(data['joints']), 'joint')}, {counted(len(data['links']), 'link')}"
     ]
     if data["refused"]:
         lines += ["", f"refused by generate: {data['refused']}"]
     lines += ["", "joints"]
-    lines += [f"  {k}  {c['name']} [{c['unit']}]{_limits(c)}" for k, c in enumerate(data["joints"], 1)]
+    lines += [_joint(k, joint) for k, joint in enumerate(data["joints"], 1)]
     lines += ["", "links (mass; moved by)"]
-    for k, link in enumerate(data["links"], 1):
-        mass = "" if link["mass"] is None else f"{link['mass']:.6g} kg; "
-        lines.append(f"  {k}  {link['name']}  ({mass}{', '.join(link['path'])})")
+    lines += [_link(k, link) for k, link in enumerate(data["links"], 1)]
     if "constraints" in data:
         lines += ["", "constraints (of `robot.constraints`; on what)"]
-        lines += [f"  {c['name']}  ({_held(c)})" for c in data["constraints"]]
+        lines += [_constraint(k, constraint) for k, constraint in enumerate(data["constraints"], 1)]
         lines.append(f"  independent: {', '.join(data['independent'])}")
         lines.append(f"  dependent: {', '.join(data['dependent'])}")
     if "frames" in data:
@@ -145,6 +154,25 @@ def table(data: dict[str, Any]) -> str:
                 effect = f"; {note['effect']}" if note["effect"] else ""
                 lines.append(f"  {note['subject']} {note['detail']}".rstrip() + effect)
     return "\n".join(map(printable, lines))
+
+
+def _joint(number: int, joint: dict[str, Any]) -> str:
+    return f"  {number}  {joint['name']} [{joint['unit']}]{_limits(joint)}"
+
+
+def _link(number: int, link: dict[str, Any], most: int | None = None) -> str:
+    mass = "" if link["mass"] is None else f"{link['mass']:.6g} kg; "
+    path = link["path"]
+    return f"  {number}  {link['name']}  ({mass}{listed(path, len(path) if most is None else most)})"
+
+
+def _moved_link(number: int, link: dict[str, Any]) -> str:
+    """A link, with the first of what moves it."""
+    return _link(number, link, SUBJECTS)
+
+
+def _constraint(_: int, constraint: dict[str, Any]) -> str:
+    return f"  {constraint['name']}  ({_held(constraint)})"
 
 
 def _limits(joint: dict[str, Any]) -> str:

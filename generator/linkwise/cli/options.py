@@ -34,7 +34,13 @@ def robot_options(
         list[str] | None,
         _flag(metavar="JOINT=VALUE", help="Hold a joint, rad or m; may be repeated"),
     ] = None,
-    base: Annotated[Literal["fixed", "floating"], _flag(help="How the root link is held")] = "fixed",
+    base: Annotated[
+        Literal["fixed", "floating"] | None,
+        _flag(
+            help="How the root link is held; fixed unless given, but floating where an SDFormat model has no "
+            "joint to the world"
+        ),
+    ] = None,
     root: Annotated[str | None, _flag(help="Keep only this link and what it carries")] = None,
     tip: Annotated[str | None, _flag(help="Keep only the chain of links to this one")] = None,
     allow_unphysical: Annotated[

@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
+from pathlib import Path
 
 import sympy as sp
 
@@ -58,7 +59,10 @@ SHARED_RUNTIME = (
 """Files of linkwise/runtime that every package has."""
 DEVICES = {"aux", "con", "nul", "prn", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 """What no file of Windows may be called, whatever follows behind a dot."""
-TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names, *DEVICES}
+HEADERS = {Path(file.name).stem for file in resources.files("linkwise.runtime.c").iterdir()}
+LINK_HEADER = re.compile(r"link_\d+")
+"""Headers beside that of a package's own name."""
+TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names, *DEVICES, *HEADERS}
 
 
 def package_files(
@@ -79,7 +83,7 @@ def package_files(
 def identifier(name: str) -> str:
     """Module name made of a robot's name: letters, digits, underscores; no keyword, no module in use."""
     text = re.sub(r"[^0-9a-z_]+", "_", name.lower()).strip("_")[:LONGEST_NAME] or "robot"
-    if text[0].isdigit() or keyword.iskeyword(text) or text in TAKEN:
+    if text[0].isdigit() or _is_taken(text):
         text = f"robot_{text}"
     return text
 
@@ -87,17 +91,17 @@ def identifier(name: str) -> str:
 def checked_identifier(name: str | None, robot: str) -> str:
     """The package name asked for, or one made of the robot's; raises LinkwiseError for one that cannot be."""
     package = name if name is not None else identifier(robot)
-    if package != identifier(package):
+    if fault := _fault_of_name(package):
         raise LinkwiseError(
-            f"--name {package[:80]!r} is not a usable module name, as it {_fault_of_name(package)}; "
-            f"use up to {LONGEST_NAME} letters a-z, digits and _"
+            f"--name {package[:80]!r} is not a usable module name, as it {fault}; "
+            f"use up to {LONGEST_NAME} letters a-z and A-Z, digits and _"
         )
     return package
 
 
 def _fault_of_name(name: str) -> str:
-    """Return why a name is not one of a module: which character, or what else."""
-    if wrong := re.search(r"[^0-9a-z_]", name):
+    """Return why a name is not one of a module: which character, or what else; empty for one that is."""
+    if wrong := re.search(r"[^0-9A-Za-z_]", name):
         return f"has {wrong[0]!r} at place {wrong.start() + 1}"
     if not name:
         return "is empty"
@@ -107,11 +111,15 @@ def _fault_of_name(name: str) -> str:
         return f"begins with the digit {name[0]!r}"
     if name != name.strip("_"):
         return "begins or ends with '_'"
-    return (
-        "is what a device of Windows is called"
-        if name in DEVICES
-        else "is a word of Python's or a module's name"
-    )
+    if name.lower() in DEVICES:
+        return "is what a device of Windows is called"
+    return "is a word of Python's, or the name of a module or of a header of C" if _is_taken(name) else ""
+
+
+def _is_taken(name: str) -> bool:
+    """Whether something else has the name, also where the names of files fold case."""
+    folded = name.lower()
+    return keyword.iskeyword(name) or folded in TAKEN or LINK_HEADER.fullmatch(folded) is not None
 
 
 def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iterator[tuple[str, str]]:

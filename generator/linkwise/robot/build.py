@@ -12,13 +12,13 @@ from linkwise.robot.constrained import check_constraints, constrained
 from linkwise.robot.coordinates import AxisRule, movement
 from linkwise.robot.description import Connection, Description
 from linkwise.robot.following_joints import followers
-from linkwise.robot.joint_types import Axis, expand, expansion_notes
+from linkwise.robot.joint_types import Axis, expand, expansion_notes, named_pose
 from linkwise.robot.limits import check_locks, coordinate_limits
 from linkwise.robot.links import moving_links
 from linkwise.robot.mass import check_bodies
 from linkwise.robot.mass_matrix import check_mass_matrix
 from linkwise.robot.naming import Named, Naming
-from linkwise.robot.notes import Note
+from linkwise.robot.notes import FREE, Note
 from linkwise.robot.parameters import numeric
 from linkwise.robot.passive import checked_passive, passive_axes, passive_notes
 from linkwise.robot.robot import Frame, Link, Parameter, Robot, Scalar, unusable
@@ -32,7 +32,7 @@ class Options:
 
     parameters: Literal["numeric", "nonzero", "symbolic"] = "numeric"
     lock: dict[str, float] = field(default_factory=dict)
-    base: Literal["fixed", "floating"] = "fixed"
+    base: Literal["fixed", "floating"] | None = None
     root: str | None = None
     tip: str | None = None
     allow_unphysical: bool = False
@@ -66,7 +66,7 @@ def build(description: Description, options: Options) -> Robot:
     naming = _naming(description, options)
     if naming is None:
         description = plain
-    root, connections = _connections(description, options.base)
+    root, connections = _connections(description, options)
     joints = [(connection, expand(connection)) for connection in connections]
     axes = tuple(axis for _, parts in joints for axis in parts)
     moving = movement(axes, connections, options.lock, options.free_mimic)
@@ -82,13 +82,14 @@ def build(description: Description, options: Options) -> Robot:
     named = {body.name for body in plain.bodies if not body.invented}
     freedom = options.lock, options.free_mimic, options.independent
     held = constrained(description, ends, assembly.frames, moving, *freedom)
-    singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical)
     if numbers and all(link.massless for link in numbers):
-        raise LinkwiseError("no moving link has mass, so no torque is to be had; give one mass and inertia")
+        which = "moving link" if any(body.mass for body in plain.bodies) else "link"
+        raise LinkwiseError(f"no {which} has mass, so no torque is to be had; give one mass and inertia")
+    singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical)
     notes = (
         *description.notes,
         *unphysical,
-        *(_on_the_ground(plain, root) if options.base == "fixed" else ()),
+        *_of_root(plain, root, connections, options),
         *expansion_notes(connections),
         *held.notes,
         *moving.notes,
@@ -148,16 +149,19 @@ def _naming(description: Description, options: Options) -> Naming | None:
     return Naming("none" if description.only_named else wanted, dict(description.parameters))
 
 
-def _connections(description: Description, base: str) -> tuple[str, tuple[Connection, ...]]:
-    """Root link, and the joints parents first, that of a floating base among them."""
+def _connections(description: Description, options: Options) -> tuple[str, tuple[Connection, ...]]:
+    """Root link, and the joints parents first, that of its base among them where it floats or is held."""
     root, connections = depth_first(description)
-    if base == "floating":
+    free = description.free
+    if options.base == "floating" or (free and options.base is None):
         if root == description.ground:
             raise LinkwiseError(
                 f"{root!r} is the world, which cannot float, and the file has joints for what moves in it; "
                 "leave --base floating out, or begin at a body by --root"
             )
         connections = (Connection("base", "floating", "", root), *connections)
+    elif free:
+        connections = (Connection("base", "fixed", "", root, free.rotation, free.translation), *connections)
     if all(c.type == "fixed" for c in connections):
         raise LinkwiseError(
             "no joint moves; give one a moving type, or let the base move with --base floating"
@@ -167,15 +171,21 @@ def _connections(description: Description, base: str) -> tuple[str, tuple[Connec
 
 def _links(description: Description, options: Options, motion: dict[str, AxisRule]) -> tuple[Link, ...]:
     """Return the moving links of a description, with the numbers or the parameters that it has."""
-    joints = [(connection, expand(connection)) for connection in _connections(description, options.base)[1]]
+    joints = [(connection, expand(connection)) for connection in _connections(description, options)[1]]
     return moving_links(description.bodies, joints, motion).links
 
 
-def _on_the_ground(description: Description, root: str) -> list[Note]:
+def _of_root(
+    description: Description, root: str, connections: tuple[Connection, ...], options: Options
+) -> list[Note]:
+    """What became of the root: the ground, or what falls though nobody asked for that."""
+    if free := description.free:
+        shown = named_pose("base", free.rotation, free.translation)
+        return [Note("free", root, f"in the file {shown}", FREE)] if options.base is None else []
     return [
         Note("merged", body.name, f"into the ground, with its {body.mass:g} kg")
         for body in description.bodies
-        if body.name == root and body.mass
+        if body.name == root and body.mass and all(c.child != root for c in connections)
     ]
 
 

@@ -143,6 +143,14 @@ class CurvedCoordinate:
 
 
 @dataclass(frozen=True)
+class FreeRoot:
+    """Where the file shows a root in the world that no joint holds: it falls, unless it is held there."""
+
+    rotation: Rotation
+    translation: Vec3
+
+
+@dataclass(frozen=True)
 class Connection:
     """A joint as the file has it: any type, any axis; its place in the parent's frame, its axis in its own.
 
@@ -192,3 +200,5 @@ class Description:
     """Joints whose motion is to give that of all others under the constraints; none: to be chosen."""
     ground: str = ""
     """The body that is the world itself, where the file has one."""
+    free: FreeRoot | None = None
+    """None where the file holds the root, or its format says nothing of that."""

@@ -1,15 +1,17 @@
 """Joint types as chains of revolute and prismatic axes."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.curve import Curve
 from linkwise.robot.description import Connection
 from linkwise.robot.notes import FLOATS, TURNS, Note
-from linkwise.robot.robot import unusable
+from linkwise.robot.robot import Rotation, Vec3, unusable
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 Vector = tuple[float, float, float]
@@ -79,6 +81,19 @@ def expansion_notes(connections: Iterable[Connection]) -> list[Note]:
         for c in connections
         if c.type not in ("fixed", "curved", *SINGLE)
     ]
+
+
+def named_pose(joint: str, rotation: Rotation, translation: Vec3) -> str:
+    """Coordinates of a floating joint at which it has this pose, in words, in m and rad; 0 is left out."""
+    yaw, roll = (
+        math.atan2(float(a), float(b)) for a, b in ((rotation[1][0], rotation[0][0]), rotation[2][1:])
+    )
+    pitch = math.asin(max(-1.0, min(1.0, -float(rotation[2][0]))))
+    values = [*map(float, translation), yaw, pitch, roll]
+    found = [
+        f"{joint}_{part[0]} = {value:.6g}" for part, value in zip(FLOATING, values, strict=True) if value
+    ]
+    return listed(found) or "at 0"
 
 
 def _parts(connection: Connection) -> tuple[Part, ...]:

@@ -15,6 +15,7 @@ LEAST = "constraints that hold something twice, so that their forces are shared 
 IMPOSSIBLE = "accepted though physically impossible"
 WARNED = "MuJoCo warns"
 TURNS = "singular at a pitch of ±90°"
+FREE = "free to fall, as no joint of the file holds it to the world (--base fixed holds it)"
 FLOATS = f"six coordinates without any contact forces, {TURNS}"
 
 SHOWN = 5
@@ -39,6 +40,7 @@ class Note:
         "snapped",
         "mimic",
         "cut",
+        "free",
         "expanded",
         "unphysical",
         "freed",

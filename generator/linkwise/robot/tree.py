@@ -102,6 +102,7 @@ def cut(description: Description, root: str | None, tip: str | None) -> Descript
         description,
         notes=(*description.notes, *gone),
         bodies=tuple(b for b in description.bodies if b.name in kept),
+        free=description.free if root is None else None,  # the frame of `root` is the world's
         connections=tuple(c for c in description.connections if c.parent in kept and c.child in kept),
     )
 

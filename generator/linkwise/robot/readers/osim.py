@@ -18,9 +18,11 @@ from linkwise.robot.readers.osim_document import members, read_document
 from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of, yes
 from linkwise.robot.readers.osim_frames import GROUND, Frames, Placed, offset_of
 from linkwise.robot.readers.osim_joints import OsimJoint, from_ground
+from linkwise.robot.readers.xml_names import Known, ignored, names
 from linkwise.robot.robot import Mat3, Vec3
 
 EARTH = "0 -9.80665 0"
+ENTRIES = ("xx", "yy", "zz", "xy", "xz", "yz")
 ACTING = {
     "BushingForce": "bushing",
     "FunctionBasedBushingForce": "bushing",
@@ -40,6 +42,13 @@ ACTING = {
 }
 """Forces that load joints by themselves, in words."""
 
+BODY = Known(
+    once=names("mass mass_center inertia Joint") | names(" ".join(f"inertia_{entry}" for entry in ENTRIES)),
+    attributes=names("name"),
+    idle=names("components FrameGeometry attached_geometry WrapObjectSet VisibleObject"),
+)
+"""What is read of a body, and what is known beside it."""
+
 
 def read_osim(path: Path) -> Description:
     """Read a model; raises LinkwiseError naming the element and the remedy."""
@@ -47,7 +56,7 @@ def read_osim(path: Path) -> Description:
     elements = [body for body in members(model, "BodySet") if name_of(body) != GROUND]
     if not elements:
         raise LinkwiseError(f"the model {name_of(model)!r} has no <Body>; give one that has some")
-    frames = Frames(model)
+    others, frames = ignored(elements, _known, "OpenSim's Body"), Frames(model)
     joints = from_ground(_joints_in_bodies(elements) if old else _joints(model, frames))
     rules, notes = coordinate_rules((c for joint in joints for c in joint.coordinates), model)
     return Description(
@@ -55,7 +64,12 @@ def read_osim(path: Path) -> Description:
         (Body(GROUND), *_bodies(elements, joints)),
         tuple(joint.connection(rules) for joint in joints),
         _vector(numbers_of(model, "gravity", EARTH, "the model", 3)),
-        notes=(*notes, *(note for joint in joints for note in joint.notes(rules)), *_ignored(model)),
+        notes=(
+            *notes,
+            *(note for joint in joints for note in joint.notes(rules)),
+            *_ignored(model),
+            *others,
+        ),
         loops=tuple(unmodelled(model)),
         ties=tuple(ties(model, frames)),
         omissions=tuple(_forces(model)),
@@ -107,8 +121,8 @@ def _inertia(element: Element, place: str) -> Mat3:
     if element.find("inertia") is not None:
         xx, yy, zz, xy, xz, yz = numbers_of(element, "inertia", "0 0 0 0 0 0", place, 6)
     else:
-        names = (f"inertia_{entry}" for entry in ("xx", "yy", "zz", "xy", "xz", "yz"))
-        xx, yy, zz, xy, xz, yz = (numbers_of(element, name, "0", place, 1)[0] for name in names)
+        tags = (f"inertia_{entry}" for entry in ENTRIES)
+        xx, yy, zz, xy, xz, yz = (numbers_of(element, tag, "0", place, 1)[0] for tag in tags)
     return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
 
 
@@ -131,6 +145,10 @@ def _forces(model: Element) -> Iterator[Omission]:
 def _gives(force: Element) -> bool:
     """Whether it is what gives the joints' torques."""
     return "Muscle" in force.tag or force.tag.endswith("Actuator")
+
+
+def _known(element: Element) -> Known | None:
+    return BODY if element.tag == "Body" else None
 
 
 def _ignored(model: Element) -> tuple[Note, ...]:

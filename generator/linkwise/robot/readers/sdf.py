@@ -1,45 +1,39 @@
 """The dynamics of an SDFormat model, Gazebo's; what it says beyond them is noted. Meshes are never opened.
 
 A joint whose child hangs on another joint already closes a loop: it is cut and becomes a constraint, at the
-place and along the axis that it has at q = 0, which is how the file shows the model.
+place and along the axis that it has at q = 0, which is how the file shows the model. A root that no joint
+holds to the world is free, as in SDFormat. A link that is called `world` is the world.
 """
 
 import re
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot import transforms
-from linkwise.robot.description import ZERO3, Body, Description, Site
-from linkwise.robot.notes import Note, Omission
+from linkwise.robot.description import ZERO3, Body, Description, FreeRoot, Site
 from linkwise.robot.readers.sdf_joints import YES, SdfJoint, sdf_joints
 from linkwise.robot.readers.sdf_poses import (
     WORLD,
     ModelPoses,
-    Pose,
     numbers_in,
     numbers_of,
     place_of,
     pose_in,
     text_of,
 )
+from linkwise.robot.readers.sdf_unmodelled import known, omissions
 from linkwise.robot.readers.xml_file import parse
+from linkwise.robot.readers.xml_names import ignored
 from linkwise.robot.robot import Vec3
 
 OF_WORLD = (0.0, 0.0, -9.8)
 """Gravity of a world that says nothing of it."""
 DOWN = (0.0, 0.0, -9.81)
 """That of a model on its own, as of a URDF file."""
-
-USED = {
-    "model": {"link", "joint", "frame", "pose", "static"},
-    "link": {"inertial", "pose", "gravity"},
-    "joint": {"parent", "child", "pose", "axis"},
-}
-"""What is read of each element; every other kind of child is noted as ignored."""
+GRAVITY = ("gravity", "physics/gravity")
 
 
 def read_sdf(path: Path) -> Description:
@@ -49,11 +43,12 @@ def read_sdf(path: Path) -> Description:
         raise LinkwiseError(f"the root element is <{root.tag}>; an SDFormat file has <sdf>")
     version, model = _version(root), _model(root)
     links, joints = model.findall("link"), model.findall("joint")
+    links = [link for link in links if link.get("name") != WORLD]
     if not links:
         raise LinkwiseError(f"the model {model.get('name')!r} has no <link>; give one that has some")
-    poses = ModelPoses(model, version)
+    notes, poses = ignored([root], known, "SDFormat"), ModelPoses(model, version)
     tree, loops = sdf_joints(joints, poses, version)
-    anchored = any(joint.parent == WORLD for joint in (*tree, *loops))
+    held = any(joint.parent == WORLD for joint in (*tree, *loops))
     places = {joint.child: joint.in_child.translation for joint in tree}
     losses = (
         *(loss for j in tree for loss in j.losses(False)),
@@ -61,13 +56,15 @@ def read_sdf(path: Path) -> Description:
     )
     return Description(
         model.get("name") or path.stem,
-        (*((Body(WORLD),) if anchored else ()), *(_body(link, places) for link in links)),
+        (*((Body(WORLD),) if held else ()), *(_body(link, places) for link in links)),
         tuple(joint.connection() for joint in tree),
-        _gravity(root, model, Pose() if anchored else _root(links, tree, poses)),
-        notes=_ignored([model, *links, *joints]),
+        _gravity(root),
+        notes=notes,
         ties=tuple(joint.tie() for joint in loops),
         sites=tuple(_site(frame, poses) for frame in model.findall("frame")),
-        omissions=(*_unmodelled(links), *losses),
+        omissions=(*omissions(links, joints), *losses),
+        ground=WORLD if held else "",
+        free=None if held else _free(links, tree, poses),
     )
 
 
@@ -85,6 +82,8 @@ def _model(root: Element) -> Element:
         names = listed(repr(model.get("name")) for model in models)
         raise LinkwiseError(f"the file has {len(models)} models{f' ({names})' if names else ''}; keep one")
     (model,) = models
+    if root.find("world/joint") is not None:
+        raise LinkwiseError("the world has a <joint>; write it in the model, with the parent world")
     for tag in ("include", "model"):
         if model.find(tag) is not None:
             raise LinkwiseError(
@@ -119,19 +118,24 @@ def _body(link: Element, places: Mapping[str, Vec3]) -> Body:
     return Body(name, numbers_in(inertial, "mass", 0.0, place), com.translation, turned, origin=origin)
 
 
-def _root(links: Iterable[Element], tree: Sequence[SdfJoint], poses: ModelPoses) -> Pose:
-    """Pose of the link that no joint carries, whose axes are those of the robot's world."""
+def _free(links: Iterable[Element], tree: Sequence[SdfJoint], poses: ModelPoses) -> FreeRoot | None:
+    """Where the file shows the link that no joint carries."""
     carried = {joint.child for joint in tree}
-    return next((poses.of(link) for link in links if link.get("name") not in carried), Pose())
+    root = next((link for link in links if link.get("name") not in carried), None)
+    if root is None:
+        return None
+    shown = poses.of_model().times(poses.of(root))
+    return FreeRoot(shown.rotation, shown.translation)
 
 
-def _gravity(root: Element, model: Element, base: Pose) -> Vec3:
-    """Gravity in the axes of the base, whose pose in the model this is."""
+def _gravity(root: Element) -> Vec3:
+    """Gravity in the world's axes; before version 1.6 it stood in the <physics> of the world."""
     world = root.find("world")
-    told = None if world is None else world.find("gravity")
-    down = (DOWN if world is None else OF_WORLD) if told is None else numbers_of(told, 3, "the world")
-    turn = pose_in(model, f"model {model.get('name')!r}").times(base).rotation
-    return transforms.rotate(transforms.transpose(turn), down)
+    if world is None:
+        return DOWN
+    told = next((found for path in GRAVITY if (found := world.find(path)) is not None), None)
+    x, y, z = OF_WORLD if told is None else numbers_of(told, 3, "the world")
+    return x, y, z
 
 
 def _site(frame: Element, poses: ModelPoses) -> Site:
@@ -139,20 +143,3 @@ def _site(frame: Element, poses: ModelPoses) -> Site:
     link = poses.link_of(name, place)
     seen = poses.named(link, place).inverse().times(poses.of(frame))
     return Site(name, link, seen.rotation, seen.translation)
-
-
-def _ignored(elements: Iterable[Element]) -> tuple[Note, ...]:
-    """Return a note for each kind of child that loads no joint, with how often."""
-    counts = Counter(
-        str(child.tag) for element in elements for child in element if child.tag not in USED[element.tag]
-    )
-    return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()))
-
-
-def _unmodelled(links: Iterable[Element]) -> Iterator[Omission]:
-    for link in links:
-        name = link.get("name", "")
-        if text_of(link, "gravity").lower() in ("false", "0"):
-            yield Omission("Gazebo's switch for gravity", name, bodies=(name,))
-        if link.find("inertial/fluid_added_mass") is not None:
-            yield Omission("added mass of a fluid", name, bodies=(name,))

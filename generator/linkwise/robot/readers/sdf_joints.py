@@ -9,7 +9,15 @@ from linkwise.robot import transforms
 from linkwise.robot.description import IDENTITY, Anchor, AnchoredTie, Connection, Mimic
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.notes import Omission
-from linkwise.robot.readers.sdf_poses import ModelPoses, Pose, numbers_in, numbers_of, place_of, text_of
+from linkwise.robot.readers.sdf_poses import (
+    WORLD,
+    ModelPoses,
+    Pose,
+    numbers_in,
+    numbers_of,
+    place_of,
+    text_of,
+)
 from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Passive, Rotation, Scalar, TieKind
 
 TIES: dict[str, TieKind] = {"ball": "point", "revolute": "hinge", "continuous": "hinge", "fixed": "frame"}
@@ -166,6 +174,8 @@ def _joint(element: Element, poses: ModelPoses, version: tuple[int, int]) -> Sdf
     if element.find("axis2") is not None:
         raise LinkwiseError(f"{place} has two axes; write it as two joints with a link between them")
     parent, child = (poses.link_of(name, place) for name in ends)
+    if child == WORLD:
+        raise LinkwiseError(f"{place} has the world for its child; make the world its parent")
     of_parent, of_child = (poses.named(name, place) for name in (parent, child))
     here = poses.of(element)
     axis = _axis(element, here.rotation, poses, version)

@@ -1,4 +1,4 @@
-"""Where the links, joints and frames of an SDFormat model are, in the axes of the model.
+"""Where the links, joints and frames of an SDFormat model are, in the axes of the model, and it in the world.
 
 From version 1.7 on, poses stand relative to any named frame, and frames hang on one another; before, links
 stand in the model and joints in their child.
@@ -42,8 +42,8 @@ class ModelPoses:
     """Frames of a model by name."""
 
     def __init__(self, model: Element, version: tuple[int, int]) -> None:
-        """Raises LinkwiseError for two frames of one name."""
-        self._model, self._named = version >= (1, 7), dict[str, Element]()
+        """Raises LinkwiseError for two frames of one name, and for a canonical link that is not there."""
+        self._model, self._named, self._whole = version >= (1, 7), dict[str, Element](), model
         for tag in PLACED:
             for element in model.findall(tag):
                 name = element.get("name", "")
@@ -51,7 +51,24 @@ class ModelPoses:
                     raise LinkwiseError(f"two of the links, joints and frames are named {name!r}; rename one")
                 # Before frames had names of their own, a joint could be called like a link.
                 self._named.setdefault(name if self._model or tag != "joint" else f"joint {name}", element)
-        self._roots = {MODEL, WORLD} if self._model else {MODEL, WORLD, ""}
+        self._roots = {MODEL} if self._model else {MODEL, ""}
+        self._canonical = self._canonical_link()
+
+    def of_model(self) -> Pose:
+        """Pose of the model in the world, of which <pose> places a frame of the model, by default its own.
+
+        Raises LinkwiseError for a pose relative to what else the world has.
+        """
+        place = place_of(self._whole)
+        pose = self._whole.find("pose")
+        relative = "" if pose is None else pose.get("relative_to", "")
+        if relative not in ("", WORLD):
+            raise LinkwiseError(
+                f"the pose of {place} is relative to {relative!r}; write it in the axes of the world"
+            )
+        placed = self._found(self._whole.get("placement_frame") or MODEL, place)
+        at = pose_in(self._whole, place)
+        return at if placed is None else at.times(self.of(placed).inverse())
 
     def of(self, element: Element) -> Pose:
         """Pose of a link, a joint or a frame in the model; raises LinkwiseError for poses in a circle."""
@@ -66,7 +83,9 @@ class ModelPoses:
         return chain
 
     def named(self, name: str, asked_by: str) -> Pose:
-        """Pose of a frame by its name; raises LinkwiseError where there is none."""
+        """Pose of a frame by its name, the world among them; raises LinkwiseError where there is none."""
+        if name == WORLD:
+            return self.of_model().inverse()
         found = self._found(name, asked_by)
         return Pose() if found is None else self.of(found)
 
@@ -81,7 +100,7 @@ class ModelPoses:
             seen.add(name)
             element = self._found(name, asked_by)
             if element is None:
-                return self._first_link()
+                return self._canonical
             if element.tag == "link":
                 return name
             name = (
@@ -109,9 +128,17 @@ class ModelPoses:
             )
         return self._named[name]
 
-    def _first_link(self) -> str:
-        """The model's own frame is attached to its first link."""
-        return next(name for name, element in self._named.items() if element.tag == "link")
+    def _canonical_link(self) -> str:
+        """The link that the model's own frame is attached to: the first, unless the model names another."""
+        links = [name for name, element in self._named.items() if element.tag == "link"]
+        named = self._whole.get("canonical_link")
+        if named and named not in links:
+            near = listed(nearest_first(named, links))
+            raise LinkwiseError(
+                f"{place_of(self._whole)} has the canonical_link {named!r}, which is not a link; "
+                f"there are {near}"
+            )
+        return named or links[0]
 
 
 def pose_in(element: Element, place: str) -> Pose:

@@ -10,8 +10,9 @@ from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.readers.urdf_passive import passives
-from linkwise.robot.readers.urdf_unmodelled import ignored, omissions
+from linkwise.robot.readers.urdf_unmodelled import known, omissions
 from linkwise.robot.readers.xml_file import numbers, parse
+from linkwise.robot.readers.xml_names import ignored
 from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Passive
 
 
@@ -23,12 +24,12 @@ def read_urdf(path: Path) -> Description:
     links, joints = robot.findall("link"), robot.findall("joint")
     if not links:
         raise LinkwiseError("<robot> is empty: the file has no <link>; give one that describes a robot")
-    passive = passives(robot)
+    notes, passive = ignored([robot], known, "URDF"), passives(robot)
     return Description(
         robot.get("name") or path.stem,
         tuple(_body(element) for element in links),
         tuple(_connection(element, passive) for element in joints),
-        notes=ignored([robot, *links, *joints]),
+        notes=notes,
         omissions=tuple(omissions(robot)),
     )
 

@@ -1,20 +1,14 @@
 """What a URDF file says beyond the dynamics of rigid bodies and what `urdf_passive` reads."""
 
-from collections import Counter
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 from xml.etree.ElementTree import Element
 
 from linkwise.robot.joint_types import SINGLE
-from linkwise.robot.notes import Note, Omission
+from linkwise.robot.notes import Omission
 from linkwise.robot.readers.urdf_passive import given_numbers
 from linkwise.robot.readers.xml_file import numbers
-
-USED = {
-    "robot": {"link", "joint"},
-    "link": {"inertial"},
-    "joint": {"parent", "child", "origin", "axis", "mimic", "dynamics"},
-}
-"""What is read of each element, beside limits; every other kind of child is noted as ignored."""
+from linkwise.robot.readers.xml_names import Known, local_name, names
 
 LOSSES = ("damping", "friction")
 """Attributes of <dynamics>."""
@@ -28,31 +22,72 @@ ACTING = {
 }
 """Extensions of simulators that load joints where their number is not zero."""
 
-WEIGHTLESS = {"turnGravityOff": ("true", "1"), "gravity": ("false", "0")}
-"""Gazebo's ways to take a link's weight away."""
+SWITCHES = {
+    "turnGravityOff": (("true", "1"), "Gazebo's switch for gravity"),
+    "gravity": (("false", "0"), "Gazebo's switch for gravity"),
+    "kinematic": (("true", "1"), "Gazebo's switch for dynamics"),
+    "enable_wind": (("true", "1"), "Gazebo's wind"),
+}
+"""Gazebo's ways to take a link's weight away, to hold it, and to push it."""
+
+TIES = {
+    "loop_joint": "joint that closes a loop",
+    "linear_bushing_rpy": "bushing",  # Drake's, as those below
+    "ball_constraint": "constraint",
+    "distance_constraint": "constraint",
+    "tendon_constraint": "constraint",
+}
+"""Extensions that tie links together."""
+
+TOLD = frozenset((*ACTING, *SWITCHES, *TIES))
+
+VOCABULARY = {
+    "robot": Known(
+        many=names("link joint"),
+        idle=TOLD | names("material transmission gazebo sensor ros2_control frame name version"),
+    ),
+    "link": Known(
+        once=names("inertial"),
+        attributes=names("name"),
+        idle=TOLD
+        | names(
+            "visual collision sensor contact surface collision_checking self_collision_checking self_filter "
+            "type concave"
+        ),
+    ),
+    "joint": Known(
+        once=names("parent child origin axis mimic limit"),
+        many=names("dynamics"),
+        attributes=names("name type"),
+        idle=TOLD | names("calibration safety_controller dont_collapse"),
+    ),
+    "inertial": Known(once=names("origin mass inertia")),
+    "origin": Known(attributes=names("xyz rpy")),
+    "mass": Known(attributes=names("value")),
+    "inertia": Known(attributes=names("ixx iyy izz ixy ixz iyz")),
+    "parent": Known(attributes=names("link")),
+    "child": Known(attributes=names("link")),
+    "axis": Known(attributes=names("xyz")),
+    "mimic": Known(attributes=names("joint multiplier offset")),
+    "dynamics": Known(attributes=names("damping friction")),
+    "limit": Known(
+        attributes=names("lower upper velocity effort"),
+        idle=names("acceleration deceleration jerk power current command_effort gear_velocity"),
+    ),
+}
+"""What is read of each element, and what is known beside it."""
+SEVERAL_AXES = replace(
+    VOCABULARY["joint"],
+    once=VOCABULARY["joint"].once - {"limit"},
+    idle=VOCABULARY["joint"].idle | {"limit"},
+)
+"""Of a joint that is not of one axis: its limits are not read."""
 
 
-def ignored(elements: list[Element]) -> tuple[Note, ...]:
-    """Return a note for each kind of child that loads no joint, with how often.
-
-    So it does for numbers of <dynamics> that the format does not have: who wrote them knows what they mean.
-    """
-    counts = Counter(
-        str(child.tag) for element in elements for child in element if child.tag not in _used(element)
-    )
-    counts.update(
-        f"{key} of <dynamics>"
-        for element in elements
-        for dynamics in element.findall("dynamics")
-        for key in dynamics.attrib
-        if key not in LOSSES
-    )
-    return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()))
-
-
-def _used(element: Element) -> set[str]:
-    """What is read of an element; limits are those of a joint of one axis."""
-    return USED[element.tag] | ({"limit"} if element.get("type") in SINGLE else set())
+def known(element: Element) -> Known | None:
+    """What URDF knows of an element."""
+    several = element.tag == "joint" and element.get("type") not in SINGLE
+    return SEVERAL_AXES if several else VOCABULARY.get(element.tag)
 
 
 def omissions(robot: Element) -> Iterator[Omission]:
@@ -65,6 +100,7 @@ def omissions(robot: Element) -> Iterator[Omission]:
                 (number,) = numbers(losses, what, "0", 1, f"joint {name!r}")
                 if number:
                     yield Omission(what, name, f"{number!r} on {joint.get('type')}", joints=(name,))
+    yield from _ties(robot, links)
     read = {id(given.element) for given in given_numbers(robot)}
     for part in robot:
         if part.tag == "gazebo":
@@ -72,25 +108,39 @@ def omissions(robot: Element) -> Iterator[Omission]:
         elif part.tag == "transmission":
             owners = [joint.get("name", "") for joint in part.findall("joint")]
         else:
-            owners = [part.get("name", "")] if part.tag == "joint" else []
+            owners = [part.get("name", "")] if part.tag in ("joint", "link") else []
         named = ", ".join(owners) or str(part.tag)
         bodies = tuple(owner for owner in owners if owner in links)
         joints = tuple(owner for owner in owners if owner and owner not in links)
-        for what, detail in _acting(part, read):
+        for what, detail in acting(part, read):
             yield Omission(what, named, detail, joints, bodies)
 
 
-def _acting(part: Element, read: Collection[int]) -> Iterator[tuple[str, str]]:
-    """Return what of an extension loads joints, with its value, but for elements that were `read`, by id."""
+def _ties(robot: Element, links: Collection[str]) -> Iterator[Omission]:
+    """What ties links together beside the joints, of the file or in Gazebo's part of it."""
+    parts = [(part, TIES.get(local_name(part.tag))) for part in robot]
+    parts += [
+        (joint, "Gazebo's joint") for part in robot.findall("gazebo") for joint in part.findall("joint")
+    ]
+    for part, what in parts:
+        if what is not None:
+            said = (text for inner in part.iter() for text in (*inner.attrib.values(), inner.text or ""))
+            ends = tuple(dict.fromkeys(text.strip() for text in said if text.strip() in links))
+            yield Omission(what, part.get("name") or local_name(part.tag), " to ".join(ends), bodies=ends)
+
+
+def acting(part: Element, read: Collection[int] = ()) -> Iterator[tuple[str, str]]:
+    """What of an extension loads joints, with its value, but for elements that were `read`, by id."""
     for element in part.iter():
         if id(element) in read:
             continue
-        tag = str(element.tag).rpartition("}")[2].rpartition(":")[2]
+        tag = local_name(element.tag)
         text = (element.get("value") or element.text or "").strip()
+        values, switched = SWITCHES.get(tag, ((), ""))
         if tag in ACTING and _number(text):
             yield ACTING[tag], text
-        elif text.lower() in WEIGHTLESS.get(tag, ()):
-            yield "Gazebo's switch for gravity", ""
+        elif text.lower() in values:
+            yield switched, ""
 
 
 def _number(text: str) -> float:

@@ -1,0 +1,118 @@
+"""A name that a format does not have: refused where it is near one that is read, told where it is not."""
+
+from pathlib import Path
+
+import pytest
+from command_line import run_linkwise
+from conftest import DATA
+from linkwise import LinkwiseError, kept_package, read_robot
+from linkwise.robot import effects
+from urdf_text import chain, joint, link, robot
+
+URDF = chain(joint("ab", "a", "b"), joint("bc", "b", "c", inner='<dynamics damping="1"/>'))
+SDF = (DATA / "poses.sdf").read_text()
+OSIM = (DATA / "knee.osim").read_text()
+MISSPELT = {
+    "inertia of a link": (
+        URDF,
+        ("inertial>", "inertal>"),
+        "link 'a' has <inertal>, which is not read; did you mean <inertial>?",
+    ),
+    "axis": (URDF, ("<axis", "<axes"), "joint 'ab' has <axes>, which is not read; did you mean <axis>?"),
+    "capital": (
+        URDF,
+        ("<mass", "<Mass"),
+        "link 'a', <inertial> has <Mass>, which is not read; did you mean <mass>?",
+    ),
+    "attribute": (
+        URDF,
+        ('ixz="', 'izx="'),
+        "link 'a', <inertial>, <inertia> has izx=…, which is not read; did you mean ixz=…?",
+    ),
+    "two letters exchanged": (
+        URDF,
+        ('<axis xyz="', '<axis xzy="'),
+        "<axis> has xzy=…, which is not read; did you mean xyz=…?",
+    ),
+    "second inertia": (
+        URDF,
+        ("</link>", "<inertial/></link>"),
+        "link 'a' has <inertial> 2 times; keep one",
+    ),
+    "SDFormat": (
+        SDF,
+        ("<ixy>0.002</ixy>", "<iyx>0.002</iyx>"),
+        "link 'upper', <inertial>, <inertia> has <iyx>, which is not read; did you mean <ixy>?",
+    ),
+    "pose": (
+        SDF,
+        ("relative_to=", "relativ_to="),
+        "<pose> has relativ_to=…, which is not read; did you mean relative_to=…?",
+    ),
+    "OpenSim": (
+        OSIM,
+        ("<mass_center>", "<mass_centre>"),
+        "has <mass_centre>, which is not read; did you mean <mass_center>?",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", MISSPELT)
+def test_a_name_near_one_that_is_read_is_refused_with_that_one(case: str, tmp_path: Path) -> None:
+    text, (right, wrong), message = MISSPELT[case]
+    path = tmp_path / ("arm.sdf" if text is SDF else "arm.osim" if text is OSIM else "arm.urdf")
+    path.write_text(text)
+    assert not [line for line in effects(read_robot(path).notes) if "no such name" in line]
+    assert right in text
+    path.write_text(text.replace(right, wrong).replace(f"</{right[1:]}", f"</{wrong[1:]}"))
+    with pytest.raises(LinkwiseError) as caught:
+        read_robot(path)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+EXTENDED = robot(
+    *map(link, "abcd"),
+    *(joint(f"{a}{b}", a, b) for a, b in ("ab", "bc", "ad")),
+    '<material name="grey"/><link_group name="arm"/>',
+    '<loop_joint name="close" type="fixed"><link1 link="c"/><link2 link="d"/></loop_joint>',
+    '<loop_joint name="still" type="fixed"><link1 link="a"/><link2 link="a"/></loop_joint>',
+    '<drake:linear_bushing_rpy><drake:bushing_frameA name="left"/></drake:linear_bushing_rpy>',
+    '<gazebo><joint name="rod" type="ball"><parent>d</parent><child>b</child></joint></gazebo>',
+    '<drake:joint name="screw" type="screw"/>',
+).replace("<robot", '<robot xmlns:drake="http://drake.mit.edu"')
+TOLD = (
+    "ignored, as URDF has no such name: joint of http://drake.mit.edu (1 ×), link_group (1 ×)",
+    "joint that closes a loop left out of the torques: close (c to d)",
+    "bushing left out of the torques: linear_bushing_rpy",
+    "Gazebo's joint left out of the torques: rod (d to b)",
+)
+
+
+def test_generate_and_a_kept_package_say_what_was_ignored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LINKWISE_CACHE", str(tmp_path / "cache"))
+    path = tmp_path / "arm.urdf"
+    path.write_text(EXTENDED)
+    done = run_linkwise("generate", "arm.urdf", "--out", "out", "--backend", "numpy", folder=tmp_path)
+    assert [line for line in done.stderr.splitlines() if line.startswith("warning")] == [
+        f"warning: arm.urdf: {line}" for line in TOLD
+    ]
+    assert kept_package(path, "numpy").warnings == tuple(f"{path}: {line}" for line in TOLD)
+
+
+def test_what_an_sdformat_file_has_that_loads_joints_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "arm.sdf"
+    text = SDF.replace("<sdf", '<sdf xmlns:drake="http://drake.mit.edu"').replace(
+        "<child>tip</child>", "<child>tip</child><drake:rotor_inertia>0.1</drake:rotor_inertia>"
+    )
+    path.write_text(
+        text.replace(
+            '<link name="tip">', '<link name="tip"><velocity_decay><linear>2</linear></velocity_decay>'
+        )
+    )
+    assert effects(read_robot(path).notes) == (
+        "damping of a link's velocity left out of the torques: tip (2)",
+        "armature left out of the torques: roll (0.1)",
+    )
