@@ -85,6 +85,7 @@ WITHOUT_FORCE = {
         LinkEnergy("plain", (2 + X.q**2) * Y.qd**2 + X.qd * Y.qd, 0),
         LinkEnergy("sloped", X.qd**2 * (2 + sp.cos(Y.q)) + Y.qd**2 + Y.q * X.qd + X.q * Y.qd, X.q),
         LinkEnergy("puck", (X.qd - 1.7 * Y.q) ** 2 + (Y.qd + 1.7 * X.q) ** 2 * (1 + X.q**2), 0),
+        LinkEnergy("spring", 0, 3 * X.q**2 + Y.q),
     ],
 }
 """Kinetic energies with terms b(q) . qd that have no force: b is the slope of a function, 3 x or x y."""
