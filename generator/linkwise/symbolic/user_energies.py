@@ -43,7 +43,8 @@ def energy_system(
             checked.append(_checked(link, coordinates, values, symbolic))
     used = set().union(*(link.kinetic.free_symbols | link.potential.free_symbols for link in checked))
     kept = {symbol: value for symbol, value in values.items() if symbol in used}
-    return EnergySystem(name, coordinates, tuple(checked), kept if symbolic else {})
+    request = {"parameters": "symbolic" if symbolic else "numeric"}
+    return EnergySystem(name, coordinates, tuple(checked), kept if symbolic else {}, request=request)
 
 
 def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
