@@ -18,6 +18,7 @@ from conftest import DATA, needs_compiler
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
 from linkwise.check import check_package
 from linkwise.cli.app import app
+from linkwise.emit.backend import BACKENDS
 from linkwise.emit.kernel_choice import check_size, chosen_kernel
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
@@ -272,7 +273,7 @@ def test_auto_is_straight_where_loops_cannot_be(monkeypatch: pytest.MonkeyPatch)
 
 def test_a_robot_too_large_is_refused_before_any_work() -> None:
     """No file is rendered: nothing reports progress."""
-    told = "400 joints are too many for C in loops: .*; take back ends without C: --backend numpy, say"
+    told = "400 joints are too many for C in loops: .*; take back ends without c: --backend numpy, say"
     with pytest.raises(LinkwiseError, match=told):
         generate(read_system("planar400"), progress=lambda *at: pytest.fail(f"at work: {at}"))
 
@@ -311,6 +312,14 @@ def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch)
             {"kernel": "loops", "backends": ["formulas"]},
             "'formulas' is not there with --kernel loops",
         ),
+        (
+            "planar4",
+            {"backends": ["numpy", "formulas"]},
+            "4 coordinates are too many for formulas to read, of which there may be 3; take back ends "
+            "without formulas: --backend numpy, say",
+        ),
+        (KNEE, {"backends": ["formulas"]}, "follows a curve, and no closed forms are derived for that"),
+        ("planar3", {"backends": []}, "no back end is asked for; choose among numpy, torch,"),
         ("planar160", {"backends": ["c"]}, "160 joints are too many for C in loops: it answers with"),
         ("planar3", {"kernel": "curved"}, "no kernel 'curved'; choose among auto, straight, loops"),
     ],
@@ -318,6 +327,34 @@ def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch)
 def test_a_kernel_that_cannot_be_is_refused(robot: str, asked: dict[str, object], told: str) -> None:
     with pytest.raises(LinkwiseError, match=re.escape(told)):
         generate(read_system(robot), **asked)  # type: ignore[arg-type]
+
+
+OF_EVERY_PACKAGE = {"__init__.py", "names.py", "py.typed", "manifest.json"}
+
+
+@pytest.mark.parametrize(
+    ("robot", "kernel", "refused"),
+    [
+        ("planar3", "straight", set()),
+        ("planar4", "straight", {"formulas"}),
+        ("planar4", "loops", {"formulas"}),
+        (KNEE, "auto", {"formulas"}),
+        (TURNTABLE, "auto", set()),
+    ],
+)
+def test_a_back_end_is_refused_or_has_files_of_its_own(robot: str, kernel: str, refused: set[str]) -> None:
+    system, without = read_system(robot), set()
+    for backend in BACKENDS:
+        try:
+            files = generate(system, iter([backend]), kernel=kernel)
+        except LinkwiseError:
+            without.add(backend)
+        else:
+            own = {path for path in files if not path.startswith("runtime/")} - OF_EVERY_PACKAGE
+            assert own, backend
+    assert without == refused
+    usual = json.loads(generate(system, kernel=kernel)["manifest.json"])["request"]["backends"]
+    assert set(usual) == BACKENDS.keys() - refused
 
 
 def test_the_flag_chooses_the_kernel(tmp_path: Path) -> None:

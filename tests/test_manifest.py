@@ -16,8 +16,7 @@ from linkwise.package.write import check_target
 @pytest.fixture(scope="session")
 def planar2(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("manifest") / "planar2"
-    request = {"robot": "planar2", "backends": ["numpy"], "parameters": "numeric", "lock": {}, "root": None}
-    write_package(generate(read_system("planar2"), ["numpy"], request=request), directory)
+    write_package(generate(read_system("planar2"), ["numpy"]), directory)
     return directory
 
 

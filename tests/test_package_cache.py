@@ -8,7 +8,16 @@ from pathlib import Path
 import pytest
 from command_line import run_linkwise
 from conftest import DATA
-from linkwise import LinkwiseError, Options, analyze, kept_package
+from linkwise import (
+    LinkwiseError,
+    Options,
+    analyze,
+    check_package,
+    generate,
+    kept_package,
+    read_robot,
+    read_system,
+)
 from linkwise.package.manifest import FILE
 from osim_text import ROLLING, chain
 
@@ -38,6 +47,41 @@ def test_an_analysis_is_the_same_by_file_and_by_package(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
     tables = [(tmp_path / out / "analysis.parquet").read_bytes() for out in ("by_file", "by_package")]
     assert len(tables[0]) == len(tables[1])
+
+
+def test_a_package_tells_how_it_was_asked_for_whoever_makes_it(tmp_path: Path) -> None:
+    (tmp_path / "odd.toml").write_text(
+        'schema = 1\nname = "odd"\nlink = [{ name = "a", mass = -1, com = [0.1, 0, 0], '
+        "inertia = { xx = 1, yy = 1, zz = 1 } }]\n"
+        'joint = [{ name = "a joint", parent = "base", child = "a", axis = [0, 1, 0] }]\n'
+    )
+    options = Options("symbolic", allow_unphysical=True)
+    flags = ("--allow-unphysical", "--parameters", "symbolic", "--backend", "numpy")
+    done = run_linkwise("generate", "odd.toml", "--out", "out", *flags, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    kept = kept_package(tmp_path / "odd.toml", "numpy", options).directory
+    folders = [
+        {
+            path.relative_to(folder).as_posix(): path.read_text(encoding="utf-8")
+            for path in folder.rglob("*.*")
+        }
+        for folder in (tmp_path / "out/odd", kept)
+    ]
+    read = [read(tmp_path / "odd.toml", options) for read in (read_system, read_robot)]
+    assert all(files == folders[0] for files in (folders[1], *(generate(robot, ["numpy"]) for robot in read)))
+    request = json.loads(folders[0][FILE])["request"]
+    assert request == {"robot": "odd.toml", **options.request()} | {
+        "backends": ["numpy"],
+        "kernel": "auto",
+        "derivation": "rule",
+    }
+    assert not [result for result in check_package(kept, 5) if result.mark == "FAIL"]
+
+
+def test_a_back_end_that_writes_nothing_keeps_no_package(cache: Path) -> None:
+    with pytest.raises(LinkwiseError, match="leg: 6 coordinates are too many for formulas to read"):
+        kept_package(KNEE.parent / "leg.toml", "formulas")
+    assert not list(cache.glob("packages/*/*"))
 
 
 def test_it_is_made_once_and_again_when_the_file_changes(tmp_path: Path) -> None:

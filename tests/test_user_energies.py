@@ -95,6 +95,7 @@ WITHOUT_FORCE = {
         LinkEnergy("plain", (2 + X.q**2) * Y.qd**2 + X.qd * Y.qd, 0),
         LinkEnergy("sloped", X.qd**2 * (2 + sp.cos(Y.q)) + Y.qd**2 + Y.q * X.qd + X.q * Y.qd, X.q),
         LinkEnergy("puck", (X.qd - 1.7 * Y.q) ** 2 + (Y.qd + 1.7 * X.q) ** 2 * (1 + X.q**2), 0),
+        LinkEnergy("spring", 0, 3 * X.q**2 + Y.q),
     ],
 }
 """Kinetic energies with terms b(q) . qd that have no force: b is the slope of a function, 3 x or x y."""
@@ -252,6 +253,22 @@ FILES = {
         "parameter m is '1'; give a number, without quotes",
     ),
     "word": (GOOD + "parameters = {sp.Symbol('m'): [1]}", "parameter m has no value as a real number"),
+    "a name that nobody reads": (
+        GOOD + "k = sp.Symbol('k')\ndissipation = k * x.qd**2 / 2",
+        "'dissipation' in line 7 would count for nothing: linkwise reads ",
+    ),
+    "a function that nobody calls": (
+        GOOD + "def forces(q, qd):\n    return -qd\n",
+        "'forces' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "a name added to": (
+        GOOD + "if x:\n    damping: list = []\n    damping += [3]",
+        "'damping' in line 7 would count for nothing: linkwise reads ",
+    ),
+    "a name misspelt": (
+        GOOD + "parametres = {sp.Symbol('m'): 1.0}",
+        "'parametres' in line 6 would count for nothing: linkwise reads parameters, ",
+    ),
     "complex": (GOOD + "parameters = {sp.Symbol('m'): sp.I}", "parameter m has no value as a real number"),
     "huge": (GOOD + "parameters = {sp.Symbol('m'): 10**400}", "parameter m has no value as a real number"),
     "infinite": (GOOD + "parameters = {sp.Symbol('m'): sp.oo}", "parameter m has NaN or infinity"),
@@ -265,6 +282,17 @@ def test_defect_of_a_python_file_is_named(case: str, tmp_path: Path) -> None:
     with pytest.raises(LinkwiseError) as caught:
         read_system(tmp_path / "bad.py")
     assert str(caught.value).startswith(f"{tmp_path / 'bad.py'}: {message}")
+
+
+def test_what_a_python_file_uses_itself_is_its_own_matter(tmp_path: Path) -> None:
+    own = (
+        "import math\nm, unused = sp.symbols('m unused')\nk = 3\nfor turn in range(2):\n    last = turn\n"
+        "def spring(a):\n    stiffness = k * last\n    return stiffness * a**2\n_note = 'mine'\n"
+        "links += [LinkEnergy('spring', 0, spring(x.q) * m)]\nname = 'mine'\nparameters = {m: 2.0}\n"
+        "if __name__ == '__main__':\n    shown = links\n"
+    )
+    (tmp_path / "own.py").write_text(GOOD + own)
+    assert read_system(tmp_path / "own.py").link_names == ("a", "spring")
 
 
 @pytest.mark.parametrize(

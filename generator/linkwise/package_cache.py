@@ -9,15 +9,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from linkwise.emit.assemble import checked_identifier
-from linkwise.emit.backend import chosen_backends
-from linkwise.emit.kernel_choice import chosen_kernel
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.makers import generator_files
 from linkwise.package.manifest import FILE
 from linkwise.package.write import write_package
-from linkwise.pipeline import generate, read_system
+from linkwise.pipeline import plan, read_system
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, is_description, robot_files
 from linkwise.robot.notes import effects
@@ -76,11 +73,9 @@ def _kept(
     found = next(folder.glob(f"*/{FILE}"), None)
     if found is None or not (folder / WARNINGS).is_file():
         system = read_system(robot, options)
-        package = folder / checked_identifier(None, system.name)
-        kind = chosen_kernel(system, "auto", backends)
-        names = [chosen.name for chosen in chosen_backends(backends, kind)]
-        request = {"robot": Path(robot).name, "backends": names, **options.request()}
-        write_package(generate(system, names, None, request, progress, kind), package)
+        made = plan(system, backends)
+        package = folder / made.name
+        write_package(made.files(progress), package)
         text = json.dumps(effects(system.notes))
         (folder / WARNINGS).write_text(text, encoding="utf-8")
         found = package / FILE

@@ -14,19 +14,21 @@ differentiates them, the autograd back end, formulas and reports.
 """
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from linkwise.dynamics.derive import Method, derive
 from linkwise.emit.assemble import checked_identifier, package_files
-from linkwise.emit.backend import backends_of, chosen_backends
+from linkwise.emit.backend import BackendFiles, chosen_backends, usual_backends
 from linkwise.emit.constrained_system import constrained_system
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.kernel_choice import check_size, chosen_kernel
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import is_file
+from linkwise.package.entries import KernelKind
 from linkwise.progress import Progress, silent
-from linkwise.robot import Options, read_robot
+from linkwise.robot import Options, read_robot, told_name
 from linkwise.robot.robot import Robot
 from linkwise.symbolic.system import System, rigid_system
 from linkwise.symbolic.user_energies import read_energies
@@ -42,34 +44,75 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
                 raise LinkwiseError(
                     f"energies in Python do not accept {', '.join(rigid)}; change the energies"
                 )
-            return read_energies(Path(spec), options.parameters != "numeric")
+            energies = read_energies(Path(spec), options.parameters != "numeric")
+            return replace(energies, request={"robot": told_name(spec), **options.request()})
     system = rigid_system(read_robot(spec, options))
     with within(str(spec)):
         return constrained_system(system)
+
+
+@dataclass(frozen=True)
+class PackagePlan:
+    """A package that can be made: what of, with which back ends, and how it was asked for.
+
+    kernel: the kind that was chosen
+    name: of the package
+    request: what its manifest keeps, so that it can be made again
+    """
+
+    system: System
+    kernel: KernelKind
+    backends: tuple[BackendFiles, ...]
+    name: str
+    derivation: Method
+    request: Mapping[str, Any]
+
+    def files(self, progress: Progress = silent) -> dict[str, str]:
+        """Files of the package, {path inside the package: text}."""
+        kernels = derive(self.system, progress, self.derivation) if self.kernel == "straight" else ()
+        derivation = Derivation(self.system, kernels, self.name, self.request)
+        return package_files(derivation, self.backends, progress)
+
+
+def plan(
+    robot: System | Robot,
+    backends: Iterable[str] | None = None,
+    name: str | None = None,
+    kernel: str = "auto",
+    derivation: Method = "rule",
+) -> PackagePlan:
+    """What `generate` does with the same arguments, before anything is derived; raises as it does."""
+    asked = None if backends is None else tuple(backends)
+    system = constrained_system(rigid_system(robot) if isinstance(robot, Robot) else robot)
+    kind = chosen_kernel(system, kernel, asked, derivation)
+    chosen = chosen_backends(usual_backends(system, kind) if asked is None else asked, kind)
+    with within(system.name):
+        check_size(system, kind, asked)
+    request = {
+        **system.request,
+        "backends": [backend.name for backend in chosen],
+        "kernel": kernel,
+        "derivation": derivation,
+    }
+    return PackagePlan(system, kind, chosen, checked_identifier(name, system.name), derivation, request)
 
 
 def generate(
     robot: System | Robot,
     backends: Iterable[str] | None = None,
     name: str | None = None,
-    request: Mapping[str, Any] | None = None,
     progress: Progress = silent,
     kernel: str = "auto",
     derivation: Method = "rule",
 ) -> dict[str, str]:
     """Files of a package, {path inside the package: text}.
 
-    `backends` are all that there are if not given. `kernel` is straight, loops, or auto, which chooses by the
-    robot's size; with loops no closed forms are derived, and `formulas` are not there. `derivation` says how
-    those of rigid links are: rule, which is cheaper, or energy, by Euler-Lagrange from SymPy energies.
+    `backends` are all that the robot can have if not given. `kernel` is straight, loops, or auto, which
+    chooses by the robot's size; with loops no closed forms are derived, and `formulas` are not there.
+    `derivation` says how those of rigid links are: rule, which is cheaper, or energy, by Euler-Lagrange from
+    SymPy energies.
 
-    `request` goes into the manifest, so that a reader sees how to make the package again.
-    Raises LinkwiseError for a name, back end or kernel that cannot be, before anything is derived.
+    The manifest keeps these arguments, and the options that the robot was read with: how to make the package
+    again. Raises LinkwiseError for a name, back end or kernel that cannot be, before anything is derived.
     """
-    system = constrained_system(rigid_system(robot) if isinstance(robot, Robot) else robot)
-    kind = chosen_kernel(system, kernel, backends, derivation)
-    chosen = chosen_backends(backends_of(kind) if backends is None else backends, kind)
-    check_size(system, kind, backends)
-    package = checked_identifier(name, system.name)
-    kernels = derive(system, progress, derivation) if kind == "straight" else ()
-    return package_files(Derivation(system, kernels, package, request or {}), chosen, progress)
+    return plan(robot, backends, name, kernel, derivation).files(progress)

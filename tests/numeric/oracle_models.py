@@ -44,6 +44,25 @@ def puma560() -> Any:
     return model
 
 
+def level_arm() -> Any:
+    """Return the pendulum and the level arm of tests/data/level_arm.toml."""
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, 0.0, -9.81])
+    moments, along, about_z = np.diag([0.01, 0.02, 0.02]), np.array([0.2, 0.0, 0.0]), pin.JointModelRZ()
+    table = (
+        ("swing", 0, pin.JointModelRY(), 1.0, 0.0),
+        ("yaw", 0, about_z, 0.8, 0.0),
+        ("elbow", 2, about_z, 0.6, 0.05),
+        ("wrist", 3, about_z, 0.4, 0.0),
+    )
+    for name, parent, kind, mass, aside in table:
+        place = pin.SE3(np.eye(3), along if parent else np.zeros(3))
+        joint = model.addJoint(parent, kind, place, name)
+        body = pin.Inertia(mass, np.array([0.1, aside, 0.0]), moments)
+        model.appendBodyToJoint(joint, body, pin.SE3.Identity())
+    return model
+
+
 def panda(path: Path) -> Any:
     """Return Panda's arm with its fingers locked at zero."""
     full = pin.buildModelFromUrdf(str(path))

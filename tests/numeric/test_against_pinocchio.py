@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from answers import packed, random_states, relative_error
-from conftest import PANDA, needs_compiler
+from conftest import DATA, PANDA, needs_compiler
 
 pytest.importorskip("pinocchio")
 
@@ -19,6 +19,7 @@ MODELS: dict[str, Callable[[], Any]] = {
     "planar3": oracle_models.planar3,
     "puma560": oracle_models.puma560,
     str(PANDA): lambda: oracle_models.panda(PANDA),
+    str(DATA / "level_arm.toml"): oracle_models.level_arm,
 }
 KNOWN: dict[str, dict[str, Any]] = {}
 
@@ -38,7 +39,7 @@ def pinocchio_says(robot: str, joints: tuple[str, ...]) -> dict[str, Any]:
         *(pytest.param(b, marks=needs_compiler) for b in ("c", "c loops", "native")),
     ],
 )
-@pytest.mark.parametrize("robot", MODELS, ids=["planar3", "puma560", "panda"])
+@pytest.mark.parametrize("robot", MODELS, ids=["planar3", "puma560", "panda", "level_arm"])
 def test_decomposition_of_every_link_is_pinocchios(
     robot: str,
     backend: str,

@@ -5,7 +5,7 @@ more than that where nobody watches.
 """
 
 import sys
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,19 +18,17 @@ from linkwise.cli import Details, counted, tell
 from linkwise.cli.depfile import depfile_text, own_modules
 from linkwise.cli.options import RobotNames, reads_robot
 from linkwise.dynamics.derive import Method
-from linkwise.emit.assemble import checked_identifier
-from linkwise.emit.backend import BACKENDS, backends_of, chosen_backends
-from linkwise.emit.kernel_choice import chosen_kernel
+from linkwise.emit.backend import BACKENDS
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.input_file import is_file, is_inside, is_same
+from linkwise.input_file import is_inside, is_same
 from linkwise.makers import generator_files
 from linkwise.output import require_writable, sweep, write_files
 from linkwise.package.manifest import FILE
 from linkwise.package.write import check_target, differences, refuse_inside_package, write_package
-from linkwise.progress import Progress, progress, silent
+from linkwise.progress import progress, silent
 from linkwise.robot import Options, effects, robot_files
-from linkwise.symbolic.system import RigidSystem, System
+from linkwise.symbolic.system import RigidSystem
 
 app = typer.Typer(add_completion=False)
 STALE = 1
@@ -52,12 +50,11 @@ class Choices:
 
 @dataclass(frozen=True)
 class Order:
-    """A package that was asked for: of which robot, where, and what makes its files."""
+    """A package that was asked for: of which robot, what makes its files, and where they go."""
 
     robot: str
-    system: System
+    plan: pipeline.PackagePlan
     directory: Path
-    files: Callable[[Progress], dict[str, str]]
 
 
 @app.command()
@@ -68,7 +65,10 @@ def generate(
     out: Annotated[Path, typer.Option(help="Directory that gets the packages")],
     name: Annotated[str | None, typer.Option(help="Name of the package; the robot's if not given")] = None,
     backend: Annotated[
-        list[str] | None, typer.Option(help=f"{', '.join(BACKENDS)}; may be repeated; all if not given")
+        list[str] | None,
+        typer.Option(
+            help=f"{', '.join(BACKENDS)}; may be repeated; all that the robot can have if not given"
+        ),
     ] = None,
     kernel: Annotated[
         Literal["auto", "straight", "loops"],
@@ -137,7 +137,7 @@ def generate(
             require_writable(order.directory)
     watched = verbose or sys.stdout.isatty()
     with progress() if verbose or sys.stderr.isatty() else nullcontext(silent) as report:
-        packages = [(order, order.files(report)) for order in orders]
+        packages = [(order, order.plan.files(report)) for order in orders]
     if list_outputs:
         tell(
             *(f"{(order.directory / path).as_posix()}" for order, files in packages for path in sorted(files))
@@ -148,7 +148,7 @@ def generate(
     rule = "" if depfile is None else _rule(packages, options, stamp, before)
     for order, files in packages:
         written = write_package(files, order.directory, replace)
-        for effect in effects(order.system.notes, details):
+        for effect in effects(order.plan.system.notes, details):
             tell(f"warning: {order.robot}: {effect}", err=True)
         if watched:
             _tell_written(order, len(files), written)
@@ -169,25 +169,11 @@ def _check_flags(list_outputs: bool, check: bool, depfile: Path | None, stamp: P
 
 def _order(robot: str, asked: Choices) -> Order:
     """Read a robot; raises LinkwiseError, before anything is derived, where its package cannot be made."""
-    chosen_backends(asked.backends)
-    path, options = Path(robot), asked.options
-    system = pipeline.read_system(robot, options)
-    kind = chosen_kernel(system, asked.kernel, asked.backends or None, asked.derivation)
-    backends = [chosen.name for chosen in chosen_backends(asked.backends or backends_of(kind), kind)]
-    request = {
-        "robot": path.name if is_file(path) else robot,
-        "backends": backends,
-        "kernel": asked.kernel,
-        "derivation": asked.derivation,
-        **options.request(),
-    }
-    directory = asked.out / checked_identifier(asked.name, system.name)
+    system = pipeline.read_system(robot, asked.options)
+    made = pipeline.plan(system, asked.backends or None, asked.name, asked.kernel, asked.derivation)
+    directory = asked.out / made.name
     check_target(directory, None if asked.replace else system.name)
-
-    def files(report: Progress) -> dict[str, str]:
-        return pipeline.generate(system, backends, asked.name, request, report, kind, asked.derivation)
-
-    return Order(robot, system, directory, files)
+    return Order(robot, made, directory)
 
 
 def _check_places(orders: Iterable[Order]) -> None:
@@ -267,7 +253,7 @@ def _rule(
 
 
 def _tell_written(order: Order, files: int, written: bool) -> None:
-    system = order.system
+    system = order.plan.system
     tell(
         f"{'wrote' if written else 'up to date:'} {order.directory}: "
         f"{counted(len(system.coordinates), 'joint')}, {counted(len(system.links), 'link')}, "

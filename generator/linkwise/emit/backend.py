@@ -30,6 +30,12 @@ def _too_large_for_straight(system: System) -> str:
     return too_large_for_straight(system)
 
 
+def _too_many_to_read(system: System) -> str:
+    from linkwise.emit.formulas import too_many_to_read
+
+    return too_many_to_read(system)
+
+
 def _too_large_for_loops(system: System) -> str:
     from linkwise.emit.c.stack import too_large_for_loops
 
@@ -76,6 +82,8 @@ class BackendFiles:
     """Other back ends without which it cannot be."""
     fault: Callable[[System], str] = _no_fault
     """Why it cannot be for a robot; nothing if it can."""
+    optional: bool = False
+    """Whether a robot that it cannot be for goes without it, unless it was asked for by name."""
 
 
 def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
@@ -202,7 +210,13 @@ BACKENDS: dict[str, BackendFiles] = {
             emits=(_c,),
             fault=_too_large_for_straight,
         ),
-        BackendFiles("formulas", "closed forms to read, for small robots", emits=(_formulas,)),
+        BackendFiles(
+            "formulas",
+            "closed forms to read, for small robots",
+            emits=(_formulas,),
+            fault=_too_many_to_read,
+            optional=True,
+        ),
     )
 }
 
@@ -230,12 +244,20 @@ def backends_of(kernel: KernelKind) -> dict[str, BackendFiles]:
     return LOOPS if kernel == "loops" else BACKENDS
 
 
+def usual_backends(system: System, kernel: KernelKind) -> tuple[str, ...]:
+    """Names of the back ends that a robot's package has where none was asked for."""
+    there = backends_of(kernel).values()
+    return tuple(one.name for one in there if not (one.optional and one.fault(system)))
+
+
 def chosen_backends(names: Iterable[str], kernel: KernelKind = "straight") -> tuple[BackendFiles, ...]:
     """Back ends by name and those that they need, in this order.
 
-    Raises LinkwiseError for an unknown name, and for one that takes closed forms where there are none.
+    Raises LinkwiseError for no name, an unknown one, and one that takes closed forms where there are none.
     """
     wanted, there = list(names), backends_of(kernel)
+    if not wanted:
+        raise LinkwiseError(f"no back end is asked for; choose among {', '.join(there)}")
     for name in wanted:
         if name not in BACKENDS:
             raise LinkwiseError(f"no back end {name!r}; choose among {', '.join(BACKENDS)}")

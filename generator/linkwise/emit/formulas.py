@@ -22,11 +22,18 @@ READABLE = (sp.Rational, sp.Float, type(sp.pi), type(sp.E), sp.Add, sp.Mul, sp.P
 """What a number may be made of for readers of Python and of LaTeX to know it."""
 
 
+def too_many_to_read(system: System) -> str:
+    """Why a robot has no formulas that anybody would read, or nothing: expanded, they explode."""
+    if (count := len(system.coordinates)) > MOST_COORDINATES:
+        return (
+            f"{count} coordinates are too many for formulas to read, of which there may be {MOST_COORDINATES}"
+        )
+    return ""
+
+
 def formula_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
-    """formulas.txt and formulas.tex; nothing for a robot that nobody would read."""
+    """formulas.txt and formulas.tex of a robot without `too_many_to_read`."""
     system = derivation.system
-    if len(system.coordinates) > MOST_COORDINATES:
-        return
     names = [symbol.name for symbol in system.parameters]
     parameters = parameter_symbols(names)
     shown = [(i, j, _shown(system, parameters, tau)) for i, j, tau in _rows(system)]

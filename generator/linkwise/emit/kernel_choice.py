@@ -1,13 +1,13 @@
 """Which kind of kernel a package gets: straight lines of closed forms, or loops over links and joints."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import get_args
 
 from linkwise.dynamics.derive import Method
 from linkwise.dynamics.frame_search import FrameSearch
 from linkwise.dynamics.link_motion import Origin
 from linkwise.dynamics.screws import CommonAxes
-from linkwise.emit.backend import LOOPS, backends_of, chosen_backends
+from linkwise.emit.backend import LOOPS, BackendFiles, backends_of, chosen_backends, usual_backends
 from linkwise.emit.c.loop_costs import decomposition_cost, link_costs
 from linkwise.errors import LinkwiseError
 from linkwise.package.entries import KernelKind
@@ -34,7 +34,7 @@ def chosen_kernel(
     """Kind of kernel for one of CHOICES and the back ends asked for by name, None for all there are.
 
     Raises LinkwiseError for a choice that is not one, and for loops over energies or for a derivation from
-    them, and for closed forms of joints that follow curves.
+    them, and for closed forms of joints that follow curves, formulas among them.
     """
     if derivation not in get_args(Method):
         raise LinkwiseError(f"no derivation {derivation!r}; choose rule or energy")
@@ -44,13 +44,13 @@ def chosen_kernel(
         raise LinkwiseError("--kernel loops goes over rigid bodies, and here are energies; leave it out")
     if choice == "loops" and derivation == "energy":
         raise LinkwiseError("--kernel loops derives nothing, and --derivation energy does; leave one out")
+    closed = derivation == "energy" or (backends is not None and not set(backends) <= LOOPS.keys())
     if isinstance(system, RigidSystem) and system.curved:
-        if choice == "straight" or derivation == "energy":
+        if choice == "straight" or closed:
             refuse_curves(system)
         return "loops"
     if choice != "auto":
         return "loops" if choice == "loops" else "straight"
-    closed = derivation == "energy" or (backends is not None and not set(backends) <= LOOPS.keys())
     if closed or isinstance(system, EnergySystem):
         return "straight"
     cost = closed_form_cost(system)
@@ -62,18 +62,28 @@ def chosen_kernel(
 
 def fault(system: System, kind: KernelKind, backends: Iterable[str] | None) -> str:
     """Why a robot cannot have these back ends with this kind of kernel; nothing if it can."""
-    chosen = chosen_backends(backends_of(kind) if backends is None else backends, kind)
-    return next(filter(None, (backend.fault(system) for backend in chosen)), "")
+    return next((why for _, why in _faults(system, kind, backends)), "")
+
+
+def _faults(
+    system: System, kind: KernelKind, backends: Iterable[str] | None
+) -> Iterator[tuple[BackendFiles, str]]:
+    """Those of these back ends that cannot be, and why."""
+    names = usual_backends(system, kind) if backends is None else backends
+    return ((one, why) for one in chosen_backends(names, kind) if (why := one.fault(system)))
 
 
 def check_size(system: System, kind: KernelKind, backends: Iterable[str] | None) -> None:
     """Raise LinkwiseError, which names a way that there is, where these back ends cannot be."""
-    if not (why := fault(system, kind, backends)):
+    found = next(_faults(system, kind, backends), None)
+    if found is None:
         return
+    backend, why = found
     other: KernelKind = "loops" if kind == "straight" else "straight"
-    if not fault(system, other, None) and (other == "loops" or _derivable(system)):
+    possible = backend.name in backends_of(other) and (other == "loops" or _derivable(system))
+    if possible and not fault(system, other, None):
         raise LinkwiseError(f"{why}; take --kernel {other}")
-    raise LinkwiseError(f"{why}; take back ends without C: --backend numpy, say")
+    raise LinkwiseError(f"{why}; take back ends without {backend.name}: --backend numpy, say")
 
 
 def _derivable(system: System) -> bool:

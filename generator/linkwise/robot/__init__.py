@@ -2,7 +2,7 @@
 
 from linkwise.robot.build import Options
 from linkwise.robot.notes import Note, effects, kept_apart, left_out
-from linkwise.robot.read import BUILT_IN, DESCRIPTIONS, is_description, read_robot, robot_files
+from linkwise.robot.read import BUILT_IN, DESCRIPTIONS, is_description, read_robot, robot_files, told_name
 from linkwise.robot.robot import Coordinate, Joint, Link, Robot
 
 __all__ = [
@@ -20,4 +20,5 @@ __all__ = [
     "left_out",
     "read_robot",
     "robot_files",
+    "told_name",
 ]

@@ -109,7 +109,7 @@ def build(description: Description, options: Options) -> Robot:
         description.gravity,
         parameters,
         (*notes, *naming.notes()) if naming else notes,
-        options.allow_unphysical,
+        options.request(),
         _with_known(assembly.frames, parameters, dict(description.parameters)),
         passive,
         held.ties,

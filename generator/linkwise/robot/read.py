@@ -1,11 +1,12 @@
 """Reading a robot, whatever describes it: a built-in name or a file."""
 
 import re
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
 from linkwise.errors import LinkwiseError, within
-from linkwise.input_file import require_file
+from linkwise.input_file import is_file, require_file
 from linkwise.robot.build import Options, build
 from linkwise.robot.builtin.planar import planar
 from linkwise.robot.constrained import check_constraints
@@ -52,6 +53,16 @@ def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
     options = options or Options()
     if not str(spec).strip():
         raise LinkwiseError(f"the robot's name is empty; give {DESCRIPTIONS}")
+    robot = _read_robot(spec, options)
+    return replace(robot, request={"robot": told_name(spec), **robot.request})
+
+
+def told_name(spec: str | Path) -> str:
+    """What a manifest calls a robot: its file without the folder, or the built-in name."""
+    return Path(spec).name if is_file(Path(spec)) else str(spec)
+
+
+def _read_robot(spec: str | Path, options: Options) -> Robot:
     with within(str(spec)):
         if match := re.fullmatch(r"planar([1-9][0-9]*)", str(spec)):
             return _built(planar(_joints(match[1])), options)

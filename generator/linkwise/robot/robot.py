@@ -2,8 +2,9 @@
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import sympy as sp
 
@@ -223,8 +224,8 @@ class Parameter:
 class Robot:
     """A tree of links, parents before children, moved by `coordinates`; gravity in m/s².
 
-    With `allow_unphysical` its parameters may take values that no body has. `frames` are the file's own, one
-    for each link among them, or none.
+    `request` tells what it was read from and how, as manifests keep it. `frames` are the file's own, one for
+    each link among them, or none.
 
     `ties` and `couplings` hold beside the tree. Under them the coordinates `independent` move all others, in
     ascending order; before they are found, `wanted` are those asked for, by name, and `driven` those that
@@ -237,7 +238,7 @@ class Robot:
     gravity: Vec3 = (0.0, 0.0, -9.81)
     parameters: tuple[Parameter, ...] = ()
     notes: tuple[Note, ...] = field(default=(), compare=False)
-    allow_unphysical: bool = False
+    request: Mapping[str, Any] = field(default_factory=dict, compare=False)
     frames: tuple[Frame, ...] = ()
     passive: tuple[PassiveAxis, ...] = ()
     ties: tuple[Tie, ...] = ()
@@ -270,6 +271,11 @@ class Robot:
     def _repr_html_(self) -> str:
         """What a notebook shows: joints with unit and limits, links with mass and parent."""
         return description_table(self)
+
+    @property
+    def allow_unphysical(self) -> bool:
+        """Whether its parameters may take values that no body has."""
+        return bool(self.request.get("allow_unphysical"))
 
     @property
     def joint_limits(self) -> tuple[Limits, ...]:

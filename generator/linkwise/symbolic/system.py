@@ -1,12 +1,12 @@
 """What every description becomes: coordinates, links and run-time parameters.
 
 A rigid link and a link of hand-written energies are two types, and so are the systems made of them. Both
-systems answer `name`, `coordinates`, `links`, `link_names`, `parameters`, `notes` and `path`.
+systems answer `name`, `coordinates`, `links`, `link_names`, `parameters`, `notes`, `request` and `path`.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import sympy as sp
 
@@ -69,6 +69,11 @@ class RigidSystem:
         return self.robot.notes
 
     @property
+    def request(self) -> Mapping[str, Any]:
+        """What the robot was read from and how, as manifests keep it."""
+        return self.robot.request
+
+    @property
     def parameters(self) -> dict[sp.Symbol, float]:
         """Run-time parameters and their values."""
         return {sp.Symbol(p.name, real=True): p.value for p in self.robot.parameters}
@@ -97,6 +102,8 @@ class EnergySystem:
     links: tuple[LinkEnergy, ...]
     parameters: Mapping[sp.Symbol, float] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
+    request: Mapping[str, Any] = field(default_factory=dict, compare=False)
+    """What it was read from and how, as manifests keep it."""
 
     def _repr_html_(self) -> str:
         """What a notebook shows: coordinates, and links with those that move them."""

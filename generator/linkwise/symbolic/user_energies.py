@@ -13,6 +13,7 @@ import sympy as sp
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import short
 from linkwise.robot.robot import Coordinate, unusable
+from linkwise.symbolic.passed_over import refuse_passed_over
 from linkwise.symbolic.system import EnergySystem, LinkEnergy
 
 MOST_EXPANDED = 50
@@ -43,17 +44,22 @@ def energy_system(
             checked.append(_checked(link, coordinates, values, symbolic))
     used = set().union(*(link.kinetic.free_symbols | link.potential.free_symbols for link in checked))
     kept = {symbol: value for symbol, value in values.items() if symbol in used}
-    return EnergySystem(name, coordinates, tuple(checked), kept if symbolic else {})
+    request = {"parameters": "symbolic" if symbolic else "numeric"}
+    return EnergySystem(name, coordinates, tuple(checked), kept if symbolic else {}, request=request)
 
 
 def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
-    """Run a Python file that defines `coordinates`, `links` and perhaps `parameters`, as `energy_system`."""
+    """Run a Python file that defines `coordinates`, `links`, and perhaps `parameters` and `name`.
+
+    Raises LinkwiseError as `energy_system` does, and for a name that nobody reads.
+    """
     try:
         scope: dict[str, Any] = runpy.run_path(str(path))
     except LinkwiseError:
         raise
     except (Exception, SystemExit) as error:  # the user's own code may raise anything
         raise LinkwiseError(f"running the file failed{_said(error, str(path))}") from error
+    refuse_passed_over(path.read_bytes(), scope.keys())
     for required, kind in (("coordinates", Coordinate), ("links", LinkEnergy)):
         items = scope.get(required)
         if not isinstance(items, (list, tuple)) or not all(isinstance(item, kind) for item in items):

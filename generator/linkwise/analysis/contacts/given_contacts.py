@@ -7,7 +7,7 @@ from pathlib import Path
 
 from linkwise.analysis.loads import Load, Loads
 from linkwise.errors import LinkwiseError
-from linkwise.runtime.constraints.held_frames import is_contact
+from linkwise.runtime.arguments import is_like
 from linkwise.runtime.robot_constraints import Contact
 
 THRESHOLD = 20.0
@@ -63,10 +63,10 @@ class Contacts:
             raise LinkwiseError(f"--contact-threshold {self.threshold:g}: give a force in N, 0 or more")
 
     def _check_kinds(self) -> None:
-        if not isinstance(self.given, list | tuple) or is_contact(self.given):
+        if not isinstance(self.given, list | tuple) or is_like(self.given, Contact):
             raise LinkwiseError("contacts: give a list of Contact, or Contacts")
         for one in self.given:
-            if not is_contact(one):
+            if not is_like(one, Contact):
                 raise LinkwiseError(f"contacts: {str(one)[:60]!r} is not a Contact")
         for name, column in self.columns.items():
             if not isinstance(column, WhileColumn):

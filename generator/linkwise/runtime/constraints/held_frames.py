@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import is_like
 from ..chosen_names import short
 from ..kinematics.named_frames import frame_index
 from ..robot_constraints import Contact
@@ -57,7 +58,7 @@ class Held(NamedTuple):
 
 def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
     """Ties of the tree, then contacts; raises as `Dynamics.constrained` does."""
-    if is_contact(contacts) or not isinstance(contacts, list | tuple):
+    if is_like(contacts, Contact) or not isinstance(contacts, list | tuple):
         raise TypeError(f"contacts is {short(contacts)}; give a list of Contact")
     ties = [
         Held(tie.name, tie.kind, tie.first, tie.second, np.eye(3), length=tie.length) for tie in tree.ties
@@ -66,7 +67,7 @@ def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
     taken = {tie.name for tie in tree.ties} | {coupling.name for coupling in tree.couplings}
     for number, contact in enumerate(contacts):
         where = f"contacts[{number}]"
-        if not is_contact(contact):
+        if not is_like(contact, Contact):
             raise TypeError(f"{where} is {short(contact)}; give a Contact")
         made = _held(contact, where, frames, links, tree.gravity)
         if tree.frames[made.first].joint is None:
@@ -76,11 +77,6 @@ def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
         taken.add(made.name)
         ties.append(made)
     return ties
-
-
-def is_contact(given: Any) -> bool:
-    """Whether it is a contact, of this package or of another."""
-    return isinstance(given, tuple) and getattr(given, "_fields", None) == Contact._fields
 
 
 def _held(contact: Contact, where: str, frames: Sequence[str], links: Sequence[str], gravity: Triple) -> Held:
