@@ -26,7 +26,7 @@ class ChosenConstraints:
     ) -> None:
         """Raises as `Dynamics.constrained` does."""
         self._structure, self._tree = structure, tree
-        self.held: Sequence[Held] = held_by(tree, structure.link_names, contacts)
+        self.held: Sequence[Held] = held_by(tree, contacts)
         if not self.held and not tree.couplings:
             raise ValueError(
                 f"{structure.name} has no ties; robot.constrained(contacts=[Contact(frame)]) makes some that "
