@@ -26,7 +26,7 @@ static inline int largest_row(int n, int width, int c, const real *scale, const 
 }
 
 /* Of the joint whose pivot is the least beside its inertia, its column, and the part of its inertia that is left when all
-   others move freely. */
+   others move freely; where far more than rounding is left, when those before it do. */
 struct pivot {
     int column;
     real left;
@@ -92,7 +92,7 @@ INLINE int eliminate(int regular, int n, int sides, const real *size, const real
         }
         row[c] = inverse;
     }
-    if (weakest)
+    if (weakest && weakest->left < 1000 * F(sqrt)(EPSILON))
         weakest->left = left_when_free(n, width, weakest->column, size[weakest->column], rows);
     for (int c = n; c--;)
         for (int k = 0; k < sides; ++k) {
