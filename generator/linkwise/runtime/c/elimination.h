@@ -49,8 +49,8 @@ static inline real left_when_free(int n, int width, int c, real size, const real
 /* x of a x = b: a (n, n), b (n, sides), which turns into x, of up to six sides. Where a is `regular` and not known to be
    positive, rows are taken in another order. Entry (i, k) is large or small beside the root of size[i] size[k]. Where a pivot
    is rounding beside that, or of a positive matrix negative, or not a number, its column is the answer, counted from 1, and b
-   is as it was; otherwise the answer is 0. Of a positive matrix `weakest` is written, unless it is NULL: x is known to a
-   relative error of about EPSILON / left. */
+   is as it was; otherwise the answer is 0. Of a positive matrix `weakest`, given as {0, 1}, is found, unless it is NULL: x is
+   known to a relative error of about EPSILON / left. */
 INLINE int eliminate(int regular, int n, int sides, const real *size, const real *a, real *b, struct pivot *weakest)
 {
     const real least = 4 * (real)n * EPSILON;
@@ -80,7 +80,7 @@ INLINE int eliminate(int regular, int n, int sides, const real *size, const real
         }
         if (!(large > least * size[c]))
             return c + 1;
-        if (weakest && (!c || large < weakest->left * size[c])) {
+        if (weakest && large < weakest->left * size[c]) {
             weakest->column = c;
             weakest->left = large / size[c];
         }

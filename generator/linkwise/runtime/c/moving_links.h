@@ -123,7 +123,7 @@ int API(forward_dynamics)(UNDER_TORQUE, real *qdd)
         size[i] = mass[i * N + i];
         force[i] = tau[i] - force[i];
     }
-    struct pivot weakest;
+    struct pivot weakest = {0, 1};
     const int singular = eliminate(0, N, 1, size, mass, force, &weakest);
     if (singular)
         return singular;
