@@ -7,6 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from linkwise import Options, generate, read_system, write_package
 from linkwise.analysis import Lowpass, Processing, Reading, analyze, stream
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.paper_motions import MOTIONS, SIMULATED, write_motions
@@ -291,3 +292,24 @@ def test_slashes_in_names_are_escaped(tmp_path):
     assert len(set(columns)) == len(columns)
     np.testing.assert_array_equal(result["tau/a%2Fb/link"], result.partial_torque[:, 1, 2])
     np.testing.assert_array_equal(result["tau/a%252Fb"], result.torque[:, 2])
+
+
+def test_a_log_near_a_bases_pole_says_how_near(tmp_path):
+    robot = tmp_path / "box.urdf"
+    inertia = '<inertia ixx="0.1" iyy="0.2" izz="0.3" ixy="0" ixz="0" iyz="0"/>'
+    robot.write_text(
+        f'<robot name="box"><link name="box"><inertial><mass value="2"/>{inertia}</inertial></link></robot>'
+    )
+    names = [f"base_{name}" for name in ("x", "y", "z", "yaw", "pitch", "roll")]
+    write_package(generate(read_system(robot, Options(base="floating")), ["numpy"]), tmp_path / "box")
+    table = smooth(101, 6)
+    for nearest, told in ((80.0, False), (89.0, True), (100.0, True)):
+        table[:, 5] = np.radians(nearest - 30.0 * (table[:, 0] - 0.5) ** 2)
+        warnings = analyze(write_csv(tmp_path / "a.csv", table, names), tmp_path / "box").warnings
+        near = [text for text in warnings if "'base_pitch' is" in text]
+        assert len(near) == told
+        if nearest == 89.0:
+            assert (
+                "is 1 degrees from where 'base_yaw' and 'base_roll' turn about one axis, at 0.5 s" in near[0]
+            )
+            assert "wrong with these two by 57.3 times as much" in near[0]

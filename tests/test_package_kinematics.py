@@ -1,5 +1,7 @@
 """`robot.kinematics`: frames by name, points, batches, gradients, parameters, bodies and `out`."""
 
+import ctypes
+import re
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -7,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from compiled import compile_library
 from conftest import DATA, needs_compiler
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
@@ -96,9 +99,9 @@ def test_a_wrench_on_a_point_loads_the_joints_by_the_transpose(package_of: Calla
     weights = robot.backend.rule.bodies()
     force = -9.81 * weights.masses[:, None] * np.array([0, 0, 1.0])
     torque = sum(
-        robot.kinematics.jacobian(q, j)[3:].T @ f
-        + np.cross(robot.kinematics.pose(q, j)[:3, :3] @ c, f) @ robot.kinematics.jacobian(q, j)[:3]
-        for j, (f, c) in enumerate(zip(force, centres_in_files_axes(robot), strict=True))
+        robot.kinematics.jacobian(q, link)[3:].T @ f
+        + np.cross(robot.kinematics.pose(q, link)[:3, :3] @ c, f) @ robot.kinematics.jacobian(q, link)[:3]
+        for link, f, c in zip(robot.link_names, force, centres_in_files_axes(robot), strict=True)
     )
     rest = 0 * q
     np.testing.assert_allclose(-torque, robot.inverse_dynamics(q, rest, rest), atol=1e-12)
@@ -219,6 +222,63 @@ def test_large_batches_are_computed_in_pieces_that_fit(arm: ModuleType) -> None:
     np.testing.assert_array_equal(poses[some], few)
 
 
+def of_frame(package: ModuleType, backend: str, frame: str | int) -> Any:
+    """What each call that takes a frame answers."""
+    robot = package.load(backend)
+    about: Any = robot.kinematics
+    motion = np.array([[0.3, -1.1, 0.7], [0.7, 0.4, -0.2], [-0.2, 0.9, 0.5]])
+    yield about.pose(motion[0], frame)
+    yield about.jacobian(motion[0], frame)
+    yield about.jacobian_rate(*motion[:2], frame)
+    yield about.velocity(*motion[:2], frame)
+    yield about.acceleration(*motion, frame)
+    yield about.load_torque(motion[0], frame, [1.0, 2.0, 3.0])
+    load = package.AppliedLoad(frame, [1.0, 2.0, 3.0])
+    shares = robot.induced_accelerations(*motion, loads=[load], frame=frame)
+    yield from (shares.loads, shares.kinematic)
+    yield robot.labelled("induced_accelerations", *motion, loads=[load], frame=frame).loads
+    if robot.backend.takes_tensors:
+        yield robot.module("kinematics.jacobian", frame=frame)(torch.from_numpy(motion[0]))
+    if frame in ("base", 0):
+        return  # What stands on the ground is neither held nor felt.
+    yield robot.constrained(contacts=[package.Contact(frame, "point", (0.3, 0.0, 0.0))]).jacobian(motion[0])
+    stiff = package.FrameImpedance(frame, damping=3.0, rows=("rz",))
+    yield robot.partial_impedance(frame=stiff)(*motion[:2], package.Target())
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_frames_number_is_its_place_among_frames_in_every_call(
+    backend: str, package_of: Callable[..., ModuleType]
+) -> None:
+    package = package_of("planar3")
+    kinematics, q = package.load(backend).kinematics, np.array([0.3, -1.1, 0.7])
+    poses = as_array(kinematics.poses(q))
+    for number, name in enumerate(kinematics.frames):
+        np.testing.assert_allclose(as_array(kinematics.pose(q, np.int64(number))), poses[number], atol=1e-15)
+        for one, other in zip(
+            of_frame(package, backend, number), of_frame(package, backend, name), strict=True
+        ):
+            np.testing.assert_array_equal(as_array(one), as_array(other))
+            if hasattr(one, "coords"):
+                assert one.identical(other)
+
+
+@needs_compiler
+def test_c_numbers_frames_as_python_does(
+    package_of: Callable[..., ModuleType], directory_of: Any, tmp_path: Path
+) -> None:
+    kinematics, q = package_of("planar3").load("numpy").kinematics, np.array([0.3, -1.1, 0.7])
+    compile_library(directory_of("planar3"), tmp_path / "planar3.so")
+    pose_in_c, pose = ctypes.CDLL(str(tmp_path / "planar3.so")).planar3_pose, np.zeros((4, 4))
+    header = (directory_of("planar3") / "c" / "planar3.h").read_text(encoding="utf-8")
+    numbers = dict(re.findall(r"PLANAR3_FRAME_(\w+) = (\d+),", header))
+    assert list(numbers) == list(kinematics.frames)
+    for name, number in numbers.items():
+        pose_in_c(int(number), ctypes.c_void_p(q.ctypes.data), ctypes.c_void_p(pose.ctypes.data))
+        for frame in (name, int(number)):
+            np.testing.assert_allclose(kinematics.pose(q, frame), pose, rtol=0.0, atol=1e-15)
+
+
 def test_what_is_no_frame_is_named(arm: ModuleType) -> None:
     kinematics = arm.load("numpy").kinematics
     with pytest.raises(
@@ -226,16 +286,16 @@ def test_what_is_no_frame_is_named(arm: ModuleType) -> None:
     ):
         kinematics.pose(Q, "tol")
     with pytest.raises(
-        ValueError, match=r"frame is 2, but links are numbered 0\.\.1; or give a frame's name"
+        ValueError, match=r"frame is 4, but frames are numbered 0\.\.3, in the order of kinematics.frames; or"
     ):
-        kinematics.pose(Q, 2)
-    with pytest.raises(TypeError, match=r"frame is None; give the name of a frame, or the number of a link"):
+        kinematics.pose(Q, 4)
+    with pytest.raises(TypeError, match=r"frame is None; give the name of a frame, or its number in"):
         kinematics.pose(Q, None)
     with pytest.raises(ValueError, match=r"point has shape \(2,\); its last axis must be 3"):
         kinematics.jacobian(Q, "tool", [1.0, 2.0])
     with pytest.raises(ValueError, match=r"point has shape \(4, 3\), the motion has samples of shape \(3,\)"):
         kinematics.jacobian(np.zeros((3, 2)), "tool", np.zeros((4, 3)))
-    np.testing.assert_array_equal(kinematics.pose(Q, 1), kinematics.pose(Q, "fore"))
+    np.testing.assert_array_equal(kinematics.pose(Q, 2), kinematics.pose(Q, "fore"))
 
 
 def test_links_of_energies_have_no_places(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from linkwise.analysis.show import draw
 from linkwise.analysis.stream import Sink, Streamed, span_of, stream
 from linkwise.analysis.tables import Format
 from linkwise.analysis.torques import Decomposer
+from linkwise.analysis.turn_poles import pole_warnings
 from linkwise.errors import within
 from linkwise.extras import extra
 from linkwise.package.load import Array
@@ -141,12 +142,17 @@ class Job:
             tuple(point.name for point in self.decomposer.induced.points),
             done.closure,
             self.samples.ignored,
-            (*self.samples.warnings, *self._twice_borne(), *self._never_on(done)),
+            (*self.samples.warnings, *self._twice_borne(), *self._near_poles(), *self._never_on(done)),
             done.samples,
             self.closed,
             self.decomposer.times,
             self.phases,
         )
+
+    def _near_poles(self) -> Iterator[str]:
+        """Warnings of turns that the log brings near a pole."""
+        robot = self.decomposer.robot
+        return pole_warnings(robot.bodies, robot.joints, self.samples)
 
     def _never_on(self, done: Streamed) -> Iterator[str]:
         """Warnings of contacts that are off throughout."""

@@ -41,7 +41,7 @@ class ClosedLoops(NamedTuple):
 def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
     """Return one where A has its largest rank; raises LinkwiseError, which names what stays open."""
     moved = joint_tree(tree)
-    held = held_by(moved, [link.name for link in moved.links], ())
+    held = held_by(moved, ())
     starts = random_starts(joints)
     found = best_closing(TieEquations(moved, joints, held), starts)
     couplings = [coupling.name for coupling in tree.couplings]

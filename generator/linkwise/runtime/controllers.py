@@ -26,7 +26,7 @@ class FrameImpedance(NamedTuple):
     """
 
     frame: str | int
-    """A frame by its name, as `kinematics.frames` has them, or a link by its number j."""
+    """A frame by its name, or by its number in `kinematics.frames`."""
     inertia: Any = Natural()
     damping: Any = Natural()
     stiffness: Any = 0.0

@@ -91,16 +91,18 @@ def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict
         centre = frame == "centre of mass" and frame not in robot.kinematics.frames
         of = "constraint" if key == "induced_reactions" else "joint" if frame is None else "component"
         axes["moved"] = axes["axis" if centre else of]
-        axes["load"] = NamedAxis("load", _names_of(arguments.get("loads", ()), robot.link_names))
+        axes["load"] = NamedAxis("load", _names_of(arguments.get("loads", ()), robot))
     return axes
 
 
-def _names_of(loads: Any, links: Sequence[str]) -> tuple[str, ...]:
+def _names_of(loads: Any, robot: Any) -> tuple[str, ...]:
     """Names of loads: those of their frames, numbered where one has several."""
     names: list[str] = []
     for load in [loads] if is_like(loads, AppliedLoad) else loads:
         several: Iterable[Any] = [load] if is_like(load, AppliedLoad) else load
-        frames = [one.frame if isinstance(one.frame, str) else links[one.frame] for one in several]
+        frames = [
+            one.frame if isinstance(one.frame, str) else robot.kinematics.frames[one.frame] for one in several
+        ]
         name = " and ".join(dict.fromkeys(frames))
         count = sum(other == name or other.startswith(f"{name} (") for other in names)
         names.append(f"{name} ({count + 1})" if count else name)

@@ -19,7 +19,7 @@ class Contact(NamedTuple):
     """
 
     frame: str | int
-    """A frame by its name, as `kinematics.frames` has them, or a link by its number j."""
+    """A frame by its name, or by its number in `kinematics.frames`."""
     kind: str = "held"
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """In the frame, in m; of a ball its centre."""

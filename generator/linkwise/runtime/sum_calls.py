@@ -60,7 +60,8 @@ class SumCalls:
 
         Raises ValueError for a robot with ties, whose joints move as `constraints.forward_dynamics` says, and
         for a singular mass matrix, with the sample and the joints that can move without moving any mass;
-        inside torch.func and torch.compile, qdd is then not finite.
+        inside torch.func and torch.compile, qdd is then not finite. Warns where rounding leaves fewer than
+        half of the digits of M^-1, as near 90 degrees of a floating base's pitch, and how many are left.
         """
         tree = self.backend.tree
         if tree is not None and tree.tied:

@@ -21,10 +21,12 @@ static inline int accelerate(const struct sample *s, const real *q, const real *
         size[i] = mass[i * N + i];
         force[i] = tau[i] - force[i];
     }
-    const int singular = eliminate(0, N, 1, size, mass, force);
-    if (!singular)
-        copy(N, force, qdd);
-    return singular;
+    struct pivot weakest = {0, 1};
+    const int singular = eliminate(0, N, 1, size, mass, force, &weakest);
+    if (singular)
+        return singular;
+    copy(N, force, qdd);
+    return weakest.left < F(sqrt)(EPSILON) ? -1 - weakest.column : 0;
 }
 
 int API(forward_dynamics)(UNDER_TORQUE, real *qdd)

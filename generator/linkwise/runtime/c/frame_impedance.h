@@ -64,7 +64,7 @@ static inline int frame_moved(const struct sample *s, const API(frame_impedance)
     for (int k = 0; k < N; ++k)
         for (int r = 0; r < 6; ++r)
             out->moved[k * 6 + r] = out->jacobian[r * N + k];
-    int fault = eliminate(0, N, 6, size, mass, out->moved);
+    int fault = eliminate(0, N, 6, size, mass, out->moved, NULL);
     if (fault)
         return fault;
     for (int r = 0; r < 6; ++r) {
@@ -75,7 +75,7 @@ static inline int frame_moved(const struct sample *s, const API(frame_impedance)
         const real own = mobility[r * 6 + r], all = r < wanted->rows ? reach[wanted->row[r] >= 3] : 1;
         size[r] = own > all ? own : all;
     }
-    fault = eliminate(0, 6, 6, size, mobility, out->inertia);
+    fault = eliminate(0, 6, 6, size, mobility, out->inertia, NULL);
     for (int r = 0; r < 6; ++r)
         for (int k = 0; k < r; ++k)
             out->inertia[r * 6 + k] = out->inertia[k * 6 + r];

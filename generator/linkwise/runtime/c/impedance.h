@@ -76,11 +76,11 @@ INLINE int solve(int regular, int n, const real *natural, const real *wanted, re
         for (int i = 0; i < n; ++i)
             for (int k = 0; k < n; ++k)
                 part[i * n + k] = R(0.5) * (wanted[i * n + k] + wanted[k * n + i]);
-        const int fault = eliminate(0, n, 0, size, part, NULL);
+        const int fault = eliminate(0, n, 0, size, part, NULL, NULL);
         if (fault)
             return fault;
     }
-    return eliminate(regular, n, 1, size, wanted, force);
+    return eliminate(regular, n, 1, size, wanted, force, NULL);
 }
 
 /* H, M* and -(B* - C) ed - K e; where c1 is not kept as it is, C is in it too. Without weights kept is M*, from H. */

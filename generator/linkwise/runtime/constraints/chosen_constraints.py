@@ -11,10 +11,10 @@ from ..arguments import as_array
 from ..chosen_names import short
 from ..rule.joint_tree import JointTree
 from ..structure import Structure
+from ..sums.known_digits import listed
 from .closing_search import TieEquations, best_closing, random_starts
 from .held_frames import Held, all_names, held_by
 from .independent_joints import chosen_independent, loose_base, rank_of, redundant_names
-from .singular_positions import listed
 from .tie_tables import tie_tables
 
 
@@ -26,7 +26,7 @@ class ChosenConstraints:
     ) -> None:
         """Raises as `Dynamics.constrained` does."""
         self._structure, self._tree = structure, tree
-        self.held: Sequence[Held] = held_by(tree, structure.link_names, contacts)
+        self.held: Sequence[Held] = held_by(tree, contacts)
         if not self.held and not tree.couplings:
             raise ValueError(
                 f"{structure.name} has no ties; robot.constrained(contacts=[Contact(frame)]) makes some that "

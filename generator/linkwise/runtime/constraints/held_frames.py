@@ -56,7 +56,7 @@ class Held(NamedTuple):
         return ["rad" if row in TURNS else "m" for row in ROWS[self.kind]]
 
 
-def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
+def held_by(tree: JointTree, contacts: Any) -> list[Held]:
     """Ties of the tree, then contacts; raises as `Dynamics.constrained` does."""
     if is_like(contacts, Contact) or not isinstance(contacts, list | tuple):
         raise TypeError(f"contacts is {short(contacts)}; give a list of Contact")
@@ -69,7 +69,7 @@ def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
         where = f"contacts[{number}]"
         if not is_like(contact, Contact):
             raise TypeError(f"{where} is {short(contact)}; give a Contact")
-        made = _held(contact, where, frames, links, tree.gravity)
+        made = _held(contact, where, frames, tree.gravity)
         if tree.frames[made.first].joint is None:
             raise ValueError(f"{where}.frame is {short(contact.frame)}, which stands on the ground anyway")
         if made.name in taken:
@@ -79,10 +79,10 @@ def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
     return ties
 
 
-def _held(contact: Contact, where: str, frames: Sequence[str], links: Sequence[str], gravity: Triple) -> Held:
+def _held(contact: Contact, where: str, frames: Sequence[str], gravity: Triple) -> Held:
     if contact.kind not in CONTACTS:
         raise ValueError(f"{where}.kind is {short(contact.kind)}; choose {', '.join(CONTACTS)}")
-    first = frame_index(contact.frame, frames, links)
+    first = frame_index(contact.frame, frames)
     point = _vector(contact.point, f"{where}.point")
     arm, axes = (0.0, 0.0, 0.0), np.eye(3)
     if contact.kind == "hinged":

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..chosen_names import plain
 from ..rule.kinematics import taken
+from ..sums.known_digits import sample_of
 from ..sums.namespace import hidden, namespace
 from .closed_places import RowNames, TiesAt, ties_at
 from .followers import JointColumns, dependent_shares, inverted
@@ -21,7 +22,6 @@ from .singular_positions import (
     left_free,
     lost_at,
     open_by,
-    sample_of,
     worst_open,
 )
 from .tie_rows import TieRows

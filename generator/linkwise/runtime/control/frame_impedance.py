@@ -71,7 +71,7 @@ class FrameTargets:
             raise TypeError(f"frame is {short(asked)}; give FrameImpedance({short(asked)}, ...)")
         self._robot, self.rows, self.names = robot, _chosen(asked.rows), tuple(asked.rows)
         self.frame, self.point = asked.frame, _point(asked.point)
-        self._check_movable(frame_index(asked.frame, robot.kinematics.frames, robot.link_names))
+        self._check_movable(frame_index(asked.frame, robot.kinematics.frames))
         self.inertia = self._part("frame.inertia", asked.inertia, True)
         self.damping = self._part("frame.damping", asked.damping, False)
         gain = Gain("frame.stiffness", asked.stiffness, self.names)

@@ -158,7 +158,7 @@ class NativeControlAnswers(ControlAnswers):
             at(None if gain is None else gain.numbers)
             for gain in (frame.inertia.added, frame.damping.added, frame.stiffness)
         )
-        number = frame_index(frame.frame, self._robot.kinematics.frames, self._robot.link_names)
+        number = frame_index(frame.frame, self._robot.kinematics.frames)
         made = frame_struct(real)(
             number,
             at(frame.point),

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from ..constraints.closed_places import ClosedPlace
-from ..constraints.singular_positions import least_left, listed, sample_of, why_not_following
+from ..constraints.singular_positions import least_left, why_not_following
+from ..sums.known_digits import listed, sample_of
 from ..sums.namespace import hidden, namespace
 
 HALVES = 30
