@@ -82,8 +82,9 @@ def rigid_tree(system: System) -> RigidTree | None:
             for axis in robot.passive
         ),
         tuple(TieEntry(*astuple(tie)) for tie in robot.ties),
-        tuple(CouplingEntry(*astuple(coupling)) for coupling in robot.couplings),
+        tuple(CouplingEntry(coupling.name, coupling.terms) for coupling in robot.couplings),
         robot.independent,
+        robot.closed_position,
         {
             place: text(value)
             for place, value in _places(robot)

@@ -28,7 +28,7 @@ from linkwise.package.entries import (
     TieEntry,
 )
 
-SCHEMA = 11
+SCHEMA = 12
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [

@@ -207,6 +207,8 @@ class Coupling:
 
     name: str
     terms: tuple[tuple[int, tuple[float, ...]], ...]
+    follower: int | None = None
+    """The coordinate that the others give wherever they are: the file's first, where its term is c_1 q."""
 
 
 @dataclass(frozen=True)
@@ -227,8 +229,8 @@ class Robot:
     for each link among them, or none.
 
     `ties` and `couplings` hold beside the tree. Under them the coordinates `independent` move all others, in
-    ascending order; before they are found, `wanted` are those asked for, by name, and `driven` those that
-    actuators drive.
+    ascending order, and `closed_position` is one in which they hold; before they are found, `wanted` are
+    those asked for, by name, and `driven` those that actuators drive.
     """
 
     name: str
@@ -245,6 +247,7 @@ class Robot:
     wanted: tuple[str, ...] = ()
     driven: tuple[int, ...] = ()
     independent: tuple[int, ...] = ()
+    closed_position: tuple[float, ...] = ()
     limits: tuple[Limits, ...] = ()
     """Of each coordinate, or none at all; those of joints that follow another are no limits of that one."""
     followers: tuple[Follower, ...] = ()

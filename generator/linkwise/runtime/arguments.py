@@ -44,6 +44,14 @@ def as_array(name: str, value: Any) -> NDArray[Any]:
         raise ValueError(f"{name} does not read as an array: {_first_line(error)}") from None
 
 
+def shape_of(value: Any) -> tuple[int, ...]:
+    """Shape of what will be read as an array or a tensor; none where that is not clear yet."""
+    try:
+        return tuple(value.shape) if hasattr(value, "shape") else np.shape(value)
+    except (TypeError, ValueError, RuntimeError):
+        return ()
+
+
 def as_weights(name: str, value: Any) -> Any:
     """A tensor as it is, or an array, of real numbers or truth values; raises as `as_array` does."""
     if has_tensors([value]):

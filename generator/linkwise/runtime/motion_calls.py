@@ -71,7 +71,8 @@ class MotionCalls:
         step: of RK4 the longest, in s; from instant to instant unless given; of the others a bound
         method: "RK4", of fixed steps, order 4, through which gradients flow; or one of SciPy's solve_ivp,
         RK45, DOP853, Radau, ..., whose steps keep rtol and atol, and with which all starts step together
-        constraints: as in `induced_accelerations`; q is closed first. Independent joints are integrated; the
+        constraints: as in `induced_accelerations`; q is closed first, and q and qd may be (..., m), of the
+        independent joints alone, as `Constraints.closed` takes them. Independent joints are integrated; the
         others are closed by Newton's method at each evaluation and after each step, and follow with G yd
 
         The answer's energy_drift is the energy that the integration made or lost. Raises ValueError where the

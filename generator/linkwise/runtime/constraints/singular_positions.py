@@ -66,8 +66,12 @@ def why_not_following(
         return (
             f"the position is singular: {told}, for the constraints take fewer freedoms there than elsewhere"
         )
-    others = [joint_names[k] for k in chosen_independent(rows, tolerance=epsilon)]
-    return f"the independent joints do not tell the others: {told}; there, choose independent={others}"
+    # Those that follow now go on to do so, as far as they can.
+    others = [joint_names[k] for k in chosen_independent(rows, dependent, tolerance=epsilon)]
+    return (
+        f"the independent joints do not tell the others: {told}; there, choose "
+        f"robot.constrained(independent={others})"
+    )
 
 
 def left_free(rows: Any, columns: JointColumns, joint_names: Sequence[str], where: str) -> str:
