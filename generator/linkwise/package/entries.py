@@ -69,6 +69,19 @@ class FollowerEntry:
 
 
 @dataclass(frozen=True)
+class FileJointEntry:
+    """A joint of the robot's file that moves, its joints here by their indices, and its place in Pinocchio.
+
+    kind: as `FileJoint` in runtime.file_joints has it
+    """
+
+    name: str
+    kind: Literal["single", "continuous", "planar", "ball", "floating"]
+    joints: tuple[int, ...]
+    pinocchio: int
+
+
+@dataclass(frozen=True)
 class BodyEntry:
     """A moving frame on its parent's, as `linkwise.robot.robot.Joint` places it, and the mass it carries.
 

@@ -192,3 +192,5 @@ class Description:
     """Joints whose motion is to give that of all others under the constraints; none: to be chosen."""
     ground: str = ""
     """The body that is the world itself, where the file has one."""
+    ordered: bool = False
+    """Whether Pinocchio has siblings in the file's order, and not in that of their joints' names."""

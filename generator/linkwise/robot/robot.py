@@ -93,6 +93,19 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class MovingJoint:
+    """A joint of the file that moves, and its coordinates: fewer than its kind has where some are locked.
+
+    kind: as `FileJoint` in runtime.file_joints has it; pinocchio: its place among those of Pinocchio's model
+    """
+
+    name: str
+    kind: Literal["single", "continuous", "planar", "ball", "floating"]
+    coordinates: tuple[int, ...]
+    pinocchio: int
+
+
+@dataclass(frozen=True)
 class Passive:
     """What a joint of one axis has of its own, q being its position in rad or m.
 
@@ -251,6 +264,7 @@ class Robot:
     limits: tuple[Limits, ...] = ()
     """Of each coordinate, or none at all; those of joints that follow another are no limits of that one."""
     followers: tuple[Follower, ...] = ()
+    file_joints: tuple[MovingJoint, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.coordinates:

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .file_joints import FileJoint, why_wider
+
 FLOATS = ("float32", "float64")
 INTEGERS = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 REAL = ("bool", "int", "uint", "float", "bfloat")
@@ -84,12 +86,17 @@ def check_dense(values: Mapping[str, Any]) -> None:
                 raise TypeError(f"{name} has the layout {value.layout}; pass {name}.to_dense()")
 
 
-def check_axes(arrays: Mapping[str, Any], n: int) -> None:
-    """Raise ValueError, which names the argument, where a last axis is not n."""
+def check_axes(arrays: Mapping[str, Any], n: int, joints: Sequence[FileJoint] = ()) -> None:
+    """Raise ValueError, which names the argument, where a last axis is not n.
+
+    joints: those of the file, by which positions of simulators have more numbers
+    """
     for name, a in arrays.items():
         if a.ndim == 0 or a.shape[-1] != n:
+            why = why_wider(joints, a.shape[-1], n) if a.ndim else ""
+            told = f" ({why}: robot.from_qpos makes q of it)" if why else ""
             raise ValueError(
-                f"{name} has shape {tuple(a.shape)}; its last axis must be {n}, one for each joint"
+                f"{name} has shape {tuple(a.shape)}; its last axis must be {n}, one for each joint{told}"
             )
 
 

@@ -86,6 +86,11 @@ def plain(name: str) -> str:
     return name if name.isprintable() and len(name) <= LONGEST else short(name)
 
 
+def sample_of(place: Sequence[int]) -> str:
+    """Where in a batch."""
+    return f" at sample {', '.join(map(str, place))}" if len(place) else ""
+
+
 def short(value: Any) -> str:
     """Any value in one line."""
     text = repr(value).replace("\n", " ")

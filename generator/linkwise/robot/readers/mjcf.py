@@ -51,6 +51,7 @@ def read_mjcf(path: Path) -> Description:
         omissions=omissions(mujoco, model, joints, links),
         sites=_sites(model, links),
         driven=_driven(mujoco, model, joints),
+        ordered=True,
     )
 
 

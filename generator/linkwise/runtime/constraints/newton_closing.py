@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..chosen_names import plain
+from ..chosen_names import plain, sample_of
 from ..rule.kinematics import taken
 from ..sums.namespace import hidden, namespace
 from .closed_places import RowNames, TiesAt, ties_at
@@ -21,7 +21,6 @@ from .singular_positions import (
     left_free,
     lost_at,
     open_by,
-    sample_of,
     worst_open,
 )
 from .tie_rows import TieRows

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chosen_names import MOST_NAMES, plain
+from ..chosen_names import MOST_NAMES, plain, sample_of
 from ..sums.inertia_solve import SHARE
 from ..sums.namespace import hidden
 from .followers import Followers, JointColumns
@@ -22,11 +22,6 @@ def listed(names: Sequence[str]) -> str:
     """Names in one line."""
     shown = ", ".join(plain(name) for name in names[:MOST_NAMES])
     return shown + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
-
-
-def sample_of(place: Sequence[int]) -> str:
-    """Where in a batch."""
-    return f" at sample {', '.join(map(str, place))}" if len(place) else ""
 
 
 def check_factors(rows: Any, triangle: Any, columns: JointColumns, joint_names: Sequence[str]) -> None:
