@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linkwise import Options, generate, read_system, write_package
+from linkwise import LinkwiseError, Options, analyze, generate, read_system, write_package
 from linkwise.package.load import import_package
 
 INERTIAL = '<inertial pos="0.1 0.02 -0.05" mass="{}" fullinertia="0.03 0.04 0.05 0.002 -0.003 0.004"/>'
@@ -215,3 +215,14 @@ def test_a_joint_locked_in_part_has_no_quaternion(tmp_path: Path) -> None:
         ValueError, match=r"^of the floating joint base some coordinates are locked or follow"
     ):
         robot.from_qpos(np.zeros(16))
+
+
+def test_a_log_of_qpos_is_refused_with_the_reason(tmp_path: Path) -> None:
+    made(tmp_path, "walker.urdf", URDF, base="floating")
+    np.savez(tmp_path / "log.npz", time=np.arange(200) / 100, qpos=np.zeros((200, 13)))
+    told = (
+        "array 'qpos' is (200, 13), and the robot has 12 joints: 13 = 12 + 1, for in a qpos of mujoco's base "
+        "has a quaternion, four numbers for three angles; make q of it by robot.from_qpos of the package"
+    )
+    with pytest.raises(LinkwiseError, match=re.escape(told)):
+        analyze(tmp_path / "log.npz", tmp_path / "package_walker")

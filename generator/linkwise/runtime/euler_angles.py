@@ -25,20 +25,18 @@ def angles_of(quaternion: Numbers) -> Numbers:
     return np.stack([yaw, pitch, roll], -1)
 
 
-def continued(angles: Numbers, before: Numbers | None = None) -> Numbers:
+def continued(given: Numbers) -> Numbers:
     """The same attitudes (..., T, 3) by angles without leaps from sample to sample.
 
     Each attitude has two triples up to whole turns, (yaw, pitch, roll) and (yaw + pi, pi - pitch, roll + pi):
-    every sample takes that which is nearer to the sample's before it. before: what comes before the first
+    every sample takes that which is nearer to the sample's before it.
     """
-    given = angles if before is None else np.concatenate([before[..., None, :], angles], -2)
     other = np.stack([given[..., 0] + np.pi, np.pi - given[..., 1], given[..., 2] + np.pi], -1)
     same, crossed = (_apart(triple[..., 1:, :], given[..., :-1, :]) for triple in (given, other))
     # From the one to the other and back, a step costs the same.
     switches = np.concatenate([np.zeros((*given.shape[:-2], 1), int), crossed < same], -1)
     found = np.where((np.cumsum(switches, -1) % 2)[..., None].astype(bool), other, given)
-    whole = np.unwrap(found, axis=-2)
-    return whole if before is None else whole[..., 1:, :]
+    return np.asarray(np.unwrap(found, axis=-2))
 
 
 def _apart(one: Numbers, other: Numbers) -> Numbers:

@@ -70,15 +70,8 @@ class Qpos:
                 )
         self.n, self.width = sum(len(j.coordinates) for j in joints), positions_of(joints, order)
 
-    def motion(
-        self,
-        qpos: Any,
-        qvel: Any = None,
-        qacc: Any = None,
-        tau: Any = None,
-        before: Numbers | None = None,
-    ) -> QposMotion:
-        """See `MotionCalls.from_qpos`; before: q (n,) of the sample before the first."""
+    def motion(self, qpos: Any, qvel: Any = None, qacc: Any = None, tau: Any = None) -> QposMotion:
+        """See `MotionCalls.from_qpos`."""
         if qacc is not None and qvel is None:
             raise ValueError("qacc is given without qvel, on which accelerations of angles depend; give both")
         positions = self._read("qpos", qpos, self.width)
@@ -91,8 +84,7 @@ class Qpos:
         for part in self._parts():
             at = list(part.joint.coordinates)
             own = [None if x is None else x[..., part.velocities] for x in read]
-            last = None if before is None else before[at]
-            made = _converted(part.joint, self.order, positions[..., part.positions], own, last, warnings)
+            made = _converted(part.joint, self.order, positions[..., part.positions], own, warnings)
             for into, values in zip(found[:4], made, strict=True):
                 if into is not None:
                     into[..., at] = values
@@ -134,27 +126,26 @@ Given = Sequence[Any]
 """Velocities, accelerations and torques of one joint, None for what was not given."""
 
 
-def _converted(
-    joint: FileJoint, order: str, p: Numbers, given: Given, before: Numbers | None, told: list[str]
-) -> tuple[Any, ...]:
+def _converted(joint: FileJoint, order: str, p: Numbers, given: Given, told: list[str]) -> tuple[Any, ...]:
     """Coordinates of one joint, and the velocities, accelerations and torques of them that are given."""
     if joint.kind == "single" or (order == "mujoco" and joint.kind in ("continuous", "planar")):
         return (p, *given)
     if joint.kind in ("continuous", "planar"):
-        return _in_plane(joint, p, given, before)
+        return _in_plane(joint, p, given)
     quaternion = p[..., -4:] if order == "mujoco" else p[..., [-1, -4, -3, -2]]
-    q = _angles(joint.name, quaternion, None if before is None else before[-3:])
+    q = _angles(joint.name, quaternion)
     _say_steepness(joint.name, q, given, told)
     if joint.kind == "ball":
         return (q, *_turning(q, given))
     return (np.concatenate([p[..., :3], q], -1), *_floating(q, given, order == "pinocchio"))
 
 
-def _in_plane(joint: FileJoint, p: Numbers, given: Given, before: Numbers | None) -> tuple[Any, ...]:
+def _in_plane(joint: FileJoint, p: Numbers, given: Given) -> tuple[Any, ...]:
     """Of Pinocchio's joints whose angle is a cosine and a sine; a planar one moves along the body's axes."""
     cosine, sine = p[..., -2], p[..., -1]
     _check_unit(joint.name, np.hypot(cosine, sine), "a cosine and a sine")
-    angle = _unwrapped(np.arctan2(sine, cosine)[..., None], None if before is None else before[-1:])
+    angle = np.arctan2(sine, cosine)[..., None]
+    angle = angle if angle.ndim == 1 else np.unwrap(angle, axis=-2)
     if joint.kind == "continuous":
         return (angle, *given)
     v, a, f = given
@@ -187,36 +178,20 @@ def _floating(q: Numbers, given: Given, is_local: bool) -> tuple[Any, ...]:
 def _turning(q: Numbers, given: Given) -> tuple[Any, ...]:
     """Rates and changes of angles q, and the torques that do the same work on them."""
     v, a, f = given
-    rates = changes = torque = None
-    if v is not None:
-        rates = rates_of(q, v)
-    if a is not None:
+    rates = None if v is None else rates_of(q, v)
+    changes = torque = None
+    if a is not None and rates is not None:
         changes = rates_of(q, a - turning_of_rates(q, rates))
     if f is not None:
         torque = (np.swapaxes(rates_map(q), -1, -2) @ f[..., None])[..., 0]
     return rates, changes, torque
 
 
-def _angles(name: str, quaternion: Numbers, before: Numbers | None) -> Numbers:
+def _angles(name: str, quaternion: Numbers) -> Numbers:
     size = np.sqrt((quaternion * quaternion).sum(-1))
     _check_unit(name, size, "a quaternion")
     angles = angles_of(quaternion / size[..., None])
-    return angles if angles.ndim == 1 and before is None else _sequence(angles, before)
-
-
-def _sequence(angles: Numbers, before: Numbers | None) -> Numbers:
-    flat = angles[None] if angles.ndim == 1 else angles
-    return continued(flat, before).reshape(angles.shape)
-
-
-def _unwrapped(angle: Numbers, before: Numbers | None) -> Numbers:
-    """Angles (..., T, 1) without leaps from sample to sample."""
-    if angle.ndim == 1:
-        angle = angle[None]
-        return _unwrapped(angle, before)[0]
-    if before is None:
-        return np.asarray(np.unwrap(angle, axis=-2))
-    return np.asarray(np.unwrap(np.concatenate([before[None], angle], -2), axis=-2)[1:])
+    return angles if angles.ndim == 1 else continued(angles)
 
 
 def _check_unit(name: str, size: Numbers, what: str) -> None:
