@@ -241,7 +241,7 @@ def test_a_loop_that_cannot_follow_is_refused_at_its_time(folder: Path, tmp_path
     time = np.arange(100) / 100
     log = write_csv(tmp_path / "log.csv", np.column_stack([time, 0.2 + 3.0 * time]), ["turn"])
     with pytest.raises(
-        LinkwiseError, match=r"log.csv: time 0\.\d+ s: the joints that follow cannot be led there"
+        LinkwiseError, match=r"log.csv: time 0\.\d+ s: the joints that follow turn cannot be led there"
     ):
         analyze(log, tmp_path / "far")
 

@@ -181,6 +181,10 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda data: data["tree"].update(ties=[TIE], independent=[0, 1]),
         "tree.independent is not of some joints where there are constraints, else of none",
     ),
+    "closed position of nothing": (
+        lambda data: data["tree"].update(closed_position=[0.5, 0.0]),
+        "tree.closed_position is not of all joints where there are constraints, else of none",
+    ),
     "independent of no joint": (
         lambda data: data["tree"].update(ties=[TIE], independent=[2]),
         "tree.independent is not of joints, in ascending order",

@@ -173,7 +173,7 @@ def test_a_dead_point_is_told_with_its_time(
     torque = np.array([0.0, 0.0, 30.0])
     message = (
         r"^at t = 0\.\d+ s knee goes no further: the independent joints do not tell the others: "
-        r"\w+, \w+ can move while knee stands still; there, choose independent="
+        r"\w+, \w+ can move while knee stands still; there, choose robot.constrained\(independent="
     )
     with pytest.raises(ValueError, match=message):
         robot.simulate(q, 0.0 * q, [0.0, 2.0], torque, constraints=rocked, **how)

@@ -298,7 +298,7 @@ BAD: dict[str, tuple[dict[str, str], str]] = {
     ),
     "too many asked for": (
         {"text": 'schema = 1\nindependent = ["b", "c"]'},
-        "2 joints are given as independent, and the constraints leave 1 to choose; choose a, say",
+        "2 joints are given as independent, and the constraints leave 1 to choose; choose --independent a",
     ),
     "twice asked for": (
         {"text": 'schema = 1\nindependent = ["b", "b"]'},
@@ -356,7 +356,9 @@ def test_constraint_that_cannot_be_is_named(case: str, tmp_path: Path) -> None:
 def test_joints_that_others_do_not_follow_cannot_be_independent(tmp_path: Path) -> None:
     tree = FOURBAR.read_text().partition("[[constraint]]")[0]
     geared = tree + COUPLED.removeprefix("schema = 1\n") + "terms = { b = 1, c = -2 }\n"
-    told = "b, c cannot be independent, for the other joints do not follow from them; choose a, c, say"
+    told = (
+        "b, c cannot be independent, for the other joints do not follow from them; choose --independent a,c"
+    )
     with pytest.raises(LinkwiseError, match=told):
         robot_of(written(tmp_path, "geared.toml", geared), independent=("b", "c"))
     with pytest.raises(LinkwiseError, match="--independent is for constraints, and here are none; leave it"):

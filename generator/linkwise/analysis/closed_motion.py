@@ -1,8 +1,8 @@
 """Positions of a log in which ties close: joints that follow are where the independent ones leave them.
 
 Columns of the log for joints that follow say where to look for them, within a tolerance. Where some are
-missing, these joints start from zero at the first sample, and go on from sample to sample: ties that can
-close in several ways stay in the one that leads from there.
+missing, these joints are led from the closed position of the package to the first sample, and from sample to
+sample: ties that can close in several ways stay in the one that leads from there.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,8 +25,6 @@ APART = 16
 """Samples from one that the last leads to, to the next; those between are guessed on a line."""
 NEAR = 0.1
 """In rad and m: farther from its guess, a joint may have come to another way to close."""
-SHORTEST = 1e-6
-"""Part of a way that is not halved any more."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ def closed_samples(
             q = np.zeros((len(time), n))
             q[:, list(there)] = samples.q[start : start + BLOCK]
             if missing:
-                q = _without_leaps(model, time, q, missing, last)
+                q = _without_leaps(model, time, q, there, last)
             else:
                 worst = _larger(worst, _checked(model, time, q, tolerance))
                 q = _closed(model, time, q)
@@ -100,17 +98,20 @@ def _closed(model: ConstrainedModel, time: Array, q: Array) -> Array:
     try:
         return np.asarray(model.constraints.closed(q))
     except ValueError as error:
-        raise LinkwiseError(f"between {time[0]:.6g} and {time[-1]:.6g} s: {error}") from None
+        raise LinkwiseError(
+            f"between {time[0]:.6g} and {time[-1]:.6g} s: {_reason(error)}; mend the log's columns of joints"
+            f" that follow, or leave them out: {', '.join(model.constraints.dependent)}"
+        ) from None
 
 
 def _without_leaps(
-    model: ConstrainedModel, time: Array, q: Array, missing: Sequence[int], last: Array | None
+    model: ConstrainedModel, time: Array, q: Array, there: Sequence[int], last: Array | None
 ) -> Array:
-    """Closed positions, led on from the closed `last` sample, or from zero."""
-    guess = _continued(model, time, q, missing, last, APART)
+    """Closed positions, led on from the closed `last` sample, or from where the package has them closed."""
+    guess = _continued(model, time, q, there, last, APART)
     found = _closed(model, time, guess)
     if np.abs(found - guess).max(initial=0.0) > NEAR:
-        found = _closed(model, time, _continued(model, time, q, missing, last, 1))
+        found = _closed(model, time, _continued(model, time, q, there, last, 1))
     return found
 
 
@@ -118,56 +119,46 @@ def _continued(
     model: ConstrainedModel,
     time: Array,
     q: Array,
-    missing: Sequence[int],
+    there: Sequence[int],
     last: Array | None,
     apart: int,
 ) -> Array:
-    """Guesses (S, n) of the joints that are missing."""
+    """Guesses (S, n) of the joints that are not in the log."""
     q, marks = q.copy(), np.unique([*range(0, len(q), apart), len(q) - 1])
-    at = _start(model, q[0], float(time[0])) if last is None else last
+    at = _start(model, q[0], there, float(time[0])) if last is None else last
     led = np.empty((len(marks), q.shape[1]))
     for row, mark in enumerate(marks):
         at = led[row] = _led(model, at, q[mark], float(time[mark]))
-    for k in missing:
+    for k in set(range(q.shape[1])).difference(there):
         q[:, k] = np.interp(np.arange(len(q)), marks, led[:, k])
     return q
 
 
-def _start(model: ConstrainedModel, first: Array, time: float) -> Array:
-    """A closed position for the first sample, in which what is missing is zero; or one for all zeros."""
+def _start(model: ConstrainedModel, first: Array, there: Sequence[int], time: float) -> Array:
+    """A closed position for the first sample: beside what the log has of joints that follow, if any."""
+    own = list(model.following.independent)
+    led = _led(model, None, first, time)
+    if set(there) <= set(own):
+        return led
+    guess = led.copy()
+    guess[list(there)] = first[list(there)]
     try:
-        return np.asarray(model.constraints.closed(first))
+        return np.asarray(model.constraints.closed(guess))
+    except ValueError:
+        return led
+
+
+def _led(model: ConstrainedModel, start: Array | None, wanted: Array, time: float) -> Array:
+    """A closed position, led from a closed one, or the model's own, to where the independent joints are."""
+    try:
+        return np.asarray(model.constraints.closed(wanted[list(model.following.independent)], start=start))
     except ValueError as error:
-        try:
-            return np.asarray(model.constraints.closed(0.0 * first))
-        except ValueError:
-            missing = ", ".join(model.constraints.dependent)
-            raise LinkwiseError(
-                f"time {time:.6g} s: joints that follow cannot be found from zero ({error}); give the log"
-                f" columns for them, {missing}"
-            ) from None
+        raise LinkwiseError(
+            f"time {time:.6g} s: {_reason(error)}; give the log columns for them:"
+            f" {', '.join(model.constraints.dependent)}"
+        ) from None
 
 
-def _led(model: ConstrainedModel, start: Array, wanted: Array, time: float) -> Array:
-    """A closed position, by steps along G from a closed one to where the independent joints are wanted."""
-    own, at, done, step = list(model.following.independent), start, 0.0, 1.0
-    way = wanted[own] - start[own]
-    while done < 1.0:
-        step = min(step, 1.0 - done)
-        try:
-            guess = at + np.asarray(model.constraints.velocity(at, step * way))
-            guess[own] = start[own] + (done + step) * way
-            found = np.asarray(model.constraints.closed(guess))
-        except ValueError as error:
-            found, told = None, str(error)
-        if found is not None and np.abs(found - guess).max() <= NEAR:
-            at, done, step = found, done + step, 2.0 * step
-            continue
-        step /= 2.0
-        if step < SHORTEST:
-            why = told if found is None else "they would have to leap"
-            raise LinkwiseError(
-                f"time {time:.6g} s: the joints that follow cannot be led there ({why}); give the log their"
-                f" columns: {', '.join(model.constraints.dependent)}"
-            )
-    return at
+def _reason(error: ValueError) -> Any:
+    """What a package says without the mend that is for callers of its own."""
+    return getattr(error, "reason", error)

@@ -17,6 +17,7 @@ from linkwise.escape import without_ending
 from linkwise.package.load import Model, Package, open_package
 from linkwise.package.manifest import FILE, BodyEntry, PassiveEntry
 from linkwise.package.potential_word import potential_word
+from linkwise.runtime.file_joints import FileJoint
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,12 @@ class LoadedRobot:
     def followers(self) -> tuple[FollowingJoint, ...]:
         """Joints of the file that follow joints, or are held, and are none themselves."""
         return FollowingJoint.of(self.package.manifest)
+
+    @property
+    def file_joints(self) -> tuple[FileJoint, ...]:
+        """Joints of the file that move, where some are several joints here."""
+        found = self.package.manifest.file_joints
+        return tuple(FileJoint(one.name, one.kind, one.joints) for one in found)
 
     @property
     def units_in_logs(self) -> tuple[str, ...]:

@@ -109,8 +109,8 @@ def _made_otherwise(package: Package) -> Iterator[str]:
     ]
     links = {link.name: link.path for link in manifest.links}
     passive = manifest.tree.passive if manifest.tree else ()
-    parameters = manifest.parameters
-    if names_text(manifest.name, manifest.joints, links, robot.linear, parameters, bodies, passive) != found:
+    numbers = links, robot.linear, manifest.parameters, bodies, passive
+    if names_text(manifest.name, manifest.joints, *numbers, manifest.file_joints) != found:
         yield "names.py"
     if "tree.py" in manifest.files and manifest.tree is not None:
         text = tree_text(manifest.tree, list(links), list(manifest.parameters))

@@ -54,12 +54,14 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     equations = LoopEquations(NewtonEuler(manifest, tree), tree)
     own = tree.independent
     rest = [k for k in range(len(manifest.joints)) if k not in own]
-    q = equations.closed_near(states.q[:TRIED])
+    # Half as far around where the package has them closed: somewhere there is always one.
+    tried = states.q[:TRIED]
+    q = equations.closed_near(np.concatenate([tried, tree.closed_position + tried / 2.0]))
     sizes = np.linalg.svd(equations.rows(q)[..., rest], compute_uv=False)
     q = q[sizes[:, -1] > FAR * sizes[:, 0]]
     if not len(q):
         return None
-    q = q[steady(equations.recursion, q, equations.velocity_map(q))][:STATES]
+    q = q[steady(equations.recursion, q, equations.velocity_map(q))][: min(STATES, len(states.q))]
     rows, basis = equations.rows(q), equations.basis(q)
     back = np.swapaxes(basis, -1, -2)
     followed = _Followed(equations, own, rest, q)

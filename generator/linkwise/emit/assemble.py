@@ -16,7 +16,14 @@ from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
 from linkwise.emit.c import loop_costs
 from linkwise.emit.c.flash import code_size
-from linkwise.emit.definition import energies, follower_entries, in_radians, joint_entries, rigid_tree
+from linkwise.emit.definition import (
+    energies,
+    file_joint_entries,
+    follower_entries,
+    in_radians,
+    joint_entries,
+    rigid_tree,
+)
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.shared_texts import init_text, names_text
 from linkwise.errors import LinkwiseError
@@ -36,6 +43,8 @@ SHARED_RUNTIME = (
     "controllers.py",
     "dense.py",
     "dynamics.py",
+    "euler_angles.py",
+    "file_joints.py",
     "html_tables.py",
     "interface.py",
     "labelled.py",
@@ -46,6 +55,7 @@ SHARED_RUNTIME = (
     "outputs.py",
     "parameter_values.py",
     "passive_joints.py",
+    "qpos_motion.py",
     "quantities.py",
     "quantity_axes.py",
     "robot_axes.py",
@@ -136,7 +146,16 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     passive = tree.passive if tree else ()
     yield (
         "names.py",
-        names_text(derivation.package, joint_entries(system), links, linear, parameters, bodies, passive),
+        names_text(
+            derivation.package,
+            joint_entries(system),
+            links,
+            linear,
+            parameters,
+            bodies,
+            passive,
+            file_joint_entries(system),
+        ),
     )
     yield "py.typed", ""
     copied = {name for backend in loadable for place in backend.runtime for name in _files_at(place)}
@@ -169,6 +188,7 @@ def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
             for j, (name, cost) in enumerate(zip(system.link_names, costs, strict=True))
         ),
         follower_entries(system),
+        file_joint_entries(system),
         in_radians(system),
         operations,
         code_size(derivation.package, files),

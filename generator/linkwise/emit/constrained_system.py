@@ -1,6 +1,7 @@
 """The coordinates of a robot that move all others under its constraints: as asked for, or by pivoting."""
 
-from collections.abc import Iterator
+import shlex
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from linkwise.emit.definition import rigid_tree
@@ -28,9 +29,11 @@ def constrained_system(system: System) -> System:
     assert tree is not None  # of rigid links there is one
     loops = closed_loops(tree, len(robot.coordinates))
     chosen = _independent(robot, loops.rows)
+    position = loops.position(chosen)
     notes = [Note("constraint", name, about, BESIDE) for name, about in constraints_of(robot)]
     notes += [Note("redundant", name, "", LEAST) for name in redundant_names(loops.rows, loops.owners)]
-    return replace(system, robot=replace(robot, independent=chosen, notes=(*robot.notes, *notes)))
+    held = replace(robot, independent=chosen, closed_position=position, notes=(*robot.notes, *notes))
+    return replace(system, robot=held)
 
 
 def constraints_of(robot: Robot) -> Iterator[tuple[str, str]]:
@@ -59,7 +62,7 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
     if not robot.wanted:
         return proposed
     chosen = sorted(names.index(name) for name in robot.wanted)
-    others = listed(names[k] for k in proposed)
+    others = _asked(names[k] for k in proposed)
     if len(chosen) != free:
         raise LinkwiseError(
             f"{_count(len(chosen))} given as independent, and the constraints leave {free} to choose; "
@@ -77,20 +80,35 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
 def _proposed(robot: Robot, rows: Array) -> tuple[int, ...]:
     """Return those that pivoting leaves.
 
-    Dependent are rather joints that nothing drives, then those that no spring holds, then those farthest
-    from the ground, then the last.
+    Dependent are first joints that the file has follow others, which these give wherever they are, unless
+    actuators drive them; then rather joints that nothing drives, that follow, that slide, that no spring
+    holds, those farthest from the ground, and the last.
     """
+    followers = {coupling.follower for coupling in robot.couplings}
     sprung = {axis.coordinate for axis in robot.passive if axis.own.stiffness}
     free = range(len(robot.coordinates))
     depths = [min(_depths(robot, k), default=0) for k in free]
-    preference = [(k not in robot.driven, k not in sprung, depths[k]) for k in free]
-    return chosen_independent(rows, preference=preference)
+    slides = [coordinate.unit == "m" for coordinate in robot.coordinates]
+    preference = [
+        (k not in robot.driven, k in followers, slides[k], k not in sprung, depths[k]) for k in free
+    ]
+    first = [k for k in free if k in followers and k not in robot.driven]
+    return chosen_independent(rows, first, preference)
 
 
 def _depths(robot: Robot, coordinate: int) -> list[int]:
     """Return how many joints are before those of a coordinate."""
     own = (at for at, link in enumerate(robot.links) if link.joint.coordinate == coordinate)
     return [len(robot.chain(at)) for at in own]
+
+
+def _asked(names: Iterable[str]) -> str:
+    """The option that asks for joints; one whose name has a comma has an option of its own."""
+    plain, apart = list[str](), list[str]()
+    for name in names:
+        (apart if "," in name else plain).append(name)
+    lists = [*([",".join(plain)] if plain else []), *apart]
+    return " ".join(f"--independent {shlex.quote(text)}" for text in lists)
 
 
 def _count(number: int) -> str:

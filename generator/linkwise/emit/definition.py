@@ -8,7 +8,7 @@ import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from linkwise.emit.formula_symbols import motion_symbol, parameter_symbols
-from linkwise.package.entries import CurveEntry, FollowerEntry
+from linkwise.package.entries import CurveEntry, FileJointEntry, FollowerEntry
 from linkwise.package.manifest import (
     BodyEntry,
     CouplingEntry,
@@ -82,8 +82,9 @@ def rigid_tree(system: System) -> RigidTree | None:
             for axis in robot.passive
         ),
         tuple(TieEntry(*astuple(tie)) for tie in robot.ties),
-        tuple(CouplingEntry(*astuple(coupling)) for coupling in robot.couplings),
+        tuple(CouplingEntry(coupling.name, coupling.terms) for coupling in robot.couplings),
         robot.independent,
+        robot.closed_position,
         {
             place: text(value)
             for place, value in _places(robot)
@@ -106,6 +107,14 @@ def follower_entries(system: System) -> tuple[FollowerEntry, ...]:
         )
         for one in system.robot.followers
     )
+
+
+def file_joint_entries(system: System) -> tuple[FileJointEntry, ...]:
+    """Return the joints of the robot's file that move; none where each is one coordinate, in that order."""
+    joints = system.robot.file_joints if isinstance(system, RigidSystem) else ()
+    if all(one.kind == "single" and one.pinocchio == at for at, one in enumerate(joints)):
+        return ()
+    return tuple(FileJointEntry(one.name, one.kind, one.coordinates, one.pinocchio) for one in joints)
 
 
 def in_radians(system: System) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """Where the loops of a robot close at its own numbers: found once, before anything is generated."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from linkwise.errors import LinkwiseError
 from linkwise.package.entries import RigidTree
 from linkwise.runtime.constraints.closing_search import (
+    TRIES,
     Closing,
     TieEquations,
     best_closing,
@@ -26,31 +28,46 @@ from linkwise.runtime.rule.joint_tree import (
 )
 
 Array = NDArray[np.float64]
+FAR = 0.3
+"""Positions whose least singular value of A_d is below this part of the best one's are next to singular."""
 FLAT = 1e-4
 """Slopes below this part of a coupling's factors are none: steps end where rows have all but lost rank."""
 
 
 class ClosedLoops(NamedTuple):
-    """A position q (n,) in which constraints hold, A (C, n) with comparable rows, and whose each row is."""
+    """Positions in which constraints hold, A (C, n) at one, with comparable rows, and whose each row is."""
 
-    q: Array
+    closed: tuple[Closing, ...]
+    """The one nearest to zero first."""
     rows: Array
     owners: tuple[str, ...]
 
+    def position(self, independent: Sequence[int]) -> tuple[float, ...]:
+        """The first one of them where the other joints follow well, as far as any does, to 1e-9."""
+        dependent = [k for k in range(self.rows.shape[1]) if k not in independent]
+        least = [
+            np.linalg.svd(at.comparable[:, dependent], compute_uv=False)[-1] / np.abs(at.comparable).max()
+            for at in self.closed
+        ]
+        best = next(at for at, size in zip(self.closed, least, strict=True) if size >= FAR * max(least))
+        return tuple(round(float(x), 9) + 0.0 for x in best.q)
+
 
 def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
-    """Return one where A has its largest rank; raises LinkwiseError, which names what stays open."""
+    """Return some, and A where it has its largest rank; raises LinkwiseError, which names what stays open."""
     moved = joint_tree(tree)
     held = held_by(moved, ())
-    starts = random_starts(joints)
-    found = best_closing(TieEquations(moved, joints, held), starts)
+    starts, equations = random_starts(joints), TieEquations(moved, joints, held)
+    found, closed = best_closing(equations, starts)
     couplings = [coupling.name for coupling in tree.couplings]
     owners = (*(one.name for one in held for _ in one.row_names), *couplings)
     if not found.is_closed:
         rows = [*(row for one in held for row in one.row_names), *couplings]
         raise LinkwiseError(_told(found, owners, rows, len(starts)))
     _check_slopes(tree, found)
-    return ClosedLoops(found.q, found.comparable, owners)
+    upright, *wider = (equations.closed_from(start) for start in (np.zeros(joints), *starts[TRIES::TRIES]))
+    there = tuple(at for at in (upright, *closed, *wider) if at.is_closed)
+    return ClosedLoops(there, found.comparable, owners)
 
 
 def _check_slopes(tree: RigidTree, found: Closing) -> None:
@@ -95,4 +112,5 @@ def joint_tree(tree: RigidTree) -> JointTree:
         tuple(TreeTie(t.name, t.kind, t.first, t.second, t.length) for t in tree.ties),
         tuple(TreeCoupling(c.name, c.terms) for c in tree.couplings),
         tree.independent,
+        tree.closed_position,
     )

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.render import render
 from linkwise.escape import python_docstring, python_literal
-from linkwise.package.entries import JointEntry, KernelKind, PassiveEntry
+from linkwise.package.entries import FileJointEntry, JointEntry, KernelKind, PassiveEntry
 from linkwise.runtime.structure import JointLimits
 from linkwise.version import VERSION
 
@@ -94,9 +94,11 @@ def names_text(
     parameters: Mapping[str, float],
     bodies: Sequence[BodyText],
     passive: Sequence[PassiveEntry],
+    file_joints: Sequence[FileJointEntry],
 ) -> str:
-    """names.py: names, units and limits of the joints, what they have of their own, names and paths of the
-    links, and what hangs on parameters."""
+    """names.py: names, units and limits of the joints, what they have of their own, those of the file, names
+    and paths of the links, and what hangs on parameters."""
+    places = [one.pinocchio for one in file_joints]
     view = {
         "version": VERSION,
         "name": repr(package),
@@ -109,6 +111,8 @@ def names_text(
         "parameters": [(python_literal(name), repr(value)) for name, value in parameters.items()],
         "bodies": bodies,
         "passive": [_passive_text(entry) for entry in passive],
+        "file_joints": [f"{python_literal(one.name)}, {one.kind!r}, {one.joints!r}" for one in file_joints],
+        "pinocchio_order": repr(tuple(sorted(range(len(file_joints)), key=places.__getitem__))),
         "calls_numpy": any("np." in value for body in bodies for value in body.values),
     }
     return render("package/names.py.j2", view)

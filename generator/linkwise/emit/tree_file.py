@@ -46,6 +46,7 @@ def tree_text(tree: RigidTree, links: Sequence[str], parameters: Sequence[str]) 
         "ties": [_tie(tie, tree) for tie in tree.ties],
         "couplings": [_coupling(coupling) for coupling in tree.couplings],
         "independent": repr(tree.independent) if tree.independent else "",
+        "closed_position": repr(tree.closed_position),
         "records": _records(tree),
         "formulas": [
             (place, expression(text))

@@ -111,6 +111,10 @@ def _check_constraints(tree: RigidTree, count: int) -> None:
         raise ValueError("tree.independent is not of joints, in ascending order")
     if bool(names) != bool(free) or (names and len(free) == count):
         raise ValueError("tree.independent is not of some joints where there are constraints, else of none")
+    if len(tree.closed_position) != (count if names else 0):
+        raise ValueError(
+            "tree.closed_position is not of all joints where there are constraints, else of none"
+        )
 
 
 def _check_joints(tree: RigidTree, joints: Sequence[JointEntry]) -> None:

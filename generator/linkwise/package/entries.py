@@ -69,6 +69,19 @@ class FollowerEntry:
 
 
 @dataclass(frozen=True)
+class FileJointEntry:
+    """A joint of the robot's file that moves, its joints here by their indices, and its place in Pinocchio.
+
+    kind: as `FileJoint` in runtime.file_joints has it
+    """
+
+    name: str
+    kind: Literal["single", "continuous", "planar", "ball", "floating"]
+    joints: tuple[int, ...]
+    pinocchio: int
+
+
+@dataclass(frozen=True)
 class BodyEntry:
     """A moving frame on its parent's, as `linkwise.robot.robot.Joint` places it, and the mass it carries.
 
@@ -146,7 +159,8 @@ class RigidTree:
     passive: what joints have of their own, those that have anything
 
     ties, couplings: what holds beside the tree; independent: the joints whose motion gives that of all others
-    then, by their indices in ascending order, none where nothing holds
+    then, by their indices in ascending order; closed_position: of all joints, in rad and m, one in which all
+    of it holds; none of both where nothing holds
 
     formulas: by its place, such as bodies[2].com[0], each number that hangs on run-time parameters, as text
     in their symbols; the numbers themselves are those of the parameters' own values
@@ -159,6 +173,7 @@ class RigidTree:
     ties: tuple[TieEntry, ...]
     couplings: tuple[CouplingEntry, ...]
     independent: tuple[int, ...]
+    closed_position: tuple[float, ...]
     formulas: Mapping[str, str]
 
     @property

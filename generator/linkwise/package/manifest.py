@@ -4,7 +4,7 @@ import hashlib
 import json
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from linkwise.package.entries import (
     CodeSize,
     CouplingEntry,
     EnergyEntry,
+    FileJointEntry,
     FollowerEntry,
     FrameEntry,
     JointEntry,
@@ -28,7 +29,7 @@ from linkwise.package.entries import (
     TieEntry,
 )
 
-SCHEMA = 11
+SCHEMA = 12
 LARGEST = 1 << 28
 """Bytes; a robot of 1000 joints takes some 2 MB."""
 __all__ = [
@@ -70,6 +71,7 @@ class Manifest:
 
     request: the options of `generate`; kernel: which kind its C is
     followers: joints of the robot's file that are none here: they follow others, or are held
+    file_joints: the file's joints that move, where some are several here, or Pinocchio has another order
     in_radians: joints and followers that logs have in radians, also where others are in degrees
     files: the SHA-256 of every other file, by its path in the package
     operations: those of a full decomposition
@@ -84,6 +86,7 @@ class Manifest:
     joints: tuple[JointEntry, ...]
     links: tuple[LinkEntry, ...]
     followers: tuple[FollowerEntry, ...]
+    file_joints: tuple[FileJointEntry, ...]
     in_radians: tuple[str, ...]
     operations: int
     code_size: CodeSize | None
@@ -109,6 +112,7 @@ class Manifest:
             if follower.joint is not None and not follower.joint < count:
                 raise ValueError(f"followers[{number}] follows a joint that is not there")
             check_curve(f"followers[{number}]", follower.curve)
+        _check_file_joints(self.file_joints, count)
         for path, digest in self.files.items():
             if not is_inside(path) or path == FILE:
                 raise ValueError(f"files has {path[:80]!a}, which is not a path of a file in the package")
@@ -144,6 +148,14 @@ class Manifest:
             return manifest
         except ValueError as error:
             raise LinkwiseError(f"{path} is damaged: {error}; generate the robot again") from error
+
+
+def _check_file_joints(entries: Sequence[FileJointEntry], count: int) -> None:
+    """Raise ValueError where joints of the file are not those of the manifest, each once."""
+    if entries and sorted(k for entry in entries for k in entry.joints) != list(range(count)):
+        raise ValueError("file_joints does not have each joint once")
+    if sorted(entry.pinocchio for entry in entries) != list(range(len(entries))):
+        raise ValueError("file_joints has places in Pinocchio that are not those of so many")
 
 
 def altered_entries(directory: Path) -> list[str]:

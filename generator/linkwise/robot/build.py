@@ -17,6 +17,7 @@ from linkwise.robot.limits import check_locks, coordinate_limits
 from linkwise.robot.links import moving_links
 from linkwise.robot.mass import check_bodies
 from linkwise.robot.mass_matrix import check_mass_matrix
+from linkwise.robot.moving_joints import moving_joints
 from linkwise.robot.naming import Named, Naming
 from linkwise.robot.notes import FREE, Note
 from linkwise.robot.parameters import numeric
@@ -118,6 +119,7 @@ def build(description: Description, options: Options) -> Robot:
         held.driven,
         limits=coordinate_limits(connections, moving.coordinates),
         followers=tuple(followers(axes, connections, moving, options.lock)),
+        file_joints=moving_joints(joints, moving, description.ordered),
     )
 
 

@@ -41,7 +41,7 @@ def coupled(
         elif lost or (free and coupling.equality):
             notes.append(Note("freed", follower, f"{coupling.rule} by {by}", UNCOUPLED))
         elif terms := _terms(coupling, motion):
-            found.append(Coupling(coupling.name, terms))
+            found.append(Coupling(coupling.name, terms, _given_by_others(motion[follower], terms)))
         else:
             notes.append(Note("ignored", coupling.name, "a constraint on joints that keep it anyway"))
     return tuple(found), notes
@@ -92,6 +92,14 @@ def _terms(
         )
     first = min(kept, default=None)
     return tuple((k, (constant if k == first else 0.0, *total[1:])) for k, total in kept.items())
+
+
+def _given_by_others(rule: AxisRule, terms: tuple[tuple[int, tuple[float, ...]], ...]) -> int | None:
+    """The coordinate of a first joint, if its term has one value for each sum of the others."""
+    for coordinate, factors in terms:
+        if coordinate == rule.coordinate and len(terms) > 1 and not any(factors[2:]):
+            return coordinate
+    return None
 
 
 def composed(coefficients: tuple[float, ...], ratio: float, offset: float) -> tuple[float, ...]:

@@ -202,3 +202,5 @@ class Description:
     """The body that is the world itself, where the file has one."""
     free: FreeRoot | None = None
     """None where the file holds the root, or its format says nothing of that."""
+    ordered: bool = False
+    """Whether Pinocchio has siblings in the file's order, and not in that of their joints' names."""

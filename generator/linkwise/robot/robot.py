@@ -94,6 +94,19 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class MovingJoint:
+    """A joint of the file that moves, and its coordinates: fewer than its kind has where some are locked.
+
+    kind: as `FileJoint` in runtime.file_joints has it; pinocchio: its place among those of Pinocchio's model
+    """
+
+    name: str
+    kind: Literal["single", "continuous", "planar", "ball", "floating"]
+    coordinates: tuple[int, ...]
+    pinocchio: int
+
+
+@dataclass(frozen=True)
 class Passive:
     """What a joint of one axis has of its own, q being its position in rad or m.
 
@@ -208,6 +221,8 @@ class Coupling:
 
     name: str
     terms: tuple[tuple[int, tuple[float, ...]], ...]
+    follower: int | None = None
+    """The coordinate that the others give wherever they are: the file's first, where its term is c_1 q."""
 
 
 @dataclass(frozen=True)
@@ -228,8 +243,8 @@ class Robot:
     each link among them, or none.
 
     `ties` and `couplings` hold beside the tree. Under them the coordinates `independent` move all others, in
-    ascending order; before they are found, `wanted` are those asked for, by name, and `driven` those that
-    actuators drive.
+    ascending order, and `closed_position` is one in which they hold; before they are found, `wanted` are
+    those asked for, by name, and `driven` those that actuators drive.
     """
 
     name: str
@@ -246,9 +261,11 @@ class Robot:
     wanted: tuple[str, ...] = ()
     driven: tuple[int, ...] = ()
     independent: tuple[int, ...] = ()
+    closed_position: tuple[float, ...] = ()
     limits: tuple[Limits, ...] = ()
     """Of each coordinate, or none at all; those of joints that follow another are no limits of that one."""
     followers: tuple[Follower, ...] = ()
+    file_joints: tuple[MovingJoint, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.coordinates:

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .file_joints import FileJoint, why_wider
+
 FLOATS = ("float32", "float64")
 INTEGERS = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 REAL = ("bool", "int", "uint", "float", "bfloat")
@@ -52,6 +54,14 @@ def as_array(name: str, value: Any) -> NDArray[Any]:
         raise ValueError(f"{name} does not read as an array: {_first_line(error)}") from None
 
 
+def shape_of(value: Any) -> tuple[int, ...]:
+    """Shape of what will be read as an array or a tensor; none where that is not clear yet."""
+    try:
+        return tuple(value.shape) if hasattr(value, "shape") else np.shape(value)
+    except (TypeError, ValueError, RuntimeError):
+        return ()
+
+
 def as_weights(name: str, value: Any) -> Any:
     """A tensor as it is, or an array, of real numbers or truth values; raises as `as_array` does."""
     if has_tensors([value]):
@@ -84,12 +94,17 @@ def check_dense(values: Mapping[str, Any]) -> None:
                 raise TypeError(f"{name} has the layout {value.layout}; pass {name}.to_dense()")
 
 
-def check_axes(arrays: Mapping[str, Any], n: int) -> None:
-    """Raise ValueError, which names the argument, where a last axis is not n."""
+def check_axes(arrays: Mapping[str, Any], n: int, joints: Sequence[FileJoint] = ()) -> None:
+    """Raise ValueError, which names the argument, where a last axis is not n.
+
+    joints: those of the file, by which positions of simulators have more numbers
+    """
     for name, a in arrays.items():
         if a.ndim == 0 or a.shape[-1] != n:
+            why = why_wider(joints, a.shape[-1], n) if a.ndim else ""
+            told = f" ({why}: robot.from_qpos makes q of it)" if why else ""
             raise ValueError(
-                f"{name} has shape {tuple(a.shape)}; its last axis must be {n}, one for each joint"
+                f"{name} has shape {tuple(a.shape)}; its last axis must be {n}, one for each joint{told}"
             )
 
 

@@ -15,6 +15,7 @@ from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import require_file
 from linkwise.package.load import Array
+from linkwise.runtime.file_joints import FileJoint
 
 AS_IT_IS = Reading()
 DELIMITED, STORAGE, HDF5 = (".csv", ".tsv", ".txt"), (".mot", ".sto"), (".h5", ".hdf5", ".hdf")
@@ -63,7 +64,12 @@ class Log(Protocol):
         """
 
 
-def open_log(path: Path, reading: Reading = AS_IT_IS, joints: Sequence[str] = ()) -> Log:
+def open_log(
+    path: Path,
+    reading: Reading = AS_IT_IS,
+    joints: Sequence[str] = (),
+    file_joints: Sequence[FileJoint] = (),
+) -> Log:
     """Open a log by its suffix; a folder as a bag of ROS 2.
 
     reading: which topic or group has the joints, and which array the time, where the format has such
@@ -75,7 +81,7 @@ def open_log(path: Path, reading: Reading = AS_IT_IS, joints: Sequence[str] = ()
     with within(str(path)):
         if not path.is_dir():
             require_file(path)
-        opened = _opener(path, reading, joints)
+        opened = _opener(path, reading, joints, file_joints)
     try:
         log = opened()
     except UnicodeDecodeError as error:
@@ -87,15 +93,17 @@ def open_log(path: Path, reading: Reading = AS_IT_IS, joints: Sequence[str] = ()
     return log
 
 
-def _opener(path: Path, reading: Reading, joints: Sequence[str]) -> Callable[[], Log]:
+def _opener(
+    path: Path, reading: Reading, joints: Sequence[str], file_joints: Sequence[FileJoint]
+) -> Callable[[], Log]:
     """What opens a log; raises LinkwiseError for a kind of file that is none."""
     suffix = path.suffix.lower()
     if path.is_dir() or suffix in BAGS:
         return lambda: BagLog.open(path, reading.topic)
     if suffix in HDF5:
-        return lambda: ArrayLog.open(Hdf5Arrays(path), reading, joints)
+        return lambda: ArrayLog.open(Hdf5Arrays(path), reading, joints, file_joints)
     if suffix == ".npz":
-        return lambda: ArrayLog.open(NpzArrays(path), reading, joints)
+        return lambda: ArrayLog.open(NpzArrays(path), reading, joints, file_joints)
     if reading.topic is not None:
         raise LinkwiseError("--topic goes with bags and files of arrays; leave it out")
     if suffix in DELIMITED:

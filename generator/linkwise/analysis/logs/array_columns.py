@@ -10,6 +10,7 @@ from functools import cached_property
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
+from linkwise.runtime.file_joints import FileJoint, why_wider
 
 NAMES = ("joint_names", "joints", "names", "name", "columns")
 """What an array of texts is called, or an attribute, that names joints."""
@@ -67,6 +68,8 @@ class ArrayColumns:
     joints: Sequence[str]
     others: frozenset[str]
     """Folders with clocks of their own."""
+    file_joints: Sequence[FileJoint] = ()
+    """Those of the robot's file, by which positions of simulators have more numbers."""
 
     @cached_property
     def samples(self) -> int:
@@ -162,6 +165,12 @@ class ArrayColumns:
             return [f"{joint}{ending}" for joint in self.joints]
         if ending == "" and (names or self.joints):
             there = f"{len(names)} names" if names else f"the robot has {len(self.joints)} joints"
+            why = why_wider(self.file_joints, width, len(self.joints))
+            if why and not names:
+                raise LinkwiseError(
+                    f"array {array!r} is {self.found[array].shape}, and {there}: {why}; make q of it by"
+                    " robot.from_qpos of the package, and save that"
+                )
             raise LinkwiseError(
                 f"array {array!r} is {self.found[array].shape}, and {there}; name its columns in an array"
                 f" {NAMES[0]!r} of {width} texts"
@@ -179,7 +188,11 @@ class ArrayColumns:
 
 
 def array_columns(
-    found: Mapping[str, StoredArray], time: str | None, group: str | None, joints: Sequence[str]
+    found: Mapping[str, StoredArray],
+    time: str | None,
+    group: str | None,
+    joints: Sequence[str],
+    file_joints: Sequence[FileJoint] = (),
 ) -> ArrayColumns:
     """Find the clock: the only array called `time` or `t`, or as given, in the group or nearest above it.
 
@@ -200,7 +213,7 @@ def array_columns(
     if not above or not any(folder in folders_of(array) for array in found):
         raise LinkwiseError(f"--topic {group}: no such group with times; they are in {where}")
     others = frozenset(clocks).difference([folder, *folders_of(folder)])
-    return ArrayColumns(found, clocks[above[0]], folder, joints, others)
+    return ArrayColumns(found, clocks[above[0]], folder, joints, others, file_joints)
 
 
 def _clocks(found: Mapping[str, StoredArray], time: str | None) -> dict[str, str]:

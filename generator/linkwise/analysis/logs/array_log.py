@@ -14,6 +14,7 @@ from linkwise.analysis.settings import Reading
 from linkwise.errors import within
 from linkwise.escape import listed
 from linkwise.package.load import Array
+from linkwise.runtime.file_joints import FileJoint
 
 
 class ArrayFile(Protocol):
@@ -43,11 +44,17 @@ class ArrayLog:
     first_row: int = 1
 
     @classmethod
-    def open(cls, source: ArrayFile, reading: Reading, joints: Sequence[str]) -> "ArrayLog":
+    def open(
+        cls,
+        source: ArrayFile,
+        reading: Reading,
+        joints: Sequence[str],
+        file_joints: Sequence[FileJoint] = (),
+    ) -> "ArrayLog":
         """Find the time and the joints' arrays; raises LinkwiseError where that is not clear."""
         found = source.found()
         with within(str(source.path)):
-            columns = array_columns(found, reading.time, reading.topic, joints)
+            columns = array_columns(found, reading.time, reading.topic, joints, file_joints)
             time = reading.time or columns.time.rpartition("/")[2]
             named_once((time, *columns.places))
             places = {time: Place(columns.time, 0)} | columns.places

@@ -16,6 +16,7 @@ from linkwise.robot.notes import WARNED, Note
 from linkwise.robot.readers.mjcf_equality import equalities
 from linkwise.robot.readers.mjcf_options import switched_off
 from linkwise.robot.readers.mjcf_passive import limits_of, passive_of
+from linkwise.robot.readers.mjcf_tendons import joints_of
 from linkwise.robot.readers.mjcf_unmodelled import omissions, unused
 from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Mat3, Passive, Rotation, Vec3
 
@@ -50,6 +51,7 @@ def read_mjcf(path: Path) -> Description:
         omissions=omissions(mujoco, model, joints, links),
         sites=_sites(model, links),
         driven=_driven(mujoco, model, joints),
+        ordered=True,
     )
 
 
@@ -79,13 +81,14 @@ def _compiled(mujoco: Any, path: Path) -> tuple[Any, list[str]]:
 
 
 def _driven(mujoco: Any, model: Any, joints: list[str]) -> tuple[str, ...]:
-    """Return the joints that actuators turn or push."""
-    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    return tuple(
-        joints[int(target)]
-        for kind, (target, _) in zip(model.actuator_trntype, model.actuator_trnid, strict=True)
-        if mujoco.mjtTrn(int(kind)) in kinds
-    )
+    """Return the joints that actuators turn or push, by fixed tendons too; a muscle drives no one joint."""
+    kinds, found = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT), list[int]()
+    for kind, (target, _) in zip(model.actuator_trntype, model.actuator_trnid, strict=True):
+        if mujoco.mjtTrn(int(kind)) in kinds:
+            found.append(int(target))
+        elif mujoco.mjtTrn(int(kind)) == mujoco.mjtTrn.mjTRN_TENDON:
+            found += joints_of(mujoco, model, int(target))
+    return tuple(joints[at] for at in found)
 
 
 @dataclass(frozen=True)

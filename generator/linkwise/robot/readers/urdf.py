@@ -31,12 +31,21 @@ def read_urdf(path: Path) -> Description:
         tuple(_connection(element, passive) for element in joints),
         notes=notes,
         omissions=tuple(omissions(robot)),
+        driven=_driven(robot),
     )
 
 
 def root_tag(path: Path) -> str:
     """Return the root element's name; raises LinkwiseError for malformed XML."""
     return str(parse(path).tag)
+
+
+def _driven(robot: Element) -> tuple[str, ...]:
+    """Return the joints of transmissions, and those that ros2_control commands."""
+    commanded = (
+        joint for joint in robot.iterfind("ros2_control/joint") if joint.find("command_interface") is not None
+    )
+    return tuple(joint.get("name", "") for joint in (*robot.iterfind("transmission/joint"), *commanded))
 
 
 def _origin(parent: Element, place: str) -> tuple[list[list[float]], tuple[float, float, float]]:

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chosen_names import plain
-from ..sums.known_digits import SHARE, listed, sample_of
+from ..chosen_names import listed, plain, sample_of
+from ..sums.known_digits import SHARE
 from ..sums.namespace import hidden
 from .followers import Followers, JointColumns
 from .independent_joints import chosen_independent, rank_of
@@ -55,8 +55,12 @@ def why_not_following(
         return (
             f"the position is singular: {told}, for the constraints take fewer freedoms there than elsewhere"
         )
-    others = [joint_names[k] for k in chosen_independent(rows, tolerance=epsilon)]
-    return f"the independent joints do not tell the others: {told}; there, choose independent={others}"
+    # Those that follow now go on to do so, as far as they can.
+    others = [joint_names[k] for k in chosen_independent(rows, dependent, tolerance=epsilon)]
+    return (
+        f"the independent joints do not tell the others: {told}; there, choose "
+        f"robot.constrained(independent={others})"
+    )
 
 
 def left_free(rows: Any, columns: JointColumns, joint_names: Sequence[str], where: str) -> str:

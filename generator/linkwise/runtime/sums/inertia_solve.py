@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .known_digits import as_array, can_move, epsilon_of, kind_of, sample_of, warn_of_vague
+from ..chosen_names import sample_of
+from .known_digits import as_array, can_move, epsilon_of, kind_of, warn_of_vague
 from .namespace import hidden, namespace
 
 CLEAR = 1e5

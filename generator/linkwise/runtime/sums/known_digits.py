@@ -12,21 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chosen_names import MOST_NAMES, plain
+from ..chosen_names import listed, sample_of
 
 SHARE = 1e-3
 """Joints that move less than this part of the one that moves most in a motion without mass are left out."""
-
-
-def listed(names: Sequence[str]) -> str:
-    """Names in one line."""
-    shown = ", ".join(plain(name) for name in names[:MOST_NAMES])
-    return shown + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
-
-
-def sample_of(place: Sequence[int]) -> str:
-    """Where in a batch."""
-    return f" at sample {', '.join(map(str, place))}" if len(place) else ""
 
 
 def can_move(motion: NDArray[Any], joint_names: Sequence[str], share: float = SHARE) -> str:
