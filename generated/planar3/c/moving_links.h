@@ -111,20 +111,3 @@ static inline void keep(const struct sample *s, const real *inertia, const real 
         }
     }
 }
-
-int API(forward_dynamics)(UNDER_TORQUE, real *qdd)
-{
-    SAMPLE(s);
-    const real rest[N] = {0};
-    real mass[N * N], size[N], force[N];
-    natural_inertia(&s, mass);
-    answer(&s, rest, qd, 1, force);
-    for (int i = 0; i < N; ++i) {
-        size[i] = mass[i * N + i];
-        force[i] = tau[i] - force[i];
-    }
-    const int singular = eliminate(0, N, 1, size, mass, force);
-    if (!singular)
-        copy(N, force, qdd);
-    return singular;
-}

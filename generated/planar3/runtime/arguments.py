@@ -16,10 +16,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .file_joints import FileJoint, why_wider
+
 FLOATS = ("float32", "float64")
 INTEGERS = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 REAL = ("bool", "int", "uint", "float", "bfloat")
 """How names of dtypes of real numbers begin."""
+
+
+def is_like(given: Any, kind: type) -> bool:
+    """Whether an argument has all that a public class has: it is of that class, or of another package's own.
+
+    Each package has a runtime of its own, whose classes are alike and not the same.
+    """
+    return all(hasattr(type(given), name) for name in vars(kind) if not name.startswith("_"))
 
 
 def has_tensors(values: Iterable[Any]) -> bool:
@@ -42,6 +52,14 @@ def as_array(name: str, value: Any) -> NDArray[Any]:
         return np.asarray(value)
     except (TypeError, ValueError, RuntimeError) as error:
         raise ValueError(f"{name} does not read as an array: {_first_line(error)}") from None
+
+
+def shape_of(value: Any) -> tuple[int, ...]:
+    """Shape of what will be read as an array or a tensor; none where that is not clear yet."""
+    try:
+        return tuple(value.shape) if hasattr(value, "shape") else np.shape(value)
+    except (TypeError, ValueError, RuntimeError):
+        return ()
 
 
 def as_weights(name: str, value: Any) -> Any:
@@ -76,12 +94,17 @@ def check_dense(values: Mapping[str, Any]) -> None:
                 raise TypeError(f"{name} has the layout {value.layout}; pass {name}.to_dense()")
 
 
-def check_axes(arrays: Mapping[str, Any], n: int) -> None:
-    """Raise ValueError, which names the argument, where a last axis is not n."""
+def check_axes(arrays: Mapping[str, Any], n: int, joints: Sequence[FileJoint] = ()) -> None:
+    """Raise ValueError, which names the argument, where a last axis is not n.
+
+    joints: those of the file, by which positions of simulators have more numbers
+    """
     for name, a in arrays.items():
         if a.ndim == 0 or a.shape[-1] != n:
+            why = why_wider(joints, a.shape[-1], n) if a.ndim else ""
+            told = f" ({why}: robot.from_qpos makes q of it)" if why else ""
             raise ValueError(
-                f"{name} has shape {tuple(a.shape)}; its last axis must be {n}, one for each joint"
+                f"{name} has shape {tuple(a.shape)}; its last axis must be {n}, one for each joint{told}"
             )
 
 

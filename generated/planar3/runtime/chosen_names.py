@@ -86,6 +86,17 @@ def plain(name: str) -> str:
     return name if name.isprintable() and len(name) <= LONGEST else short(name)
 
 
+def listed(names: Sequence[str]) -> str:
+    """Names in one line."""
+    shown = ", ".join(plain(name) for name in names[:MOST_NAMES])
+    return shown + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
+
+
+def sample_of(place: Sequence[int]) -> str:
+    """Where in a batch."""
+    return f" at sample {', '.join(map(str, place))}" if len(place) else ""
+
+
 def short(value: Any) -> str:
     """Any value in one line."""
     text = repr(value).replace("\n", " ")

@@ -26,7 +26,7 @@ class FrameImpedance(NamedTuple):
     """
 
     frame: str | int
-    """A frame by its name, as `kinematics.frames` has them, or a link by its number j."""
+    """A frame by its name, or by its number in `kinematics.frames`."""
     inertia: Any = Natural()
     damping: Any = Natural()
     stiffness: Any = 0.0
@@ -56,7 +56,7 @@ class Target(NamedTuple):
 class PartialImpedance(Generic[Array]):
     """Torques under which the robot obeys its targets; `Dynamics.partial_impedance` makes it.
 
-    With e = q - q_d and f, what acts on the joints from outside (Eq. 19 of the paper, summed over j):
+    With e = q - q_d and f, what acts on the joints from outside (the paper's equation, summed over j):
 
         M* (qdd - qdd_d) + B* (qd - qd_d) + K* e = f     M* = sum_j M_ijk, B* and K* likewise
         u = M qdd + C qd + g - f, where qdd follows from the line above
@@ -67,8 +67,9 @@ class PartialImpedance(Generic[Array]):
     With a frame, that has precedence: of all accelerations with which the frame moves as asked, the joints
     take the one nearest to what the lines above ask for, by Gauss's principle of least constraint.
 
-    M is the inertia of links and armatures. Arguments, batches and errors are as for `Dynamics`; gradients
-    flow through motion, targets and gains.
+    M is the inertia of links and armatures. Friction of the joints brakes them beside f, but for what is
+    compensated, which is never more than there is. Arguments, batches and errors are as for `Dynamics`;
+    gradients flow through motion, targets and gains.
 
     target: positions q_d (..., n) to stay at, or a `Target`
     external: what the surroundings put on the joints, (..., n), in N m or N: J^T (n, f) of a moment and a
@@ -115,7 +116,8 @@ class PartialImpedance(Generic[Array]):
 class Cancellation(Generic[Array]):
     """Torques that cancel chosen motion propagation torques and leave the others; see `Dynamics.cancel`.
 
-    u = tau + sum over the cancelled c_m,ijk q_k^(m) + g, under which the robot obeys
+    u = tau + sum over the cancelled c_m,ijk q_k^(m) + g, and what joints have of their own, as
+    `partial_impedance` compensates it, under which the robot obeys
 
         (M - M_S) qdd + (C - C_S) qd = tau + f
 
@@ -141,7 +143,8 @@ class Cancellation(Generic[Array]):
 
         tau: what the task asks for, (..., n); nothing unless given
         qdd: acceleration at which the cancelled torques are taken, measured or wanted; unless given, the one
-        that follows. With all of them cancelled and a wanted one this is computed torque.
+        that follows. With all of them cancelled and a wanted one this is computed torque, but for
+        armature, which is of no link.
         """
         torque: Array = self._answers.cancelling(q, qd, tau, external, qdd)
         return torque

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import has_tensors
+from .arguments import has_tensors, is_like
 from .chosen_names import choice, short
 from .motion_quantities import AppliedLoad
 from .named_arguments import SampleAxes, samples_along, taken
@@ -16,7 +16,7 @@ from .named_arrays import Part, alone, dataset, xarray
 from .quantity_axes import CONSTRAINTS, QUANTITIES
 from .robot_axes import NamedAxis, axes_of, tied_axes
 
-VARIANTS = ("_by_link", "_with_passive")
+VARIANTS = ("_by_link", "_of_links")
 """Ends of names of what the arguments of a call choose."""
 TIED = "constraints."
 
@@ -91,16 +91,18 @@ def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict
         centre = frame == "centre of mass" and frame not in robot.kinematics.frames
         of = "constraint" if key == "induced_reactions" else "joint" if frame is None else "component"
         axes["moved"] = axes["axis" if centre else of]
-        axes["load"] = NamedAxis("load", _names_of(arguments.get("loads", ()), robot.link_names))
+        axes["load"] = NamedAxis("load", _names_of(arguments.get("loads", ()), robot))
     return axes
 
 
-def _names_of(loads: Any, links: Sequence[str]) -> tuple[str, ...]:
+def _names_of(loads: Any, robot: Any) -> tuple[str, ...]:
     """Names of loads: those of their frames, numbered where one has several."""
     names: list[str] = []
-    for load in [loads] if isinstance(loads, AppliedLoad) else loads:
-        several: Iterable[Any] = [load] if isinstance(load, AppliedLoad) else load
-        frames = [one.frame if isinstance(one.frame, str) else links[one.frame] for one in several]
+    for load in [loads] if is_like(loads, AppliedLoad) else loads:
+        several: Iterable[Any] = [load] if is_like(load, AppliedLoad) else load
+        frames = [
+            one.frame if isinstance(one.frame, str) else robot.kinematics.frames[one.frame] for one in several
+        ]
         name = " and ".join(dict.fromkeys(frames))
         count = sum(other == name or other.startswith(f"{name} (") for other in names)
         names.append(f"{name} ({count + 1})" if count else name)

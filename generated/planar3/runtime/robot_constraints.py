@@ -2,6 +2,9 @@
 
 from typing import Any, Generic, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .interface import Array
 from .labelled import labelled
 from .quantities import Coefficients, ConstrainedMotion, Propagation
@@ -19,7 +22,7 @@ class Contact(NamedTuple):
     """
 
     frame: str | int
-    """A frame by its name, as `kinematics.frames` has them, or a link by its number j."""
+    """A frame by its name, or by its number in `kinematics.frames`."""
     kind: str = "held"
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """In the frame, in m; of a ball its centre."""
@@ -129,13 +132,28 @@ class Constraints(Generic[Array]):
         rate: Array = self._answers.jacobian_rate(q, qd)
         return rate
 
-    def closed(self, q: Array, held_at: Array | None = None) -> Array:
-        """The same q with its dependent joints moved until all ties close, by Newton's method.
+    @property
+    def closed_position(self) -> NDArray[np.float64]:
+        """A position of all joints in which the ties close, (n,).
 
-        held_at: positions in which contacts took hold; q itself unless given. Raises ValueError, with the
-        sample, the tie and what remains, if they do not close.
+        It is the one that generating found, near zero if ties close there; of `Dynamics.constrained` with
+        other joints or contacts the one at which these were chosen.
         """
-        closed: Array = self._answers.closed(q, held_at)
+        position: NDArray[np.float64] = self._answers.closed_position.copy()
+        return position
+
+    def closed(self, q: Array, held_at: Array | None = None, start: Array | None = None) -> Array:
+        """The same q with its dependent joints moved until all ties close, (..., n), by Newton's method.
+
+        q: of all joints, (..., n), the dependent ones where they are looked for; or of the independent ones
+        alone, (..., m): the others are then led there from `start`, step by step without leaps, so that ties
+        that can close in several ways stay in the one of the start
+        held_at: positions in which contacts took hold; q itself unless given, or the start
+        start: a closed position (..., n); `closed_position` unless given
+
+        Raises ValueError, with the sample, the tie and what remains, if they do not close.
+        """
+        closed: Array = self._answers.closed(q, held_at, start)
         return closed
 
     def velocity_map(self, q: Array) -> Array:
@@ -205,11 +223,12 @@ class Constraints(Generic[Array]):
         return forces
 
     def forward_dynamics(
-        self, q: Array, qd: Array, tau: Array, passive: bool = False
+        self, q: Array, qd: Array, tau: Array, passive: bool = True
     ) -> ConstrainedMotion[Array]:
-        """qdd (..., n) and lambda (..., C) of M qdd + h + g = tau + A^T lambda; tau (..., n) on all joints.
+        """qdd (..., n) and lambda (..., C) of M qdd + h + g + p = tau + A^T lambda, tau on all joints.
 
-        passive: as `Dynamics.forward_dynamics` has it
+        tau: (..., n)
+        passive: as `Dynamics.forward_dynamics` has it, with p
         """
         answer: ConstrainedMotion[Array] = self._answers.forward_dynamics(q, qd, tau, passive)
         return answer

@@ -49,17 +49,19 @@ class SumCalls:
         return gravity
 
     def forward_dynamics(
-        self, q: Array, qd: Array, tau: Array, passive: bool = False, out: Array | None = None
+        self, q: Array, qd: Array, tau: Array, passive: bool = True, out: Array | None = None
     ) -> Array:
-        """qdd of M qdd + C qd + g = tau, shape (..., n), in rad/s^2 or m/s^2; tau (..., n) in N m or N.
+        """qdd of M qdd + C qd + g + p = tau, shape (..., n), in rad/s^2 or m/s^2; tau (..., n) in N m or N.
 
-        passive: whether tau is what actuators give, and so has to move the joints' own springs, damping,
-        friction and armature too, as `passive_torque` has them; else it is for the links alone, the inverse
-        of `inverse_dynamics`
+        p is the total of `passive_torque`, which has armature times qdd in it.
+
+        passive: whether joints have their springs, damping, friction and armature; False leaves p away: tau
+        is then for the links alone, and this the inverse of `inverse_dynamics`
 
         Raises ValueError for a robot with ties, whose joints move as `constraints.forward_dynamics` says, and
         for a singular mass matrix, with the sample and the joints that can move without moving any mass;
-        inside torch.func and torch.compile, qdd is then not finite.
+        inside torch.func and torch.compile, qdd is then not finite. Warns where rounding leaves fewer than
+        half of the digits of M^-1, as near 90 degrees of a floating base's pitch, and how many are left.
         """
         tree = self.backend.tree
         if tree is not None and tree.tied:

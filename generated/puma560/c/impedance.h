@@ -1,7 +1,7 @@
 /* Partial impedance of the joints. The same in every package of linkwise.
 
-   With H = M and the joints' armature, C, gravity g, springs and losses p of the joints, and torques f from outside, the
-   robot moves by
+   With H = M and the joints' armature, C, gravity g, springs and damping p of the joints, and of their friction what is to be
+   compensated, and torques f from outside, the robot moves by
        H qdd + C qd + g + p = tau + f
    Of a wanted motion it is away by e = q - q_d and ed = qd - qd_d. What is wanted there is, v being a task's torques,
        M* (qdd - qdd_d) + B* ed + K e = f + v
@@ -13,6 +13,18 @@
    The file that includes this one has `answer`, `natural_inertia` and `keep` of a SAMPLE. */
 #include "elimination.h"
 #include "passive.h"
+
+/* Nothing but what is natural, and no friction compensated. */
+static inline API(impedance) all_natural(void)
+{
+    API(impedance) wanted;
+    wanted.keep_inertia = wanted.inertia = wanted.keep_velocity = wanted.damping = wanted.stiffness = NULL;
+    wanted.regular = 0;
+#ifdef PASSIVE
+    wanted.friction_width = 0;
+#endif
+    return wanted;
+}
 
 /* What is asked of a sample: where to, and how it is away from there. */
 struct deviation {
@@ -64,11 +76,11 @@ INLINE int solve(int regular, int n, const real *natural, const real *wanted, re
         for (int i = 0; i < n; ++i)
             for (int k = 0; k < n; ++k)
                 part[i * n + k] = R(0.5) * (wanted[i * n + k] + wanted[k * n + i]);
-        const int fault = eliminate(0, n, 0, size, part, NULL);
+        const int fault = eliminate(0, n, 0, size, part, NULL, NULL);
         if (fault)
             return fault;
     }
-    return eliminate(regular, n, 1, size, wanted, force);
+    return eliminate(regular, n, 1, size, wanted, force, NULL);
 }
 
 /* H, M* and -(B* - C) ed - K e; where c1 is not kept as it is, C is in it too. Without weights kept is M*, from H. */
@@ -121,7 +133,7 @@ static inline int wanted_acceleration(const struct sample *s, const API(impedanc
 int API(partial_impedance)(AT_REST, const API(impedance) * wanted, const real *q_d, const real *qd_d, const real *qdd_d,
     const real *task, const real *external, real *tau)
 {
-    const API(impedance) natural = {NULL, NULL, NULL, NULL, NULL, 0};
+    const API(impedance) natural = all_natural();
     struct deviation from;
     real mass[N * N], kept[N * N], force[N], qdd[N], torque[N];
     SAMPLE(s);
@@ -133,6 +145,7 @@ int API(partial_impedance)(AT_REST, const API(impedance) * wanted, const real *q
     if (!changed) {
         answer(&s, from.qdd_d, wanted->keep_velocity ? qd : from.qd_d, 1, torque);
         add_passive(q, qd, from.qdd_d, torque);
+        add_smooth_friction(qd, wanted->friction_width, torque);
         join_force(force, torque);
         join_force(task, torque);
         return command(torque, tau);
@@ -142,6 +155,7 @@ int API(partial_impedance)(AT_REST, const API(impedance) * wanted, const real *q
         return fault;
     answer(&s, qdd, qd, 1, torque);
     add_passive(q, qd, qdd, torque);
+    add_smooth_friction(qd, wanted->friction_width, torque);
     for (int i = 0; external && i < N; ++i)
         torque[i] -= external[i];
     return command(torque, tau);

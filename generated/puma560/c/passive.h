@@ -10,17 +10,40 @@ static inline void add_armature(real *mass)
         mass[i * N + i] += passive[i].armature;
 }
 
+/* But friction. */
 static inline void add_passive(const real *q, const real *qd, const real *qdd, real *torque)
 {
     for (int i = 0; i < N; ++i) {
         const struct passive_joint *const own = &passive[i];
-        const real sign = (real)((qd[i] > 0) - (qd[i] < 0));
-        torque[i] += own->stiffness * q[i] + own->pull + own->damping * qd[i] + own->friction * sign + own->armature * qdd[i];
+        torque[i] += own->stiffness * q[i] + own->pull + own->damping * qd[i] + own->armature * qdd[i];
     }
+}
+
+/* Coulomb's, none at rest. */
+static inline void add_friction(const real *qd, real *torque)
+{
+    for (int i = 0; i < N; ++i)
+        torque[i] += passive[i].friction * (real)((qd[i] > 0) - (qd[i] < 0));
+}
+
+/* For controllers, which near rest must not jump with the noise of a sensor; none of it without a width. */
+static inline void add_smooth_friction(const real *qd, real width, real *torque)
+{
+    for (int i = 0; width > 0 && i < N; ++i)
+        torque[i] += passive[i].friction * F(tanh)(qd[i] / width);
+}
+
+void API(passive_torque)(const real *q, const real *qd, const real *qdd, real *torque)
+{
+    clear(N, torque);
+    add_passive(q, qd, qdd, torque);
+    add_friction(qd, torque);
 }
 #else
 #define add_armature(mass) ((void)(mass))
-#define add_passive(q, qd, qdd, torque) ((void)(torque))
+#define add_passive(q, qd, qdd, torque) ((void)(q), (void)(torque))
+#define add_friction(qd, torque) ((void)(torque))
+#define add_smooth_friction(qd, width, torque) ((void)(torque))
 #endif
 
 #endif

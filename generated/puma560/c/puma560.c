@@ -549,5 +549,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 #if PART(CONTROL)
 #include "frames.h"
 #include "moving_links.h"
+#include "passive.h"
+#include "forward_dynamics.h"
 #include "frame_impedance.h"
 #endif

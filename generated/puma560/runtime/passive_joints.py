@@ -60,3 +60,8 @@ def passive_torques(side: Any, sums: PassiveSums, q: Any, qd: Any, qdd: Any) -> 
     """Spring, damping, friction, armature, (..., n) each; `side` is what computes with the motion."""
     stiffness, pull, damping, friction, armature = (side.constant(numbers, q) for numbers in sums)
     return stiffness * q + pull, damping * qd, friction * side.xp.sign(qd), armature * qdd
+
+
+def smooth_friction(side: Any, sums: PassiveSums, qd: Any, width: float) -> Any:
+    """Friction tanh(qd / width), (..., n): what a controller gives, which must not jump at rest."""
+    return side.constant(sums.friction, qd) * side.xp.tanh(qd / width)

@@ -90,7 +90,7 @@ ARRAYS: Mapping[str, tuple[Quantity, ...]] = {
     **_by_link("coriolis_matrix", "joint cause", COEFFICIENT_UNITS[1], "torque per velocity of the cause"),
     **_by_link("gravity_torque", "joint", TORQUE, "torque of gravity and other potentials"),
     "forward_dynamics": QDD,
-    "forward_dynamics_with_passive": QDD,
+    "forward_dynamics_of_links": QDD,
     "energy": (
         Quantity("kinetic", ("link",), "J", "kinetic energy of the link"),
         Quantity("potential", ("link",), "J", "potential energy of the link"),

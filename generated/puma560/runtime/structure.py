@@ -1,6 +1,6 @@
 """What a robot consists of: names, units, paths, parameters, and where its packed values belong."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .chosen_names import position_of
+from .file_joints import FileJoint
 from .parameter_values import ParametricBody, checked_values
 from .passive_joints import PassiveJoint, PassiveSums, passive_sums
+from .qpos_motion import Qpos
 
 Indices = NDArray[np.intp]
 
@@ -81,6 +83,10 @@ class Structure:
     """What joints have of their own: springs, damping, friction, armature."""
     joint_limits: JointLimits = NO_LIMITS
     """What each joint may reach, by the robot's file."""
+    file_joints: tuple[FileJoint, ...] = ()
+    """The file's joints, in the order of their coordinates; none where each coordinate is one."""
+    pinocchio_order: tuple[int, ...] = ()
+    """These, by their numbers, in the order in which Pinocchio has them."""
 
     @cached_property
     def n(self) -> int:
@@ -108,6 +114,12 @@ class Structure:
     def sizes(self) -> Sizes:
         """Number of packed values of one sample: c2, c1, g, tau, h1."""
         return Sizes(*map(len, self.layout))
+
+    def qpos(self, order: Any = "mujoco", names: Sequence[str] | None = None) -> Qpos:
+        """How positions of MuJoCo or Pinocchio are those here; raises as `Qpos` does."""
+        single = [FileJoint(name, "single", (k,)) for k, name in enumerate(self.joint_names)]
+        joints = self.file_joints or tuple(single)
+        return Qpos(joints, self.pinocchio_order or range(len(joints)), order, names)
 
     def joint_index(self, given: int | str, argument: str = "joint") -> int:
         """Index i or k of a joint by number from 0 or by name; raises ValueError with the argument's name."""

@@ -25,11 +25,33 @@ static inline int largest_row(int n, int width, int c, const real *scale, const 
     return row;
 }
 
+/* Of the joint whose pivot is the least beside its inertia, its column, and the part of its inertia that is left when all
+   others move freely; where far more than rounding is left, when those before it do. */
+struct pivot {
+    int column;
+    real left;
+};
+
+/* 1 / (a_cc (a^-1)_cc) of a positive a = L D L', of which rows hold D L' and 1 / D: (a^-1)_cc = y' D^-1 y, L y = e_c. */
+static inline real left_when_free(int n, int width, int c, real size, const real *rows)
+{
+    real y[LARGEST] = {0}, mobility = 0;
+    y[c] = 1;
+    for (int m = c; m < n; ++m) {
+        const real *const row = rows + m * width, moved = y[m] * row[m];
+        mobility += moved * y[m];
+        for (int k = m + 1; k < n; ++k)
+            y[k] -= row[k] * moved;
+    }
+    return 1 / (size * mobility);
+}
+
 /* x of a x = b: a (n, n), b (n, sides), which turns into x, of up to six sides. Where a is `regular` and not known to be
    positive, rows are taken in another order. Entry (i, k) is large or small beside the root of size[i] size[k]. Where a pivot
    is rounding beside that, or of a positive matrix negative, or not a number, its column is the answer, counted from 1, and b
-   is as it was; otherwise the answer is 0. */
-INLINE int eliminate(int regular, int n, int sides, const real *size, const real *a, real *b)
+   is as it was; otherwise the answer is 0. Of a positive matrix `weakest`, given as {0, 1}, is found, unless it is NULL: x is
+   known to a relative error of about EPSILON / left. */
+INLINE int eliminate(int regular, int n, int sides, const real *size, const real *a, real *b, struct pivot *weakest)
 {
     const real least = 4 * (real)n * EPSILON;
     const int width = (n + sides + FILLED - 1) / FILLED * FILLED;
@@ -58,6 +80,10 @@ INLINE int eliminate(int regular, int n, int sides, const real *size, const real
         }
         if (!(large > least * size[c]))
             return c + 1;
+        if (weakest && large < weakest->left * size[c]) {
+            weakest->column = c;
+            weakest->left = large / size[c];
+        }
         const real inverse = 1 / row[c];
         for (int r = c + 1; r < n; ++r) {
             const real factor = rows[r * width + c] * inverse;
@@ -66,6 +92,8 @@ INLINE int eliminate(int regular, int n, int sides, const real *size, const real
         }
         row[c] = inverse;
     }
+    if (weakest && weakest->left < 1000 * F(sqrt)(EPSILON))
+        weakest->left = left_when_free(n, width, weakest->column, size[weakest->column], rows);
     for (int c = n; c--;)
         for (int k = 0; k < sides; ++k) {
             const real x = rows[c * width + n + k] * rows[c * width + c];

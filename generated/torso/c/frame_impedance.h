@@ -64,7 +64,7 @@ static inline int frame_moved(const struct sample *s, const API(frame_impedance)
     for (int k = 0; k < N; ++k)
         for (int r = 0; r < 6; ++r)
             out->moved[k * 6 + r] = out->jacobian[r * N + k];
-    int fault = eliminate(0, N, 6, size, mass, out->moved);
+    int fault = eliminate(0, N, 6, size, mass, out->moved, NULL);
     if (fault)
         return fault;
     for (int r = 0; r < 6; ++r) {
@@ -75,7 +75,7 @@ static inline int frame_moved(const struct sample *s, const API(frame_impedance)
         const real own = mobility[r * 6 + r], all = r < wanted->rows ? reach[wanted->row[r] >= 3] : 1;
         size[r] = own > all ? own : all;
     }
-    fault = eliminate(0, 6, 6, size, mobility, out->inertia);
+    fault = eliminate(0, 6, 6, size, mobility, out->inertia, NULL);
     for (int r = 0; r < 6; ++r)
         for (int k = 0; k < r; ++k)
             out->inertia[r * 6 + k] = out->inertia[k * 6 + r];
@@ -125,7 +125,7 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
     const API(frame_impedance) * wanted, const real *pose_d, const real *velocity_d, const real *acceleration_d,
     const real *external, real *tau)
 {
-    const API(impedance) natural = {NULL, NULL, NULL, NULL, NULL, 0};
+    const API(impedance) natural = all_natural();
     const int rows = wanted->rows;
     struct deviation from;
     struct frame_motion frame;
@@ -161,6 +161,7 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
     join_force(force, qdd);
     answer(&s, qdd, qd, 1, torque);
     add_passive(q, qd, qdd, torque);
+    add_smooth_friction(qd, posture->friction_width, torque);
     for (int i = 0; external && i < N; ++i)
         torque[i] -= external[i];
     return command(torque, tau);

@@ -282,7 +282,7 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
     def masked(
         self, q: Array, qd: Array, qdd: Array, mask: ArrayLike | Array, out: Array | None = None
     ) -> Array:
-        """sum over m, k of mask_mk c_m,ijk q_k^(m) (the paper's Eq. 21-24), shape (..., n, N).
+        """sum over m, k of mask_mk c_m,ijk q_k^(m) (the paper's Eq. 21-23), shape (..., n, N).
 
         mask: shape (3, n), zeros and ones, or weights between; row m is the order: 0 position, 1 velocity,
         2 acceleration. Gravity is in no row: a mask of ones in rows 1 and 2 gives tau_ij - g_ij.

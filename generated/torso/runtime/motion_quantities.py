@@ -13,7 +13,7 @@ class AppliedLoad(NamedTuple):
     """A force, and a moment if there is one, on a frame; all as `robot.kinematics.load_torque` takes it."""
 
     frame: str | int
-    """Name of a frame, or number of a link."""
+    """A frame by its name, or by its number in `kinematics.frames`."""
     force: Any
     """On the frame, in the world's axes, in N, (3,) or (..., 3)."""
     moment: Any = None

@@ -9,7 +9,8 @@ class Kinematics(Generic[Array]):
     """Poses, Jacobians and their rates of a robot's frames; `Dynamics.kinematics` of any back end.
 
     A frame is a body of the robot's file, also one that was merged into another, stands on the ground or has
-    no mass, or a site of it. It is given by its name, or a link by its number j; its axes are the file's.
+    no mass, or a site of it. It is given by its name, or by its number in `frames`, which is that of `poses`
+    and of C too, and not a link's j; its axes are the file's.
 
     q, qd, qdd, batches and `out` are as for `Dynamics`. Answers are in the world's axes, which are those of
     the file's root with a fixed base, in m, rad and s, of the motion's kind and dtype. Gradients flow through
@@ -29,7 +30,7 @@ class Kinematics(Generic[Array]):
 
     @property
     def frames(self) -> tuple[str, ...]:
-        """Names of the frames: those on the ground, then link by link."""
+        """Names of the frames, by number: those on the ground, then link by link."""
         names: tuple[str, ...] = self._answers.frames
         return names
 

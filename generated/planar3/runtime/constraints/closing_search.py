@@ -94,16 +94,17 @@ def random_starts(n: int) -> list[Numbers]:
     return [width * random.uniform(-1.0, 1.0, n) for width in WIDTHS for _ in range(TRIES)]
 
 
-def best_closing(equations: TieEquations, starts: Iterable[Numbers]) -> Closing:
-    """A closed position where A has its largest rank; if none was found, what is open least."""
+def best_closing(equations: TieEquations, starts: Iterable[Numbers]) -> tuple[Closing, tuple[Closing, ...]]:
+    """A closed position where A has its largest rank, and all that were found; else what is open least."""
     ended = []
     for start in starts:
         ended.append(equations.closed_from(start))
         closed = [at for at in ended if at.is_closed]
         if len(closed) == ENOUGH:
             break
-    return (
+    best = (
         max(closed, key=lambda at: rank_of(at.comparable))
         if closed
         else min(ended, key=lambda at: at.open_by)
     )
+    return best, tuple(closed)

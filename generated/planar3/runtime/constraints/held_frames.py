@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import is_like
 from ..chosen_names import short
 from ..kinematics.named_frames import frame_index
 from ..robot_constraints import Contact
@@ -55,9 +56,9 @@ class Held(NamedTuple):
         return ["rad" if row in TURNS else "m" for row in ROWS[self.kind]]
 
 
-def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
+def held_by(tree: JointTree, contacts: Any) -> list[Held]:
     """Ties of the tree, then contacts; raises as `Dynamics.constrained` does."""
-    if is_contact(contacts) or not isinstance(contacts, list | tuple):
+    if is_like(contacts, Contact) or not isinstance(contacts, list | tuple):
         raise TypeError(f"contacts is {short(contacts)}; give a list of Contact")
     ties = [
         Held(tie.name, tie.kind, tie.first, tie.second, np.eye(3), length=tie.length) for tie in tree.ties
@@ -66,9 +67,9 @@ def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
     taken = {tie.name for tie in tree.ties} | {coupling.name for coupling in tree.couplings}
     for number, contact in enumerate(contacts):
         where = f"contacts[{number}]"
-        if not is_contact(contact):
+        if not is_like(contact, Contact):
             raise TypeError(f"{where} is {short(contact)}; give a Contact")
-        made = _held(contact, where, frames, links, tree.gravity)
+        made = _held(contact, where, frames, tree.gravity)
         if tree.frames[made.first].joint is None:
             raise ValueError(f"{where}.frame is {short(contact.frame)}, which stands on the ground anyway")
         if made.name in taken:
@@ -78,15 +79,10 @@ def held_by(tree: JointTree, links: Sequence[str], contacts: Any) -> list[Held]:
     return ties
 
 
-def is_contact(given: Any) -> bool:
-    """Whether it is a contact, of this package or of another."""
-    return isinstance(given, tuple) and getattr(given, "_fields", None) == Contact._fields
-
-
-def _held(contact: Contact, where: str, frames: Sequence[str], links: Sequence[str], gravity: Triple) -> Held:
+def _held(contact: Contact, where: str, frames: Sequence[str], gravity: Triple) -> Held:
     if contact.kind not in CONTACTS:
         raise ValueError(f"{where}.kind is {short(contact.kind)}; choose {', '.join(CONTACTS)}")
-    first = frame_index(contact.frame, frames, links)
+    first = frame_index(contact.frame, frames)
     point = _vector(contact.point, f"{where}.point")
     arm, axes = (0.0, 0.0, 0.0), np.eye(3)
     if contact.kind == "hinged":

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import check_numbers
+from ..arguments import check_numbers, is_like
+from ..chosen_names import short
 from ..controllers import FrameImpedance, Target
 from ..dense import Dense
 from ..quantities import NaturalImpedance
@@ -33,7 +34,13 @@ class Controls:
         return NaturalImpedance(spread(packed.acceleration, "acceleration"), slopes, c0)
 
     def impedance(
-        self, inertia: Any, damping: Any, stiffness: Any, frame: FrameImpedance | None, passive: bool
+        self,
+        inertia: Any,
+        damping: Any,
+        stiffness: Any,
+        frame: FrameImpedance | None,
+        passive: bool,
+        friction_width: float | None,
     ) -> "ControlAnswers":
         """See `ControllerCalls.partial_impedance`."""
         self._check_free()
@@ -44,12 +51,13 @@ class Controls:
             stiffness_of(stiffness, structure),
             True,
             bool(passive),
+            _width(friction_width, passive),
         )
         held = None if frame is None else FrameTargets(self._robot, frame)
         return self._answers(self._robot, targets, held)
 
     def cancellation(
-        self, entries: Iterable[Any], passive: bool
+        self, entries: Iterable[Any], passive: bool, friction_width: float | None
     ) -> tuple["ControlAnswers", tuple[tuple[str, str, str, int], ...]]:
         """See `ControllerCalls.cancel`."""
         self._check_free()
@@ -59,7 +67,8 @@ class Controls:
         for i, j, k, order in chosen:
             kept[order][i, j, k] = 0.0
         acceleration, velocity = (WantedShares(kept[m], None, None, False, False) for m in (2, 1))
-        targets = JointTargets(acceleration, velocity, None, False, bool(passive))
+        width = _width(friction_width, passive)
+        targets = JointTargets(acceleration, velocity, None, False, bool(passive), width)
         names = structure.joint_names, structure.link_names
         named = tuple((names[0][i], names[1][j], names[0][k], m) for i, j, k, m in chosen)
         return self._answers(self._robot, targets, None), named
@@ -152,8 +161,9 @@ class ControlAnswers:
 
     def _given(self, q: Any, qd: Any, target: Any, external: Any) -> tuple[Target, dict[str, Any]]:
         """Target and motion, as they were given and of one shape; positions alone are a target."""
-        # a Target of another package serves as well
-        read = Target(*target) if hasattr(target, "_fields") else Target(q=target)
+        read = target if is_like(target, Target) else Target(q=target)
+        if hasattr(read.q, "_fields"):
+            raise TypeError(f"target is {short(read.q)}; give positions (..., n), or Target(q, qd, ...)")
         if read.q is None and self._joints.targets.stiffness is not None:
             raise ValueError("the joints are stiff, but target has no q; give positions, (..., n)")
         if self._frame is None and any(a is not None for a in read[3:]):
@@ -178,3 +188,19 @@ def _errors(given: dict[str, Any]) -> Errors:
     rate = given["qd"] - given["target.qd"] if "target.qd" in given else given["qd"]
     forces = [given[name] for name in ("external", "task") if name in given]
     return Errors(place, rate, given.get("target.qdd"), sum(forces) if forces else None)
+
+
+def _width(given: Any, passive: bool) -> float | None:
+    """A width of friction; raises ValueError for one that is no velocity, or without friction."""
+    if given is None:
+        return None
+    if isinstance(given, bool) or not isinstance(given, int | float) or not 0.0 < given < np.inf:
+        raise ValueError(
+            f"friction_width is {short(given)}; give a velocity above 0, in rad/s or m/s, within which "
+            "friction is smooth, or None to compensate none"
+        )
+    if not passive:
+        raise ValueError(
+            "friction_width is given, and passive=False takes friction for not being there; leave one away"
+        )
+    return float(given)

@@ -1,4 +1,4 @@
-"""The impedance of a frame, which has precedence over that of the joints (Eq. 18 of the paper).
+"""The impedance of a frame, which has precedence over that of the joints (the paper's target impedance).
 
 With r rows of the frame's Jacobian J, its velocity nu = J qd, and H, C, f as for joints:
 
@@ -16,12 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import is_like
 from ..chosen_names import short
-from ..controllers import ROWS, FrameImpedance
+from ..controllers import ROWS, FrameImpedance, Natural
 from ..kinematics.named_frames import frame_index
 from ..sums.namespace import namespace
 from .frame_rotation import rates_of_turning, rotation_vector
-from .gains import Gain, is_natural
+from .gains import Gain
 from .joint_impedance import JointState, times
 from .wanted_solve import solved_wanted
 
@@ -66,11 +67,11 @@ class FrameTargets:
 
     def __init__(self, robot: Any, asked: FrameImpedance) -> None:
         """Raises ValueError and TypeError as `Dynamics.partial_impedance` does."""
-        if not hasattr(asked, "rows"):
+        if not is_like(asked, FrameImpedance):
             raise TypeError(f"frame is {short(asked)}; give FrameImpedance({short(asked)}, ...)")
         self._robot, self.rows, self.names = robot, _chosen(asked.rows), tuple(asked.rows)
         self.frame, self.point = asked.frame, _point(asked.point)
-        self._check_movable(frame_index(asked.frame, robot.kinematics.frames, robot.link_names))
+        self._check_movable(frame_index(asked.frame, robot.kinematics.frames))
         self.inertia = self._part("frame.inertia", asked.inertia, True)
         self.damping = self._part("frame.damping", asked.damping, False)
         gain = Gain("frame.stiffness", asked.stiffness, self.names)
@@ -195,7 +196,7 @@ class FrameTargets:
         return xp.concat([theta, moved], -1)[..., rows], turning[..., rows, :][..., rows]
 
     def _part(self, name: str, given: Any, definite: bool) -> FramePart:
-        if is_natural(given):
+        if is_like(given, Natural):
             if isinstance(given.scale, bool) or not isinstance(given.scale, int | float) or given.scale < 0.0:
                 raise ValueError(f"{name}.scale is {given.scale!r}; give a number, 0 or above")
             if given.plus is None:

@@ -77,11 +77,6 @@ class Gain:
         return numbers
 
 
-def is_natural(given: Any) -> bool:
-    """Whether it is a `Natural`, of whatever package."""
-    return isinstance(given, tuple) and hasattr(given, "scale") and hasattr(given, "plus")
-
-
 def numbers_of(name: str, given: Any) -> Any:
     """A tensor, or an array; raises TypeError and ValueError for what is no numbers."""
     if isinstance(given, Mapping) or hasattr(given, "_fields") or isinstance(given, type | str | complex):

@@ -166,7 +166,7 @@ class KinematicAnswers:
         return self._answer(call, given, self._index(frame), {"point": point}, answer, shape, out)
 
     def _index(self, frame: Any) -> int:
-        return frame_index(frame, self.frames, self._structure.link_names)
+        return frame_index(frame, self.frames)
 
     def _at_once(self, call: str, motion: Sequence[Any], part: Any, point: Any) -> Any:
         """What a back end answers without these arrays; None where it does not."""

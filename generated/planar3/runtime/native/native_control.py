@@ -27,6 +27,7 @@ class ControlCalls:
             "jacobian_rate": (6, n),
             "mass_matrix": (n, n),
             "forward_dynamics": (n,),
+            "forward_dynamics_of_links": (n,),
         }
         self._free: dict[Any, list[Desk]] = {}
 
@@ -61,7 +62,7 @@ class ControlCalls:
         if about.point:
             told.append(None if origin else memory[:3])
         found = symbol(self._calls.sources, call, kind.str[1:])
-        found.restype = ctypes.c_int if call == "forward_dynamics" else None
+        found.restype = ctypes.c_int if call.startswith("forward_dynamics") else None
         given = (*told, *motion, self._calls.constants(kind))
         return new_desk(found, given, memory, [np.empty(self._shapes[call], kind)])
 
@@ -73,7 +74,8 @@ class NativeSums(Summed):
         self, structure: Structure, backend: Backend[Any], compute: Compute, control: ControlCalls
     ) -> None:
         super().__init__(structure, backend, compute)
-        self._control = control
+        tree = backend.tree
+        self._control, self._tied = control, tree is not None and tree.tied
 
     def mass_matrix(self, q: Any) -> tuple[Any, ...]:
         """See `Summed.mass_matrix`."""
@@ -82,8 +84,18 @@ class NativeSums(Summed):
 
     def forward_dynamics(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
         """See `Summed.forward_dynamics`, which says what is wrong where C finds M singular."""
-        found = self._control.answer("forward_dynamics", (q, qd, tau))
+        found = self._accelerated("forward_dynamics", q, qd, tau)
         return super().forward_dynamics(q, qd, tau) if found is None else (found,)
+
+    def forward_dynamics_of_links(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
+        """See `Summed.forward_dynamics_of_links`; C has it apart where joints have anything of their own."""
+        call = "forward_dynamics_of_links" if self._structure.passive else "forward_dynamics"
+        found = self._accelerated(call, q, qd, tau)
+        return super().forward_dynamics_of_links(q, qd, tau) if found is None else (found,)
+
+    def _accelerated(self, call: str, *motion: Any) -> NumberArray | None:
+        """What C answers; None where it has no such function, as of joints that are tied."""
+        return None if self._tied else self._control.answer(call, motion)
 
 
 class NativeKinematics(KinematicAnswers):

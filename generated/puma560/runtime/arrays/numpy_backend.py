@@ -72,7 +72,7 @@ class NumpyBackend(ArrayBackend):
         read = {name: as_array(name, value) for name, value in named.items()}
         kind = precision(named, read)
         arrays = {name: a.astype(kind, copy=False) for name, a in read.items()}
-        check_axes(arrays, n)
+        check_axes(arrays, n, self.structure.file_joints)
         try:
             shape = np.broadcast_shapes(*(a.shape for a in arrays.values()))
         except ValueError:

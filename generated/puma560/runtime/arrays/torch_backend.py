@@ -80,7 +80,7 @@ class TorchBackend(ArrayBackend):
             raise TypeError(f"{', '.join(named)} lie on different devices; move them to one")
         if len(given) < len(named) or {t.dtype for t in given} not in FLOATS:
             named = _tensors(named, given[0].device if given else torch.device("cpu"))
-        check_axes(named, n)
+        check_axes(named, n, self.structure.file_joints)
         try:
             return torch.broadcast_tensors(*named.values())  # type: ignore[no-any-return, no-untyped-call]
         except RuntimeError:

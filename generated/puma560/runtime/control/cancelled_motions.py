@@ -45,7 +45,7 @@ def _meant(entry: tuple[Any, ...], structure: Structure) -> list[Entry]:
     if order is not None and (isinstance(order, bool) or order not in ORDERS):
         raise ValueError(
             f"the order of {short(entry)} is {short(order)}; cancel 1, of velocity, or 2, of "
-            "acceleration, as gravity is compensated in any case"
+            "acceleration, as gravity, as any potential, is compensated in any case"
         )
     i_wanted = None if joint is None else structure.joint_index(joint)
     j_wanted = None if link is None else structure.link_index(link)

@@ -2,8 +2,8 @@
 
     M* (qdd - qdd_d) + B* (qd - qd_d) + K* (q - q_d) = f + v        u = H qdd + C qd + g + p - f
 
-H is the inertia of links and armature, p what the joints' own springs, damping and friction take, v what a
-task asks for where motions are cancelled.
+H is the inertia of links and armature, p what the joints' own springs and damping take, and of their friction
+what is to be compensated, v what a task asks for where motions are cancelled.
 """
 
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..dense import Dense
-from ..passive_joints import passive_torques
+from ..passive_joints import passive_torques, smooth_friction
 from ..sums.joint_matrices import JointMatrices
 from .gains import Gain
 from .wanted_coefficients import WantedShares
@@ -27,7 +27,9 @@ class JointTargets(NamedTuple):
     positive: bool
     """Whether M* must be positive; else it must be regular, as where motions are cancelled."""
     passive: bool
-    """Whether the joints' own springs, damping, friction and armature count."""
+    """Whether the joints' own springs, damping and armature count."""
+    friction_width: float | None
+    """In rad/s or m/s, the width of their friction; None where it is not compensated."""
 
 
 class JointState(NamedTuple):
@@ -81,8 +83,10 @@ class JointImpedance:
         if targets.passive:
             sums = self._robot.structure.passive_sums
             armature = side.constant(np.diag(sums.armature), q)
-            spring, damping, friction, _ = passive_torques(side, sums, q, qd, qd)
-            inertia, rest = mass + armature, rest + spring + damping + friction
+            spring, damping, _, _ = passive_torques(side, sums, q, qd, qd)
+            inertia, rest = mass + armature, rest + spring + damping
+            if targets.friction_width is not None:
+                rest = rest + smooth_friction(side, sums, qd, targets.friction_width)
             # a share of links leaves the armature beside it, a sum that is given whole has it in it
             wanted = wanted if targets.inertia.whole else wanted + armature
         return JointState(inertia, coriolis, rest, wanted, targets.damping.of(side, coriolis, c1, q))

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import is_like
 from ..chosen_names import short
 from ..robot_constraints import Constraints
 from ..sums.inertia_solve import solved_columns
@@ -92,7 +93,7 @@ def constraints_of(robot: Any, given: Any) -> Any:
     if given is False:
         return None
     if given is not None:
-        if not isinstance(given, Constraints):
+        if not is_like(given, Constraints):
             raise TypeError(
                 f"constraints is {short(given)}; give what robot.constrained(...) makes, or False"
             )

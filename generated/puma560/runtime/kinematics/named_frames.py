@@ -1,4 +1,4 @@
-"""Frames of a robot by their names, and those of links also by number."""
+"""Frames of a robot by their names, or by their numbers."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,8 +6,8 @@ from typing import Any
 from ..chosen_names import choice, known_as, short, whole_number
 
 
-def frame_index(given: Any, frames: Sequence[str], links: Sequence[str]) -> int:
-    """Index among `frames` of one by its name, or of link `given` by number from 0.
+def frame_index(given: Any, frames: Sequence[str]) -> int:
+    """Index among `frames` of one by its name, or by that index itself: the number that C has for it too.
 
     Raises ValueError for one that is not there, TypeError for what is neither a name nor a number.
     """
@@ -18,9 +18,12 @@ def frame_index(given: Any, frames: Sequence[str], links: Sequence[str]) -> int:
         raise ValueError(f"frame is {short(given)}, which is not there; choose {known}")
     number = whole_number(given)
     if number is None:
-        raise TypeError(f"frame is {short(given)}; give the name of a frame, or the number of a link")
-    if not 0 <= number < len(links):
-        raise ValueError(
-            f"frame is {number}, but links are numbered 0..{len(links) - 1}; or give a frame's name"
+        raise TypeError(
+            f"frame is {short(given)}; give the name of a frame, or its number in kinematics.frames"
         )
-    return frames.index(links[number])
+    if not 0 <= number < len(frames):
+        raise ValueError(
+            f"frame is {number}, but frames are numbered 0..{len(frames) - 1}, in the order of "
+            "kinematics.frames; or give a frame's name"
+        )
+    return number

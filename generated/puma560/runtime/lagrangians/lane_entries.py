@@ -48,7 +48,7 @@ class LaneEntries:
     @cached_property
     def lanes(self) -> Indices:
         """Rows (link, k, kind): kind 0 at e_k, 1 at rest along qd (no k), 2 at rest along e_k."""
-        rows = np.zeros((sum(self.plan.counts), 3), np.intp)
+        rows = np.zeros((self.plan.lanes, 3), np.intp)
         for j, (path, start) in enumerate(zip(self.paths, self.plan.starts, strict=True)):
             kinds = [(j, k, 0) for k in path]
             if self.linear[j]:
@@ -81,18 +81,27 @@ class LaneEntries:
 
 
 class Rows:
-    """Values in the lanes of variables, by coordinate and lane; zeros where no variable was asked for."""
+    """Values in the lanes of variables, by coordinate and lane; zeros where no variable was asked for.
 
-    def __init__(self, places: Iterable[tuple[int, slice]], values: Sequence[Tensor], n: int, like: Tensor):
+    lanes: how many the plan has, whichever of them an energy asks for
+    """
+
+    def __init__(
+        self,
+        places: Iterable[tuple[int, slice]],
+        values: Sequence[Tensor],
+        lanes: int,
+        n: int,
+        like: Tensor,
+    ) -> None:
         self.values = torch.cat([*values, like.new_zeros(1, *like.shape)])
         self.tables: list[Indices] = []
-        places = list(places)
-        lanes, none, at = max((rows.stop for _, rows in places), default=0), len(self.values) - 1, 0
+        none, at = len(self.values) - 1, 0
         for k, rows in places:
             room = (t for t in self.tables if (t[rows, k] == none).all())
             found = next(room, None)
             if found is None:
-                found = np.full((lanes + 1, n), none)
+                found = np.full((lanes + 1, n), none)  # the last row is NOWHERE's
                 self.tables.append(found)
             found[rows, k] = np.arange(at, at + rows.stop - rows.start)
             at += rows.stop - rows.start

@@ -93,6 +93,11 @@ class Plan:
     counts: tuple[int, ...]
 
     @cached_property
+    def lanes(self) -> int:
+        """Lanes of all links together."""
+        return sum(self.counts)
+
+    @cached_property
     def totals(self) -> tuple[int, ...]:
         """Lanes of each link and of what it carries."""
         totals = list(self.counts)

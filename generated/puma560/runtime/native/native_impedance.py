@@ -19,17 +19,12 @@ JOINTS = ("target", "target.qd", "target.qdd", "task", "external")
 """What a call of joints may be given beside q and qd, in the order of C; a frame is given no task."""
 
 
-class JointStruct(ctypes.Structure):
-    """NAME_impedance."""
-
-    _fields_ = (
-        ("keep_inertia", ctypes.c_void_p),
-        ("inertia", ctypes.c_void_p),
-        ("keep_velocity", ctypes.c_void_p),
-        ("damping", ctypes.c_void_p),
-        ("stiffness", ctypes.c_void_p),
-        ("regular", ctypes.c_int),
-    )
+def joint_struct(real: Any) -> type[ctypes.Structure]:
+    """NAME_impedance, of double or float; C has the last where joints have anything of their own."""
+    pointers = ("keep_inertia", "inertia", "keep_velocity", "damping", "stiffness")
+    fields: list[tuple[str, Any]] = [(name, ctypes.c_void_p) for name in pointers]
+    fields += [("regular", ctypes.c_int), ("friction_width", real)]
+    return type("JointStruct", (ctypes.Structure,), {"_fields_": fields})
 
 
 def frame_struct(real: Any) -> type[ctypes.Structure]:
@@ -145,13 +140,15 @@ class NativeControlAnswers(ControlAnswers):
         inertia = None if targets.inertia.added is None else targets.inertia.added.numbers
         if inertia is not None and targets.inertia.whole:  # C adds the armature to what links have
             inertia = inertia - np.diag(self._robot.structure.passive_sums.armature)
-        joints = JointStruct(
+        real = ctypes.c_double if kind.itemsize == 8 else ctypes.c_float
+        joints = joint_struct(real)(
             at(weights(targets.inertia.kept)),
             at(inertia),
             at(weights(targets.damping.kept)),
             at(None if targets.damping.added is None else targets.damping.added.numbers),
             at(None if targets.stiffness is None else targets.stiffness.numbers),
             not targets.positive,
+            targets.friction_width or 0.0,
         )
         if self._frame is None:
             return Settings(joints, None, memory)
@@ -161,8 +158,8 @@ class NativeControlAnswers(ControlAnswers):
             at(None if gain is None else gain.numbers)
             for gain in (frame.inertia.added, frame.damping.added, frame.stiffness)
         )
-        number = frame_index(frame.frame, self._robot.kinematics.frames, self._robot.link_names)
-        made = frame_struct(ctypes.c_double if kind.itemsize == 8 else ctypes.c_float)(
+        number = frame_index(frame.frame, self._robot.kinematics.frames)
+        made = frame_struct(real)(
             number,
             at(frame.point),
             len(rows),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import as_array, check_numbers
+from ..arguments import as_array, check_numbers, shape_of
 from ..chosen_names import short
 from ..induced.responses import constraints_of
 from ..motion_quantities import Trajectory
@@ -30,11 +30,13 @@ def simulated(
     constraints: Any,
 ) -> Trajectory[Any]:
     """See `MotionCalls.simulate`."""
+    constraints = constraints_of(robot, constraints)
+    q, qd = (q, qd) if constraints is None else _of_all_joints(constraints, q, qd)
     named = {"q": q, "qd": qd}
     q, qd = robot.backend.arrays(named, robot.n)
     check_numbers(named, robot.joint_names)
     times, step = _instants(time), None if step is None else _positive("step", step)
-    equations, start = _started(robot, q, qd, tau, loads, passive, constraints_of(robot, constraints))
+    equations, start = _started(robot, q, qd, tau, loads, passive, constraints)
     if method == "RK4":
         states = in_fixed_steps(equations.rates, equations.settled, start, times, step)
     elif method in ADAPTIVE:
@@ -47,6 +49,16 @@ def simulated(
     else:
         raise ValueError(f"method is {short(method)}; choose RK4 or, of SciPy, {', '.join(ADAPTIVE)}")
     return _collected(equations, times, _finite(states, times, q))
+
+
+def _of_all_joints(constraints: Any, q: Any, qd: Any) -> tuple[Any, Any]:
+    """The start of all joints, where it is given of the independent ones."""
+    m = len(constraints.independent)
+    if shape_of(q)[-1:] == (m,):
+        q = constraints.closed(q)
+    if shape_of(qd)[-1:] == (m,):
+        qd = constraints.velocity(constraints.closed(q), qd)
+    return q, qd
 
 
 def _started(

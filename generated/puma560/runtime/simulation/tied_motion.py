@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from ..chosen_names import listed, sample_of
 from ..constraints.closed_places import ClosedPlace
-from ..constraints.singular_positions import least_left, listed, sample_of, why_not_following
+from ..constraints.singular_positions import least_left, why_not_following
 from ..sums.namespace import hidden, namespace
 
 HALVES = 30

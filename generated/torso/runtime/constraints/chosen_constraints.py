@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import as_array
-from ..chosen_names import short
+from ..chosen_names import listed, short
 from ..rule.joint_tree import JointTree
 from ..structure import Structure
-from .closing_search import TieEquations, best_closing, random_starts
+from .closing_search import Closing, TieEquations, best_closing, random_starts
 from .held_frames import Held, all_names, held_by
 from .independent_joints import chosen_independent, loose_base, rank_of, redundant_names
-from .singular_positions import listed
 from .tie_tables import tie_tables
 
 
@@ -26,7 +25,7 @@ class ChosenConstraints:
     ) -> None:
         """Raises as `Dynamics.constrained` does."""
         self._structure, self._tree = structure, tree
-        self.held: Sequence[Held] = held_by(tree, structure.link_names, contacts)
+        self.held: Sequence[Held] = held_by(tree, contacts)
         if not self.held and not tree.couplings:
             raise ValueError(
                 f"{structure.name} has no ties; robot.constrained(contacts=[Contact(frame)]) makes some that "
@@ -46,6 +45,7 @@ class ChosenConstraints:
             [one.name for one in self.held for _ in one.row_names] + [c.name for c in tree.couplings]
         )
         self._at = None if at is None else self._position(at)
+        self._is_own = independent is None and not contacts and bool(tree.independent)
         self.independent = self._independent(independent, bool(contacts))
 
     @cached_property
@@ -54,28 +54,42 @@ class ChosenConstraints:
         return redundant_names(self._matrix, self.row_names)
 
     @cached_property
+    def closed_position(self) -> NDArray[np.float64]:
+        """Where ties close, (n,): the tree's own position, or that where other joints were chosen."""
+        if self._is_own and self._at is None:
+            return np.array(self._tree.closed_position)
+        return self._closing.q
+
+    @property
     def _matrix(self) -> NDArray[np.float64]:
-        """A where loops close beside `at`, or anywhere, of the tree's own numbers, its rows comparable."""
+        return self._closing.comparable
+
+    @cached_property
+    def _closing(self) -> Closing:
+        """Where loops close beside `at`, or anywhere, and A there, of the tree's own numbers."""
         tree, n = self._tree, self._structure.n
         starts = random_starts(n) if self._at is None else [self._at]
         q = starts[0]
         if tree.tied:
             ties = TieEquations(tree, n, [one for one in self.held if one.second is not None])
-            found = best_closing(ties, starts)
+            found, _ = best_closing(ties, starts)
             if not found.is_closed:
                 told = "from any position that was tried; give `at`" if self._at is None else "beside `at`"
                 raise ValueError(f"{listed(self.names)} did not close {told}")
             q = found.q
-        return TieEquations(tree, n, self.held).at(q).comparable
+        return TieEquations(tree, n, self.held).at(q)
 
     def _independent(self, given: Any, has_contacts: bool) -> tuple[int, ...]:
-        if given is None and not has_contacts and self._tree.independent:
+        if self._is_own:
             return self._tree.independent
         n, names = self._structure.n, self._structure.joint_names
         free = n - rank_of(self._matrix)
         if not free:
             raise ValueError(f"{listed(self.names)} leave nothing to move: the robot is over-constrained")
-        proposed = chosen_independent(self._matrix, loose_base(self._tree) if has_contacts else ())
+        # What follows by the ties goes on to do so where contacts hold besides.
+        following = [k for k in range(n) if self._tree.independent and k not in self._tree.independent]
+        first = (*loose_base(self._tree), *following) if has_contacts else following
+        proposed = chosen_independent(self._matrix, tuple(dict.fromkeys(first)))
         if given is None:
             return proposed
         chosen = self._listed(given)

@@ -1,15 +1,22 @@
 """The calls of `Constraints` behind its face, composed of the rows of ties and the calls of the open tree."""
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from functools import cached_property
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import shape_of
 from ..quantities import Coefficients, ConstrainedMotion, Propagation
 from ..sums.inertia_solve import solved
-from ..sums.namespace import namespace, side_by_side
+from ..sums.namespace import hidden, namespace, side_by_side
 from .chosen_constraints import ChosenConstraints
 from .closed_places import ClosedPlace, RowNames, TiesAt, closed_place, followed
 from .followers import Followers, borne, joint_columns, projected, times
-from .newton_closing import closed
+from .led_positions import led
+from .newton_closing import closed, with_independent
 from .tie_rows import TieRows
 
 
@@ -45,9 +52,46 @@ class ConstraintAnswers:
         """See `Constraints.jacobian_rate`."""
         return self._tie_rows.rates(q, qd)
 
-    def closed(self, q: Any, held_at: Any) -> Any:
+    @cached_property
+    def closed_position(self) -> NDArray[np.float64]:
+        """See `Constraints.closed_position`."""
+        read = self._read(q=self._chosen.closed_position)[0]
+        with _without_gradient(read):
+            found = self._closed(read, None).q
+        position: NDArray[np.float64] = found if isinstance(found, np.ndarray) else found.cpu().numpy()
+        return position.copy()
+
+    def closed(self, q: Any, held_at: Any, start: Any) -> Any:
         """See `Constraints.closed`."""
+        if shape_of(q)[-1:] == (len(self.independent),):
+            return self._led(q, held_at, start)
+        if start is not None:
+            m = len(self.independent)
+            raise ValueError(
+                f"start is where joints are led from that q does not have, and q has shape {shape_of(q)}; "
+                f"leave it out, or give q the {m} independent joints alone"
+            )
         return self._closed(q, held_at).q
+
+    def _led(self, own: Any, held_at: Any, start: Any) -> Any:
+        """Closed positions for independent joints (..., m)."""
+        (own,) = self.robot.backend.arrays({"q": own}, len(self.independent))
+        if hidden(own):
+            raise ValueError(
+                "joints cannot be led where nobody may look at numbers, as under vmap or a compiler; give "
+                f"closed(q) all {self.robot.n} joints"
+            )
+        begin = self.robot.backend.weights("start", self.closed_position if start is None else start, own)
+        if begin.shape[-1:] != (self.robot.n,):
+            raise ValueError(
+                f"start has shape {tuple(begin.shape)}; give a closed position ({self.robot.n},)"
+            )
+        columns = self._own_columns(own)
+        begin = begin + 0.0 * own[..., :1]
+        held_at = begin if held_at is None else held_at
+        with _without_gradient(own):
+            found = led(lambda q: self.closed_place(q, held_at), begin, own, columns, self.robot.joint_names)
+        return self._closed(with_independent(found, own, columns), held_at).q
 
     def velocity_map(self, q: Any) -> Any:
         """See `Constraints.velocity_map`."""
@@ -129,10 +173,10 @@ class ConstraintAnswers:
         return self._solved(place, mass, force, place.bias(qd))
 
     def _driven(self, q: Any, qd: Any, tau: Any, passive: bool) -> tuple[Any, Any]:
-        """M and tau - h - g."""
+        """M and tau - h - g, of joints and of links or of links alone."""
         robot, rest = self.robot, 0.0 * qd
         mass, force = robot.mass_matrix(q), tau - robot.inverse_dynamics(q, qd, rest)
-        if not passive:
+        if not (passive and robot.structure.passive):
             return mass, force
         armature = robot.backend.constant(robot.structure.passive_sums.armature, q)
         return mass + namespace(q).diag(armature), force - robot.passive_torque(q, qd, rest).total
@@ -199,6 +243,10 @@ class ConstraintAnswers:
         q, qd, qdd = self._read(q=q, qd=qd, qdd=qdd)
         place, q, qd = self._moving(q, qd)
         return place.found, q, qd, place.velocity(place.own(qdd)) + place.bias(qd)
+
+
+def _without_gradient(like: Any) -> Any:
+    return nullcontext() if isinstance(like, np.ndarray) else namespace(like).no_grad()
 
 
 def _projected_cubes(found: Followers, parts: Any) -> Any:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..chosen_names import plain
+from ..chosen_names import plain, sample_of
 from ..rule.kinematics import taken
 from ..sums.namespace import hidden, namespace
 from .closed_places import RowNames, TiesAt, ties_at
@@ -21,7 +21,6 @@ from .singular_positions import (
     left_free,
     lost_at,
     open_by,
-    sample_of,
     worst_open,
 )
 from .tie_rows import TieRows
@@ -29,6 +28,14 @@ from .tie_rows import TieRows
 STEPS = 50
 LONGEST = 0.5
 """Of a step, in m and rad; loops that are far from closing are not thrown further."""
+
+
+class DoesNotClose(ValueError):
+    """Ties stay open: why, and what mends it."""
+
+    def __init__(self, reason: str, mend: str) -> None:
+        super().__init__(f"{reason}; {mend}")
+        self.reason = reason
 
 
 def closed(
@@ -51,13 +58,13 @@ def closed(
         with xp.no_grad():
             at = _found(ties, columns, q, held_at, tolerance, names)
         if xp.is_grad_enabled():
-            found = _with_independent_of(q, at.q.detach(), columns)
+            found = with_independent(at.q.detach(), taken(q, columns.independent, -1), columns)
             at = ties_at(ties, columns, found, held_at)
             step = dependent_shares(columns, inverted(at.factors), at.violation[..., None])[..., 0]
             at = ties_at(ties, columns, found + step, held_at)
-    _check(at.violation, tolerance, names)
+    _check(at.violation, tolerance, columns, names)
     if tolerance is None:
-        _check(at.closable, closable_tolerance(q), names)
+        _check(at.closable, closable_tolerance(q), columns, names)
     return at
 
 
@@ -95,27 +102,35 @@ def _check_step(
     tie, where = plain(names.owners[found[1]]), sample_of(place)
     free = left_free(at.rows[tuple(place)], columns, names.joints, " there")
     if is_start:
-        raise ValueError(
+        raise DoesNotClose(
             f"{tie} cannot be closed{where}, for the start is singular: {free}, and no step of theirs closes "
-            "it; start them off it, by 0.1 say, to the side on which it shall close"
+            "it",
+            f"start them off it, by 0.1 say, to the side on which it shall close, or {_led(columns)}",
         )
-    raise ValueError(
-        f"{tie} does not close{where}: on the way the dependent joints come to a singular position, {free}; "
-        "start them elsewhere, if it can close at all"
+    raise DoesNotClose(
+        f"{tie} does not close{where}: on the way the dependent joints come to a singular position, {free}",
+        f"start them elsewhere, or {_led(columns)}, if it can close at all",
     )
 
 
-def _with_independent_of(q: Any, found: Any, columns: JointColumns) -> Any:
-    """Positions found, through whose independent joints a gradient of q runs."""
-    own, others = taken(q, columns.independent, -1), taken(found, columns.dependent, -1)
+def _led(columns: JointColumns) -> str:
+    """The mend that asks for no guess."""
+    own = columns.independent.tolist()
+    return f"give closed(q[..., {own}]) the independent joints alone"
+
+
+def with_independent(q: Any, own: Any, columns: JointColumns) -> Any:
+    """Positions q (..., n) with the independent joints at others (..., m); gradients run through both."""
+    others = taken(q, columns.dependent, -1)
     return taken(namespace(q).concat([own, others], -1), columns.order, -1)
 
 
-def _check(violation: Any, tolerance: float | None, names: RowNames) -> None:
+def _check(violation: Any, tolerance: float | None, columns: JointColumns, names: RowNames) -> None:
     found = worst_open(violation, tolerance)
     if found is not None:
         place, row, size = found
-        raise ValueError(
+        raise DoesNotClose(
             f"{plain(names.owners[row])} does not close{sample_of(place)}: from here the dependent joints "
-            f"leave {open_by(size, names.rows[row])}; start them elsewhere, if it can close at all"
+            f"leave {open_by(size, names.rows[row])}",
+            f"start them elsewhere, or {_led(columns)}, if it can close at all",
         )

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chosen_names import MOST_NAMES, plain
-from ..sums.inertia_solve import SHARE
+from ..chosen_names import listed, plain, sample_of
+from ..sums.known_digits import SHARE
 from ..sums.namespace import hidden
 from .followers import Followers, JointColumns
 from .independent_joints import chosen_independent, rank_of
@@ -16,17 +16,6 @@ OPEN = 1e-4
 """In m, rad and units of couplings, what may be left open that nothing closes: files round their numbers."""
 AGREE = 1e-4
 """Rows that follow from others may differ from these by this part of their size: files round numbers."""
-
-
-def listed(names: Sequence[str]) -> str:
-    """Names in one line."""
-    shown = ", ".join(plain(name) for name in names[:MOST_NAMES])
-    return shown + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
-
-
-def sample_of(place: Sequence[int]) -> str:
-    """Where in a batch."""
-    return f" at sample {', '.join(map(str, place))}" if len(place) else ""
 
 
 def check_factors(rows: Any, triangle: Any, columns: JointColumns, joint_names: Sequence[str]) -> None:
@@ -66,8 +55,12 @@ def why_not_following(
         return (
             f"the position is singular: {told}, for the constraints take fewer freedoms there than elsewhere"
         )
-    others = [joint_names[k] for k in chosen_independent(rows, tolerance=epsilon)]
-    return f"the independent joints do not tell the others: {told}; there, choose independent={others}"
+    # Those that follow now go on to do so, as far as they can.
+    others = [joint_names[k] for k in chosen_independent(rows, dependent, tolerance=epsilon)]
+    return (
+        f"the independent joints do not tell the others: {told}; there, choose "
+        f"robot.constrained(independent={others})"
+    )
 
 
 def left_free(rows: Any, columns: JointColumns, joint_names: Sequence[str], where: str) -> str:

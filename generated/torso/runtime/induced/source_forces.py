@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arguments import is_like
 from ..motion_quantities import AppliedLoad
 from ..sums.namespace import namespace
 
@@ -42,7 +43,7 @@ def source_forces(robot: Any, q: Any, qd: Any, loads: Sequence[Any], passive: bo
     kinds = [-(c1 * qd[..., None, None, :]).reshape(*q.shape, links * n), -gravity]
     mass, rest = c2.sum(-2), 0.0 * q
     identity = side.constant(np.eye(n), q)
-    if passive:
+    if passive and robot.structure.passive:
         shares = robot.passive_torque(q, qd, rest)[:3]
         mass = mass + side.constant(np.diag(own.armature), q)
     else:
@@ -68,7 +69,7 @@ def beside(parts: Sequence[Any]) -> Any:
 
 def listed(loads: Any) -> list[Any]:
     """Loads as a list, of which one alone may be given; raises TypeError for what is neither."""
-    if isinstance(loads, AppliedLoad):
+    if is_like(loads, AppliedLoad):
         return [loads]
     if not isinstance(loads, list | tuple):
         raise TypeError(f"loads is a {type(loads).__name__}; give a list of AppliedLoad(frame, force, ...)")
@@ -79,8 +80,8 @@ def load_torques(robot: Any, q: Any, loads: Sequence[Any]) -> list[Any]:
     """What each load adds to the torques that joints need, (..., n); errors tell which load is meant."""
     found = []
     for e, load in enumerate(loads):
-        several = [load] if isinstance(load, AppliedLoad) else load
-        if not isinstance(several, list | tuple) or not all(isinstance(a, AppliedLoad) for a in several):
+        several = [load] if is_like(load, AppliedLoad) else load
+        if not isinstance(several, list | tuple) or not all(is_like(a, AppliedLoad) for a in several):
             raise TypeError(
                 f"loads[{e}] is a {type(load).__name__}; give AppliedLoad(frame, force, ...), or a list of "
                 "them that counts as one load"

@@ -63,9 +63,10 @@ class Sweep:
         energies = [link.potential(at, self.p) for link, at in zip(self.links, q.own, strict=True)]
         return q, gradient(energies, None, q.variables(), keep, last=True)
 
-    def rows(self, motion: Motion, values: Sequence[Tensor]) -> Rows:
-        """Values that belong to the variables of a motion."""
-        return Rows(motion.places(), values, self.n, self.record.like)
+    def rows(self, values: Sequence[Tensor], *motions: Motion) -> Rows:
+        """Values that belong to the variables of one or more motions, in their order."""
+        places = (place for motion in motions for place in motion.places())
+        return Rows(places, values, self.plan.lanes, self.n, self.record.like)
 
     def along(self, motion: Motion, direction: Leaf) -> list[Tensor]:
         """A direction for each variable of a motion."""
@@ -115,7 +116,7 @@ def torque(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> T
     with torch.enable_grad():
         sweep = Sweep(links, p, entries.single, (q, qd, qdd), record)
         rate, force, gravity = (
-            sweep.rows(motion, values)(*entries.paths_in_lanes)
+            sweep.rows(values, motion)(*entries.paths_in_lanes)
             for motion, values in zip(*sweep.torque(record.wanted), strict=True)
         )
         return record.finish(rate - force + gravity)
@@ -133,7 +134,7 @@ def position_gradient(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: T
         weights = [*sweep.along(qd_, mine), *(-m for m in sweep.along(q_, mine)), *sweep.along(place, mine)]
         moved = [*q_.variables(), *place.variables()]
         slopes = gradient([*rate, *force, *gravity], weights, moved, record.wanted, last=True)
-        found = Rows([*q_.places(), *place.places()], slopes, sweep.n, record.like)
+        found = sweep.rows(slopes, q_, place)
         return record.finish(found(resting.pairs[:, 1], resting.pairs[:, 2]))
 
 
@@ -147,11 +148,11 @@ def _second_derivatives(sweep: Sweep, entries: LaneEntries) -> tuple[Tensor, Ten
     keep, along_qd = sweep.record.wanted, sweep.same(sweep.v)
     q, qd, force, momentum = sweep.kinetic(sweep.marks(lambda k: (coordinate == k) & (kind == 0)))
     rate = gradient(force, sweep.along(q, along_qd), qd.variables(), keep, last=False)
-    mass_rate, mass = sweep.rows(qd, rate), sweep.rows(qd, momentum)
+    mass_rate, mass = sweep.rows(rate, qd), sweep.rows(momentum, qd)
     i, k, at_i, at_k, rest, rest_i, rest_k = entries.pairs.T
     if not any(entries.linear):
         bent = gradient(momentum, sweep.along(qd, along_qd), q.variables(), keep, last=True)
-        bend = sweep.rows(q, bent)
+        bend = sweep.rows(bent, q)
         c1 = 0.5 * (mass_rate(i, at_k) + bend(k, at_i) - bend(i, at_k))
         return mass(i, at_k), c1, c1[:0]
     along_unit = sweep.marks(lambda k: (coordinate == k) & (kind == 2))
@@ -159,7 +160,7 @@ def _second_derivatives(sweep: Sweep, entries: LaneEntries) -> tuple[Tensor, Ten
     way = [along_unit(c, rows) + moving(c, rows) * along_qd(c, rows) for c, rows in qd.places()]
     x, v = q.variables(), qd.variables()
     both = gradient(momentum, way, [*x, *v], keep, last=True)
-    bend, lean = sweep.rows(q, both[: len(x)]), sweep.rows(qd, both[len(x) :])
+    bend, lean = sweep.rows(both[: len(x)], q), sweep.rows(both[len(x) :], qd)
     # At rest along e_k, the Hessian gives column k of M without dK/dqd's part b, which may be far larger.
     still = torch.from_numpy(rest != NOWHERE).to(sweep.record.like.device)
     columns = lean(i, rest_k), mass(i, at_k)
@@ -174,7 +175,7 @@ def _gravity(sweep: Sweep, entries: LaneEntries) -> Tensor:
     """dP/dq_i of every link over its path, in one lane for each link."""
     sweep = Sweep(sweep.links, sweep.p, entries.single, sweep.motion, sweep.record)
     place, slopes = sweep.potential(sweep.record.wanted)
-    return sweep.rows(place, slopes)(*entries.paths_in_lanes)
+    return sweep.rows(slopes, place)(*entries.paths_in_lanes)
 
 
 def _sums(terms: Tensor, entries: LaneEntries) -> Tensor:

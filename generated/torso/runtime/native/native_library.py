@@ -36,6 +36,7 @@ CONTROL = {
     "jacobian_rate": Control(2, point=True),
     "mass_matrix": Control(1),
     "forward_dynamics": Control(3),
+    "forward_dynamics_of_links": Control(3),
 }
 """Functions that take one sample and no count."""
 IMPEDANCE = ("partial_impedance", "frame_partial_impedance")

@@ -116,6 +116,8 @@ class JointTree:
     couplings: tuple[TreeCoupling, ...] = ()
     independent: tuple[int, ...] = ()
     """Coordinates that the others follow by the ties and couplings, in order; none where none was chosen."""
+    closed_position: tuple[float, ...] = ()
+    """All coordinates where ties and couplings hold, at the tree's own numbers; none where nothing does."""
 
     @property
     def tied(self) -> bool:

@@ -9,7 +9,7 @@ from ..structure import Structure
 from .namespace import side_by_side
 from .summed import Summed
 
-GIVEN = dict.fromkeys(("forward_dynamics", "forward_dynamics_with_passive"), ("q", "qd", "tau"))
+GIVEN = dict.fromkeys(("forward_dynamics", "forward_dynamics_of_links"), ("q", "qd", "tau"))
 """Names of the arguments of calls that are not given q, qd and qdd."""
 
 
@@ -36,7 +36,7 @@ class SumAnswers(Answers):
 
     def forward_dynamics(self, q: Any, qd: Any, tau: Any, passive: bool, out: Any = None) -> Any:
         """See `Dynamics.forward_dynamics`."""
-        call = "forward_dynamics_with_passive" if passive else "forward_dynamics"
+        call = "forward_dynamics" if passive else "forward_dynamics_of_links"
         return self._summed(call, (q, qd, tau), out)
 
     def energy(self, q: Any, qd: Any, out: Any = None) -> Any:

@@ -54,12 +54,14 @@ class Summed:
         rest = self._rest(q)
         return tuple(self._compute("partial_torque", (q, rest, rest)))
 
-    def forward_dynamics(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
+    def forward_dynamics_of_links(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
         """Solve M qdd = tau - (h + g)."""
         return self._accelerations(q, qd, tau)
 
-    def forward_dynamics_with_passive(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
+    def forward_dynamics(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
         """Solve (M + armature) qdd = tau - spring - damping - friction - (h + g)."""
+        if not self._structure.passive:
+            return self._accelerations(q, qd, tau)
         sums, side = self._structure.passive_sums, self._backend.side(q)
         spring, damping, friction, _ = passive_torques(side, sums, q, qd, self._rest(q))
         armature = side.constant(np.diag(sums.armature), q)

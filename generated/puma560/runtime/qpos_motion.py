@@ -1,0 +1,223 @@
+"""Positions, velocities, accelerations and torques as MuJoCo and Pinocchio have them, in coordinates q.
+
+Either has the angular velocity of a body that turns along its own axes. The linear one of a body that floats
+MuJoCo has along the world's, Pinocchio along the body's; accelerations are the changes of these numbers.
+Torques are what the same power takes: tau^T qd = tau_v^T v.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arguments import as_array
+from .chosen_names import plain, sample_of, short
+from .euler_angles import angles_of, continued, rates_map, rates_of, turned, turning_of_rates
+from .file_joints import COORDINATES, POSITIONS, FileJoint, in_given_order, layout, positions_of
+
+Numbers = NDArray[np.float64]
+UNIT = 1e-2
+"""By which a quaternion's length, or that of a cosine and a sine, may miss 1."""
+STEEP = 0.05
+"""Cosine of a pitch next to a right angle, some 3 degrees."""
+UPRIGHT = 1e-6
+"""One at which yaw and roll have no rates."""
+
+
+class QposMotion(NamedTuple):
+    """Arrays (..., n) in SI units; None for what was not given."""
+
+    q: Numbers
+    qd: Numbers | None
+    qdd: Numbers | None
+    tau: Numbers | None
+    warnings: tuple[str, ...]
+
+
+class _JointNumbers(NamedTuple):
+    """A joint, and where its numbers stand in a qpos and in velocities."""
+
+    joint: FileJoint
+    positions: slice
+    velocities: slice
+
+
+class Qpos:
+    """How numbers of one order become coordinates."""
+
+    def __init__(
+        self,
+        joints: Sequence[FileJoint],
+        pinocchio: Sequence[int],
+        order: Any = "mujoco",
+        names: Sequence[str] | None = None,
+    ) -> None:
+        """`pinocchio`: the joints in its order; names: those of the joints in that of qpos, if it is another.
+
+        Raises ValueError for another order, for names that are not those of the joints, and for a joint of
+        which some coordinates are locked.
+        """
+        if not isinstance(order, str) or order not in POSITIONS:
+            raise ValueError(f"order is {short(order)}; choose {' or '.join(POSITIONS)}")
+        own = joints if order == "mujoco" else [joints[at] for at in pinocchio]
+        self.order, self.joints = order, own if names is None else in_given_order(joints, names)
+        for joint in self.joints:
+            if len(joint.coordinates) < COORDINATES[joint.kind]:
+                raise ValueError(
+                    f"of the {joint.kind} joint {plain(joint.name)} some coordinates are locked or follow, "
+                    "so that a quaternion is none of what is left; generate the robot without that"
+                )
+        self.n, self.width = sum(len(j.coordinates) for j in joints), positions_of(joints, order)
+
+    def motion(self, qpos: Any, qvel: Any = None, qacc: Any = None, tau: Any = None) -> QposMotion:
+        """See `MotionCalls.from_qpos`."""
+        if qacc is not None and qvel is None:
+            raise ValueError("qacc is given without qvel, on which accelerations of angles depend; give both")
+        positions = self._read("qpos", qpos, self.width)
+        shape = positions.shape[:-1]
+        others = {"qvel": qvel, "qacc": qacc, "tau": tau}
+        read = [None if x is None else self._read(name, x, self.n, shape) for name, x in others.items()]
+        v, a, f = (None if x is None else np.empty_like(x) for x in read)
+        found = QposMotion(np.empty((*shape, self.n)), v, a, f, ())
+        warnings: list[str] = []
+        for part in self._parts():
+            at = list(part.joint.coordinates)
+            own = [None if x is None else x[..., part.velocities] for x in read]
+            made = _converted(part.joint, self.order, positions[..., part.positions], own, warnings)
+            for into, values in zip(found[:4], made, strict=True):
+                if into is not None:
+                    into[..., at] = values
+        return found._replace(warnings=tuple(warnings))
+
+    def _parts(self) -> Iterator[_JointNumbers]:
+        at_q = at_v = 0
+        for joint in self.joints:
+            next_q, next_v = at_q + POSITIONS[self.order][joint.kind], at_v + COORDINATES[joint.kind]
+            yield _JointNumbers(joint, slice(at_q, next_q), slice(at_v, next_v))
+            at_q, at_v = next_q, next_v
+
+    def _read(self, name: str, given: Any, width: int, shape: tuple[int, ...] | None = None) -> Numbers:
+        values = as_array(name, given)
+        if values.dtype.kind not in "fiu":
+            raise TypeError(f"{name} has dtype {values.dtype}; give numbers")
+        if values.ndim == 0 or values.shape[-1] != width or shape not in (None, values.shape[:-1]):
+            raise ValueError(
+                f"{name} has shape {values.shape}; {self._told(name, values.shape, width, shape)}"
+            )
+        return values.astype(np.float64)
+
+    def _told(self, name: str, given: tuple[int, ...], width: int, shape: tuple[int, ...] | None) -> str:
+        if given[-1:] == (width,):
+            return f"qpos has {shape} samples; give as many"
+        if name != "qpos":
+            return f"its last axis must be {width}, one for each degree of freedom"
+        other = (
+            next((o for o in POSITIONS if positions_of(self.joints, o) == given[-1]), None) if given else None
+        )
+        hint = f"; of order={other!r} it would have {given[-1]}" if other not in (None, self.order) else ""
+        return (
+            f"of {self.order}'s order its last axis must be {width}: {layout(self.joints, self.order)}{hint}"
+            "; joints that are locked, or follow others, have none"
+        )
+
+
+Given = Sequence[Any]
+"""Velocities, accelerations and torques of one joint, None for what was not given."""
+
+
+def _converted(joint: FileJoint, order: str, p: Numbers, given: Given, told: list[str]) -> tuple[Any, ...]:
+    """Coordinates of one joint, and the velocities, accelerations and torques of them that are given."""
+    if joint.kind == "single" or (order == "mujoco" and joint.kind in ("continuous", "planar")):
+        return (p, *given)
+    if joint.kind in ("continuous", "planar"):
+        return _in_plane(joint, p, given)
+    quaternion = p[..., -4:] if order == "mujoco" else p[..., [-1, -4, -3, -2]]
+    q = _angles(joint.name, quaternion)
+    _say_steepness(joint.name, q, given, told)
+    if joint.kind == "ball":
+        return (q, *_turning(q, given))
+    return (np.concatenate([p[..., :3], q], -1), *_floating(q, given, order == "pinocchio"))
+
+
+def _in_plane(joint: FileJoint, p: Numbers, given: Given) -> tuple[Any, ...]:
+    """Of Pinocchio's joints whose angle is a cosine and a sine; a planar one moves along the body's axes."""
+    cosine, sine = p[..., -2], p[..., -1]
+    _check_unit(joint.name, np.hypot(cosine, sine), "a cosine and a sine")
+    angle = np.arctan2(sine, cosine)[..., None]
+    angle = angle if angle.ndim == 1 else np.unwrap(angle, axis=-2)
+    if joint.kind == "continuous":
+        return (angle, *given)
+    v, a, f = given
+    still = np.zeros_like(angle)
+    yaw = np.concatenate([angle, still, still], -1)
+
+    def along(values: Numbers) -> Numbers:
+        flat = np.concatenate([values[..., :2], still], -1)
+        return np.concatenate([turned(yaw, flat)[..., :2], values[..., 2:]], -1)
+
+    if a is not None and v is not None:  # what the axes turn by
+        a = a + np.stack([-v[..., 2] * v[..., 1], v[..., 2] * v[..., 0], 0.0 * v[..., 2]], -1)
+    q = np.concatenate([p[..., :2], angle], -1)
+    return (q, *(None if x is None else along(x) for x in (v, a, f)))
+
+
+def _floating(q: Numbers, given: Given, is_local: bool) -> tuple[Any, ...]:
+    """Velocities, accelerations and torques of x, y, z and the angles q."""
+    v, a, f = given
+    if is_local and a is not None and v is not None:
+        a = np.concatenate([a[..., :3] + np.cross(v[..., 3:], v[..., :3]), a[..., 3:]], -1)
+    turning = _turning(q, [None if x is None else x[..., 3:] for x in given])
+    moving = (None if x is None else x[..., :3] for x in (v, a, f))
+    return tuple(
+        None if x is None else np.concatenate([turned(q, x) if is_local else x, turns], -1)
+        for x, turns in zip(moving, turning, strict=True)
+    )
+
+
+def _turning(q: Numbers, given: Given) -> tuple[Any, ...]:
+    """Rates and changes of angles q, and the torques that do the same work on them."""
+    v, a, f = given
+    rates = None if v is None else rates_of(q, v)
+    changes = torque = None
+    if a is not None and rates is not None:
+        changes = rates_of(q, a - turning_of_rates(q, rates))
+    if f is not None:
+        torque = (np.swapaxes(rates_map(q), -1, -2) @ f[..., None])[..., 0]
+    return rates, changes, torque
+
+
+def _angles(name: str, quaternion: Numbers) -> Numbers:
+    size = np.sqrt((quaternion * quaternion).sum(-1))
+    _check_unit(name, size, "a quaternion")
+    angles = angles_of(quaternion / size[..., None])
+    return angles if angles.ndim == 1 else continued(angles)
+
+
+def _check_unit(name: str, size: Numbers, what: str) -> None:
+    """Raise ValueError for the first sample at which numbers of length 1 have another."""
+    wrong = np.argwhere(~(np.abs(size - 1.0) <= UNIT))
+    if len(wrong):
+        place = tuple(wrong[0].tolist())
+        raise ValueError(
+            f"qpos has {what} of length {size[place]:.3g} for {plain(name)}{sample_of(place)}, and it must "
+            "be 1; look whether these numbers are qpos, and of which order"
+        )
+
+
+def _say_steepness(name: str, q: Numbers, given: Given, told: list[str]) -> None:
+    """Say where yaw and roll are about nearly the same axis; raise ValueError where they have no rates."""
+    level = np.abs(np.cos(q[..., 1]))
+    if not level.size or not level.min() < STEEP:
+        return
+    place = np.unravel_index(int(level.argmin()), level.shape)
+    where = sample_of([int(k) for k in place])
+    if level.min() < UPRIGHT and any(x is not None for x in given):
+        raise ValueError(
+            f"{plain(name)} is pitched by 90 degrees{where}, where yaw and roll are one turn and have no "
+            "rates; cut the motion there, or let the robot's file turn that link otherwise"
+        )
+    told.append(
+        f"{plain(name)} comes within {np.degrees(np.arcsin(level.min())):.2g} degrees of a pitch of 90{where}"
+        ": yaw and roll turn about nearly the same axis there, and their rates are large"
+    )
