@@ -144,7 +144,7 @@ class TorchBackend(ArrayBackend):
 
     def check_untraced(self) -> None:
         """Raise TypeError inside torch.jit.trace where it would record only a part, or only the numbers."""
-        if not self.traced and torch._C._is_tracing():
+        if not (self.traced or torch.compiler.is_compiling()) and torch._C._is_tracing():
             raise TypeError(
                 f"torch.jit.trace does not see how the back end {self.name} computes; "
                 "take the back end torch, whose numbers are the same, or torch.export"
