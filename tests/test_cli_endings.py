@@ -161,7 +161,7 @@ def test_what_is_no_file_is_not_opened(kind: str, unusual: dict[str, Path], endi
 
 def test_a_reader_that_has_enough_is_no_error() -> None:
     with subprocess.Popen(
-        [*COMMAND, "inspect", "planar300"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [*COMMAND, "inspect", "--details", "planar300"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as done:
         assert done.stdout.read(1) == b"p"
         done.stdout.close()

@@ -350,3 +350,43 @@ def test_a_compiler_takes_energies_and_torques_whole(package_of: Callable[[str],
         slopes = [torch.autograd.grad(a.sum(), robot.links[0].mass)[0] for a in (compiled, plain)]
         assert relative_error(compiled, plain) <= 1e-13
         assert relative_error(*slopes) <= 1e-13
+
+
+@pytest.mark.parametrize("backend", ["torch", "autograd"])
+def test_a_call_is_compiled_once(planar2: ModuleType, backend: str) -> None:
+    motion, robot = states(2, 5), planar2.load(backend)
+    for call, count in (
+        ("partial_torque", 3),
+        ("propagation", 3),
+        ("mass_matrix", 1),
+        ("forward_dynamics", 3),
+    ):
+        compiled: list[Any] = []
+
+        def kept(graph: Any, _: Any, compiled: list[Any] = compiled) -> Any:
+            compiled.append(graph)
+            return graph.forward
+
+        torch._dynamo.reset()
+        run = torch.compile(getattr(robot, call), fullgraph=True, backend=kept)
+        for _ in range(3):
+            run(*motion[:count])
+        assert len(compiled) == 1, call
+
+
+@pytest.mark.filterwarnings("ignore:`torch.jit.trace:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore::torch.jit.TracerWarning")
+def test_traced_by_torch_jit_a_call_is_right_or_refused(planar2: ModuleType) -> None:
+    some, others = states(2, 5), states(2, 3, seed=1)
+    robot = planar2.load("torch")
+    for call in (robot.partial_torque, robot.module("partial_torque")):
+        traced = torch.jit.trace(call, some)
+        assert torch.equal(traced(*others), robot.partial_torque(*others))
+    differentiated, compiled = planar2.load("autograd"), planar2.load("native")
+    for call in (
+        differentiated,
+        differentiated.module("mass_matrix"),
+        lambda *m: compiled.partial_torque(*m),
+    ):
+        with pytest.raises(TypeError, match=r"^torch.jit.trace does not see how .* take the back end torch"):
+            torch.jit.trace(call, some if call is differentiated or not hasattr(call, "robot") else some[:1])

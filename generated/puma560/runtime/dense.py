@@ -11,7 +11,7 @@ from .structure import Structure
 
 
 class Dense:
-    """Spreads packed values of one robot, with tables of constants kept for each dtype and device."""
+    """Spreads packed values of one robot, with tables of constants kept for each device."""
 
     def __init__(self, structure: Structure, backend: Backend[Any]) -> None:
         self._layout, self._n = structure.layout, structure.n
@@ -25,6 +25,10 @@ class Dense:
             "torque": over,
         }
         self._tables: dict[Any, Any] = {}
+        for like in backend.examples:
+            for field in self._shapes:
+                self._table(field, like)
+            self._sums(like)
 
     def spread(self, values: Array, field: str) -> Array:
         """Values (..., count) of a field of `Layout` over (..., n, N) or (..., n, N, n), zeros elsewhere."""
@@ -36,26 +40,26 @@ class Dense:
     def spread_rows(self, values: Array, field: str) -> Array:
         """Rows of 10 (..., 10 count) of a field over (..., n, N[, n], 10), zeros elsewhere."""
         padded = self._backend.concatenate([values, self._backend.zeros(values, PARAMETERS)])
-        entries = padded[..., self._table(f"rows of {field}", values)]
+        rows = padded.reshape(*values.shape[:-1], padded.shape[-1] // PARAMETERS, PARAMETERS)
+        entries = rows[..., self._table(field, values), :]
         dense: Array = entries.reshape(*values.shape[:-1], *self._shapes[field], PARAMETERS)
         return dense
 
     def summed(self, tau: Array) -> Array:
         """Packed torques (..., count), summed over the links: (..., n)."""
-        total: Array = tau @ self._table("joint sums", tau)
+        total: Array = tau @ self._sums(tau)
         return total
 
-    def _table(self, name: str, like: Any) -> Any:
-        key = name, like.dtype, getattr(like, "device", None)
+    def _table(self, field: str, like: Any) -> Any:
+        key = field, getattr(like, "device", None)
         if key not in self._tables:
-            if name == "joint sums":
-                self._tables[key] = self._backend.constant(self._joint_sums(), like)
-            elif name.startswith("rows of "):
-                starts = self._positions(name.removeprefix("rows of ")) * PARAMETERS
-                each = (starts[:, None] + np.arange(PARAMETERS)).reshape(-1)
-                self._tables[key] = self._backend.index(each, like)
-            else:
-                self._tables[key] = self._backend.index(self._positions(name), like)
+            self._tables[key] = self._backend.index(self._positions(field), like)
+        return self._tables[key]
+
+    def _sums(self, like: Any) -> Any:
+        key = like.dtype, getattr(like, "device", None)
+        if key not in self._tables:
+            self._tables[key] = self._backend.constant(self._joint_sums(), like)
         return self._tables[key]
 
     def _joint_sums(self) -> NDArray[np.float64]:

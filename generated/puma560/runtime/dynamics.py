@@ -9,7 +9,7 @@ tau_ij is zero off the path of link j, so results are kept packed, beside a list
 tensors are a view that is built on request.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from types import MethodType
 from typing import Any, Literal, overload
@@ -91,6 +91,12 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         self._answers = backend.answers(check_finite)
         # They stand before the methods of the class, which they pass on to what is no plain array.
         vars(self).update({name: MethodType(call, self) for name, call in self._answers.direct.items()})
+
+    def __dir__(self) -> Iterable[str]:
+        """Names of what this robot has: torch.jit reads each of them, whose values may not raise."""
+        tree = self.backend.tree
+        absent = {"kinematics", "constraints"} if tree is None else set() if tree.tied else {"constraints"}
+        return sorted(set(super().__dir__()) - absent)
 
     @property
     def parameters(self) -> Mapping[str, Any]:

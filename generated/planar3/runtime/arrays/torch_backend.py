@@ -36,8 +36,11 @@ class TorchBackend(ArrayBackend):
 
     name: ClassVar = "torch"
     takes_tensors: ClassVar = True
+    examples: ClassVar = tuple(torch.empty(0, dtype=dtype) for dtype in (torch.float32, torch.float64))
     face: ClassVar[Any] = None
     xp: ClassVar[Any] = torch
+    traced: ClassVar[bool] = True
+    """Whether torch.jit.trace sees all operations."""
 
     def __init__(
         self,
@@ -69,11 +72,12 @@ class TorchBackend(ArrayBackend):
         # What torch.compile would trace otherwise: how numbers are summed up, and how tables are made.
         _ = structure.passive_sums
         if self.rule and self.kernel != "straight":
-            for dtype in (torch.float32, torch.float64):
-                self.rule.tables(self, torch.empty(0, dtype=dtype))
+            for like in self.examples:
+                self.rule.tables(self, like)
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
+        self.check_untraced()
         check_dense(named)
         given = [value for value in named.values() if torch.is_tensor(value)]
         if len({t.device for t in given}) > 1:
@@ -137,6 +141,14 @@ class TorchBackend(ArrayBackend):
         """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
         assert self.rule is not None  # Answers has seen to it
         return self.rule.coefficient_regressors(self, (q, qd, qdd), self._values(q))
+
+    def check_untraced(self) -> None:
+        """Raise TypeError inside torch.jit.trace where it would record only a part, or only the numbers."""
+        if not (self.traced or torch.compiler.is_compiling()) and torch._C._is_tracing():
+            raise TypeError(
+                f"torch.jit.trace does not see how the back end {self.name} computes; "
+                "take the back end torch, whose numbers are the same, or torch.export"
+            )
 
     def module(self, robot: Any, call: str, fixed: Mapping[str, Any]) -> CallModule:
         """One call of a robot on this back end as a torch module."""

@@ -39,6 +39,7 @@ class TorchSide(TorchBackend):
     """What the native back end does with tensors."""
 
     name: ClassVar = "native"
+    traced: ClassVar = False
 
     def __init__(
         self, calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None
@@ -50,6 +51,7 @@ class TorchSide(TorchBackend):
 
     def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
         """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
+        self.check_untraced()
         motion = list(named.values())
         q = motion[0]
         plain = all(

@@ -23,15 +23,14 @@ class SumTable(NamedTuple):
 
 
 class JointMatrices:
-    """Sums sum_j c_ijk of one robot, with tables of positions kept for each dtype and device."""
+    """Sums sum_j c_ijk of one robot, with tables of positions kept for each device."""
 
     def __init__(self, structure: Structure, backend: Backend[Any]) -> None:
         self._layout, self._n, self._backend = structure.layout, structure.n, backend
         self._tables: dict[Any, SumTable] = {}
-        self._listed: dict[str, SumTable] = {}
-        if backend.takes_tensors:  # torch.compile cannot trace how they are made
+        for like in backend.examples:
             for field in ("acceleration", "velocity"):
-                self._listed[field] = sum_table(self._layout, field, self._n)
+                self._table(field, like)
 
     def summed(self, values: Any, field: str) -> Any:
         """Matrices (..., n, n) of values (..., count) of a field of `Layout` with rows (i, j, k)."""
@@ -49,9 +48,9 @@ class JointMatrices:
         return sums.reshape(*values.shape[:-1], self._n, self._n)
 
     def _table(self, field: str, like: Any) -> SumTable:
-        key = field, like.dtype, getattr(like, "device", None)
+        key = field, getattr(like, "device", None)
         if key not in self._tables:
-            listed = self._listed.get(field) or sum_table(self._layout, field, self._n)
+            listed = sum_table(self._layout, field, self._n)
             self._tables[key] = SumTable(*(self._backend.index(a, like) for a in listed))
         return self._tables[key]
 

@@ -31,6 +31,7 @@ class AutogradBackend(TorchBackend):
     """
 
     name: ClassVar = "autograd"
+    traced: ClassVar = False
 
     def __init__(
         self,
