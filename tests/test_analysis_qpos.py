@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import h5py
 import numpy as np
 import pytest
 from linkwise import (
@@ -190,7 +191,10 @@ def test_angles_go_on_from_block_to_block(moved: Moved) -> None:
 
 def test_joints_may_be_named_in_the_order_of_the_qpos(walker: Moved) -> None:
     swapped = np.concatenate([walker.qpos[:, 11:], walker.qpos[:, :11]], axis=1)
-    named = walker.log("named.npz", qpos=swapped, joint_names=["knee", "free", "hip"])
+    named = walker.folder / "named.h5"
+    with h5py.File(named, "w") as file:
+        file["sim/time"], file["sim/qpos"] = walker.time, swapped
+        file["sim/qpos"].attrs["joint_names"] = ["knee", "free", "hip"]
     package, reading = walker.folder / "package", Reading(qpos="mujoco")
     expected = analyze(walker.log(qpos=walker.qpos), package, reading)
     np.testing.assert_array_equal(analyze(named, package, reading).q, expected.q)
