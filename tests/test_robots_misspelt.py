@@ -37,6 +37,11 @@ MISSPELT = {
         ('<axis xyz="', '<axis xzy="'),
         "<axis> has xzy=…, which is not read; did you mean xyz=…?",
     ),
+    "turn as a quaternion": (
+        URDF,
+        (' rpy="', ' quat_xyzw="0 0 0.6 0.8" rpy="'),
+        "link 'a': <origin> has quat_xyzw=…, which is not read; write the turn as rpy",
+    ),
     "second inertia": (
         URDF,
         ("</link>", "<inertial/></link>"),
