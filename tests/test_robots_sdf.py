@@ -79,6 +79,13 @@ def test_poses_and_axes_of_every_version_make_the_robot_of_a_urdf_file(text: str
     assert [c.name for c in ours.coordinates] == ["hip", "slide"]
 
 
+def test_switches_are_read_in_capitals_too(tmp_path: Path) -> None:
+    as_written = {"1.11": ('degrees="true"', 'degrees="True"'), "1.6": ("frame>1<", "frame>TRUE<")}
+    for text, (old, new) in ((RELATIVE, as_written["1.11"]), (IN_THE_JOINT, as_written["1.6"])):
+        assert old in text
+        assert robot_of(tmp_path, text.replace(old, new)) == robot_of(tmp_path, text)
+
+
 def test_the_world_of_the_file_has_its_gravity(tmp_path: Path) -> None:
     world = IN_THE_MODEL.replace("<model", "<world name='moon'><gravity>0 0 -1.6</gravity><model")
     moon = world.replace("</model>", "</model></world>")
@@ -214,6 +221,10 @@ BAD = {
     ),
     "static": (
         ('<link name="lower">', '<static>true</static><link name="lower">'),
+        "is <static>, and never moves",
+    ),
+    "static in capitals": (
+        ('<link name="lower">', '<static> True </static><link name="lower">'),
         "is <static>, and never moves",
     ),
     "no version": (('version="1.11"', ""), "<sdf version=None>; give the format's version, such as 1.9"),
