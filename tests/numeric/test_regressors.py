@@ -123,14 +123,6 @@ def test_regressors_are_pinocchios(robot: str, backend: str, made: Made) -> None
             assert error <= limit, f"{what}, {kind}: {error:.1e}"
 
 
-@pytest.mark.parametrize("backend", ["numpy", "torch", pytest.param("native", marks=needs_compiler)])
-def test_regressors_of_no_samples_are_empty(backend: str, made: Made) -> None:
-    dynamics, nothing = made("panda")[1].load(backend), np.zeros((0, 7))
-    assert dynamics.regressor(nothing, nothing, nothing).shape == (0, 7, 7, 10)
-    shapes = [value.shape for value in dynamics.coefficient_regressors(nothing, nothing)]
-    assert shapes == [(0, 7, 7, 7, 10), (0, 7, 7, 7, 10), (0, 7, 7, 10)]
-
-
 def test_a_gradient_through_a_regressor_is_its_torques(
     made: Made,
 ) -> None:
