@@ -131,6 +131,17 @@ def test_the_model_stands_in_the_world_where_its_poses_say(place: str, tmp_path:
     assert {"corner", "edge", "tip"} <= set(robot.kinematics.frames)
 
 
+def test_frames_of_a_model_stay_where_a_link_called_world_comes_first(tmp_path: Path) -> None:
+    inertia = "".join(f"<{entry}>0.1</{entry}>" for entry in ("ixx", "iyy", "izz"))
+    text = f"""<sdf version="1.9"><model name="m"><link name="world"/>
+        <frame name="mark"><pose>0 0 .5 0 0 0</pose></frame>
+        <link name="a"><pose>0 .1 0 0 0 0</pose>
+        <inertial><mass>1</mass><inertia>{inertia}</inertia></inertial></link></model></sdf>"""
+    robot, _ = loaded(tmp_path, text)
+    expected = np.array([1.0, 2.0 - 0.1, 3.0 + 0.5])
+    np.testing.assert_allclose(robot.kinematics.pose([1, 2, 3, 0, 0, 0], "mark")[:3, 3], expected)
+
+
 def test_a_model_that_nothing_holds_falls_and_says_where_the_file_shows_it(tmp_path: Path) -> None:
     text = POSES.replace(STAND, "")
     robot, (told, *_) = loaded(tmp_path, text)

@@ -129,8 +129,11 @@ class ModelPoses:
         return self._named[name]
 
     def _canonical_link(self) -> str:
-        """The link that the model's own frame is attached to: the first, unless the model names another."""
-        links = [name for name, element in self._named.items() if element.tag == "link"]
+        """The link that the model's own frame is attached to: the first, unless the model names another.
+
+        It is never one called as the world, which no model carries about.
+        """
+        links = [name for name, element in self._named.items() if element.tag == "link" and name != WORLD]
         named = self._whole.get("canonical_link")
         if named and named not in links:
             near = listed(nearest_first(named, links))
