@@ -8,6 +8,7 @@ from linkwise import Options, check_package, generate, read_system, write_packag
 from linkwise.check.contact_checks import contact_calls
 from linkwise.check.loop_checks import loop_calls
 from linkwise.check.loop_reference import LoopReference, loop_reference
+from linkwise.check.parametric_tree import tree_with
 from linkwise.check.simulation_checks import simulated_motion, simulation_calls
 from linkwise.check.states import random_states
 from linkwise.package.load import Package, load_package
@@ -93,6 +94,13 @@ def test_another_length_is_open_where_loops_close(package: Package, reference: L
     model = package.load("numpy", {"L": 0.7001, "m": 2.0})
     with pytest.raises(ValueError, match=r"^pin is open by 0\.\d+ mm at sample 0"):
         list(loop_calls("numpy", model, reference))
+
+
+def test_a_length_with_which_loops_never_close_leaves_no_state_to_check(package: Package) -> None:
+    tree = package.manifest.tree
+    assert tree is not None
+    too_long = tree_with(tree, {**package.manifest.parameters, "L": 9.0})
+    assert loop_reference(package.manifest, too_long, random_states(4, 60)) is None
 
 
 @pytest.mark.parametrize("tied", [False, True])

@@ -161,6 +161,25 @@ def test_mujoco_takes_every_link_of_the_file_as_a_body_that_can_exist(written: P
     assert moved == pytest.approx([moved[0]] * 3, rel=1e-9)
 
 
+def test_a_point_of_mass_stays_one(log: Path, tmp_path: Path) -> None:
+    """MuJoCo takes moments of 0, and none that rounding has left below."""
+    ballast = (
+        b'<link name="ballast"><inertial><mass value="0.1"/>'
+        b'<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>'
+        b'<joint name="hung" type="fixed"><origin xyz="0.1 0.2 0.3" rpy="0.3 1 0.2"/>'
+        b'<parent link="hand"/><child link="ballast"/></joint></robot>'
+    )
+    arm = tmp_path / "arm.urdf"
+    arm.write_bytes(OWN.read_bytes().replace(b"</robot>", ballast))
+    identified(log, arm, tmp_path / "out")
+    text = (tmp_path / "out/arm.urdf").read_bytes().split(b"?>")[1].decode()
+    own = re.search(r'<link name="ballast">.*?<inertia ([^>]*)/>', text, re.DOTALL)
+    assert own is not None
+    assert [float(said) for said in re.findall(r'"([^"]*)"', own[1])] == [0.0] * 6
+    extension = '<mujoco><compiler fusestatic="false" balanceinertia="false"/></mujoco></robot>'
+    assert mujoco.MjModel.from_xml_string(text.replace("</robot>", extension)).body("ballast").mass[0] != 0.1
+
+
 def test_what_torques_do_not_tell_stays_as_the_file_has_it(log: Path, tmp_path: Path) -> None:
     identified(log, OWN, tmp_path, "--no-friction")
     assert b'<dynamics friction="0.1" damping="0.2"/>' in (tmp_path / OWN.name).read_bytes()

@@ -380,3 +380,11 @@ def test_the_runtime_asks_of_no_argument_whether_its_class_is_its_own(
         if isinstance(name, ast.Name)
     }
     assert not {one for one in asked if one.split(": ")[1] in public}
+
+
+@pytest.mark.parametrize("backend", [b for b in BACKENDS if b != "autograd"])
+def test_no_samples_have_regressors_of_no_rows(backend: str, package_of: Callable[[str], ModuleType]) -> None:
+    robot, none = package_of("planar3").load(backend), np.zeros((0, 3))
+    assert robot.regressor(none, none, none).shape == (0, 3, 3, 10)
+    c2, _, g = robot.coefficient_regressors(none, none)
+    assert (c2.shape, g.shape) == ((0, 3, 3, 3, 10), (0, 3, 3, 10))

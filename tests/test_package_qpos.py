@@ -222,7 +222,7 @@ def test_a_log_of_qpos_is_refused_with_the_reason(tmp_path: Path) -> None:
     np.savez(tmp_path / "log.npz", time=np.arange(200) / 100, qpos=np.zeros((200, 13)))
     told = (
         "array 'qpos' is (200, 13), and the robot has 12 joints: 13 = 12 + 1, for in a qpos of mujoco's base "
-        "has a quaternion, four numbers for three angles; make q of it by robot.from_qpos of the package"
+        "has a quaternion, four numbers for three angles; say whose it is, --qpos mujoco or --qpos pinocchio"
     )
     with pytest.raises(LinkwiseError, match=re.escape(told)):
         analyze(tmp_path / "log.npz", tmp_path / "package_walker")

@@ -1,12 +1,15 @@
 """A name that a format does not have: refused where it is near one that is read, told where it is not."""
 
 from pathlib import Path
+from xml.etree.ElementTree import fromstring
 
 import pytest
 from command_line import run_linkwise
 from conftest import DATA
 from linkwise import LinkwiseError, kept_package, read_robot
 from linkwise.robot import effects
+from linkwise.robot.readers.osim_document import as_xml
+from linkwise.robot.readers.osim_names import refuse_misspelt_names
 from urdf_text import chain, joint, link, robot
 
 URDF = chain(joint("ab", "a", "b"), joint("bc", "b", "c", inner='<dynamics damping="1"/>'))
@@ -34,6 +37,11 @@ MISSPELT = {
         ('<axis xyz="', '<axis xzy="'),
         "<axis> has xzy=…, which is not read; did you mean xyz=…?",
     ),
+    "turn as a quaternion": (
+        URDF,
+        (' rpy="', ' quat_xyzw="0 0 0.6 0.8" rpy="'),
+        "link 'a': <origin> has quat_xyzw=…, which is not read; write the turn as rpy",
+    ),
     "second inertia": (
         URDF,
         ("</link>", "<inertial/></link>"),
@@ -54,6 +62,26 @@ MISSPELT = {
         ("<mass_center>", "<mass_centre>"),
         "has <mass_centre>, which is not read; did you mean <mass_center>?",
     ),
+    "axis of OpenSim": (
+        OSIM,
+        ("<axis>", "<axes>"),
+        "TransformAxis 'rotation1' has <axes>, which is not read; did you mean <axis>?",
+    ),
+    "place of an offset": (
+        OSIM,
+        ("<translation>", "<traslation>"),
+        "PhysicalOffsetFrame 'thigh_top' has <traslation>, which is not read; did you mean <translation>?",
+    ),
+    "function": (
+        OSIM,
+        ("<coefficients>", "<coeficients>"),
+        "LinearFunction 'function' has <coeficients>, which is not read; did you mean <coefficients>?",
+    ),
+    "gravity": (
+        OSIM,
+        ("<gravity>", "<gravty>"),
+        "has <gravty>, which is not read; did you mean <gravity>?",
+    ),
 }
 
 
@@ -69,6 +97,21 @@ def test_a_name_near_one_that_is_read_is_refused_with_that_one(case: str, tmp_pa
         read_robot(path)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_no_name_of_opensims_own_components_is_taken_for_a_misspelt_one() -> None:
+    opensim = pytest.importorskip("opensim")
+    registered = opensim.ArrayStr()
+    opensim.OpenSimObject.getRegisteredTypenames(registered)
+    opensim.OpenSimObject.setSerializeAllDefaults(True)
+    try:
+        classes = [registered.get(i) for i in range(registered.getSize())]
+        texts = [opensim.OpenSimObject.newInstanceOfType(name).dump() for name in classes]
+    finally:
+        opensim.OpenSimObject.setSerializeAllDefaults(False)
+    assert len(texts) > 200
+    for text in texts:
+        refuse_misspelt_names(fromstring(as_xml(text.encode())))
 
 
 EXTENDED = robot(

@@ -79,6 +79,13 @@ def test_poses_and_axes_of_every_version_make_the_robot_of_a_urdf_file(text: str
     assert [c.name for c in ours.coordinates] == ["hip", "slide"]
 
 
+def test_switches_are_read_in_capitals_too(tmp_path: Path) -> None:
+    as_written = {"1.11": ('degrees="true"', 'degrees="True"'), "1.6": ("frame>1<", "frame>TRUE<")}
+    for text, (old, new) in ((RELATIVE, as_written["1.11"]), (IN_THE_JOINT, as_written["1.6"])):
+        assert old in text
+        assert robot_of(tmp_path, text.replace(old, new)) == robot_of(tmp_path, text)
+
+
 def test_the_world_of_the_file_has_its_gravity(tmp_path: Path) -> None:
     world = IN_THE_MODEL.replace("<model", "<world name='moon'><gravity>0 0 -1.6</gravity><model")
     moon = world.replace("</model>", "</model></world>")
@@ -122,6 +129,17 @@ def test_the_model_stands_in_the_world_where_its_poses_say(place: str, tmp_path:
         still = robot.inverse_dynamics(q, np.zeros(3), np.zeros(3))
         np.testing.assert_allclose(still, shown.gravity_torque(q), atol=1e-8)
     assert {"corner", "edge", "tip"} <= set(robot.kinematics.frames)
+
+
+def test_frames_of_a_model_stay_where_a_link_called_world_comes_first(tmp_path: Path) -> None:
+    inertia = "".join(f"<{entry}>0.1</{entry}>" for entry in ("ixx", "iyy", "izz"))
+    text = f"""<sdf version="1.9"><model name="m"><link name="world"/>
+        <frame name="mark"><pose>0 0 .5 0 0 0</pose></frame>
+        <link name="a"><pose>0 .1 0 0 0 0</pose>
+        <inertial><mass>1</mass><inertia>{inertia}</inertia></inertial></link></model></sdf>"""
+    robot, _ = loaded(tmp_path, text)
+    expected = np.array([1.0, 2.0 - 0.1, 3.0 + 0.5])
+    np.testing.assert_allclose(robot.kinematics.pose([1, 2, 3, 0, 0, 0], "mark")[:3, 3], expected)
 
 
 def test_a_model_that_nothing_holds_falls_and_says_where_the_file_shows_it(tmp_path: Path) -> None:
@@ -214,6 +232,10 @@ BAD = {
     ),
     "static": (
         ('<link name="lower">', '<static>true</static><link name="lower">'),
+        "is <static>, and never moves",
+    ),
+    "static in capitals": (
+        ('<link name="lower">', '<static> True </static><link name="lower">'),
         "is <static>, and never moves",
     ),
     "no version": (('version="1.11"', ""), "<sdf version=None>; give the format's version, such as 1.9"),

@@ -265,6 +265,14 @@ FILES = {
         GOOD + "if x:\n    damping: list = []\n    damping += [3]",
         "'damping' in line 7 would count for nothing: linkwise reads ",
     ),
+    "a name made of itself": (
+        GOOD + "damping = 0\ndamping = damping + x.qd**2",
+        "'damping' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "a table that is filled": (
+        GOOD + "damping = {}\ndamping['x'] = 3",
+        "'damping' in line 6 would count for nothing: linkwise reads ",
+    ),
     "a name misspelt": (
         GOOD + "parametres = {sp.Symbol('m'): 1.0}",
         "'parametres' in line 6 would count for nothing: linkwise reads parameters, ",

@@ -35,6 +35,17 @@ class QposMotion(NamedTuple):
     warnings: tuple[str, ...]
 
 
+class Earlier(NamedTuple):
+    """What comes before the samples, where a motion is converted piece by piece."""
+
+    samples: int = 0
+    q: Numbers | None = None
+    """At the last of them, (n,)."""
+
+
+NOTHING = Earlier()
+
+
 class _JointNumbers(NamedTuple):
     """A joint, and where its numbers stand in a qpos and in velocities."""
 
@@ -70,8 +81,15 @@ class Qpos:
                 )
         self.n, self.width = sum(len(j.coordinates) for j in joints), positions_of(joints, order)
 
-    def motion(self, qpos: Any, qvel: Any = None, qacc: Any = None, tau: Any = None) -> QposMotion:
-        """See `MotionCalls.from_qpos`."""
+    def motion(
+        self,
+        qpos: Any,
+        qvel: Any = None,
+        qacc: Any = None,
+        tau: Any = None,
+        earlier: Earlier = NOTHING,
+    ) -> QposMotion:
+        """See `MotionCalls.from_qpos`; angles and numbers of samples go on from what is earlier."""
         if qacc is not None and qvel is None:
             raise ValueError("qacc is given without qvel, on which accelerations of angles depend; give both")
         positions = self._read("qpos", qpos, self.width)
@@ -84,11 +102,22 @@ class Qpos:
         for part in self._parts():
             at = list(part.joint.coordinates)
             own = [None if x is None else x[..., part.velocities] for x in read]
-            made = _converted(part.joint, self.order, positions[..., part.positions], own, warnings)
+            before = None if earlier.q is None else earlier.q[at]
+            piece = _Piece(part.joint, self.order, before, earlier.samples, warnings)
+            made = _converted(piece, positions[..., part.positions], own)
             for into, values in zip(found[:4], made, strict=True):
                 if into is not None:
                     into[..., at] = values
         return found._replace(warnings=tuple(warnings))
+
+    def why_not(self, width: int) -> str:
+        """What a qpos has, in words, for positions that have another number of columns than `width`."""
+        other = next((o for o in POSITIONS if positions_of(self.joints, o) == width), None)
+        hint = f"; in {other}'s it would have {width}" if other not in (None, self.order) else ""
+        return (
+            f"in {self.order}'s order its last axis must be {self.width}: {layout(self.joints, self.order)}"
+            f"{hint}; joints that are locked, or follow others, have none"
+        )
 
     def _parts(self) -> Iterator[_JointNumbers]:
         at_q = at_v = 0
@@ -112,41 +141,52 @@ class Qpos:
             return f"qpos has {shape} samples; give as many"
         if name != "qpos":
             return f"its last axis must be {width}, one for each degree of freedom"
-        other = (
-            next((o for o in POSITIONS if positions_of(self.joints, o) == given[-1]), None) if given else None
-        )
-        hint = f"; of order={other!r} it would have {given[-1]}" if other not in (None, self.order) else ""
-        return (
-            f"of {self.order}'s order its last axis must be {width}: {layout(self.joints, self.order)}{hint}"
-            "; joints that are locked, or follow others, have none"
-        )
+        return self.why_not(given[-1] if given else 0)
+
+
+class _Piece(NamedTuple):
+    """A joint, in whose numbers it is given, and what there was of its motion before."""
+
+    joint: FileJoint
+    order: str
+    before: Numbers | None
+    """Its coordinates at the sample before the first."""
+    samples: int
+    warnings: list[str]
+
+    def at(self, place: Sequence[Any]) -> str:
+        """Which sample of all, in words."""
+        return sample_of([*map(int, place[:-1]), *(self.samples + int(last) for last in place[-1:])])
 
 
 Given = Sequence[Any]
 """Velocities, accelerations and torques of one joint, None for what was not given."""
 
 
-def _converted(joint: FileJoint, order: str, p: Numbers, given: Given, told: list[str]) -> tuple[Any, ...]:
+def _converted(piece: _Piece, p: Numbers, given: Given) -> tuple[Any, ...]:
     """Coordinates of one joint, and the velocities, accelerations and torques of them that are given."""
-    if joint.kind == "single" or (order == "mujoco" and joint.kind in ("continuous", "planar")):
+    kind, is_mujocos = piece.joint.kind, piece.order == "mujoco"
+    if kind == "single" or (is_mujocos and kind in ("continuous", "planar")):
         return (p, *given)
-    if joint.kind in ("continuous", "planar"):
-        return _in_plane(joint, p, given)
-    quaternion = p[..., -4:] if order == "mujoco" else p[..., [-1, -4, -3, -2]]
-    q = _angles(joint.name, quaternion)
-    _say_steepness(joint.name, q, given, told)
-    if joint.kind == "ball":
+    if kind in ("continuous", "planar"):
+        return _in_plane(piece, p, given)
+    q = _angles(piece, p[..., -4:] if is_mujocos else p[..., [-1, -4, -3, -2]])
+    _say_steepness(piece, q, given)
+    if kind == "ball":
         return (q, *_turning(q, given))
-    return (np.concatenate([p[..., :3], q], -1), *_floating(q, given, order == "pinocchio"))
+    return (np.concatenate([p[..., :3], q], -1), *_floating(q, given, not is_mujocos))
 
 
-def _in_plane(joint: FileJoint, p: Numbers, given: Given) -> tuple[Any, ...]:
+def _in_plane(piece: _Piece, p: Numbers, given: Given) -> tuple[Any, ...]:
     """Of Pinocchio's joints whose angle is a cosine and a sine; a planar one moves along the body's axes."""
     cosine, sine = p[..., -2], p[..., -1]
-    _check_unit(joint.name, np.hypot(cosine, sine), "a cosine and a sine")
+    _check_unit(piece, np.hypot(cosine, sine), "a cosine and a sine")
     angle = np.arctan2(sine, cosine)[..., None]
-    angle = angle if angle.ndim == 1 else np.unwrap(angle, axis=-2)
-    if joint.kind == "continuous":
+    if piece.before is not None:
+        angle = np.unwrap(np.concatenate([piece.before[None, -1:], angle]), axis=0)[1:]
+    elif angle.ndim > 1:
+        angle = np.unwrap(angle, axis=-2)
+    if piece.joint.kind == "continuous":
         return (angle, *given)
     v, a, f = given
     still = np.zeros_like(angle)
@@ -187,37 +227,39 @@ def _turning(q: Numbers, given: Given) -> tuple[Any, ...]:
     return rates, changes, torque
 
 
-def _angles(name: str, quaternion: Numbers) -> Numbers:
+def _angles(piece: _Piece, quaternion: Numbers) -> Numbers:
     size = np.sqrt((quaternion * quaternion).sum(-1))
-    _check_unit(name, size, "a quaternion")
+    _check_unit(piece, size, "a quaternion")
     angles = angles_of(quaternion / size[..., None])
-    return angles if angles.ndim == 1 else continued(angles)
+    if angles.ndim == 1:
+        return angles
+    return continued(angles, None if piece.before is None else piece.before[-3:])
 
 
-def _check_unit(name: str, size: Numbers, what: str) -> None:
+def _check_unit(piece: _Piece, size: Numbers, what: str) -> None:
     """Raise ValueError for the first sample at which numbers of length 1 have another."""
     wrong = np.argwhere(~(np.abs(size - 1.0) <= UNIT))
     if len(wrong):
         place = tuple(wrong[0].tolist())
         raise ValueError(
-            f"qpos has {what} of length {size[place]:.3g} for {plain(name)}{sample_of(place)}, and it must "
-            "be 1; look whether these numbers are qpos, and of which order"
+            f"qpos has {what} of length {size[place]:.3g} for {plain(piece.joint.name)}{piece.at(place)}, "
+            "and it must be 1; look whether these numbers are qpos, and of which order"
         )
 
 
-def _say_steepness(name: str, q: Numbers, given: Given, told: list[str]) -> None:
+def _say_steepness(piece: _Piece, q: Numbers, given: Given) -> None:
     """Say where yaw and roll are about nearly the same axis; raise ValueError where they have no rates."""
     level = np.abs(np.cos(q[..., 1]))
     if not level.size or not level.min() < STEEP:
         return
     place = np.unravel_index(int(level.argmin()), level.shape)
-    where = sample_of([int(k) for k in place])
+    name, where = piece.joint.name, piece.at(place)
     if level.min() < UPRIGHT and any(x is not None for x in given):
         raise ValueError(
             f"{plain(name)} is pitched by 90 degrees{where}, where yaw and roll are one turn and have no "
             "rates; cut the motion there, or let the robot's file turn that link otherwise"
         )
-    told.append(
+    piece.warnings.append(
         f"{plain(name)} comes within {np.degrees(np.arcsin(level.min())):.2g} degrees of a pitch of 90{where}"
         ": yaw and roll turn about nearly the same axis there, and their rates are large"
     )

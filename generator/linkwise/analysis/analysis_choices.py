@@ -28,6 +28,7 @@ from linkwise.analysis.written_choices import (
     constant_loads,
     pairs,
 )
+from linkwise.runtime.file_joints import Order
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class AnalysisChoices:
     units: Units | None = None
     time: str | None = None
     topic: str | None = None
+    qpos: Order | None = None
     map: tuple[str, ...] = ()
     ignore_extra: bool = False
     resample: float | None = None
@@ -70,7 +72,7 @@ class AnalysisChoices:
         """How the log is read."""
         mapping = pairs("--map", self.map)
         how = self.ignore_extra, self.resample, self.loop_tolerance, self.topic
-        return Reading(self.units, self.time, mapping, *how)
+        return Reading(self.units, self.time, mapping, *how, self.qpos)
 
     @property
     def processing(self) -> Processing:

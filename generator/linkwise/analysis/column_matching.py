@@ -128,9 +128,10 @@ def unit_warnings(log: Log, reading: Reading, peaks: Sequence[Peak]) -> tuple[st
     """Warnings about a told unit of angles that is unlikely by their size.
 
     Raises LinkwiseError where the unit is not told: in a file whose header ought to, where a column's name
-    says degrees, and where angles in radians would make more than a turn or pass their joint's limits.
+    says degrees, and where angles in radians would make more than a turn or pass their joint's limits. No
+    simulator has degrees.
     """
-    if not peaks:
+    if not peaks or reading.qpos is not None:
         return ()
     told = reading.units is not None or log.degrees is not None
     if log.path.suffix.lower() in {".mot", ".sto"} and not told:

@@ -191,7 +191,7 @@ def prepared(
 ) -> Job:
     """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
     points = induced_points(wanted.induced, robot)
-    opened = open_log(log, reading, robot.joints, robot.file_joints)
+    opened = open_log(log, reading, robot.joints, robot.file_joints, robot.qpos)
     switches = (*switch_columns(contacts, opened), *phase_columns(wanted.phases, opened))
     samples, closed = _samples(opened, robot, reading, switches, progress, buffer)
     with within(str(log)):

@@ -17,7 +17,8 @@ from linkwise.escape import without_ending
 from linkwise.package.load import Model, Package, open_package
 from linkwise.package.manifest import FILE, BodyEntry, PassiveEntry
 from linkwise.package.potential_word import potential_word
-from linkwise.runtime.file_joints import FileJoint
+from linkwise.runtime.file_joints import FileJoint, Order
+from linkwise.runtime.qpos_motion import Qpos
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,18 @@ class LoadedRobot:
         """Joints of the file that move, where some are several joints here."""
         found = self.package.manifest.file_joints
         return tuple(FileJoint(one.name, one.kind, one.joints) for one in found)
+
+    def qpos(self, order: Order, names: Sequence[str] | None) -> Qpos:
+        """How a simulator's positions become the joints; names: those of the file's joints in its order.
+
+        Raises ValueError for names of other joints, and where the robot has no file.
+        """
+        if self.package.manifest.tree is None:
+            raise LinkwiseError(
+                "the robot is of energies written by hand, which no simulator's file has; log its q"
+            )
+        found: Qpos = self.package.module.ROBOT.qpos(order, names)
+        return found
 
     @property
     def units_in_logs(self) -> tuple[str, ...]:

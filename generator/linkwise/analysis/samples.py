@@ -11,8 +11,9 @@ from linkwise.analysis.disk_rows import collected, first_column
 from linkwise.analysis.even_time import TOLERANCE, even_rate, resampled
 from linkwise.analysis.follower_columns import FollowerColumns, FollowingJoint
 from linkwise.analysis.logs import Log
+from linkwise.analysis.logs.finite import require_finite
 from linkwise.analysis.settings import Reading
-from linkwise.errors import LinkwiseError, within
+from linkwise.errors import within
 from linkwise.package.load import Array
 from linkwise.progress import Progress
 
@@ -93,15 +94,10 @@ def finite_blocks(
     log: Log, columns: Sequence[int], progress: Progress, others: Sequence[int] = ()
 ) -> Iterator[Array]:
     """Blocks (rows, columns and others) of the log; LinkwiseError for what is not finite in the columns."""
-    row, width = log.first_row, len(columns)
+    row, width, names = log.first_row, len(columns), [log.columns[at] for at in columns]
     for block, done in log.read((*columns, *others)):
-        if not np.isfinite(block[:, :width]).all():
-            at, column = np.argwhere(~np.isfinite(block[:, :width]))[0]
-            name = log.columns[columns[column]]
-            raise LinkwiseError(
-                f"{log.path}: row {row + at}, column {name!r}: {block[at, column]} is not a sample;"
-                " fill the gap"
-            )
+        with within(str(log.path)):
+            require_finite(block[:, :width], names, row)
         yield block
         row += len(block)
         progress("reading", done, log.size)

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from linkwise.errors import LinkwiseError
+from linkwise.runtime.file_joints import Order
 
 Units = Literal["rad", "deg"]
 Derivative = Literal["five-point", "savitzky-golay"]
@@ -34,8 +35,12 @@ class Reading:
     """How far positions of the log may be from closing the robot's loops, in m and rad."""
     topic: str | None = None
     """Topic of a bag, or group of a file of arrays, that has the joints; None takes the only one."""
+    qpos: Order | None = None
+    """Whose positions and torques a file of arrays has, MuJoCo's or Pinocchio's; None for the robot's own."""
 
     def __post_init__(self) -> None:
+        if self.qpos is not None and self.units is not None:
+            raise LinkwiseError(f"--units {self.units}: a --qpos is in rad and m; leave --units out")
         if self.resample is not None and not 0 < self.resample < float("inf"):
             raise LinkwiseError(f"--resample {self.resample:g}: give a rate in Hz above 0")
         if not all(isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in self.pairs):

@@ -72,7 +72,8 @@ class LoopEquations(NamedTuple):
         poses, speeds = self.recursion.poses(self._ends, q), np.zeros((samples, n, 0, 6))
         if self.tree.ties:
             places = [(frame.body, np.array(frame.translation)) for frame in self._ends]
-            speeds = self.recursion.points(places, many, units, 0.0 * units)[0].reshape(samples, n, -1, 6)
+            moving = self.recursion.points(places, many, units, 0.0 * units)[0]
+            speeds = moving.reshape(samples, n, len(places), 6)
         for at, tie in enumerate(self.tree.ties):
             moved = np.swapaxes(speeds[:, :, 2 * at] - speeds[:, :, 2 * at + 1], -1, -2)
             own = poses[:, 2 * at]

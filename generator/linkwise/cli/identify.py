@@ -23,6 +23,7 @@ from linkwise.cli.log_options import (
     LoopTolerance,
     Map,
     Pad,
+    Positions,
     Resample,
     Time,
     Topic,
@@ -66,6 +67,7 @@ def identify(
     units: AngleUnits = None,
     time: Time = None,
     topic: Topic = None,
+    qpos: Positions = None,
     mapping: Map = None,
     torque: Torque = None,
     unmeasured: Unmeasured = None,
@@ -86,7 +88,7 @@ def identify(
 ) -> None:
     """What a log of motion and torques says of the links: masses, centres, inertias, friction."""
     reading = Reading(
-        units, time, pairs("--map", mapping or []), ignore_extra, resample, loop_tolerance, topic
+        units, time, pairs("--map", mapping or []), ignore_extra, resample, loop_tolerance, topic, qpos
     )
     lowpass = chosen_lowpass(cutoff, filter_order, padding)
     processing = chosen_processing(derivative, window, degree, lowpass, "trim")

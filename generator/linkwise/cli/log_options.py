@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from linkwise.analysis.settings import Derivative, Edges, Padding, Units
+from linkwise.runtime.file_joints import Order
 
 UNITS = {
     "reading": "B",
@@ -28,6 +29,10 @@ Time = Annotated[str | None, typer.Option(help="Column of the time, in s")]
 Topic = Annotated[
     str | None,
     typer.Option(help="Topic of a bag, group of an HDF5 file: where the joints are, if several have some"),
+]
+Positions = Annotated[
+    Order | None,
+    typer.Option("--qpos", help="Take the array of positions, and of torques, as this simulator has them"),
 ]
 Map = Annotated[
     list[str] | None,

@@ -26,6 +26,8 @@ from linkwise.robot.transforms import from_rpy
 SUFFIXES = (".urdf", ".xml")
 KEYS = tuple(f"i{'xyz'[a]}{'xyz'[b]}" for a, b in MOMENTS)
 """Attributes of <inertia>, in the order of MOMENTS."""
+ROUNDING = 1e-14
+"""Of a link's second moments about where its body and it have their origins."""
 
 
 @dataclass(frozen=True)
@@ -85,13 +87,16 @@ class OwnUrdf:
             places, shared_mass(np.array(own), pseudo_inertia(pi)), members, strict=True
         ):
             back = np.linalg.inv(at)
-            yield from self._inertial(inertial, back @ j @ back.T)
+            moved = back @ j @ back.T
+            # A point of mass stays one: readers refuse moments that rounding leaves below 0.
+            rounding = ROUNDING * float(np.trace(j[:3, :3]) + np.trace(moved[:3, :3]))
+            yield from self._inertial(inertial, moved, rounding)
 
-    def _inertial(self, inertial: PlacedElement, j: Array) -> Iterator[Edit]:
+    def _inertial(self, inertial: PlacedElement, j: Array, rounding: float) -> Iterator[Edit]:
         """New numbers of an <inertial>, in the axes that it has."""
         if not j.any():
             return
-        mass, com, inertia = central_of(j)
+        mass, com, inertia = central_of(j, rounding)
         turn = _turn(inertial)
         turned = turn.T @ inertia @ turn
         values = {

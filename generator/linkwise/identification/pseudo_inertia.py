@@ -45,9 +45,14 @@ def central(pi: Array) -> tuple[float, Array, Array]:
     return central_of(pseudo_inertia(pi))
 
 
-def central_of(j: Array) -> tuple[float, Array, Array]:
-    """The same of J (4, 4); what has inertia and no mass is at the origin."""
+def central_of(j: Array, rounding: float = 0.0) -> tuple[float, Array, Array]:
+    """The same of J (4, 4); what has inertia and no mass is at the origin.
+
+    rounding: below such a sum of second moments about the centre, kg m², a body is a point
+    """
     mass = float(j[3, 3])
     com = j[:3, 3] / mass if mass else np.zeros(3)
     second = j[:3, :3] - mass * np.outer(com, com)
+    if np.trace(second) < rounding:
+        second = np.zeros((3, 3))
     return mass, com, np.trace(second) * np.eye(3) - second

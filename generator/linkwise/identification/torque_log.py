@@ -70,7 +70,7 @@ def read_torque_log(
     stands still.
     """
     measured = _measured(robot, torques, unmeasured)
-    log = open_log(path, reading, robot.joints, robot.file_joints)
+    log = open_log(path, reading, robot.joints, robot.file_joints, robot.qpos)
     with within(str(path)):
         columns = _torque_columns(log.columns, robot.joints, [robot.joints[i] for i in measured], torques)
         if not reading.ignore_extra:

@@ -40,7 +40,7 @@ class Dense:
     def spread_rows(self, values: Array, field: str) -> Array:
         """Rows of 10 (..., 10 count) of a field over (..., n, N[, n], 10), zeros elsewhere."""
         padded = self._backend.concatenate([values, self._backend.zeros(values, PARAMETERS)])
-        rows = padded.reshape(*values.shape[:-1], padded.shape[-1] // PARAMETERS, PARAMETERS)
+        rows = padded.reshape(*values.shape[:-1], len(getattr(self._layout, field)) + 1, PARAMETERS)
         entries = rows[..., self._table(field, values), :]
         dense: Array = entries.reshape(*values.shape[:-1], *self._shapes[field], PARAMETERS)
         return dense

@@ -25,12 +25,16 @@ def angles_of(quaternion: Numbers) -> Numbers:
     return np.stack([yaw, pitch, roll], -1)
 
 
-def continued(given: Numbers) -> Numbers:
+def continued(given: Numbers, before: Numbers | None = None) -> Numbers:
     """The same attitudes (..., T, 3) by angles without leaps from sample to sample.
+
+    before: angles (..., 3) of the sample before the first, from which they go on
 
     Each attitude has two triples up to whole turns, (yaw, pitch, roll) and (yaw + pi, pi - pitch, roll + pi):
     every sample takes that which is nearer to the sample's before it.
     """
+    if before is not None:
+        return continued(np.concatenate([before[..., None, :], given], -2))[..., 1:, :]
     other = np.stack([given[..., 0] + np.pi, np.pi - given[..., 1], given[..., 2] + np.pi], -1)
     same, crossed = (_apart(triple[..., 1:, :], given[..., :-1, :]) for triple in (given, other))
     # From the one to the other and back, a step costs the same.

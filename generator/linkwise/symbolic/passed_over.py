@@ -2,12 +2,14 @@
 
 import ast
 from collections.abc import Collection, Iterator
+from typing import TypeGuard
 
 from linkwise.errors import LinkwiseError
 from linkwise.runtime.chosen_names import nearest_first
 
 READ = ("coordinates", "links", "parameters", "name")
 """What linkwise reads of a file."""
+ASSIGNMENTS = (ast.Assign, ast.AnnAssign, ast.AugAssign)
 
 
 def refuse_passed_over(source: bytes, defined: Collection[str]) -> None:
@@ -19,9 +21,8 @@ def refuse_passed_over(source: bytes, defined: Collection[str]) -> None:
     defined: names that the file had when it had run
     """
     tree = ast.parse(source)
-    used = {
-        node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
-    }
+    filled = {id(node) for statement in ast.walk(tree) for node in _own_loads(statement)}
+    used = {node.id for node in ast.walk(tree) if _is_load(node) and id(node) not in filled}
     for name, line in _definitions(tree):
         if name in defined and name not in used and name not in READ and not name.startswith("_"):
             raise LinkwiseError(
@@ -31,6 +32,25 @@ def refuse_passed_over(source: bytes, defined: Collection[str]) -> None:
             )
 
 
+def _is_load(node: ast.AST) -> TypeGuard[ast.Name]:
+    return isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
+
+
+def _own_loads(statement: ast.AST) -> Iterator[ast.Name]:
+    """Where an assignment reads what it assigns to, or has an element of: whom that serves is not said."""
+    if not isinstance(statement, ASSIGNMENTS):
+        return
+    targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
+    own = set()
+    for target in targets:
+        base: ast.AST = target
+        while isinstance(base, ast.Subscript | ast.Attribute):
+            base = base.value
+        if isinstance(base, ast.Name):
+            own.add(base.id)
+    yield from (node for node in ast.walk(statement) if _is_load(node) and node.id in own)
+
+
 def _definitions(tree: ast.AST) -> Iterator[tuple[str, int]]:
     """Names and lines of single assignments, functions and classes, outside of functions and classes."""
     for node in ast.iter_child_nodes(tree):
@@ -38,7 +58,7 @@ def _definitions(tree: ast.AST) -> Iterator[tuple[str, int]]:
             yield node.name, node.lineno
             continue
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-        if isinstance(node, ast.Assign | ast.AnnAssign | ast.AugAssign):
+        if isinstance(node, ASSIGNMENTS):
             yield from ((one.id, node.lineno) for one in targets if isinstance(one, ast.Name))
         elif isinstance(node, ast.stmt | ast.ExceptHandler):
             yield from _definitions(node)

@@ -4,21 +4,27 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from linkwise.analysis.logs.array_log import ArrayLog
+from linkwise.analysis.logs.array_log import ArrayFile, ArrayLog
 from linkwise.analysis.logs.bag import BagLog
 from linkwise.analysis.logs.hdf5 import Hdf5Arrays
 from linkwise.analysis.logs.headers import open_delimited, open_storage
 from linkwise.analysis.logs.named_once import named_once
 from linkwise.analysis.logs.npz import NpzArrays
 from linkwise.analysis.logs.parquet import ParquetLog
+from linkwise.analysis.logs.qpos_log import QposLog, QposOf
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
+from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.package.load import Array
 from linkwise.runtime.file_joints import FileJoint
 
 AS_IT_IS = Reading()
-DELIMITED, STORAGE, HDF5 = (".csv", ".tsv", ".txt"), (".mot", ".sto"), (".h5", ".hdf5", ".hdf")
+DELIMITED, STORAGE = (".csv", ".tsv", ".txt"), (".mot", ".sto")
+ARRAYS: dict[str, Callable[[Path], ArrayFile]] = {
+    ".npz": NpzArrays,
+    **dict.fromkeys((".h5", ".hdf5", ".hdf"), Hdf5Arrays),
+}
 BAGS = ".mcap", ".db3", ".bag"
 """Of ROS 2, and the last of ROS 1."""
 MARKERS = ".trc", ".c3d"
@@ -69,11 +75,13 @@ def open_log(
     reading: Reading = AS_IT_IS,
     joints: Sequence[str] = (),
     file_joints: Sequence[FileJoint] = (),
+    qpos_of: QposOf | None = None,
 ) -> Log:
     """Open a log by its suffix; a folder as a bag of ROS 2.
 
     reading: which topic or group has the joints, and which array the time, where the format has such
     joints: what columns of arrays are, in this order, where the file names none
+    file_joints, qpos_of: those of the robot's file, and how a simulator's positions become these
 
     Raises LinkwiseError for a missing file, an unknown suffix, a header that cannot be read, or one that
     names two columns alike.
@@ -81,7 +89,7 @@ def open_log(
     with within(str(path)):
         if not path.is_dir():
             require_file(path)
-        opened = _opener(path, reading, joints, file_joints)
+        opened = _opener(path, reading, joints, file_joints, qpos_of)
     try:
         log = opened()
     except UnicodeDecodeError as error:
@@ -94,16 +102,24 @@ def open_log(
 
 
 def _opener(
-    path: Path, reading: Reading, joints: Sequence[str], file_joints: Sequence[FileJoint]
+    path: Path,
+    reading: Reading,
+    joints: Sequence[str],
+    file_joints: Sequence[FileJoint],
+    qpos_of: QposOf | None,
 ) -> Callable[[], Log]:
     """What opens a log; raises LinkwiseError for a kind of file that is none."""
     suffix = path.suffix.lower()
+    order = reading.qpos
+    if order is not None and suffix not in ARRAYS:
+        raise LinkwiseError(f"--qpos goes with files of arrays, {listed(ARRAYS)}; save the qpos in one")
     if path.is_dir() or suffix in BAGS:
         return lambda: BagLog.open(path, reading.topic)
-    if suffix in HDF5:
-        return lambda: ArrayLog.open(Hdf5Arrays(path), reading, joints, file_joints)
-    if suffix == ".npz":
-        return lambda: ArrayLog.open(NpzArrays(path), reading, joints, file_joints)
+    if suffix in ARRAYS:
+        source = ARRAYS[suffix](path)
+        if order is not None and qpos_of is not None:
+            return lambda: QposLog.open(source, reading, joints, order, qpos_of)
+        return lambda: ArrayLog.open(source, reading, joints, file_joints)
     if reading.topic is not None:
         raise LinkwiseError("--topic goes with bags and files of arrays; leave it out")
     if suffix in DELIMITED:
@@ -117,5 +133,5 @@ def _opener(
             "this holds markers and force plates, not joints; give the .mot or .sto that inverse kinematics,"
             " as OpenSim's, makes of it"
         )
-    known = [*DELIMITED, *STORAGE, ".parquet", ".npz", *HDF5, *BAGS]
+    known = [*DELIMITED, *STORAGE, ".parquet", *ARRAYS, *BAGS]
     raise LinkwiseError(f"unknown suffix; give a {', '.join(known)} file, or a bag's folder")

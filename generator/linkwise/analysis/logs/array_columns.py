@@ -168,8 +168,8 @@ class ArrayColumns:
             why = why_wider(self.file_joints, width, len(self.joints))
             if why and not names:
                 raise LinkwiseError(
-                    f"array {array!r} is {self.found[array].shape}, and {there}: {why}; make q of it by"
-                    " robot.from_qpos of the package, and save that"
+                    f"array {array!r} is {self.found[array].shape}, and {there}: {why}; say whose it is,"
+                    " --qpos mujoco or --qpos pinocchio, or make q of it by robot.from_qpos of the package"
                 )
             raise LinkwiseError(
                 f"array {array!r} is {self.found[array].shape}, and {there}; name its columns in an array"
@@ -178,13 +178,17 @@ class ArrayColumns:
         return None
 
     def _names(self, array: str) -> tuple[str, ...]:
-        """The names of joints that stand nearest to an array, at it or above; none where there are none."""
-        for folder in (array, *folders_of(array)):
-            for word in NAMES:
-                found = self.found.get(f"{folder}/{word}".lstrip("/"))
-                if found is not None and found.texts:
-                    return found.texts
-        return ()
+        return names_beside(self.found, array)
+
+
+def names_beside(found: Mapping[str, StoredArray], array: str) -> tuple[str, ...]:
+    """The names of joints that stand nearest to an array, at it or above; none where there are none."""
+    for folder in (array, *folders_of(array)):
+        for word in NAMES:
+            has = found.get(f"{folder}/{word}".lstrip("/"))
+            if has is not None and has.texts:
+                return has.texts
+    return ()
 
 
 def array_columns(

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
-from linkwise.analysis.logs.array_columns import WORDS, Place, StoredArray, array_columns
+from linkwise.analysis.logs.array_columns import WORDS, ArrayColumns, Place, StoredArray, array_columns
 from linkwise.analysis.logs.named_once import named_once
 from linkwise.analysis.settings import Reading
 from linkwise.errors import within
@@ -39,7 +39,7 @@ class ArrayLog:
     places: Mapping[str, Place]
     size: int
     """Samples."""
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
     degrees: bool | None = None
     first_row: int = 1
 
@@ -55,17 +55,22 @@ class ArrayLog:
         found = source.found()
         with within(str(source.path)):
             columns = array_columns(found, reading.time, reading.topic, joints, file_joints)
-            time = reading.time or columns.time.rpartition("/")[2]
-            named_once((time, *columns.places))
-            places = {time: Place(columns.time, 0)} | columns.places
-            columns.check()
-            degrees = columns.degrees
+            log = cls.of(source, columns, reading.time)
         told = tuple(
             f"nothing names the columns of {array!r}: they are taken for the robot's joints {listed(joints)};"
             " add an array 'joint_names'"
             for array in columns.unnamed
         )
-        return cls(source, places, columns.samples, told, degrees)
+        return replace(log, warnings=told)
+
+    @classmethod
+    def of(cls, source: ArrayFile, columns: ArrayColumns, time: str | None) -> "ArrayLog":
+        """Columns that were found, the time by the name that was asked for; raises LinkwiseError likewise."""
+        called = time or columns.time.rpartition("/")[2]
+        named_once((called, *columns.places))
+        places = {called: Place(columns.time, 0)} | columns.places
+        columns.check()
+        return cls(source, places, columns.samples, degrees=columns.degrees)
 
     @property
     def path(self) -> Path:

@@ -18,6 +18,7 @@ from linkwise.robot.readers.osim_document import members, read_document
 from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of, yes
 from linkwise.robot.readers.osim_frames import GROUND, Frames, Placed, offset_of
 from linkwise.robot.readers.osim_joints import OsimJoint, from_ground
+from linkwise.robot.readers.osim_names import refuse_misspelt_names
 from linkwise.robot.readers.xml_names import Known, ignored, names
 from linkwise.robot.robot import Mat3, Vec3
 
@@ -53,6 +54,7 @@ BODY = Known(
 def read_osim(path: Path) -> Description:
     """Read a model; raises LinkwiseError naming the element and the remedy."""
     model, old = read_document(path)
+    refuse_misspelt_names(model)
     elements = [body for body in members(model, "BodySet") if name_of(body) != GROUND]
     if not elements:
         raise LinkwiseError(f"the model {name_of(model)!r} has no <Body>; give one that has some")

@@ -14,10 +14,11 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.description import ZERO3, Body, Description, FreeRoot, Site
-from linkwise.robot.readers.sdf_joints import YES, SdfJoint, sdf_joints
+from linkwise.robot.readers.sdf_joints import SdfJoint, sdf_joints
 from linkwise.robot.readers.sdf_poses import (
     WORLD,
     ModelPoses,
+    is_true,
     numbers_in,
     numbers_of,
     place_of,
@@ -89,7 +90,7 @@ def _model(root: Element) -> Element:
             raise LinkwiseError(
                 f"the model {model.get('name')!r} has a <{tag}>; write all in one model, without others in it"
             )
-    if text_of(model, "static") in YES:
+    if is_true(text_of(model, "static")):
         raise LinkwiseError(f"the model {model.get('name')!r} is <static>, and never moves; remove that")
     return model
 
@@ -102,7 +103,7 @@ def _body(link: Element, places: Mapping[str, Vec3]) -> Body:
         raise LinkwiseError(
             f"{place} has no <inertial>, which SDFormat takes for 1 kg and 1 kg m²; write it out"
         )
-    if inertial.get("auto") in YES:
+    if is_true(inertial.get("auto", "")):
         raise LinkwiseError(
             f"{place}: <inertial auto> is worked out of shapes by Gazebo; write the numbers out"
         )

@@ -13,6 +13,7 @@ from linkwise.robot.readers.sdf_poses import (
     WORLD,
     ModelPoses,
     Pose,
+    is_true,
     numbers_in,
     numbers_of,
     place_of,
@@ -30,7 +31,6 @@ DYNAMICS = {
 }
 ENDLESS = 1e16
 """SDFormat's own number for a limit that is none."""
-YES = ("true", "1")
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def _axis(
     if axis is None:
         return _numbers(transforms.rotate(own, (0.0, 0.0, 1.0)))
     numbers = numbers_of(axis, 3, place)
-    in_model = text_of(element, "axis/use_parent_model_frame") in YES
+    in_model = is_true(text_of(element, "axis/use_parent_model_frame"))
     if version < (1, 5) or in_model:
         return _numbers(numbers)
     seen_in = axis.get("expressed_in", "") if version >= (1, 7) else ""

@@ -129,8 +129,11 @@ class ModelPoses:
         return self._named[name]
 
     def _canonical_link(self) -> str:
-        """The link that the model's own frame is attached to: the first, unless the model names another."""
-        links = [name for name, element in self._named.items() if element.tag == "link"]
+        """The link that the model's own frame is attached to: the first, unless the model names another.
+
+        It is never one called as the world, which no model carries about.
+        """
+        links = [name for name, element in self._named.items() if element.tag == "link" and name != WORLD]
         named = self._whole.get("canonical_link")
         if named and named not in links:
             near = listed(nearest_first(named, links))
@@ -158,7 +161,7 @@ def pose_in(element: Element, place: str) -> Pose:
             raise LinkwiseError(f"{place}: <pose> has a quaternion of zeros; give 0 0 0 1 for no turn")
         rotation = transforms.from_quaternion(a / length, b / length, c / length, d / length)
     else:
-        degrees = pose.get("degrees", "false") in ("true", "1")
+        degrees = is_true(pose.get("degrees", ""))
         roll, pitch, yaw = (math.radians(e) if degrees else e for e in turn)
         rotation = transforms.from_rpy(roll, pitch, yaw)
     return Pose(transforms.snap(rotation), (x, y, z))
@@ -188,6 +191,11 @@ def numbers_in(element: Element, path: str, default: float, place: str) -> float
 def text_of(element: Element, tag: str) -> str:
     """Text of a child, empty without it."""
     return (element.findtext(tag) or "").strip()
+
+
+def is_true(text: str) -> bool:
+    """Whether a switch is on; SDFormat reads it in capitals, too."""
+    return text.strip().lower() in ("true", "1")
 
 
 def place_of(element: Element) -> str:

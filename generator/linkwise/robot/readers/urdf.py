@@ -52,6 +52,8 @@ def _origin(parent: Element, place: str) -> tuple[list[list[float]], tuple[float
     origin = parent.find("origin")
     if origin is None:
         origin = Element("origin")
+    if origin.get("quat_xyzw") is not None:
+        raise LinkwiseError(f"{place}: <origin> has quat_xyzw=…, which is not read; write the turn as rpy")
     roll, pitch, yaw = numbers(origin, "rpy", "0 0 0", 3, place)
     x, y, z = numbers(origin, "xyz", "0 0 0", 3, place)
     return transforms.from_rpy(roll, pitch, yaw), (x, y, z)

@@ -75,18 +75,18 @@ def _look_into(
         if local_name(tag) in here.idle:
             counts[local_name(tag)] += count
         elif tag not in read:
-            _refuse_misspelt(inside, f"<{short(tag)}>", tag, {f"<{name}>": name for name in read})
+            refuse_misspelt(inside, f"<{short(tag)}>", tag, {f"<{name}>": name for name in read})
             unknown[_shown(tag)] += count
     for name in element.attrib:
         if name not in here.attributes | here.idle:
-            _refuse_misspelt(inside, f"{short(name)}=…", name, {f"{a}=…": a for a in here.attributes})
+            refuse_misspelt(inside, f"{short(name)}=…", name, {f"{a}=…": a for a in here.attributes})
             unknown[f"{_shown(name)} of <{element.tag}>"] += 1
     for child in element:
         if child.tag in read:
             _look_into(child, known, f"{inside}, <{child.tag}>", counts, unknown)
 
 
-def _refuse_misspelt(place: str, shown: str, name: str, meant: dict[str, str]) -> None:
+def refuse_misspelt(place: str, shown: str, name: str, meant: dict[str, str]) -> None:
     """Raise LinkwiseError for a name near one that is meant, of those shown otherwise."""
     near = (
         (_distance(name.lower(), one.lower()), sorted(name) != sorted(one), as_shown, one)
