@@ -71,20 +71,11 @@ def overlay(robot: Any, joint: int, link: int | None, parts: Sequence[TorqueGrap
         joint,
         tuple(robot.link_names) if link is None else (robot.link_names[link],),
         link,
-        potential_word(_is_rigid(robot)),
+        potential_word(robot.backend.tree is not None),
         tuple(parts),
         nodes,
         {key: tuple(numbers) for key, numbers in users.items()},
     )
-
-
-def _is_rigid(robot: Any) -> bool:
-    """Whether a robot has bodies that are somewhere; links of energies are nowhere."""
-    try:
-        robot.kinematics  # noqa: B018
-    except ValueError:
-        return False
-    return True
 
 
 def part_label(graph: Overlay, part: int) -> str:
