@@ -27,7 +27,8 @@ from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.cli.app import app
 from linkwise.identification.base_parameters import base_parameters
-from linkwise.identification.identified_files import identified_files
+from linkwise.identification.identified_files import page
+from linkwise.identification.identified_robot import identified_robot
 from linkwise.identification.pseudo_inertia import pseudo_inertia
 from linkwise.identification.urdf_file import urdf_text
 from linkwise.package.load import import_package
@@ -184,9 +185,9 @@ def test_a_robot_on_a_floating_base_is_identified_without_the_grounds_forces(tmp
     # Friction there is none of is none, and not what the solver leaves.
     slight = found.physical.friction[6:, 1] / found.fit.friction_errors[6:, 1]
     assert ((slight == 0) | (slight >= 0.01)).all()
-    made = identified_files(found, Manifest.read(tmp_path / "crane"), {})
+    made, _ = identified_robot(found, Manifest.read(tmp_path / "crane"), None)
     assert made["crane.urdf"].count(b"<dynamics") == 3
-    assert b"Without friction, as what floats has no bearings: base_x, " in made["identified.md"]
+    assert "Without friction, as what floats has no bearings: base_x, " in page(found, ())
 
 
 def test_bodies_can_exist_where_least_squares_has_none(planar3: LoadedRobot, tmp_path: Path) -> None:
@@ -537,7 +538,7 @@ def test_springs_and_armatures_of_the_file_are_known_and_kept(tmp_path: Path) ->
     assert found.fit.friction == pytest.approx(np.array([[0.5, 0.2], [0.0, 0.0]]), abs=1e-3)
     assert (found.errors(found.unseen)["bodies"] < 1e-2).all()
     manifest = Manifest.read(tmp_path / "arm")
-    (tmp_path / "again.urdf").write_bytes(identified_files(found, manifest, {})["test.urdf"])
+    (tmp_path / "again.urdf").write_bytes(identified_robot(found, manifest, None)[0]["test.urdf"])
     kept = {axis.joint: axis.own for axis in read_robot(tmp_path / "again.urdf").passive}
     assert kept["ab"].armature == 0.125
     assert (kept["bc"].stiffness, kept["bc"].rest) == (3.0, 0.25)

@@ -18,6 +18,7 @@ BROUGHT_BY = {
     "rosbags": "logs",
     "scipy": "motion",
     "spm1d": "spm",
+    "tomlkit": "identify",
     "torch": "torch",
     "xarray": "names",
 }

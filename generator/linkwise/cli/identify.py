@@ -34,8 +34,8 @@ from linkwise.cli.robot_option import RobotOption, opened_robot
 from linkwise.escape import json_text, listed
 from linkwise.identification import Fitting, Identification
 from linkwise.identification import identify as identified
-from linkwise.identification.identified_files import identified_files, lost, record
-from linkwise.identification.own_urdf import OwnUrdf
+from linkwise.identification.identified_files import identified_files, record
+from linkwise.identification.identified_robot import identified_robot, own_file
 from linkwise.output import require_writable, write_files
 from linkwise.package.write import refuse_inside_package
 from linkwise.progress import progress as shown_progress
@@ -94,7 +94,7 @@ def identify(
     processing = chosen_processing(derivative, window, degree, lowpass, "trim")
     without = tuple(unmeasured or [])
     fitting = Fitting(pairs("--torque", torque or []), torque_factor, friction, unseen, without)
-    own = OwnUrdf.of(robot)
+    own = own_file(robot)
     if own is not None:
         own.refuse_to_overwrite(out)
     with shown_progress() as progress:
@@ -104,9 +104,10 @@ def identify(
     with shown_progress(UNITS) as progress:
         found = identified(log, package, reading, processing, fitting, progress)
     manifest = package.package.manifest
-    found = replace(found, warnings=(*found.warnings, *lost(found, manifest, own)))
+    of_robot, lost = identified_robot(found, manifest, own)
+    found = replace(found, warnings=(*found.warnings, *lost))
     chosen = choices(reading, processing) | {"fitting": asdict(fitting)}
-    files = write_files(out, identified_files(found, manifest, chosen, own))
+    files = write_files(out, identified_files(found, manifest, chosen, lost) | of_robot)
     for warning in found.warnings:
         tell(f"warning: {log}: {warning}", err=True)
     if found.log.ignored:

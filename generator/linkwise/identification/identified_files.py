@@ -1,7 +1,4 @@
-"""The files of an identification: a record, a page, and the robot.
-
-The robot is the user's own URDF file written back, or else one of the package, its loops beside it.
-"""
+"""The record and the page of an identification."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -10,11 +7,8 @@ import numpy as np
 
 from linkwise.escape import json_text, markdown
 from linkwise.identification.base_parameters import NAMES, UNITS
-from linkwise.identification.constraint_file import constraint_text
 from linkwise.identification.identification_result import Identification
-from linkwise.identification.own_urdf import OwnUrdf
 from linkwise.identification.pseudo_inertia import central
-from linkwise.identification.urdf_file import lost_gravity, urdf_text
 from linkwise.package.manifest import Manifest
 
 COEFFICIENTS = {"rad": ("N m s/rad", "N m"), "m": ("N s/m", "N")}
@@ -22,36 +16,13 @@ COEFFICIENTS = {"rad": ("N m s/rad", "N m"), "m": ("N s/m", "N")}
 
 
 def identified_files(
-    found: Identification, manifest: Manifest, choices: dict[str, Any], own: OwnUrdf | None = None
+    found: Identification, manifest: Manifest, choices: dict[str, Any], lost: Sequence[str]
 ) -> dict[str, bytes]:
-    """The files, by name; `choices` are recorded, and `own` is the file that the package was made of."""
+    """The record and the page; `choices` are recorded, `lost` is what the robot's file does not say."""
     assert manifest.tree is not None
     about = record(found) | {"gravity": list(manifest.tree.gravity), "choices": choices}
-    texts = {
-        "identified.json": json_text(about, indent=1) + "\n",
-        "identified.md": page(found, lost(found, manifest, own)),
-    }
-    pi = dict(zip(found.robot.links, found.physical.pi, strict=True))
-    friction = found.frictions
-    files = {name: text.encode() for name, text in texts.items()}
-    if own is not None:
-        return files | {own.path.name: own.identified(manifest.tree, pi, friction)}
-    urdf = urdf_text(manifest.name, manifest.tree, manifest.joints, pi, friction)
-    files[f"{manifest.name}.urdf"] = urdf.encode()
-    if manifest.tree.tied:
-        files[f"{manifest.name}.toml"] = constraint_text(manifest.tree, manifest.joints).encode()
-    return files
-
-
-def lost(found: Identification, manifest: Manifest, own: OwnUrdf | None = None) -> tuple[str, ...]:
-    """What the robot's file does not say of what was identified, in words."""
-    assert manifest.tree is not None
-    if own is None:
-        return tuple(filter(None, [lost_gravity(manifest.tree)]))
-    return tuple(
-        f"{own.path.name} has no place for the friction of {joint}, part of a joint of several axes"
-        for joint in own.unwritten(found.frictions)
-    )
+    texts = {"identified.json": json_text(about, indent=1) + "\n", "identified.md": page(found, lost)}
+    return {name: text.encode() for name, text in texts.items()}
 
 
 def record(found: Identification) -> dict[str, Any]:

@@ -1,13 +1,11 @@
-"""An XML file's elements and their places in its bytes: a few attributes change, and all else stays."""
+"""An XML file's elements and their places in its bytes: a few numbers change, and all else stays."""
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
+from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
-from xml.sax.saxutils import quoteattr
-
-from linkwise.errors import LinkwiseError
+from xml.sax.saxutils import escape, quoteattr
 
 NAME = re.compile(rb"<[^\s/>]+")
 ATTRIBUTE = re.compile(rb"""\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")
@@ -23,91 +21,110 @@ class Edit(NamedTuple):
     text: bytes
 
 
-@dataclass(frozen=True)
-class PlacedElement:
-    """An element from byte `start` to `stop`; `inside` are the elements in it."""
+class ElementBytes(NamedTuple):
+    """Bytes of an element: its tag begins and ends, what is in it ends, and it ends.
 
-    tag: str
-    attributes: Mapping[str, str]
+    Of one that is closed at once, as <a/>, the tag ends behind its attributes, and so does what is in it.
+    """
+
     start: int
+    inside: int
+    inside_stop: int
     stop: int
-    inside: tuple["PlacedElement", ...]
 
-    def every(self, tag: str) -> tuple["PlacedElement", ...]:
-        """Those right inside it of a tag."""
-        return tuple(element for element in self.inside if element.tag == tag)
 
-    def first(self, tag: str) -> "PlacedElement | None":
-        """The first of them."""
-        return next(iter(self.every(tag)), None)
+class PlacedXml:
+    """A file that has been read as XML already, its `root`, and where its elements stand."""
+
+    def __init__(self, data: bytes, as_xml: bytes | None = None) -> None:
+        """as_xml: the same byte for byte at its place, where a reader takes what is not quite XML."""
+        self.data = data if as_xml is None else as_xml
+        reader = _Reader(self.data)
+        self.root, self._places = reader.root, reader.places
+        self._own = data
+
+    def with_attributes(self, element: Element, values: Mapping[str, str | None]) -> list[Edit]:
+        """Give an element these attributes, in their places or behind the others; None takes one away."""
+        at = _behind(NAME, self.data, self._places[element].start)
+        edits, left = [], dict(values)
+        while found := ATTRIBUTE.match(self.data, at):
+            at, key = found.end(), found[1].decode()
+            if key in left:
+                value = left.pop(key)
+                place = found.span() if value is None else found.span(2)
+                edits.append(Edit(*place, b"" if value is None else quoteattr(value).encode()))
+        more = "".join(f" {key}={quoteattr(value)}" for key, value in left.items() if value is not None)
+        return [*edits, Edit(at, at, more.encode())] if more else edits
+
+    def with_text(self, element: Element, text: str) -> Edit:
+        """Give an element that has no others in it this text; blanks around it stay."""
+        place = self._places[element]
+        if place.inside == place.inside_stop:
+            return self.with_children(element, [], text)
+        inside = self.data[place.inside : place.inside_stop]
+        start = place.inside + len(inside) - len(inside.lstrip())
+        return Edit(start, max(start, place.inside + len(inside.rstrip())), escape(text).encode())
+
+    def with_children(self, parent: Element, tags: Iterable[str], text: str = "") -> Edit:
+        """Put elements, as they are written, behind those of a parent, as far in as these are."""
+        place, last = self._places[parent], next(reversed(parent), None)
+        if last is not None:
+            own = self._places[last]
+            blanks = BLANKS.search(self.data, 0, own.start)
+            assert blanks is not None
+            return Edit(own.stop, own.stop, b"".join(blanks[0] + tag.encode() for tag in tags))
+        inside = escape(text).encode() + "".join(tags).encode()
+        if place.inside_stop < place.stop and self.data[place.inside_stop : place.inside_stop + 2] == b"</":
+            return Edit(place.inside_stop, place.inside_stop, inside)
+        return Edit(place.inside, place.stop, b">" + inside + f"</{parent.tag}>".encode())
+
+    def edited(self, edits: Iterable[Edit]) -> bytes:
+        """The file with edits that do not overlap."""
+        data = self._own
+        for edit in sorted(edits, reverse=True):
+            data = data[: edit.start] + edit.text + data[edit.stop :]
+        return data
 
 
 class _Reader:
-    """Gathers elements, the innermost first."""
+    """Builds the elements, and gathers where they stand."""
 
     def __init__(self, data: bytes) -> None:
-        self.data = data
+        self.data, self.places = data, dict[Element, ElementBytes]()
+        self.builder, self.open = TreeBuilder(), list[tuple[Element, int, int, bool]]()
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self.start
         self.parser.EndElementHandler = self.end
-        self.open: list[tuple[str, dict[str, str], int]] = []
-        self.inside: list[list[PlacedElement]] = [[]]
+        self.parser.CharacterDataHandler = self.builder.data
+        self.parser.Parse(data, True)
+        self.root: Element = self.builder.close()
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        self.open.append((tag, attributes, self.parser.CurrentByteIndex))
-        self.inside.append([])
-
-    def end(self, _: str) -> None:
-        (tag, attributes, start), inside = self.open.pop(), tuple(self.inside.pop())
-        tag_end = TAG_END.match(self.data, _behind_attributes(self.data, start))
+        at = _behind(NAME, self.data, start := self.parser.CurrentByteIndex)
+        while more := ATTRIBUTE.match(self.data, at):
+            at = more.end()
+        tag_end = TAG_END.match(self.data, at)
         assert tag_end is not None
-        at = tag_end.start() if tag_end[1] else self.parser.CurrentByteIndex
-        stop = self.data.index(b">", at) + 1
-        self.inside[-1].append(PlacedElement(tag, attributes, start, stop, inside))
+        closed = bool(tag_end[1])
+        self.open.append(
+            (self.builder.start(tag, attributes), start, at if closed else tag_end.end(), closed)
+        )
+
+    def end(self, tag: str) -> None:
+        element, start, inside, closed = self.open.pop()
+        self.builder.end(tag)
+        inside_stop = inside if closed else self.parser.CurrentByteIndex
+        self.places[element] = ElementBytes(
+            start, inside, inside_stop, self.data.index(b">", inside_stop) + 1
+        )
 
 
-def placed_elements(data: bytes) -> PlacedElement:
-    """The root of a file that has been read as XML already; raises LinkwiseError for UTF-16."""
-    if b"\0" in data:
-        raise LinkwiseError("not UTF-8 text, which alone is written back; save it as UTF-8")
-    reader = _Reader(data)
-    reader.parser.Parse(data, True)
-    return reader.inside[0][0]
-
-
-def with_attributes(data: bytes, element: PlacedElement, values: Mapping[str, str]) -> list[Edit]:
-    """Give an element these attributes: in their places where it has them, else behind the others."""
-    name = NAME.match(data, element.start)
-    assert name is not None
-    edits, left, at = [], dict(values), name.end()
-    while found := ATTRIBUTE.match(data, at):
-        at = found.end()
-        if (value := left.pop(found[1].decode(), None)) is not None:
-            edits.append(Edit(found.start(2), found.end(2), quoteattr(value).encode()))
-    more = "".join(f" {key}={quoteattr(value)}" for key, value in left.items())
-    return [*edits, Edit(at, at, more.encode())] if more else edits
-
-
-def with_child(data: bytes, parent: PlacedElement, tag: str, values: Mapping[str, str]) -> Edit:
-    """Put an element behind those of a parent that has some, on a line of its own where they have lines."""
-    last = parent.inside[-1]
-    blanks = BLANKS.search(data, 0, last.start)
-    assert blanks is not None
-    attributes = "".join(f" {key}={quoteattr(value)}" for key, value in values.items())
-    return Edit(last.stop, last.stop, blanks[0] + f"<{tag}{attributes}/>".encode())
-
-
-def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
-    """The file with edits that do not overlap."""
-    for edit in sorted(edits, reverse=True):
-        data = data[: edit.start] + edit.text + data[edit.stop :]
-    return data
-
-
-def _behind_attributes(data: bytes, start: int) -> int:
-    found = NAME.match(data, start)
+def _behind(pattern: re.Pattern[bytes], data: bytes, start: int) -> int:
+    found = pattern.match(data, start)
     assert found is not None
-    at = found.end()
-    while more := ATTRIBUTE.match(data, at):
-        at = more.end()
-    return at
+    return found.end()
+
+
+def tag(name: str, values: Mapping[str, str]) -> str:
+    """An element as it is written, with attributes only."""
+    return f"<{name}{''.join(f' {key}={quoteattr(value)}' for key, value in values.items())}/>"

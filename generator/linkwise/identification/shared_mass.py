@@ -25,7 +25,7 @@ def shared_mass(own: Array, wanted: Array) -> Array:
     shared = np.zeros_like(links)
     if whole[3, 3] > 0.0:
         stretch = _least_map(whole, wanted)
-        shared = stretch @ links @ stretch.T
+        shared = _that_can_exist(stretch @ links @ stretch.T)
     # What flat bodies leave, and rounding.
     shared[int(own[:, 3, 3].argmax())] += wanted - shared.sum(0)
     return shared
@@ -51,7 +51,7 @@ def _about_centre(j: Array) -> tuple[Array, Array]:
 
 
 def _that_can_exist(own: Array) -> Array:
-    """The links, without second moments below zero, which files round flat bodies to."""
+    """The links, without second moments below zero, to which flat bodies are rounded."""
     links = own.copy()
     for j in links:
         mass = j[3, 3]

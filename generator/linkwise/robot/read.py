@@ -1,9 +1,11 @@
 """Reading a robot, whatever describes it: a built-in name or a file."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
+from typing import TypeAlias
 
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import is_file, require_file
@@ -21,13 +23,17 @@ from linkwise.robot.readers.urdf import read_urdf, root_tag
 from linkwise.robot.readers.xml_file import XACRO
 from linkwise.robot.robot import Robot
 
+Reader: TypeAlias = Callable[[Path], Description]
+XML: dict[str, Reader] = {"mujoco": read_mjcf, "sdf": read_sdf}
+"""What reads a file by its root element, which is a URDF file's if it is another."""
+
 
 def read_xml(path: Path) -> Description:
     """Read MJCF or SDFormat where the root element says so, else URDF."""
-    return {"mujoco": read_mjcf, "sdf": read_sdf}.get(root_tag(path), read_urdf)(path)
+    return XML.get(root_tag(path), read_urdf)(path)
 
 
-READERS = {
+READERS: dict[str, Reader] = {
     ".toml": read_toml,
     ".urdf": read_urdf,
     ".sdf": read_sdf,
@@ -76,6 +82,12 @@ def _read_robot(spec: str | Path, options: Options) -> Robot:
         return _built(description, options)
 
 
+def reader_of(path: Path) -> Reader | None:
+    """What reads a file; None for one that is none of a robot."""
+    reader = READERS.get(path.suffix.lower())
+    return XML.get(root_tag(path), read_urdf) if reader is read_xml else reader
+
+
 def is_built_in(spec: str | Path) -> bool:
     """Whether a name is that of a built-in robot."""
     return str(spec) in FILES or re.fullmatch(r"planar([1-9][0-9]*)", str(spec)) is not None
@@ -90,7 +102,7 @@ def robot_files(spec: str | Path, options: Options) -> tuple[Path, ...]:
     """Files that a robot is read from, with those that they include; a built-in has none."""
     path = Path(spec)
     own: tuple[Path, ...] = () if is_built_in(spec) else (path,)
-    if own and READERS.get(path.suffix.lower()) is read_xml and root_tag(path) == "mujoco":
+    if own and reader_of(path) is read_mjcf:
         own = tuple(dict.fromkeys((path, *mjcf_files(path))))
     return own if options.constraints is None else (*own, Path(options.constraints))
 

@@ -4,9 +4,11 @@ A hinge's or slide's coordinate is its qpos. Where MuJoCo has a quaternion, a ba
 and a free joint by those after x, y, z of the world.
 """
 
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from warnings import catch_warnings, simplefilter
 
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
@@ -27,7 +29,16 @@ TYPES = ("floating", "ball", "prismatic", "revolute")
 def read_mjcf(path: Path) -> Description:
     """Read a robot; raises LinkwiseError with MuJoCo's own words, or when MuJoCo is missing."""
     mujoco = extra("mujoco")
-    model, warnings = _compiled(mujoco, path)
+    return _described(mujoco, path, *_compiled(mujoco, path))
+
+
+def read_mjcf_text(path: Path, text: bytes) -> Description:
+    """Read a robot as if the file had another text; raises LinkwiseError as `read_mjcf` does."""
+    mujoco = extra("mujoco")
+    return _described(mujoco, path, *_compiled(mujoco, path, text))
+
+
+def _described(mujoco: Any, path: Path, model: Any, warnings: list[str]) -> Description:
     bodies, connections = [Body(_name(model, 0))], list[Connection]()
     for number in range(1, model.nbody):
         chain, body = _body(mujoco, model, number)
@@ -66,13 +77,27 @@ def mjcf_files(path: Path) -> tuple[Path, ...]:
     return tuple(Path(name) for name in mujoco.mju_getXMLDependencies(str(path)))
 
 
-def _compiled(mujoco: Any, path: Path) -> tuple[Any, list[str]]:
-    """Compiled model, and MuJoCo's warnings, which it would write into a file in the working directory."""
+def _compiled(mujoco: Any, path: Path, text: bytes | None = None) -> tuple[Any, list[str]]:
+    """Compiled model, and MuJoCo's warnings, which it would write into a file in the working directory.
+
+    text: what stands in the file's place
+    """
     warnings: list[str] = []
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(warnings.append)
     try:
-        return mujoco.MjModel.from_xml_path(str(path)), warnings
+        if text is None:
+            return mujoco.MjModel.from_xml_path(str(path)), warnings
+        included = [
+            own for own in mjcf_files(path) if own.suffix == ".xml" and own.resolve() != path.resolve()
+        ]
+        spec = mujoco.MjSpec.from_string(
+            text.decode(), {os.path.relpath(own, path.parent): own.read_bytes() for own in included}
+        )
+        spec.modelfiledir = str(path.parent)
+        with catch_warnings(record=True) as noted:
+            simplefilter("always")
+            return spec.compile(), [*warnings, *(str(one.message) for one in noted)]
     except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         told = "; ".join(" ".join(text.split()) for text in (str(error), *warnings))
         raise LinkwiseError(f"MuJoCo cannot compile it: {told}") from None
@@ -159,7 +184,7 @@ def _joints(mujoco: Any, model: Any, number: int, body: str) -> list[_Joint]:
         x, y, z = map(float, model.jnt_axis[index])
         joints.append(
             _Joint(
-                model.joint(index).name or f"{body}_joint{index - first + 1 if count > 1 else ''}",
+                joint_name(model.joint(index).name, body, index - first, count),
                 kind,
                 (x, y, z),
                 _vector(model.jnt_pos[index]),
@@ -171,8 +196,18 @@ def _joints(mujoco: Any, model: Any, number: int, body: str) -> list[_Joint]:
     return joints
 
 
+def joint_name(name: str, body: str, at: int, count: int) -> str:
+    """What the joint `at` of a body's `count` is called: its name in the file, if it has one."""
+    return name or f"{body}_joint{at + 1 if count > 1 else ''}"
+
+
+def body_name(name: str, number: int) -> str:
+    """What a body is called that MuJoCo counts as `number`: its name in the file, if it has one."""
+    return name or f"body{number}"
+
+
 def _name(model: Any, number: int) -> str:
-    return model.body(number).name or f"body{number}"
+    return body_name(model.body(number).name, number)
 
 
 def _vector(a: Any) -> Vec3:

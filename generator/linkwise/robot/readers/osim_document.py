@@ -13,6 +13,7 @@ from linkwise.robot.readers.xml_file import parse
 LARGEST = 64 * MIB
 """Models of a whole spine have hundreds of muscles."""
 COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+BLACK = re.compile(rb"[^\n]")
 CLASS_OF_CLASS = re.compile(rb"(</?\w+)::")
 """As in <HuntCrossleyForce::ContactParametersSet>, which OpenSim writes and XML forbids."""
 
@@ -54,8 +55,11 @@ def read_document(path: Path) -> tuple[Element, bool]:
 
 
 def as_xml(data: bytes) -> bytes:
-    """What OpenSim reads although it is no XML: hyphens in comments, colons in tags, another encoding."""
-    mended = CLASS_OF_CLASS.sub(rb"\1.", COMMENT.sub(b"", data))
+    """What OpenSim reads although it is no XML: hyphens in comments, colons in tags, another encoding.
+
+    What is mended stays as long as it was, so that every element keeps its place, but in another encoding.
+    """
+    mended = CLASS_OF_CLASS.sub(rb"\1..", COMMENT.sub(lambda found: BLACK.sub(b" ", found[0]), data))
     try:
         mended.decode("utf-8")
     except UnicodeDecodeError:

@@ -1,0 +1,62 @@
+"""The robot that was identified: the user's own file written back, or a URDF file of the package.
+
+The latter has its loops beside it, as a file of constraints.
+"""
+
+from pathlib import Path
+
+from linkwise.errors import within
+from linkwise.identification.constraint_file import constraint_text
+from linkwise.identification.identification_result import Identification
+from linkwise.identification.own_file import NotWrittenBack, OwnFile
+from linkwise.identification.own_mjcf import OwnMjcf
+from linkwise.identification.own_osim import OwnOsim
+from linkwise.identification.own_sdf import OwnSdf
+from linkwise.identification.own_toml import OwnToml
+from linkwise.identification.own_urdf import OwnUrdf
+from linkwise.identification.urdf_file import lost_gravity, urdf_text
+from linkwise.package.manifest import Manifest
+from linkwise.robot.read import Reader, reader_of
+from linkwise.robot.readers.mjcf import read_mjcf
+from linkwise.robot.readers.osim import read_osim
+from linkwise.robot.readers.sdf import read_sdf
+from linkwise.robot.readers.toml import read_toml
+from linkwise.robot.readers.urdf import read_urdf
+
+KINDS: dict[Reader, type[OwnFile]] = {
+    read_mjcf: OwnMjcf,
+    read_osim: OwnOsim,
+    read_sdf: OwnSdf,
+    read_toml: OwnToml,
+    read_urdf: OwnUrdf,
+}
+"""Files by what reads them."""
+
+
+def own_file(robot: Path) -> OwnFile | None:
+    """What `--robot` names, if it is a robot's file; raises LinkwiseError where that cannot be read."""
+    if not robot.is_file():
+        return None
+    with within(str(robot)):
+        reader = reader_of(robot)
+        return None if reader is None else KINDS[reader](robot, robot.read_bytes(), reader(robot))
+
+
+def identified_robot(
+    found: Identification, manifest: Manifest, own: OwnFile | None
+) -> tuple[dict[str, bytes], tuple[str, ...]]:
+    """Its files by name, and what they do not say, in words; `own` is what the package was made of."""
+    assert manifest.tree is not None
+    pi = dict(zip(found.robot.links, found.physical.pi, strict=True))
+    lost = []
+    if own is not None:
+        try:
+            written = own.identified(manifest.tree, pi, found.frictions)
+            return {own.path.name: written}, tuple(own.lost(found.frictions))
+        except NotWrittenBack as error:
+            lost.append(f"{error}; {manifest.name}.urdf is a new file")
+    urdf = urdf_text(manifest.name, manifest.tree, manifest.joints, pi, found.frictions)
+    files = {f"{manifest.name}.urdf": urdf.encode()}
+    if manifest.tree.tied:
+        files[f"{manifest.name}.toml"] = constraint_text(manifest.tree, manifest.joints).encode()
+    return files, (*lost, *filter(None, [lost_gravity(manifest.tree)]))

@@ -1,0 +1,63 @@
+"""A robot in TOML with other inertias and friction: numbers, where there were formulas too."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from linkwise.escape import listed
+from linkwise.extras import extra
+from linkwise.identification.own_file import Friction, LinkMass, OwnFile
+from linkwise.package.load import Array
+from linkwise.robot.readers.toml import INERTIA
+from linkwise.robot.readers.toml_table import toml_data
+
+KEYS = ("mass", "com", "inertia")
+LINE_END = re.compile(rb"(?<!\r)\n")
+BOM = b"\xef\xbb\xbf"
+
+
+class OwnToml(OwnFile):
+    """New numbers in mass, com and inertia of [[link]], damping and friction of [[joint]]."""
+
+    def written(self, links: Mapping[str, LinkMass], friction: Friction) -> bytes:
+        """See OwnFile."""
+        document = extra("tomlkit").parse(self.data.removeprefix(BOM).decode())
+        for link in document["link"]:
+            if (carried := links.get(link["name"])) is not None:
+                _carry(link, carried)
+        for joint in document.get("joint", ()):
+            for what, text in friction.get(joint["name"], {}).items():
+                joint[what] = float(text)
+        written: bytes = document.as_string().encode()
+        if b"\r\n" in self.data:
+            written = LINE_END.sub(b"\r\n", written)  # new lines end as the others do
+        return (BOM if self.data.startswith(BOM) else b"") + written
+
+    def lost(self, friction: Mapping[str, Array]) -> Iterator[str]:
+        """See OwnFile."""
+        yield from super().lost(friction)
+        formulas = [
+            link["name"]
+            for link in toml_data(self.path).get("link", ())
+            if any(isinstance(value, str) for key in KEYS for value in _values(link.get(key, 0.0)))
+        ]
+        if formulas:
+            yield (
+                f"{self.path.name} had formulas in mass, com or inertia of {listed(formulas)}, in whose "
+                "place there are numbers"
+            )
+
+
+def _values(said: Any) -> Iterable[Any]:
+    return said.values() if isinstance(said, dict) else said if isinstance(said, list) else (said,)
+
+
+def _carry(link: Any, carried: LinkMass) -> None:
+    link["mass"] = carried.mass
+    if "com" in link or carried.com.any():
+        link["com"] = carried.com.tolist()
+    moments = {e: float(carried.inertia["xyz".index(e[0]), "xyz".index(e[1])]) for e in INERTIA}
+    own = link.setdefault("inertia", extra("tomlkit").inline_table())
+    for key, value in moments.items():
+        if value or key in own:
+            own[key] = value
