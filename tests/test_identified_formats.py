@@ -266,6 +266,12 @@ def test_where_mujoco_would_make_something_else_of_it_a_new_file_is_written_and_
     np.testing.assert_allclose(arm.model.inverse_dynamics(q, qd, qdd), torque, atol=2e-3 * abs(torque).max())
 
 
+def test_of_a_file_that_mujoco_reads_although_it_is_no_xml_a_new_one_is_written(tmp_path: Path) -> None:
+    _, warnings = identified(tmp_path / "a", "arm.mjcf", MJCF.replace("weighed", "weighed -- well"))
+    assert warnings[0].startswith("arm.mjcf is not quite XML (")
+    assert (tmp_path / "a/out/arm.urdf").exists()
+
+
 def test_files_that_mujoco_includes_are_found_and_told(tmp_path: Path) -> None:
     (tmp_path / "a/parts").mkdir(parents=True)
     defaults, text = MJCF[MJCF.index("  <default>") : MJCF.index("  <worldbody>")], MJCF

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
+from xml.parsers.expat import ExpatError
 
 import numpy as np
 
@@ -89,7 +90,10 @@ class OwnFile(ABC):
                 own = joint.passive.damping, joint.passive.friction
                 found = zip(("damping", "friction"), friction[joint.name].tolist(), own, strict=True)
                 rubs[joint.name] = {what: f"{new:.6g}" for what, new, old in found if new or old}
-        return self.written(links, rubs)
+        try:
+            return self.written(links, rubs)
+        except ExpatError as error:
+            raise NotWrittenBack(f"{self.path.name} is not quite XML ({error}); mend that") from None
 
     def lost(self, friction: Mapping[str, Array]) -> Iterator[str]:
         """What the file, written back, does not say of what was identified, or asks of its user, in words."""
