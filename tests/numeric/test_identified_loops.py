@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from linkwise import Fitting, LinkwiseError, Options, generate, identify, read_system, write_package
 from linkwise.analysis.loaded_robot import load_robot
-from linkwise.identification.identified_files import identified_files
+from linkwise.identification.identified_robot import identified_robot
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 
@@ -119,8 +119,9 @@ def test_links_of_a_closed_mechanism_are_found_and_predict_another_motion(
     predicted = y[..., list(found.base.picked)] @ found.fit.beta + rubbed
     assert np.abs(predicted - torque).max() <= LIMIT * np.abs(torque).max()
     # The files are the same mechanism with these bodies.
-    files = identified_files(found, Manifest.read(driven.package), {})
-    assert {f"{name}.urdf", f"{name}.toml"} < set(files)
+    files, lost = identified_robot(found, Manifest.read(driven.package), None)
+    assert set(files) == {f"{name}.urdf", f"{name}.toml"}
+    assert all(words.startswith("a URDF file has no gravity") for words in lost)
     for file, text in files.items():
         (tmp_path / file).write_bytes(text)
     given = Options(constraints=tmp_path / f"{name}.toml")
