@@ -157,9 +157,12 @@ def test_long_arms_are_controlled_in_single_precision(count: int, tmp_path: Path
     robot = package.load("native")
     target = package.Target(pose=robot.kinematics.pose(q + 0.01, f"link{count}"))
     expected = package.load("numpy").partial_impedance(frame=frame)(q, qd, target)
-    for kind, bound in ((np.float64, 1e-9), (np.float32, 1e-2)):
-        found = robot.partial_impedance(frame=frame)(q.astype(kind), qd.astype(kind), target)
-        assert relative_error(found, expected) <= bound
+    control = robot.partial_impedance(frame=frame)
+    assert relative_error(control(q, qd, target), expected) <= 1e-9
+    # Torques are better known than these.
+    with pytest.warns(RuntimeWarning, match="float32 knows the accelerations"):
+        found = control(q.astype(np.float32), qd.astype(np.float32), target)
+    assert relative_error(found, expected) <= 1e-5
 
 
 def test_a_controller_maps_over_samples(package_of: Packages) -> None:
