@@ -26,7 +26,7 @@ static inline int accelerate(const struct sample *s, const real *q, const real *
     if (singular)
         return singular;
     copy(N, force, qdd);
-    return weakest.left < F(sqrt)(EPSILON) ? -1 - weakest.column : 0;
+    return -vague(&weakest);
 }
 
 int API(forward_dynamics)(UNDER_TORQUE, real *qdd)

@@ -37,10 +37,11 @@ INLINE void transposed_times(int rows, int length, const real *a, const real *y,
     copy((size_t)length, sum, product);
 }
 
-/* Returns 0, the joint at which H is not positive, or - the row along which the frame cannot move, both from 1. Rows of turns
-   are judged together, and so are those of places: by how far joints would move the frame, were they alone. */
+/* Returns 0, the joint at which H is not positive, or - the row along which the frame cannot move, both from 1. Whether it
+   moves at all along rows of turns is judged by all of them together, and so of places: by how far joints would move the frame,
+   were they alone. `joint` and `row`, given as {0, 1}, say how well that is known. */
 static inline int frame_moved(const struct sample *s, const API(frame_impedance) * wanted, vector at, const real *mass,
-    struct frame_motion *out)
+    struct frame_motion *out, struct pivot *joint, struct pivot *row)
 {
     real j[6 * N], rate[6 * N], mobility[36] = {0}, size[LARGEST], reach[2] = {0, 0};
     const int carrier = named_frames[wanted->frame].frame;
@@ -64,7 +65,7 @@ static inline int frame_moved(const struct sample *s, const API(frame_impedance)
     for (int k = 0; k < N; ++k)
         for (int r = 0; r < 6; ++r)
             out->moved[k * 6 + r] = out->jacobian[r * N + k];
-    int fault = eliminate(0, N, 6, size, mass, out->moved, NULL);
+    int fault = eliminate(0, N, 6, size, mass, out->moved, joint);
     if (fault)
         return fault;
     for (int r = 0; r < 6; ++r) {
@@ -72,10 +73,11 @@ static inline int frame_moved(const struct sample *s, const API(frame_impedance)
         transposed_times(N, 6, out->moved, out->jacobian + r * N, mobility + r * 6);
         if (r >= wanted->rows)
             mobility[r * 6 + r] = 1;
-        const real own = mobility[r * 6 + r], all = r < wanted->rows ? reach[wanted->row[r] >= 3] : 1;
-        size[r] = own > all ? own : all;
+        size[r] = mobility[r * 6 + r];
+        if (r < wanted->rows && !(size[r] > ROUNDING(6) * reach[wanted->row[r] >= 3]))
+            return -1 - r;
     }
-    fault = eliminate(0, 6, 6, size, mobility, out->inertia, NULL);
+    fault = eliminate(0, 6, 6, size, mobility, out->inertia, row);
     for (int r = 0; r < 6; ++r)
         for (int k = 0; k < r; ++k)
             out->inertia[r * 6 + k] = out->inertia[k * 6 + r];
@@ -83,13 +85,13 @@ static inline int frame_moved(const struct sample *s, const API(frame_impedance)
 }
 
 /* nud - nud_d, which M_e is to have, from - B_e (nu - nu_d) - E' K_e x + F; returns 0, -7, or - the row, from 1, at which M_e
-   is not positive. */
+   is not positive. `weakest`, given as {0, 1}, says how well it is known where M_e is more than a share of L. */
 static inline int frame_acceleration(const struct sample *s, const API(frame_impedance) * wanted, const real *target, vector at,
-    const struct frame_motion *frame, const real *velocity, const real *external, real *out)
+    const struct frame_motion *frame, const real *velocity, const real *external, real *out, struct pivot *weakest)
 {
     const int rows = wanted->rows;
     const real still[N] = {0};
-    real inertia[36], force[6], share[6] = {0};
+    real natural[36], inertia[36], force[6], share[6] = {0};
     clear(6, out);
     resist(rows, wanted->damping, velocity, out);
     if (wanted->stiffness && pull(s, wanted, target, at, out))
@@ -113,12 +115,13 @@ static inline int frame_acceleration(const struct sample *s, const API(frame_imp
     for (int r = 0; r < 6; ++r) {
         out[r] += force[r];
         for (int k = 0; k < 6; ++k)
-            inertia[r * 6 + k] = r < rows && k < rows ? wanted->keep_inertia * frame->inertia[r * 6 + k] : r == k;
+            natural[r * 6 + k] = r < rows && k < rows ? wanted->keep_inertia * frame->inertia[r * 6 + k] : r == k;
     }
+    copy(36, natural, inertia);
     for (int r = 0; wanted->inertia && r < rows; ++r)
         for (int k = 0; k < rows; ++k)
             inertia[r * 6 + k] += wanted->inertia[r * rows + k];
-    return -solve(0, 6, frame->inertia, inertia, out);
+    return -solve(0, 6, natural, inertia, out, wanted->inertia ? weakest : NULL);
 }
 
 int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const real *q_d, const real *qd_d, const real *qdd_d,
@@ -129,6 +132,7 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
     const int rows = wanted->rows;
     struct deviation from;
     struct frame_motion frame;
+    struct pivot joint[2] = {{0, 1}, {0, 1}}, row[2] = {{0, 1}, {0, 1}};
     real mass[N * N], kept[N * N], force[N], qdd[N], torque[N], velocity[6], asked[6], change[6], follows[6];
     OFFSETS(o);
     SAMPLE(s);
@@ -136,18 +140,18 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
         posture = &natural;
     deviate(q, qd, q_d, qd_d, qdd_d, &from);
     wish(&s, posture, &from, 1, mass, kept, force);
-    int fault = wanted_acceleration(&s, posture, &from, mass, kept, external, NULL, force, qdd);
+    int fault = wanted_acceleration(&s, posture, &from, mass, kept, external, NULL, force, qdd, &joint[0]);
     if (fault)
         return fault;
     const vector at = place_of(&s.m, wanted->frame, o, wanted->point);
-    fault = frame_moved(&s, wanted, at, mass, &frame);
+    fault = frame_moved(&s, wanted, at, mass, &frame, &joint[1], &row[0]);
     if (fault)
         return fault;
     times(6, N, frame.jacobian, qd, velocity);
     for (int r = 0; velocity_d && r < rows; ++r)
         velocity[r] -= velocity_d[wanted->row[r]];
     const vector there = place_in_world(&s, wanted->frame, o, wanted->point, q);
-    fault = frame_acceleration(&s, wanted, pose_d, there, &frame, velocity, external, asked);
+    fault = frame_acceleration(&s, wanted, pose_d, there, &frame, velocity, external, asked, &row[1]);
     if (fault)
         return fault;
     for (int r = 0; acceleration_d && r < rows; ++r)
@@ -164,5 +168,7 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
     add_smooth_friction(qd, posture->friction_width, torque);
     for (int i = 0; external && i < N; ++i)
         torque[i] -= external[i];
-    return command(torque, tau);
+    const int moving = vague(&joint[0]) ? vague(&joint[0]) : vague(&joint[1]);
+    const int along = vague(&row[0]) ? vague(&row[0]) : vague(&row[1]);
+    return command(torque, moving ? -7 - moving : along ? -7 - N - along : 0, tau);
 }

@@ -224,8 +224,9 @@ typedef struct {
    beside (v), and `external` (f). To cancel motions alone, leave q_d, qd_d, qdd_d and stiffness NULL, have weights 0 for
    them and `regular` 1: tau is then v, what they ask for, and g.
    Returns 0, or the number of a joint, from 1: where M* is not positive along it and those before it, or not regular, or
-   its torque is not finite; tau is then as it was. With all inertia kept and none added, f takes no part, M* is not
-   looked at, and a call costs about as much as inverse dynamics.
+   its torque is not finite; tau is then as it was. Near there, where rounding leaves fewer than half of the digits of qdd, it
+   writes tau and returns the number of such a joint, negative, as forward_dynamics does of M. With all inertia kept and none
+   added, f takes no part, M* is not looked at, and a call costs about as much as inverse dynamics.
    Reads q, qd (JOINTS), q_d, qd_d, qdd_d, task, external (JOINTS); writes tau (JOINTS). */
 int planar3_partial_impedance(const double *q, const double *qd, const planar3_impedance *wanted,
     const double *q_d, const double *qd_d, const double *qdd_d, const double *task, const double *external, double *tau);
@@ -253,7 +254,8 @@ typedef struct {
    for zeros; both are of the point, and all six are there, whichever rows count.
    Returns 0; the number of a joint, as above, also where H is not positive; - the number of a row, from 1, along which the
    frame cannot move beside those before it, or its M_e is not positive; or -7 where the frame is half a turn away from a
-   pose_d to which it is to turn. tau is then as it was.
+   pose_d to which it is to turn. tau is then as it was. Below -7 tau is written, and fewer than half of the digits are known:
+   -7 - the number of a joint, as above, or -7 - JOINTS - the number of a row, as near where the frame cannot move along it.
    Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
    velocity_d, acceleration_d (6); writes tau (JOINTS). */
 int planar3_frame_partial_impedance(const double *q, const double *qd, const planar3_impedance *posture,
@@ -388,8 +390,9 @@ typedef struct {
    beside (v), and `external` (f). To cancel motions alone, leave q_d, qd_d, qdd_d and stiffness NULL, have weights 0 for
    them and `regular` 1: tau is then v, what they ask for, and g.
    Returns 0, or the number of a joint, from 1: where M* is not positive along it and those before it, or not regular, or
-   its torque is not finite; tau is then as it was. With all inertia kept and none added, f takes no part, M* is not
-   looked at, and a call costs about as much as inverse dynamics.
+   its torque is not finite; tau is then as it was. Near there, where rounding leaves fewer than half of the digits of qdd, it
+   writes tau and returns the number of such a joint, negative, as forward_dynamics does of M. With all inertia kept and none
+   added, f takes no part, M* is not looked at, and a call costs about as much as inverse dynamics.
    Reads q, qd (JOINTS), q_d, qd_d, qdd_d, task, external (JOINTS); writes tau (JOINTS). */
 int planar3_partial_impedancef(const float *q, const float *qd, const planar3_impedancef *wanted,
     const float *q_d, const float *qd_d, const float *qdd_d, const float *task, const float *external, float *tau);
@@ -417,7 +420,8 @@ typedef struct {
    for zeros; both are of the point, and all six are there, whichever rows count.
    Returns 0; the number of a joint, as above, also where H is not positive; - the number of a row, from 1, along which the
    frame cannot move beside those before it, or its M_e is not positive; or -7 where the frame is half a turn away from a
-   pose_d to which it is to turn. tau is then as it was.
+   pose_d to which it is to turn. tau is then as it was. Below -7 tau is written, and fewer than half of the digits are known:
+   -7 - the number of a joint, as above, or -7 - JOINTS - the number of a row, as near where the frame cannot move along it.
    Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
    velocity_d, acceleration_d (6); writes tau (JOINTS). */
 int planar3_frame_partial_impedancef(const float *q, const float *qd, const planar3_impedancef *posture,

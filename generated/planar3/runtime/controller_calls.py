@@ -71,8 +71,8 @@ class ControllerCalls:
         passive, friction_width: as in `partial_impedance`
 
         Raises ValueError for what is not there, such as a joint that is not on the path of the link, or what
-        is named twice. Calls raise it where what is left has no regular mass matrix, unless they are given
-        qdd.
+        is named twice. Calls raise it where what is left has no regular mass matrix, and warn where rounding
+        leaves fewer than half of the digits of what follows from it, unless they are given qdd.
         """
         answers, named = self.backend.controls(self).cancellation(entries, passive, friction_width)
         return Cancellation(answers, named)

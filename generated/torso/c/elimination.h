@@ -26,11 +26,23 @@ static inline int largest_row(int n, int width, int c, const real *scale, const 
 }
 
 /* Of the joint whose pivot is the least beside its inertia, its column, and the part of its inertia that is left when all
-   others move freely; where far more than rounding is left, when those before it do. */
+   others move freely; where far more than rounding is left, when those before it do. Of a matrix that is not known to be
+   positive, what is left is 1 by the largest number of its inverse. */
 struct pivot {
     int column;
     real left;
 };
+
+/* Beside numbers of the size of 1: a pivot that is rounding, one that may be, and one by which half of the digits are lost. */
+#define ROUNDING(n) (4 * (real)(n) * EPSILON)
+#define SMALL (1000 * F(sqrt)(EPSILON))
+#define HALF F(sqrt)(EPSILON)
+
+/* 0, or the joint, from 1, by which fewer than half of the digits of a solution are known. */
+static inline int vague(const struct pivot *weakest)
+{
+    return weakest->left < HALF ? weakest->column + 1 : 0;
+}
 
 /* 1 / (a_cc (a^-1)_cc) of a positive a = L D L', of which rows hold D L' and 1 / D: (a^-1)_cc = y' D^-1 y, L y = e_c. */
 static inline real left_when_free(int n, int width, int c, real size, const real *rows)
@@ -48,12 +60,12 @@ static inline real left_when_free(int n, int width, int c, real size, const real
 
 /* x of a x = b: a (n, n), b (n, sides), which turns into x, of up to six sides. Where a is `regular` and not known to be
    positive, rows are taken in another order. Entry (i, k) is large or small beside the root of size[i] size[k]. Where a pivot
-   is rounding beside that, or of a positive matrix negative, or not a number, its column is the answer, counted from 1, and b
-   is as it was; otherwise the answer is 0. Of a positive matrix `weakest`, given as {0, 1}, is found, unless it is NULL: x is
-   known to a relative error of about EPSILON / left. */
+   or what is left is rounding beside that, or of a positive matrix negative, or not a number, its column is the answer, counted
+   from 1, and b is as it was; otherwise the answer is 0. `weakest`, given as {0, 1}, is found, unless it is NULL: x is known to
+   a relative error of about EPSILON / left. Of a matrix that is not known to be positive its pivot is all that is looked at. */
 INLINE int eliminate(int regular, int n, int sides, const real *size, const real *a, real *b, struct pivot *weakest)
 {
-    const real least = 4 * (real)n * EPSILON;
+    const real least = ROUNDING(n);
     const int width = (n + sides + FILLED - 1) / FILLED * FILLED;
     real rows[LARGEST * (LARGEST + 6 + FILLED)], scale[LARGEST];
     for (int r = 0; r < n; ++r) {
@@ -92,8 +104,11 @@ INLINE int eliminate(int regular, int n, int sides, const real *size, const real
         }
         row[c] = inverse;
     }
-    if (weakest && weakest->left < 1000 * F(sqrt)(EPSILON))
+    if (weakest && !regular && weakest->left < SMALL) {
         weakest->left = left_when_free(n, width, weakest->column, size[weakest->column], rows);
+        if (!(weakest->left > least))
+            return weakest->column + 1;
+    }
     for (int c = n; c--;)
         for (int k = 0; k < sides; ++k) {
             const real x = rows[c * width + n + k] * rows[c * width + c];

@@ -59,15 +59,38 @@ static inline void resist(int n, const real *a, const real *x, real *force)
             force[i] -= a[i * n + k] * x[k];
 }
 
-/* Solves wanted x = force for a matrix (n, n); `natural` (n, n) is what its size is judged by. Returns 0, or the row from 1 at
-   which it is not positive, or not regular where this is enough. */
-INLINE int solve(int regular, int n, const real *natural, const real *wanted, real *force)
+/* 1 by the largest number of the inverse of a regular a (n, n), each beside its size. */
+static inline real left_of_inverse(int n, const real *size, const real *a)
+{
+    real largest = 0, column[LARGEST * 6];
+    for (int first = 0; first < n; first += 6) {
+        clear((size_t)n * 6, column);
+        for (int k = 0; k < 6 && first + k < n; ++k)
+            column[(first + k) * 6 + k] = 1;
+        if (eliminate(1, n, 6, size, a, column, NULL))
+            return 0;
+        for (int i = 0; i < n; ++i)
+            for (int k = 0; k < 6 && first + k < n; ++k) {
+                const real entry = F(fabs)(column[i * 6 + k]) * F(sqrt)(size[i]) * F(sqrt)(size[first + k]);
+                if (entry > largest)
+                    largest = entry;
+            }
+    }
+    return 1 / largest;
+}
+
+/* Solves wanted x = force for a matrix (n, n). Returns 0, or the row from 1 at which it is not positive, or not regular where
+   this is enough: as far as rounding of `natural` (n, n) tells, from which it is made. Otherwise `weakest`, given as {0, 1},
+   says how well x is known: a positive matrix is judged by its own diagonal, as M is. */
+INLINE int solve(int regular, int n, const real *natural, const real *wanted, real *force, struct pivot *weakest)
 {
     real size[LARGEST];
     int symmetric = 1;
     for (int i = 0; i < n; ++i) {
-        const real own = natural[i * n + i], asked = F(fabs)(wanted[i * n + i]);
-        size[i] = own > asked ? own : asked;
+        const real own = natural[i * n + i], asked = wanted[i * n + i], large = F(fabs)(asked);
+        if (!regular && !(asked > ROUNDING(n) * own))
+            return i + 1;
+        size[i] = regular && own > large ? own : large;
         for (int k = 0; k < i; ++k)
             symmetric &= wanted[i * n + k] == wanted[k * n + i];
     }
@@ -76,11 +99,14 @@ INLINE int solve(int regular, int n, const real *natural, const real *wanted, re
         for (int i = 0; i < n; ++i)
             for (int k = 0; k < n; ++k)
                 part[i * n + k] = R(0.5) * (wanted[i * n + k] + wanted[k * n + i]);
-        const int fault = eliminate(0, n, 0, size, part, NULL, NULL);
-        if (fault)
-            return fault;
+        const int fault = eliminate(0, n, 0, size, part, NULL, weakest);
+        return fault ? fault : eliminate(0, n, 1, size, wanted, force, NULL);
     }
-    return eliminate(regular, n, 1, size, wanted, force, NULL);
+    const int fault = eliminate(regular, n, 1, size, wanted, force, weakest);
+    if (fault || !regular || !(weakest->left < SMALL))
+        return fault;
+    weakest->left = left_of_inverse(n, size, wanted);
+    return weakest->left > ROUNDING(n) ? 0 : weakest->column + 1;
 }
 
 /* H, M* and -(B* - C) ed - K e; where c1 is not kept as it is, C is in it too. Without weights kept is M*, from H. */
@@ -104,19 +130,20 @@ static inline void wish(const struct sample *s, const API(impedance) * wanted, c
         kept[i] += wanted->inertia[i];
 }
 
-/* Torques that give these accelerations, to `tau`; returns 0, or the joint, from 1, whose torque is not finite. */
-static inline int command(const real *torque, real *tau)
+/* Torques that give these accelerations, to `tau`; returns the joint, from 1, whose torque is not finite, or else `said`. */
+static inline int command(const real *torque, int said, real *tau)
 {
     for (int i = 0; i < N; ++i)
         if (!(torque[i] - torque[i] == 0))
             return i + 1;
     copy(N, torque, tau);
-    return 0;
+    return said;
 }
 
 /* The accelerations that are wanted; `force` is -(B* - C) ed - K e, or -B* ed - K e where c1 has weights. */
 static inline int wanted_acceleration(const struct sample *s, const API(impedance) * wanted, const struct deviation *from,
-    const real *mass, const real *kept, const real *external, const real *task, const real *force, real *qdd)
+    const real *mass, const real *kept, const real *external, const real *task, const real *force, real *qdd,
+    struct pivot *weakest)
 {
     real natural[N] = {0};
     if (!wanted->keep_velocity)
@@ -125,7 +152,7 @@ static inline int wanted_acceleration(const struct sample *s, const API(impedanc
         qdd[i] = force[i] - natural[i];
     join_force(external, qdd);
     join_force(task, qdd);
-    const int fault = solve(wanted->regular, N, mass, kept, qdd);
+    const int fault = solve(wanted->regular, N, mass, kept, qdd, weakest);
     join_force(from->qdd_d, qdd);
     return fault;
 }
@@ -148,9 +175,10 @@ int API(partial_impedance)(AT_REST, const API(impedance) * wanted, const real *q
         add_smooth_friction(qd, wanted->friction_width, torque);
         join_force(force, torque);
         join_force(task, torque);
-        return command(torque, tau);
+        return command(torque, 0, tau);
     }
-    const int fault = wanted_acceleration(&s, wanted, &from, mass, kept, external, task, force, qdd);
+    struct pivot weakest = {0, 1};
+    const int fault = wanted_acceleration(&s, wanted, &from, mass, kept, external, task, force, qdd, &weakest);
     if (fault)
         return fault;
     answer(&s, qdd, qd, 1, torque);
@@ -158,5 +186,5 @@ int API(partial_impedance)(AT_REST, const API(impedance) * wanted, const real *q
     add_smooth_friction(qd, wanted->friction_width, torque);
     for (int i = 0; external && i < N; ++i)
         torque[i] -= external[i];
-    return command(torque, tau);
+    return command(torque, -vague(&weakest), tau);
 }

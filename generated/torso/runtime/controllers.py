@@ -77,7 +77,8 @@ class PartialImpedance(Generic[Array]):
     no measured f.
 
     Raises ValueError for an M* that is not positive at a sample, for a frame that cannot move along a row,
-    and for one that is half a turn from its target.
+    and for one that is half a turn from its target. Warns where rounding leaves fewer than half of the
+    digits of the accelerations that are wanted.
     """
 
     def __init__(self, answers: Any) -> None:

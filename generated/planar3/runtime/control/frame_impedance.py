@@ -20,11 +20,12 @@ from ..arguments import is_like
 from ..chosen_names import short
 from ..controllers import ROWS, FrameImpedance, Natural
 from ..kinematics.named_frames import frame_index
+from ..sums.known_digits import Told
 from ..sums.namespace import namespace
 from .frame_rotation import rates_of_turning, rotation_vector
 from .gains import Gain
 from .joint_impedance import JointState, times
-from .wanted_solve import solved_wanted
+from .wanted_solve import Wanted, solved_wanted
 
 
 class FramePart(NamedTuple):
@@ -102,21 +103,23 @@ class FrameTargets:
         robot, side, xp = self._robot, self._robot.backend.side(q), namespace(q)
         point = side.constant(self.point, q)
         rows = side.index(np.array(self.rows, np.intp), q)
-        j = robot.kinematics.jacobian(q, self.frame, point)[..., rows, :]
+        whole = robot.kinematics.jacobian(q, self.frame, point)
+        j = whole[..., rows, :]
         rate = robot.kinematics.jacobian_rate(q, qd, self.frame, point)[..., rows, :]
-        names = robot.joint_names
-        moved = solved_wanted(
-            "the inertia of the joints", joints.inertia, xp.swapaxes(j, -1, -2), joints.inertia, names
+        sizes = joints.inertia.diagonal(0, -2, -1)
+        vague = Told(
+            "the mass matrix is nearly singular",
+            robot.joint_names,
+            beside=", and torques for a frame perhaps by fewer digits",
         )
+        about = Wanted("the mass matrix is not positive", vague)
+        moved = solved_wanted(about, joints.inertia, xp.swapaxes(j, -1, -2), sizes)
         compliance = j @ moved
         ones = side.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
-        inertia = solved_wanted(
-            f"frame {self.frame!r} cannot move along rows each by itself",
-            compliance,
-            ones,
-            compliance,
-            self.names,
-        )
+        hardly = f"frame {self.frame!r} can hardly move along rows each by itself"
+        singular = f"frame {self.frame!r} cannot move along rows each by itself"
+        about = Wanted(singular, Told(hardly, self.names, of_frame=True))
+        inertia = solved_wanted(about, compliance, ones, _reach(whole, sizes)[..., rows])
         dual = moved @ inertia
         natural = (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.coriolis - rate)) @ dual
         place, turning = self._place(side, q, target)
@@ -149,8 +152,12 @@ class FrameTargets:
             pull = pull - times(xp.swapaxes(state.turning, -1, -2), self._pull(state.place))
         if external is not None:
             pull = pull + times(xp.swapaxes(state.dual, -1, -2), external)
-        what = f"the wanted inertia of frame {self.frame!r} is not positive"
-        moved = solved_wanted(what, state.wanted_inertia, pull[..., None], state.inertia, self.names)[..., 0]
+        what = f"the wanted inertia of frame {self.frame!r}"
+        vague = Told(f"{what} is nearly singular", self.names, of_frame=True)
+        natural = self.inertia.kept * state.inertia.diagonal(0, -2, -1)
+        told = self.inertia.added is None  # a share of L is known as well as L
+        about = Wanted(f"{what} is not positive", vague)
+        moved = solved_wanted(about, state.wanted_inertia, pull[..., None], natural, told=told)[..., 0]
         if state.wanted is not None:
             moved = moved + state.wanted
         return qdd + times(state.dual, moved - state.bias - times(state.jacobian, qdd))
@@ -204,6 +211,14 @@ class FrameTargets:
             gain = Gain(f"{name}.plus", given.plus, self.names, symmetric=definite)
             return FramePart(float(given.scale), gain)
         return FramePart(0.0, Gain(name, given, self.names, None, definite, symmetric=definite))
+
+
+def _reach(jacobian: Any, inertia: Any) -> Any:
+    """How far joints of these inertias (..., n), each by itself, turn and move a frame, (..., 6)."""
+    xp = namespace(jacobian)
+    each = (jacobian**2 / inertia[..., None, :]).sum(-1)
+    turns, moves = each[..., :3].sum(-1)[..., None], each[..., 3:].sum(-1)[..., None]
+    return xp.concat([turns, turns, turns, moves, moves, moves], -1)
 
 
 def _point(given: Any) -> NDArray[Any]:

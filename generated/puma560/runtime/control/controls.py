@@ -154,7 +154,7 @@ class ControlAnswers:
         """Acceleration that follows, and torque for it."""
         q, qd, external = given["q"], given["qd"], given.get("external")
         state = self._joints.state(q, qd)
-        qdd = self._joints.acceleration(state, _errors(given), q)
+        qdd = self._joints.acceleration(state, _errors(given), q, told=self._frame is not None)
         if self._frame is not None:
             qdd = self._frame.acceleration(self._frame.state(state, q, qd, target), qdd, external)
         return qdd, self._joints.torque(state, qd, qdd, external)

@@ -13,9 +13,10 @@ import numpy as np
 from ..dense import Dense
 from ..passive_joints import passive_torques, smooth_friction
 from ..sums.joint_matrices import JointMatrices
+from ..sums.known_digits import Told
 from .gains import Gain
 from .wanted_coefficients import WantedShares
-from .wanted_solve import solved_wanted
+from .wanted_solve import Wanted, solved_wanted
 
 
 class JointTargets(NamedTuple):
@@ -98,16 +99,23 @@ class JointImpedance:
             return pull
         return pull - times(self.targets.stiffness.matrix(self._robot.backend.side(like), like), errors.place)
 
-    def acceleration(self, state: JointState, errors: Errors, like: Any) -> Any:
-        """qdd = qdd_d + M*^-1 (f + v - B* ed - K* e), (..., n)."""
+    def acceleration(self, state: JointState, errors: Errors, like: Any, told: bool = False) -> Any:
+        """qdd = qdd_d + M*^-1 (f + v - B* ed - K* e), (..., n).
+
+        told: whether it is said elsewhere how well a natural M* tells it
+        """
         pull = self.pull(state, errors, like)
         if errors.force is not None:
             pull = pull + errors.force
-        what = "what is left of the mass matrix is singular"
-        if self.targets.positive:
-            what = "the wanted inertia is not positive"
-        names, natural, positive = self._robot.joint_names, state.inertia, self.targets.positive
-        solved = solved_wanted(what, state.wanted_inertia, pull[..., None], natural, names, positive)
+        names, positive = self._robot.joint_names, self.targets.positive
+        whose = "what is left of the mass matrix"
+        if positive:
+            whose = "the mass matrix" if self.targets.inertia.natural else "the wanted inertia"
+        singular = "the wanted inertia is not positive" if positive else f"{whose} is singular"
+        about = Wanted(singular, Told(f"{whose} is nearly singular", names))
+        natural = state.inertia.diagonal(0, -2, -1)
+        told = told and self.targets.inertia.natural
+        solved = solved_wanted(about, state.wanted_inertia, pull[..., None], natural, positive, told)
         moved = solved[..., 0]
         return moved if errors.wanted is None else errors.wanted + moved
 

@@ -1,64 +1,134 @@
-"""Accelerations from a wanted inertia, M* a = f, and the joints or rows along which it is not positive."""
+"""Accelerations from a wanted inertia, M* a = f, and the joints or rows along which it is not positive.
+
+What half of the digits are asks for, and what is refused, C judges by the same numbers (impedance.h).
+"""
 
 import sys
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..chosen_names import sample_of
+from ..controllers import ROWS
+from ..sums.inertia_solve import ROUNDINGS
+from ..sums.known_digits import Told, as_array, epsilon_of, warn_of_vague
 from ..sums.namespace import hidden, namespace
 
-LEAST = 4.0
-"""Roundings by which an eigenvalue of each row, of a matrix scaled to its natural size, may be wrong."""
+SMALL = 1e3
+"""Beside the root of rounding: where no pivot is less, half of the digits and more are known."""
+
+
+class Wanted(NamedTuple):
+    """A matrix to be solved for, in messages."""
+
+    singular: str
+    vague: Told
+
+    @property
+    def roundings(self) -> float:
+        """By which a number of the size of 1 may be wrong, as C has it: six rows stand for any of a frame."""
+        return ROUNDINGS * (len(ROWS) if self.vague.of_frame else len(self.vague.names))
 
 
 def solved_wanted(
-    what: str, wanted: Any, force: Any, natural: Any, names: Sequence[str], positive: bool = True
+    about: Wanted, wanted: Any, force: Any, natural: Any, positive: bool = True, told: bool = False
 ) -> Any:
     """a (..., r, X) of M* (..., r, r) and forces (..., r, X).
 
-    what: is wrong where it cannot be, as the message says
-    natural: matrix (..., r, r) whose diagonal says how large each row is, so that kilograms and square metres
-    go together; positive: whether M* must be positive (its symmetric part, that is), else regular
+    natural: numbers (..., r), as large as those that each row of M* is made from, whose rounding is in it
+    positive: whether M* must be positive (its symmetric part, that is), else regular
+    told: whether another matrix says already how well a is known
 
     Raises ValueError for the first M* that is not, with the sample and the rows: of a singular one those
-    that say nothing, or the same as others.
+    that say nothing, or the same as others. Warns of samples whose answer is known to fewer than half of the
+    digits. A positive matrix is judged by its own diagonal, as M is: links that are made lighter all alike
+    are as well known as before.
     """
     xp = namespace(wanted)
-    diagonal = abs(natural.diagonal(0, -2, -1))
-    size = xp.where(diagonal > 0.0, diagonal, xp.ones_like(diagonal)) ** 0.5
+    own, natural = abs(wanted.diagonal(0, -2, -1)), abs(natural)
+    size = own if positive else xp.maximum(own, natural)
+    size = xp.where(size > 0.0, size, xp.ones_like(size)) ** 0.5
     scaled = wanted / (size[..., :, None] * size[..., None, :])
     if not hidden(wanted):
-        numbers = scaled if xp is np else scaled.detach().cpu().numpy()
-        _check(what, numbers, names, positive)
+        diagonals = as_array(wanted).diagonal(0, -2, -1), as_array(natural)
+        _check(about, as_array(scaled), diagonals, positive, told)
     if xp is np:
         return np.linalg.solve(scaled, force / size[..., None]) / size[..., None]
     return sys.modules["torch"].linalg.solve_ex(scaled, force / size[..., None])[0] / size[..., None]
 
 
-def _check(what: str, scaled: NDArray[Any], names: Sequence[str], positive: bool) -> None:
-    """Raise ValueError for the first of (..., r, r) that is not positive, or regular; NaN passes."""
+def _check(
+    about: Wanted,
+    scaled: NDArray[Any],
+    diagonals: tuple[NDArray[Any], NDArray[Any]],
+    positive: bool,
+    told: bool,
+) -> None:
+    """Raise ValueError for the first that is not positive, or not regular, or warn; NaN passes.
+
+    diagonals: of it before it was scaled, and of what it is made from, (..., r)
+    """
     finite = np.isfinite(scaled).all((-2, -1), keepdims=True)
-    known = np.where(finite, scaled, np.eye(scaled.shape[-1]))
-    least = LEAST * scaled.shape[-1] * np.finfo(scaled.dtype).eps
+    known = np.where(finite, scaled, np.eye(scaled.shape[-1], dtype=scaled.dtype))
+    least = about.roundings * epsilon_of(scaled)
     if positive:
-        symmetric = (known + np.swapaxes(known, -1, -2)) / 2.0
-        try:
-            if np.linalg.cholesky(symmetric).diagonal(0, -2, -1).min(initial=1.0) ** 2 > 1e3 * least:
-                return
-        except np.linalg.LinAlgError:
-            pass
-        values, vectors = np.linalg.eigh(symmetric)
-        value, vector = values[..., 0], vectors[..., :, 0]
-    else:
-        vectors, values, _ = np.linalg.svd(known)
-        value, vector = values[..., -1], vectors[..., :, -1]
-    bad = value <= least * np.maximum(1.0, np.abs(values).max(-1))
-    if not bad.any():
-        return
-    sample = tuple(np.argwhere(bad)[0].tolist())
-    where = f" at sample {', '.join(map(str, sample))}" if sample else ""
-    along = np.abs(vector[sample])
-    rows = ", ".join(names[r] for r in np.flatnonzero(along > 0.1 * along.max()).tolist())
-    raise ValueError(f"{what}{where}: along {rows}")
+        own, natural = diagonals
+        lost = own <= least * natural  # by rounding alone it may be as large
+        if lost.any():
+            at = tuple(np.argwhere(lost.any(-1))[0].tolist())
+            _refuse(about, at, lost[at])
+        known = (known + np.swapaxes(known, -1, -2)) / 2.0
+    mobility = _largest_when_free(known) if positive else _largest_of_inverse(known)
+    singular = ~(mobility * least < 1.0)
+    if singular.any():
+        sample = tuple(np.argwhere(singular)[0].tolist())
+        along = np.abs(_least_along(known[sample], positive))
+        _refuse(about, sample, along > 0.1 * along.max())
+    if not told:
+        warn_of_vague(known, mobility, about.vague)
+
+
+def _refuse(about: Wanted, sample: tuple[int, ...], rows: NDArray[Any]) -> None:
+    along = ", ".join(about.vague.names[r] for r in np.flatnonzero(rows).tolist())
+    raise ValueError(f"{about.singular}{sample_of(sample)}: along {along}")
+
+
+def _largest_when_free(matrices: NDArray[Any]) -> NDArray[Any]:
+    """Of positive ones, 1 by the part of a row's inertia that is left when all others move freely (...,).
+
+    It is of the row with the least pivot; infinite where one of the matrices is not positive.
+    """
+    try:
+        pivots = np.linalg.cholesky(matrices).diagonal(0, -2, -1) ** 2
+    except np.linalg.LinAlgError:
+        least = np.linalg.eigvalsh(matrices)[..., 0]
+        return _inverted(least)
+    if pivots.min(initial=1.0) >= SMALL * epsilon_of(matrices) ** 0.5:
+        return _inverted(pivots.min(-1))
+    unit = np.eye(matrices.shape[-1], dtype=matrices.dtype)[pivots.argmin(-1)]
+    moved = np.linalg.solve(matrices, unit[..., None])[..., 0]
+    mobility: NDArray[Any] = (moved * unit).sum(-1)
+    return np.where(mobility > 0.0, mobility, np.inf)  # rounding may leave less than nothing
+
+
+def _largest_of_inverse(matrices: NDArray[Any]) -> NDArray[Any]:
+    """Of any, the largest number of its inverse (...,); infinite where one is exactly singular."""
+    try:
+        largest: NDArray[Any] = np.abs(np.linalg.inv(matrices)).max((-2, -1))
+    except np.linalg.LinAlgError:
+        return _inverted(np.linalg.svd(matrices, compute_uv=False)[..., -1])
+    return largest
+
+
+def _inverted(least: NDArray[Any]) -> NDArray[Any]:
+    """1 by each, infinite for what is not above 0."""
+    above = least > 0.0
+    return np.where(above, 1.0 / np.where(above, least, 1.0), np.inf).astype(least.dtype)
+
+
+def _least_along(matrix: NDArray[Any], symmetric: bool) -> NDArray[Any]:
+    """The rows (r,) along which a matrix is the least."""
+    if symmetric:
+        return np.asarray(np.linalg.eigh(matrix)[1][:, 0])
+    return np.asarray(np.linalg.svd(matrix)[0][:, -1])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..chosen_names import sample_of
-from .known_digits import as_array, can_move, epsilon_of, kind_of, warn_of_vague
+from .known_digits import Told, as_array, can_move, epsilon_of, kind_of, warn_of_vague
 from .namespace import hidden, namespace
 
 CLEAR = 1e5
@@ -41,7 +41,9 @@ def solved_columns(mass: Any, forces: Any, joint_names: Sequence[str]) -> Any:
     wide = xp.zeros_like(own[..., None] + columns.sum(-1)[..., None])
     # One column more: the acceleration of that joint by a unit of its own force.
     moved = _quotient(scaled, xp.concat([columns + wide, own[..., None] + wide], -1))
-    warn_of_vague(scaled, (moved[..., -1] * own).sum(-1), joint_names)
+    warn_of_vague(
+        scaled, (moved[..., -1] * own).sum(-1), Told("the mass matrix is nearly singular", joint_names)
+    )
     return moved[..., :-1] / size[..., None]
 
 
