@@ -374,6 +374,32 @@ def test_a_call_is_compiled_once(planar2: ModuleType, backend: str) -> None:
         assert len(compiled) == 1, call
 
 
+@pytest.mark.parametrize(("call", "broken"), [("partial_torque", 1), ("mass_matrix", 0)])
+def test_a_call_of_native_is_one_graph_beside_its_callers(
+    planar2: ModuleType, call: str, broken: int
+) -> None:
+    from torch._dynamo.testing import CompileCounter
+
+    native, expected = (getattr(planar2.load(name), call) for name in ("native", "torch"))
+    motion = states(2, 5)[: 3 if broken else 1]
+
+    def sines(*motion: Any) -> Any:
+        return native(*motion).sin()
+
+    torch._dynamo.reset()
+    torch._dynamo.utils.counters.clear()
+    counted = CompileCounter()
+    compiled = torch.compile(sines, backend=counted)
+    for _ in range(3):
+        assert relative_error(compiled(*motion), sines(*motion)) <= 1e-13
+    assert counted.frame_count == 1 + broken
+    assert sum(torch._dynamo.utils.counters["graph_break"].values()) == broken
+    torch._dynamo.reset()
+    q = motion[0].requires_grad_()
+    taken = (run(*motion).sin().sum() for run in (torch.compile(native, backend="aot_eager"), expected))
+    assert relative_error(*(torch.autograd.grad(each, q)[0] for each in taken)) <= 1e-13
+
+
 @pytest.mark.filterwarnings("ignore:`torch.jit.trace:DeprecationWarning")
 @pytest.mark.filterwarnings("ignore::torch.jit.TracerWarning")
 def test_traced_by_torch_jit_a_call_is_right_or_refused(planar2: ModuleType) -> None:
@@ -387,6 +413,7 @@ def test_traced_by_torch_jit_a_call_is_right_or_refused(planar2: ModuleType) -> 
         differentiated,
         differentiated.module("mass_matrix"),
         lambda *m: compiled.partial_torque(*m),
+        compiled.partial_torque,
     ):
         with pytest.raises(TypeError, match=r"^torch.jit.trace does not see how .* take the back end torch"):
             torch.jit.trace(call, some if call is differentiated or not hasattr(call, "robot") else some[:1])
