@@ -52,7 +52,7 @@ class Backend(Protocol[Kind]):
     name: ClassVar[str]
     takes_tensors: ClassVar[bool]
     """Whether motion is given as torch tensors only."""
-    examples: ClassVar[tuple[Any, ...]]
+    examples: tuple[Any, ...]
     """Empty arrays of kinds that tables are made for in advance: no compiler traces how they are made."""
     face: ClassVar[Any]
     """Class of the robots that compute with it; None for `Dynamics`."""

@@ -1,5 +1,6 @@
 """Compiled C on NumPy arrays and torch CPU tensors."""
 
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -49,6 +50,8 @@ class NativeBackend(NumpyBackend):
         self.calls = NativeCalls(structure, sources, parameters)
         self.control = ControlCalls(self.calls)
         self._torch_side: TorchSide | None = None
+        if "torch" in sys.modules:
+            self.examples = self.on_torch().examples
 
     @property
     def threads(self) -> int:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
+from torch._subclasses.fake_tensor import is_fake
 
 from ..answers import MOTION
 from ..arguments import too_many_axes
@@ -147,22 +148,59 @@ def _define(
     def setup(ctx: Any, inputs: Any, output: Any) -> None:
         ctx.save_for_backward(*inputs[:-1])
 
-    def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
-        def again(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
-            return getattr(TorchBackend(structure, links, values(p), rule), call)(q, qd, qdd)
+    def again(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
+        return getattr(TorchBackend(structure, links, values(p), rule), call)(q, qd, qdd)
 
-        return (*_backward(again, ctx.saved_tensors, ctx.needs_input_grad[:-1], slopes), None)
+    def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
+        inputs, needed = ctx.saved_tensors, ctx.needs_input_grad[:-1]
+        if any(map(is_fake, inputs)):
+            found = iter(differentiated(*inputs, needed, slopes))
+            return (*(next(found) if need else None for need in needed), None)
+        return (*_backward(again, inputs, needed, slopes), None)
 
     results = ", ".join(["Tensor"] * len(sizes))
     schema = f"(Tensor q, Tensor qd, Tensor qdd, Tensor p, int threads) -> ({results})"
     made = torch.library.custom_op(f"{_namespace(sources)}::{call}", forward, mutates_args=(), schema=schema)
     made.register_fake(fake)
     made.register_autograd(backward, setup_context=setup)
+    differentiated = _differentiated(f"{_namespace(sources)}::{call}_slopes", again)
     return made
 
 
+def _differentiated(name: str, again: Any) -> Any:
+    """Operator (q, qd, qdd, p, which of them, slopes of results) -> slopes of these.
+
+    A compiler takes it as it stands: what torch would record of the rule has tables that it may not see.
+    """
+
+    def forward(
+        q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, needed: Sequence[bool], slopes: Sequence[Tensor | None]
+    ) -> list[Tensor]:
+        inputs = q, qd, qdd, p
+        with _recorded_in_an_operator():
+            found = _backward(again, inputs, needed, slopes)
+        pairs = zip(inputs, found, needed, strict=True)
+        return [torch.zeros_like(t) if slope is None else slope.clone() for t, slope, need in pairs if need]
+
+    def fake(
+        q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, needed: Sequence[bool], slopes: Sequence[Tensor | None]
+    ) -> list[Tensor]:
+        return [torch.empty_like(t) for t, need in zip((q, qd, qdd, p), needed, strict=True) if need]
+
+    schema = "(Tensor q, Tensor qd, Tensor qdd, Tensor p, bool[] needed, Tensor?[] slopes) -> Tensor[]"
+    made = torch.library.custom_op(name, forward, mutates_args=(), schema=schema)
+    made.register_fake(fake)
+    return made
+
+
+def _recorded_in_an_operator() -> Any:
+    """Within operators torch records nothing for gradients, unless it is told to."""
+    left_out = torch._C._dispatch_tls_local_exclude_set().remove(torch._C.DispatchKey.AutogradCPU)
+    return torch._C._ForceDispatchKeyGuard(torch._C._dispatch_tls_local_include_set(), left_out)
+
+
 def _backward(
-    again: Any, inputs: Sequence[Tensor], needed: Sequence[bool], slopes: Sequence[Tensor]
+    again: Any, inputs: Sequence[Tensor], needed: Sequence[bool], slopes: Sequence[Tensor | None]
 ) -> tuple[Tensor | None, ...]:
     """Slopes of the inputs from those of the results, by computing these once more in torch."""
     differentiable = torch.is_grad_enabled()

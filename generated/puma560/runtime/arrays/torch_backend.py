@@ -36,7 +36,7 @@ class TorchBackend(ArrayBackend):
 
     name: ClassVar = "torch"
     takes_tensors: ClassVar = True
-    examples: ClassVar = tuple(torch.empty(0, dtype=dtype) for dtype in (torch.float32, torch.float64))
+    examples = tuple(torch.empty(0, dtype=dtype) for dtype in (torch.float32, torch.float64))
     face: ClassVar[Any] = None
     xp: ClassVar[Any] = torch
     traced: ClassVar[bool] = True

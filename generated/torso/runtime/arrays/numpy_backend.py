@@ -32,7 +32,7 @@ class NumpyBackend(ArrayBackend):
 
     name: ClassVar = "numpy"
     takes_tensors: ClassVar = False
-    examples: ClassVar = ()
+    examples: tuple[Any, ...] = ()
     face: ClassVar[Any] = None
     xp: ClassVar[Any] = np
     fuses: ClassVar = False

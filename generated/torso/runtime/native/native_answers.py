@@ -58,7 +58,10 @@ class NativeAnswers(SumAnswers):
     @property
     def direct(self) -> Mapping[str, Callable[..., Any]]:
         """The compiled module's calls, where there is one."""
-        return {call: getattr(self._compiled, call) for call in COMPILED} if self._compiled else {}
+        calls = {call: getattr(self._compiled, call) for call in COMPILED} if self._compiled else {}
+        for call in calls.values():
+            call.__module__ = __name__  # torch.jit asks where a function is from, before it calls it
+        return calls
 
     def _made(self, made: Any) -> Any:
         """The compiled module's side of this robot."""
