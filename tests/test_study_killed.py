@@ -5,10 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import Any
 
 import pytest
 from linkwise import LinkwiseError
@@ -64,16 +61,29 @@ def test_a_study_killed_at_any_instant_goes_on_where_it_was(tmp_path: Path) -> N
     assert set(counts) == {300}
 
 
-def test_an_interrupt_is_told_in_a_line_and_leaves_what_is_done(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("many", "later"), [(0, 0.0), (0, 0.7), (1, 0.0), (3, 0.05)])
+def test_an_interrupt_is_told_in_a_line_and_leaves_what_is_done(
+    tmp_path: Path, many: int, later: float
+) -> None:
+    """While processes begin, in the midst of trials and between them."""
     file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=3), tmp_path / "out"
     study = begun(file, out)
-    wait_for(2, study, out)
+    while not (out / "study.json").exists():
+        time.sleep(0.01)
+    wait_for(many, study, out)
+    time.sleep(later)
     os.killpg(study.pid, signal.SIGINT)
-    _, told = study.communicate(timeout=30)
+    _, told = study.communicate(timeout=10)
     assert (study.returncode, told.splitlines()[-1]) == (130, "linkwise: interrupted")
     assert "Traceback" not in told
     assert not list(out.rglob(".linkwise-*"))
-    assert 2 <= len(records(out)) < 12
+    assert many <= len(records(out)) < 12
+
+
+def test_a_study_leaves_the_callers_environment_as_it_was(tmp_path: Path) -> None:
+    file, before = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), dict(os.environ)
+    assert run_study(file, tmp_path / "out", ProcessPool(2)).done == ("S1-fast-1", "S1-slow-1")
+    assert dict(os.environ) == before
 
 
 def test_a_script_may_run_a_study_as_it_stands(tmp_path: Path) -> None:
@@ -99,24 +109,6 @@ def test_one_study_at_a_time_is_at_work_in_a_folder(tmp_path: Path) -> None:
     assert run_study(file, tmp_path / "out", engine).fresh == 8
 
 
-def test_a_process_that_dies_while_none_is_waited_for_loses_no_trial(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    submitted = iter((False, True, False, False, False))
-    submit = ProcessPoolExecutor.submit
-
-    def breaking(pool: ProcessPoolExecutor, *work: Any) -> Any:
-        if next(submitted):
-            raise BrokenProcessPool
-        return submit(pool, *work)
-
-    monkeypatch.setattr(ProcessPoolExecutor, "submit", breaking)
-    file, before = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), dict(os.environ)
-    found = run_study(file, tmp_path / "out", ProcessPool(2))
-    assert (found.done, found.broken) == (("S1-fast-1", "S1-slow-1"), ())
-    assert dict(os.environ) == before, "the caller's own"
-
-
 KILLER = """
 import multiprocessing, os, pathlib, signal
 
@@ -124,20 +116,22 @@ opened = pathlib.Path.open
 
 def deadly(self, mode="r", *rest, **more):
     if self.name == "fast_1.csv" and mode == "rb" and multiprocessing.parent_process():
-        os.kill(os.getpid(), signal.SIGKILL)
+        os.kill(os.getpid(), {0})
     return opened(self, mode, *rest, **more)
 
 pathlib.Path.open = deadly
 """
 
 
-def test_a_process_that_dies_takes_its_trial_alone(tmp_path: Path) -> None:
-    """A worker is killed whenever it opens one of the logs, as the system does where memory ends."""
+@pytest.mark.parametrize("deadly", ["SIGKILL", "SIGTERM"])
+def test_a_process_that_dies_takes_its_trial_alone(tmp_path: Path, deadly: str) -> None:
+    """A worker is ended whenever it opens one of the logs, as the system does where memory ends."""
     file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1)
     out = tmp_path / "out"
-    (tmp_path / "sitecustomize.py").write_text(KILLER)
+    (tmp_path / "sitecustomize.py").write_text(KILLER.format(f"signal.{deadly}"))
     study = begun(file, out, PYTHONPATH=str(tmp_path))
-    said, told = study.communicate()
+    said, told = study.communicate(timeout=60)
     assert study.returncode == 1, told
     assert "broken: S1-fast-1: its process died" in told
     assert said.startswith("1 trials done, 0 of them before, 1 broken")
+    assert not list(out.rglob(".linkwise-*")) or deadly == "SIGKILL"

@@ -50,6 +50,16 @@ def workplace(parent: Path) -> Iterator[Path]:
             _left(work, lock)
 
 
+@contextmanager
+def signals_held() -> Iterator[None]:
+    """Let signals wait till the end of a few steps that must not be parted."""
+    mask = _hold_signals()
+    try:
+        yield
+    finally:
+        _release_signals(mask)
+
+
 def _hold_signals() -> set[int] | None:
     """Let signals wait, where the system can; returns what `_release_signals` needs."""
     if not hasattr(signal, "pthread_sigmask"):

@@ -1,21 +1,30 @@
-"""Trials in processes of this machine; one that kills its process is told, and stops no other."""
+"""Trials in processes of this machine; one that kills its process is told, and stops no other.
+
+Each process has a pipe of its own and shares nothing with the others: no lock dies with one of them, and
+whoever ends at any instant leaves nobody waiting. `concurrent.futures` keeps one queue for all, and takes
+the exit that a signal asks of a process for a result.
+"""
 
 import multiprocessing
 import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
 from types import ModuleType
 
+from linkwise.output.workplace import ENDING, signals_held
 from linkwise.study.trial_work import TrialOutcome, TrialTask, run_trial
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """What keeps libraries from threads of their own: there is a process for every core."""
 DIED = "its process died, as for want of memory; what is special about this log?"
+TIDYING = 3.0
+"""Seconds in which a process that is told to end removes what it has half written."""
 
 
 class ProcessPool:
@@ -26,56 +35,77 @@ class ProcessPool:
 
     def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
         """Outcomes of all tasks, as they come; what is at work ends when nobody wants them any more."""
-        waiting = list(reversed(tasks))
-        while waiting:
-            lost: list[TrialTask] = []
-            yield from self._until_one_dies(waiting, lost, self.workers)
-            for task in lost:  # one of them is the cause: each by itself
-                died: list[TrialTask] = []
-                yield from self._until_one_dies([task], died, 1)
-                if died:
-                    yield TrialOutcome(task.trial.name, reason=DIED)
-
-    def _until_one_dies(
-        self, waiting: list[TrialTask], lost: list[TrialTask], workers: int
-    ) -> Iterator[TrialOutcome]:
-        """Work on what is waiting, from its end; those that were in work when a process died are lost."""
-        running: dict[Future[TrialOutcome], TrialTask] = {}
-        with _processes(workers) as pool:
-            while waiting or running:
-                while waiting and len(running) < workers:
-                    task = waiting.pop()
-                    try:
-                        with _born_apart():
-                            running[pool.submit(run_trial, task)] = task
-                    except BrokenProcessPool:  # one died just now, while none was waited for
-                        waiting.append(task)
-                        lost += running.values()
-                        return
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    try:
-                        yield future.result()
-                    except BrokenProcessPool:
-                        lost += running.values()
-                        return
-                    del running[future]
-
-
-@contextmanager
-def _processes(count: int) -> Iterator[ProcessPoolExecutor]:
-    """So many processes, which are ended in the midst of their work where this one is."""
-    before = set(multiprocessing.active_children())
-    with ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _end_with_parent) as pool:
+        waiting, workers = list(reversed(tasks)), list[_Worker]()
+        if sys.platform != "win32":
+            resource_tracker.ensure_running()  # which lets signals pass, once, wherever it is begun
         try:
-            yield pool
-        except BaseException:
-            for child in set(multiprocessing.active_children()) - before:
-                child.terminate()
-            raise
+            while waiting or workers:
+                while waiting and len(workers) < self.workers:
+                    with signals_held():  # one that comes meanwhile finds it among those that are ended
+                        workers.append(_Worker())
+                    workers[-1].give(waiting.pop())
+                ready = wait([worker.pipe for worker in workers])
+                for worker in [one for one in workers if one.pipe in ready]:
+                    yield worker.outcome()
+                    if waiting and worker.process.is_alive():
+                        worker.give(waiting.pop())
+                    else:
+                        workers.remove(worker)
+                        _end([worker])
+        finally:
+            _end(workers)
+
+
+class _Worker:
+    """A process that does one trial after another."""
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(theirs,), daemon=True)
+        self.at_hand = ""
+        with _born_apart():
+            self.process.start()
+        theirs.close()  # the pipe ends where they do
+
+    def give(self, task: TrialTask) -> None:
+        self.at_hand = task.trial.name
+        with suppress(OSError):  # it is dead, as its outcome tells
+            self.pipe.send(task)
+
+    def outcome(self) -> TrialOutcome:
+        try:
+            outcome: TrialOutcome = self.pipe.recv()
+        except (EOFError, OSError):
+            _end([self])
+            return TrialOutcome(self.at_hand, reason=DIED)
+        return outcome
+
+
+def _end(workers: Sequence[_Worker]) -> None:
+    """End processes, in the midst of their work if need be; one that does not tidy up in time is killed."""
+    for worker in workers:
+        worker.process.terminate()
+    until = time.monotonic() + TIDYING
+    for worker in workers:
+        worker.process.join(max(0.0, until - time.monotonic()))
+        worker.process.kill()
+        worker.process.join()
+        worker.pipe.close()
+
+
+def _work(tasks: Connection) -> None:
+    """In a process: trials as they come, until it is told to end."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the matter of the one that began it
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, *ENDING})
+    _end_with_parent()
+    while True:
+        tasks.send(run_trial(tasks.recv()))
 
 
 def _end_with_parent() -> None:
-    """In a process: end when the one that began it does, however that ends; it would wait for ever."""
+    """In a process: end when the one that began it does, however that ends, and not after a trial more."""
     if (parent := multiprocessing.parent_process()) is not None:
 
         def watch() -> None:
@@ -87,13 +117,11 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def _born_apart() -> Iterator[None]:
-    """Have processes that begin here know nothing of Ctrl-C, which is this one's matter, nor of its program.
+    """Have a process that begins here know nothing of this one's program, and keep to one thread.
 
-    A process would run a user's script again that has no `if __name__ == "__main__"`, and needs none of it.
+    It would run a user's script again that has no `if __name__ == "__main__"`, and needs none of it.
     """
     main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
-    is_main = threading.current_thread() is threading.main_thread()  # which alone may speak of signals
-    former = signal.signal(signal.SIGINT, signal.SIG_IGN) if is_main else None
     unset = [name for name in ONE_THREAD if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))
     try:
@@ -102,8 +130,6 @@ def _born_apart() -> Iterator[None]:
         for name in unset:
             del os.environ[name]
         sys.modules["__main__"] = main
-        if former is not None:
-            signal.signal(signal.SIGINT, former)
 
 
 def _cores() -> int:
