@@ -16,7 +16,7 @@ from ..sums.joint_matrices import JointMatrices
 from ..sums.known_digits import Told
 from .gains import Gain
 from .wanted_coefficients import WantedShares
-from .wanted_solve import Wanted, solved_wanted
+from .wanted_solve import WantedInertia, solved_wanted
 
 
 class JointTargets(NamedTuple):
@@ -112,7 +112,7 @@ class JointImpedance:
         if positive:
             whose = "the mass matrix" if self.targets.inertia.natural else "the wanted inertia"
         singular = "the wanted inertia is not positive" if positive else f"{whose} is singular"
-        about = Wanted(singular, Told(f"{whose} is nearly singular", names))
+        about = WantedInertia(singular, Told(f"{whose} is nearly singular", names))
         natural = state.inertia.diagonal(0, -2, -1)
         told = told and self.targets.inertia.natural
         solved = solved_wanted(about, state.wanted_inertia, pull[..., None], natural, positive, told)

@@ -19,7 +19,7 @@ SMALL = 1e3
 """Beside the root of rounding: where no pivot is less, half of the digits and more are known."""
 
 
-class Wanted(NamedTuple):
+class WantedInertia(NamedTuple):
     """A matrix to be solved for, in messages."""
 
     singular: str
@@ -32,7 +32,7 @@ class Wanted(NamedTuple):
 
 
 def solved_wanted(
-    about: Wanted, wanted: Any, force: Any, natural: Any, positive: bool = True, told: bool = False
+    about: WantedInertia, wanted: Any, force: Any, natural: Any, positive: bool = True, told: bool = False
 ) -> Any:
     """a (..., r, X) of M* (..., r, r) and forces (..., r, X).
 
@@ -59,7 +59,7 @@ def solved_wanted(
 
 
 def _check(
-    about: Wanted,
+    about: WantedInertia,
     scaled: NDArray[Any],
     diagonals: tuple[NDArray[Any], NDArray[Any]],
     positive: bool,
@@ -89,7 +89,7 @@ def _check(
         warn_of_vague(known, mobility, about.vague)
 
 
-def _refuse(about: Wanted, sample: tuple[int, ...], rows: NDArray[Any]) -> None:
+def _refuse(about: WantedInertia, sample: tuple[int, ...], rows: NDArray[Any]) -> None:
     along = ", ".join(about.vague.names[r] for r in np.flatnonzero(rows).tolist())
     raise ValueError(f"{about.singular}{sample_of(sample)}: along {along}")
 

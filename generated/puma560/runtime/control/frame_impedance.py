@@ -25,7 +25,7 @@ from ..sums.namespace import namespace
 from .frame_rotation import rates_of_turning, rotation_vector
 from .gains import Gain
 from .joint_impedance import JointState, times
-from .wanted_solve import Wanted, solved_wanted
+from .wanted_solve import WantedInertia, solved_wanted
 
 
 class FramePart(NamedTuple):
@@ -112,13 +112,13 @@ class FrameTargets:
             robot.joint_names,
             beside=", and torques for a frame perhaps by fewer digits",
         )
-        about = Wanted("the mass matrix is not positive", vague)
+        about = WantedInertia("the mass matrix is not positive", vague)
         moved = solved_wanted(about, joints.inertia, xp.swapaxes(j, -1, -2), sizes)
         compliance = j @ moved
         ones = side.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
         hardly = f"frame {self.frame!r} can hardly move along rows each by itself"
         singular = f"frame {self.frame!r} cannot move along rows each by itself"
-        about = Wanted(singular, Told(hardly, self.names, of_frame=True))
+        about = WantedInertia(singular, Told(hardly, self.names, of_frame=True))
         inertia = solved_wanted(about, compliance, ones, _reach(whole, sizes)[..., rows])
         dual = moved @ inertia
         natural = (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.coriolis - rate)) @ dual
@@ -156,7 +156,7 @@ class FrameTargets:
         vague = Told(f"{what} is nearly singular", self.names, of_frame=True)
         natural = self.inertia.kept * state.inertia.diagonal(0, -2, -1)
         told = self.inertia.added is None  # a share of L is known as well as L
-        about = Wanted(f"{what} is not positive", vague)
+        about = WantedInertia(f"{what} is not positive", vague)
         moved = solved_wanted(about, state.wanted_inertia, pull[..., None], natural, told=told)[..., 0]
         if state.wanted is not None:
             moved = moved + state.wanted
