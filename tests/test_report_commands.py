@@ -23,6 +23,7 @@ def report(tmp_path: Path) -> Report:
     [
         (("reduction", "--dof", "5..3"), "--dof '5..3' is not a range"),
         (("reduction", "--dof", "-1..3"), "--dof '-1..3' is not a range"),
+        (("reduction", "--dof", "1" * 5000), "--dof '111111111111…11111111111' is not a range"),
         (("reduction", "--dof", "0..3"), "1 ≤ FIRST ≤ LAST"),
         (("reduction", "--robot", "puma560", "--dof", "1..7"), "--dof reaches 7, but 6 links move"),
         (("reduction", "--dof", "1..12", "--tip", "link9"), "--dof reaches 12, but 9 links move"),

@@ -217,6 +217,7 @@ WRONG: Mapping[str, tuple[str, str]] = {
         fault().replace("40500", "30512"),
         "Version '30512' is not read, but 20000 to 30499 (OpenSim 2 and 3) and from 30517 on (OpenSim 4)",
     ),
+    "format of many digits": (fault().replace("40500", "4" * 5000), "Version '444444444444…"),
     "coupled in a circle": (
         fault(
             sets=constraints(

@@ -10,6 +10,7 @@ import typer
 from linkwise.cli import BUDGET, Budget, Json, ReportOut
 from linkwise.cli.options import reads_robot
 from linkwise.errors import LinkwiseError
+from linkwise.escape import short
 from linkwise.output import require_writable, write_files
 from linkwise.package.write import refuse_inside_package
 from linkwise.pipeline import read_system
@@ -87,11 +88,12 @@ def reduction(
 
 def dof_range(text: str) -> tuple[int, int]:
     """Parse FIRST..LAST or a single number; raises LinkwiseError for an empty or negative range."""
-    match = re.fullmatch(r"(-?\d+)(?:\.\.(-?\d+))?", text)
+    # Nine digits: more than any robot's joints, and far below what Python takes for one number.
+    match = re.fullmatch(r"(\d{1,9})(?:\.\.(\d{1,9}))?", text)
     first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
     if not 1 <= first <= last:
         raise LinkwiseError(
-            f"--dof {text!r} is not a range; write FIRST..LAST with 1 ≤ FIRST ≤ LAST, such as 1..10"
+            f"--dof {short(text)!r} is not a range; write FIRST..LAST with 1 ≤ FIRST ≤ LAST, such as 1..10"
         )
     return first, last
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import short
 from linkwise.robot.readers.bounded import MIB
 from linkwise.robot.readers.osim_elements import text_of
 from linkwise.robot.readers.xml_file import parse
@@ -42,11 +43,11 @@ def read_document(path: Path) -> tuple[Element, bool]:
             f"the root element is <{root.tag}>; an OpenSim model has <OpenSimDocument><Model>"
         )
     text = root.get("Version", "")
-    version = int(text) if text.isdecimal() else 0
+    version = int(text) if text.isdecimal() and len(text) < 10 else 0
     if version < OLDEST or JOINTS_BY_THEMSELVES <= version < SOCKETS:
         raise LinkwiseError(
-            f"Version {text!r} is not read, but {OLDEST} to {JOINTS_BY_THEMSELVES - 1} (OpenSim 2 and 3) and "
-            f"from {SOCKETS} on (OpenSim 4); open the file in OpenSim 4 and save it"
+            f"Version {short(text)!r} is not read, but {OLDEST} to {JOINTS_BY_THEMSELVES - 1} "
+            f"(OpenSim 2 and 3) and from {SOCKETS} on (OpenSim 4); open the file in OpenSim 4 and save it"
         )
     units = text_of(model, "length_units", "meters")
     if units.lower() not in ("meters", "m"):
