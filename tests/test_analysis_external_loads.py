@@ -83,12 +83,49 @@ def test_forces_are_on_the_bodies_and_in_the_axes_that_the_file_says(leg: Path) 
         ({"side": "2_"}, r"force_identifier is '2_ground_force_v', and 0 columns of grf.mot begin so"),
         ({"axes": "tibia"}, r"load 'right', given in the axes of 'tibia': leg has no such body"),
         ({"switch": "<isDisabled>true</isDisabled>"}, r"grf.xml: no ExternalForce that is on"),
+        ({"switch": "<isDisabled>maybe</isDisabled>"}, r"'right': <isDisabled>maybe<.* needs true or false"),
         ({"body": ""}, r"grf.xml: load 'right' has no applied_to_body; name the body there"),
     ],
 )
 def test_what_a_file_of_external_loads_lacks_is_named(leg: Path, force: dict[str, str], message: str) -> None:
     with pytest.raises(LinkwiseError, match=message):
         analyze(leg / "walk.csv", leg / "leg", loads=[write_loads(leg, RIGHT | force)])
+
+
+@pytest.mark.parametrize(
+    ("said", "misspelt"),
+    [
+        ("<point_identifier>", "<pont_identifier>"),
+        ("<torque_identifier>", "<torqe_identifier>"),
+        ("<force_expressed_in_body>", "<force_expresed_in_body>"),
+        ("<isDisabled>", "<isDisabld>"),
+        ("<ExternalForce name", "<ExternalForc name"),
+        ("<datafile>", "<datafil>"),
+    ],
+)
+def test_a_misspelt_name_moves_or_drops_no_force_unsaid(leg: Path, said: str, misspelt: str) -> None:
+    path = write_loads(leg, RIGHT, RIGHT | {"name": "left", "switch": "<isDisabled>true</isDisabled>"})
+    tag, wrong = (text.strip("<>").partition(" ")[0] for text in (said, misspelt))
+    text = path.read_text().replace(said, misspelt, 1).replace(f"</{tag}>", f"</{wrong}>", 1)
+    path.write_text(text)
+    with pytest.raises(LinkwiseError, match=f"grf.xml: .* has <{wrong}>, .*; did you mean <{tag}>"):
+        analyze(leg / "walk.csv", leg / "leg", loads=[path])
+
+
+def test_what_a_file_of_external_loads_says_for_nobody_is_told(leg: Path) -> None:
+    path = write_loads(leg, RIGHT)
+    path.write_text(path.read_text().replace("<groups/>", "<plates>2</plates>"))
+    result = analyze(leg / "walk.csv", leg / "leg", loads=[path])
+    assert result.load_warnings == (
+        "grf.xml: ignored, as OpenSim's ExternalLoads has no such name: plates (1 ×)",
+    )
+
+
+def test_a_force_without_a_point_is_told_to_act_at_the_bodys_origin(leg: Path) -> None:
+    path = forces_alone(leg, "push_v", ["push_vx", "push_vy", "push_vz"])
+    assert analyze(leg / "walk.csv", leg / "leg", loads=[path]).load_warnings == (
+        "grf.xml: load 'right' has no point_identifier, so its force acts at the origin of foot",
+    )
 
 
 def test_a_missing_file_of_forces_is_named(leg: Path) -> None:

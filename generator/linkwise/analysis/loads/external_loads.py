@@ -29,15 +29,19 @@ IDENTIFIERS = {"force": "force_identifier", "moment": "torque_identifier", "poin
 def external_loads(path: Path) -> tuple[LoadColumns, ...]:
     """The forces that are not switched off, each with the columns of its data file; warns of the others.
 
-    Raises LinkwiseError for a file without any, data that are not there, and identifiers of other than three
-    columns.
+    Raises LinkwiseError for a file without any, misspelt names, data that are not there, and identifiers of
+    other than three columns.
     """
     with within(str(path)):
-        forces, off = _forces(path)
+        forces, told = _forces(path)
         unread = [_unread(force, log) for force, log in forces]
         found = [_with_columns(load, force) for load, (force, _) in zip(unread, forces, strict=True)]
-    told = tuple(f"{path.name}: force {name!r} is switched off there, and left out" for name in off)
-    return (replace(found[0], warnings=told), *found[1:])
+    told += [
+        f"load {load.name!r} has no point_identifier, so its force acts at the origin of {load.body}"
+        for load in found
+        if "force" in load.columns and "point" not in load.columns
+    ]
+    return (replace(found[0], warnings=tuple(f"{path.name}: {one}" for one in told)), *found[1:])
 
 
 def data_files(path: Path) -> tuple[Path, ...]:
@@ -50,20 +54,28 @@ def data_files(path: Path) -> tuple[Path, ...]:
 
 
 def _forces(path: Path) -> tuple[list[tuple[Element, Path]], list[str]]:
-    """The forces that are on, each with the file of its numbers; and the names of those that are not."""
-    from linkwise.robot.readers.xml_file import (
-        parse,
-    )  # its room brings SymPy, which other loads can do without
+    """The forces that are on, each with the file of its numbers; and what is left out, in words."""
+    # The readers' room brings SymPy, which other loads can do without.
+    from linkwise.analysis.loads.external_names import unread_names
+    from linkwise.robot.readers.osim_elements import yes
+    from linkwise.robot.readers.xml_file import parse
 
     require_file(path)
     root = parse(path)
     loads = root if root.tag == LOADS else root.find(LOADS)
     there = [] if loads is None else loads.findall(f"objects/{FORCE}")
-    forces = [force for force in there if not _is_off(force)]
+    told = list(unread_names(root))
+    # Files of OpenSim 3 say isDisabled, those of 4 appliesForce.
+    is_on = [yes(force, "appliesForce", True) and not yes(force, "isDisabled") for force in there]
+    forces = [force for force, on in zip(there, is_on, strict=True) if on]
     if not forces:
         raise LinkwiseError("no ExternalForce that is on; give OpenSim's file of ExternalLoads")
-    off = [_name(force) for force in there if _is_off(force)]
-    return [(force, _data_file(path, loads, force)) for force in forces], off
+    told += [
+        f"force {_name(force)!r} is switched off there, and left out"
+        for force, on in zip(there, is_on, strict=True)
+        if not on
+    ]
+    return [(force, _data_file(path, loads, force)) for force in forces], told
 
 
 def _unread(force: Element, log: Path) -> LoadColumns:
@@ -131,14 +143,6 @@ def _data_file(path: Path, loads: Element | None, force: Element) -> Path:
     if not told:
         raise LinkwiseError("no datafile; name the .mot or .sto file of the forces there")
     return path.parent / told.replace("\\", "/")
-
-
-def _is_off(force: Element) -> bool:
-    """Whether a force is switched off, as files of OpenSim 3 and of 4 say it."""
-    return _told(force, "isDisabled").lower() in {"true", "1"} or _told(force, "appliesForce").lower() in {
-        "false",
-        "0",
-    }
 
 
 def _told(force: Element, key: str) -> str:
