@@ -206,6 +206,7 @@ def test_two_parameters_of_one_name_are_refused(symbolic: bool) -> None:
         (X.q / (A - B), "link 'disc': its energies hold NaN or infinity"),
         (sp.sqrt(-A) * X.q, "link 'disc': its energies hold the imaginary unit"),
         (sp.I * X.q, "link 'disc': its energies hold the imaginary unit"),
+        (sp.asin(2) * X.q + 1, r"link 'disc': its energies hold asin\(2\), which is not a real number"),
         (10**309 * X.q, "link 'disc': its energies hold a number beyond 1e308"),
         (None, "link 'disc': its potential energy is None; give a SymPy expression"),
         ("x", "link 'disc': its potential energy is 'x'; give a SymPy expression"),
@@ -272,6 +273,18 @@ FILES = {
     "a table that is filled": (
         GOOD + "damping = {}\ndamping['x'] = 3",
         "'damping' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "names of several": (
+        GOOD + "damping, friction = 1, 2",
+        "'damping' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "a name of a list": (
+        GOOD + "shown = [*links, friction := x.qd**2]\nprint(shown)",
+        "'friction' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "a name of what is opened": (
+        GOOD + "with open(__file__) as friction:\n    pass",
+        "'friction' in line 6 would count for nothing: linkwise reads ",
     ),
     "a name misspelt": (
         GOOD + "parametres = {sp.Symbol('m'): 1.0}",

@@ -1,30 +1,35 @@
 """Names that a Python file of energies defines for nobody: linkwise does not read them, nor does the file."""
 
 import ast
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator, Mapping
 from typing import TypeGuard
+
+import sympy as sp
 
 from linkwise.errors import LinkwiseError
 from linkwise.runtime.chosen_names import nearest_first
 
 READ = ("coordinates", "links", "parameters", "name")
 """What linkwise reads of a file."""
+SCOPES = (ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+"""Whose names are their own."""
 ASSIGNMENTS = (ast.Assign, ast.AnnAssign, ast.AugAssign)
 
 
-def refuse_passed_over(source: bytes, defined: Collection[str]) -> None:
+def refuse_passed_over(source: bytes, defined: Mapping[str, object]) -> None:
     """Raise LinkwiseError for what the file defines by a name of its own, and neither reads nor loads.
 
-    Such as `dissipation`, which would count for nothing. What is imported, unpacked, looped over, or begins
-    with _ may be left over.
+    Such as `dissipation`, which would count for nothing. What is imported, looped over, a symbol that stands
+    nowhere, or what begins with _ may be left over.
 
-    defined: names that the file had when it had run
+    defined: what the file had by its names when it had run
     """
     tree = ast.parse(source)
     filled = {id(node) for statement in ast.walk(tree) for node in _own_loads(statement)}
     used = {node.id for node in ast.walk(tree) if _is_load(node) and id(node) not in filled}
     for name, line in _definitions(tree):
-        if name in defined and name not in used and name not in READ and not name.startswith("_"):
+        is_left_over = name.startswith("_") or isinstance(defined.get(name), sp.Symbol)
+        if name in defined and name not in used and name not in READ and not is_left_over:
             raise LinkwiseError(
                 f"{name!r} in line {line} would count for nothing: linkwise reads "
                 f"{', '.join(nearest_first(name, READ))}, and the file does not use it; remove it, or begin "
@@ -52,13 +57,14 @@ def _own_loads(statement: ast.AST) -> Iterator[ast.Name]:
 
 
 def _definitions(tree: ast.AST) -> Iterator[tuple[str, int]]:
-    """Names and lines of single assignments, functions and classes, outside of functions and classes."""
+    """Names and lines of assignments, functions and classes, outside of functions and classes."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             yield node.name, node.lineno
-            continue
-        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-        if isinstance(node, ASSIGNMENTS):
-            yield from ((one.id, node.lineno) for one in targets if isinstance(one, ast.Name))
-        elif isinstance(node, ast.stmt | ast.ExceptHandler):
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id, node.lineno
+        elif isinstance(node, ast.For | ast.AsyncFor):
+            for statement in (*node.body, *node.orelse):
+                yield from _definitions(ast.Module([statement], []))
+        elif not isinstance(node, SCOPES):
             yield from _definitions(node)

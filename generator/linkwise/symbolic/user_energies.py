@@ -2,7 +2,7 @@
 
 import runpy
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from sys import float_info
 from traceback import walk_tb
@@ -59,7 +59,7 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
         raise
     except (Exception, SystemExit) as error:  # the user's own code may raise anything
         raise LinkwiseError(f"running the file failed{_said(error, str(path))}") from error
-    refuse_passed_over(path.read_bytes(), scope.keys())
+    refuse_passed_over(path.read_bytes(), scope)
     for required, kind in (("coordinates", Coordinate), ("links", LinkEnergy)):
         items = scope.get(required)
         if not isinstance(items, (list, tuple)) or not all(isinstance(item, kind) for item in items):
@@ -214,6 +214,19 @@ def _check_real(*energies: sp.Expr) -> None:
             raise LinkwiseError("its energies hold the imaginary unit; energies are real")
         if any(abs(number) > float_info.max for number in energy.atoms(sp.Number)):
             raise LinkwiseError("its energies hold a number beyond 1e308; choose other units")
+        if complex_numbers := [number for number in _numbers(energy) if sp.im(number.evalf()) != 0]:
+            raise LinkwiseError(
+                f"its energies hold {short(str(complex_numbers[0]))}, which is not a real number"
+            )
+
+
+def _numbers(expr: sp.Basic) -> Iterator[sp.Expr]:
+    """The largest parts of an expression that are numbers."""
+    if isinstance(expr, sp.Expr) and expr.is_number:
+        yield expr
+    else:
+        for part in expr.args:
+            yield from _numbers(part)
 
 
 def _check_degree(lagrangian: sp.Expr, velocities: list[sp.Symbol]) -> None:
