@@ -218,6 +218,7 @@ def beside(folder: Path, **changed: str) -> str:
 
 
 COUPLED = 'schema = 1\n[[constraint]]\nname = "own"\ntype = "coupling"\n'
+CENTRES = 'first = { frame = "base" }\nsecond = { frame = "crank" }\nlength = 0.2'
 BAD: dict[str, tuple[dict[str, str], str]] = {
     "unknown link": (
         {"first": 'first = "crunk"'},
@@ -254,6 +255,10 @@ BAD: dict[str, tuple[dict[str, str], str]] = {
     "never closes": (
         {"first": 'first = { frame = "base", xyz = [2, 0, 0] }'},
         "constraint 'own' never closes: from 24 positions that were tried, ",
+    ),
+    "ends that always coincide": (
+        {"text": 'schema = 1\n[[constraint]]\nname = "own"\ntype = "distance"\n' + CENTRES},
+        "constraint 'own' never closes: from 24 positions that were tried, 200 mm are left at best",
     ),
     "nothing moves": (
         {"first": 'first = { frame = "base", xyz = [0.28, 0.24, 0] }'},
