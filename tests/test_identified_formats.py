@@ -77,32 +77,7 @@ name = "arm"
 [parameters]
 reach = 0.3
 
-[[link]]
-name = "upper"
-mass = 2.5  # kg
-com = ["reach / 30", 0.02, 0.15]
-inertia = { xx = 0.02, yy = 0.018, zz = 0.004 }
-
-[[link]]
-name = "lower"
-mass = 1.5
-[link.inertia]
-xx = 0.008
-yy = 0.009
-zz = 0.006
-
-[[link]]
-name = "hand"
-mass = 0.6
-inertia.xx = 0.0008
-inertia.yy = 0.0011
-inertia.zz = 0.0009
-
-[[link]]
-name = "finger"
-mass = 0.2
-inertia = { xx = 2e-4, yy = 2e-4, zz = 1e-4 }
-
+# ---- shoulder ----
 [[joint]]
 name = "shoulder"
 parent = "base"
@@ -112,6 +87,13 @@ axis = [0, 1, 0]
 damping = 0.1  # of the bearing
 lower = -1.5
 
+[[link]]
+name = "upper"
+mass = 2.5  # kg
+com = ["reach / 30", 0.02, 0.15]  # from a drawing
+inertia = { xx = 0.02, yy = 0.018, zz = 0.004 }
+
+# ---- elbow ----
 [[joint]]
 name = "elbow"
 parent = "upper"
@@ -120,6 +102,15 @@ xyz = [0, 0, "reach"]
 rpy = [0.1, 0, 0]
 axis = [0.6, 0, 0.8]
 
+[[link]]
+name = "lower"
+mass = 1.5
+[link.inertia]
+xx = 0.008
+yy = 0.009
+zz = 0.006
+
+# ---- wrist ----
 [[joint]]
 name = "wrist"
 type = "fixed"
@@ -127,6 +118,14 @@ parent = "lower"
 child = "hand"
 xyz = [0.02, 0, 0.25]
 
+[[link]]
+name = "hand"
+mass = 0.6
+inertia.xx = 0.0008
+inertia.yy = 0.0011
+inertia.zz = 0.0009
+
+# ---- slide ----
 [[joint]]
 name = "slide"
 type = "prismatic"
@@ -134,6 +133,11 @@ parent = "hand"
 child = "finger"
 xyz = [0, 0, 0.1]
 axis = [1, 0, 0]
+
+[[link]]
+name = "finger"
+mass = 0.2
+inertia = { xx = 2e-4, yy = 2e-4, zz = 1e-4 }
 """
 
 OSIM = """<?xml version="1.0" encoding="UTF-8"?>
@@ -268,6 +272,30 @@ def test_a_robots_own_file_has_the_identified_bodies_and_is_else_as_it_was(name:
         assert warnings == [
             "arm.toml had formulas in mass, com or inertia of upper, in whose place there are numbers"
         ]
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("arm.toml", 'com = ["reach / 30", ', 'com = ["reach / 30",  # beside the axis\n  '),
+        ("arm.sdf", "<mass>0.2</mass>", "<mass>0.2 <!-- beside the axis --></mass>"),
+        ("arm.osim", "<mass>1.5</mass>", "<mass><!-- # beside the axis -->1.5</mass>"),
+    ],
+)
+def test_comments_inside_of_numbers_stay(name: str, old: str, new: str, tmp_path: Path) -> None:
+    identified(tmp_path / "a", name, TEXTS[name].replace(old, new))
+    after = (tmp_path / "a/out" / name).read_text()
+    assert "beside the axis" in after
+    assert new not in after
+
+
+def test_a_table_of_a_link_that_stands_among_others_is_not_written_back(tmp_path: Path) -> None:
+    table, wrist = "[link.inertia]\nxx = 0.008\nyy = 0.009\nzz = 0.006\n", "xyz = [0.02, 0, 0.25]\n"
+    text = TOML.replace(table, "").replace(wrist, wrist + table)
+    _, warnings = identified(tmp_path / "a", "arm.toml", text)
+    assert warnings[0] == (
+        "arm.toml has a table of [[link]] behind other tables; move it to its link; arm.urdf is a new file"
+    )
 
 
 def test_friction_has_no_place_in_an_opensim_model(tmp_path: Path) -> None:

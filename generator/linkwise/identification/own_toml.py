@@ -1,17 +1,19 @@
 """A robot in TOML with other inertias and friction: numbers, where there were formulas too."""
 
 import re
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from linkwise.escape import listed
 from linkwise.extras import extra
-from linkwise.identification.own_file import Friction, LinkMass, OwnFile
+from linkwise.identification.own_file import Friction, LinkMass, NotWrittenBack, OwnFile
 from linkwise.package.load import Array
 from linkwise.robot.readers.toml import INERTIA
 from linkwise.robot.readers.toml_table import toml_data
 
 KEYS = ("mass", "com", "inertia")
+TABLE = re.compile(r"^(?=[ \t]*\[\[)", re.MULTILINE)
 LINE_END = re.compile(rb"(?<!\r)\n")
 BOM = b"\xef\xbb\xbf"
 
@@ -21,17 +23,27 @@ class OwnToml(OwnFile):
 
     def written(self, links: Mapping[str, LinkMass], friction: Friction) -> bytes:
         """See OwnFile."""
-        document = extra("tomlkit").parse(self.data.removeprefix(BOM).decode())
-        for link in document["link"]:
+        written = b"".join(
+            self._part(part, links, friction) for part in _parts(self.data.removeprefix(BOM).decode())
+        )
+        if b"\r\n" in self.data:
+            written = LINE_END.sub(b"\r\n", written)  # new lines end as the others do
+        return (BOM if self.data.startswith(BOM) else b"") + written
+
+    def _part(self, part: str, links: Mapping[str, LinkMass], friction: Friction) -> bytes:
+        document = extra("tomlkit").parse(part)
+        for what in ("link", "joint"):
+            if isinstance(document.get(what), dict):
+                raise NotWrittenBack(
+                    f"{self.path.name} has a table of [[{what}]] behind other tables; move it to its {what}"
+                )
+        for link in document.get("link", ()):
             if (carried := links.get(link["name"])) is not None:
                 _carry(link, carried)
         for joint in document.get("joint", ()):
             for what, text in friction.get(joint["name"], {}).items():
                 joint[what] = float(text)
-        written: bytes = document.as_string().encode()
-        if b"\r\n" in self.data:
-            written = LINE_END.sub(b"\r\n", written)  # new lines end as the others do
-        return (BOM if self.data.startswith(BOM) else b"") + written
+        return str(document.as_string()).encode()
 
     def lost(self, friction: Mapping[str, Array]) -> Iterator[str]:
         """See OwnFile."""
@@ -48,13 +60,38 @@ class OwnToml(OwnFile):
             )
 
 
+def _parts(text: str) -> Iterator[str]:
+    """The file, cut before each [[...]]: as a whole, tomlkit would put all tables of one name together.
+
+    A line that begins so inside of a value is none: what stands before it is no TOML by itself.
+    """
+    part = ""
+    for piece in TABLE.split(text):
+        if part and _is_toml(part):
+            yield part
+            part = ""
+        part += piece
+    yield part
+
+
+def _is_toml(text: str) -> bool:
+    try:
+        tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        return False
+    return True
+
+
 def _values(said: Any) -> Iterable[Any]:
     return said.values() if isinstance(said, dict) else said if isinstance(said, list) else (said,)
 
 
 def _carry(link: Any, carried: LinkMass) -> None:
     link["mass"] = carried.mass
-    if "com" in link or carried.com.any():
+    if "com" in link:
+        for at, value in enumerate(carried.com.tolist()):
+            link["com"][at] = value  # comments between them stay
+    elif carried.com.any():
         link["com"] = carried.com.tolist()
     moments = {e: float(carried.inertia["xyz".index(e[0]), "xyz".index(e[1])]) for e in INERTIA}
     own = link.setdefault("inertia", extra("tomlkit").inline_table())

@@ -9,6 +9,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 NAME = re.compile(rb"<[^\s/>]+")
 ATTRIBUTE = re.compile(rb"""\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")
+COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 TAG_END = re.compile(rb"\s*(/?)>")
 BLANKS = re.compile(rb"\s*\Z")
 
@@ -57,13 +58,19 @@ class PlacedXml:
         return [*edits, Edit(at, at, more.encode())] if more else edits
 
     def with_text(self, element: Element, text: str) -> Edit:
-        """Give an element that has no others in it this text; blanks around it stay."""
+        """Give an element that has no others in it this text; blanks and comments around it stay."""
         place = self._places[element]
         if place.inside == place.inside_stop:
             return self.with_children(element, [], text)
         inside = self.data[place.inside : place.inside_stop]
-        start = place.inside + len(inside) - len(inside.lstrip())
-        return Edit(start, max(start, place.inside + len(inside.rstrip())), escape(text).encode())
+        bare = COMMENT.sub(lambda comment: b" " * len(comment[0]), inside)
+        start, stop = len(bare) - len(bare.lstrip()), len(bare.rstrip())
+        comments = b" ".join(COMMENT.findall(inside, start, stop))  # of those amid the text
+        return Edit(
+            place.inside + start,
+            place.inside + max(start, stop),
+            b" ".join(filter(None, [escape(text).encode(), comments])),
+        )
 
     def with_children(self, parent: Element, tags: Iterable[str], text: str = "") -> Edit:
         """Put elements, as they are written, behind those of a parent, as far in as these are."""
