@@ -424,10 +424,14 @@ def test_the_reduction_in_nodes_of_the_graph() -> None:
     pairs = list(recorded_operations(arm, 10, silent))
     assert (pairs[0].total, pairs[0].kept) == (4, 1)
     stated = re.search(
-        r"at 10 joints the part saves (\d+) % of the nodes of autograd's graph, .* tends to ([\d.]+) %",
+        r"equal ones counted once, the part saves (\d+) % at 10 joints, which tends to ([\d.]+) % with more; "
+        r"of torch's own nodes, ([\d,]+) for the torque and (\d+) for its part, it saves (\d+) %",
         REPORTS,
     )
     assert stated is not None
+    nodes = pairs[9].nodes
+    assert [f"{nodes.total:,}", str(nodes.kept)] == [stated[3], stated[4]]
+    assert round(100 * nodes.reduction) == int(stated[5])
     assert round(100 * pairs[9].reduction) == int(stated[1])
     total, kept = (count_polynomial([getattr(p, name) for p in pairs[1:]]) for name in ("total", "kept"))
     assert total is not None
@@ -457,7 +461,7 @@ def test_the_page_shows_the_nodes_where_they_were_counted() -> None:
     two, three = result.recorded
     page, data = reduction_markdown(result), reduction_json(result)
     assert f"| 3 | {three.total} | {three.kept} | {three.reduction:.4f} |" in page
-    assert f"autograd's graph of τ_1 has at 3 DoF, its q̈_1 part needs {three.kept}" in page
+    assert f"takes for τ_1 at 3 DoF, equal ones counted once, its q̈_1 part needs {three.kept}" in page
     nodes = f"0.76 at 2 DoF ({two.nodes.total} and {two.nodes.kept}), 0.77 at 3 DoF ({three.nodes.total} and "
     assert nodes in page
     assert data["recorded"]["points"][1]["kept_nodes"] == three.nodes.kept

@@ -21,7 +21,7 @@ COMMANDS = {
     "analyze": "Who loads whom: every torque term of a recorded movement, as a table, figures and a page.",
     "study": "Many recordings: every trial analysed, and what they say together; also on a cluster.",
     "identify": "What a log of motion and torques says of the links: masses, centres, inertias, friction.",
-    "graph": "Show the operations that autograd takes for a partial torque, or for a part of it, as a graph.",
+    "graph": "Show what autograd computes for a partial torque, or a part of it; equal operations are one.",
     "motion": "Write two motions modelled on the paper's Fig. 5 and 10, for the arm of Table 2, `planar3`.",
 }
 REPORTS = {

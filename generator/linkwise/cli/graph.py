@@ -38,7 +38,7 @@ def graph(
     out: Annotated[Path | None, typer.Option(help="Directory that gets the files")] = None,
     as_json: Json = False,
 ) -> None:
-    """Show the operations that autograd takes for a partial torque, or for a part of it, as a graph."""
+    """Show what autograd computes for a partial torque, or a part of it; equal operations are one."""
     _check("--order", order, ("all", "0", "1", "2"))
     _check("--fold", fold, ("auto", *FOLDS))
     wanted = formats or ["svg", "graphml", "json"]

@@ -105,11 +105,12 @@ def identify(
         found = identified(log, package, reading, processing, fitting, progress)
     manifest = package.package.manifest
     of_robot, lost = identified_robot(found, manifest, own)
+    told = (*(f"{log}: {warning}" for warning in found.warnings), *lost)
     found = replace(found, warnings=(*found.warnings, *lost))
     chosen = choices(reading, processing) | {"fitting": asdict(fitting)}
     files = write_files(out, identified_files(found, manifest, chosen, lost) | of_robot)
-    for warning in found.warnings:
-        tell(f"warning: {log}: {warning}", err=True)
+    for warning in told:
+        tell(f"warning: {warning}", err=True)
     if found.log.ignored:
         tell(f"left out: {listed(found.log.ignored)}", err=True)
     if as_json:

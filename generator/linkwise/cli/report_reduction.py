@@ -53,7 +53,8 @@ def reduction(
         typer.Option(help=f"Degrees of freedom, FIRST..LAST; else from 1 on, to {ASKED_FOR} at most"),
     ] = None,
     graphs: Annotated[
-        bool, typer.Option("--graphs", help="Count nodes of autograd's graphs too; needs torch")
+        bool,
+        typer.Option("--graphs", help="Count what autograd takes too, operations and nodes; needs torch"),
     ] = False,
     measured: Annotated[bool, typer.Option("--measure", help="Time generated code too; needs torch")] = False,
     seconds: Annotated[Path | None, typer.Option(help="Draw the times of an earlier measured.json")] = None,

@@ -95,7 +95,9 @@ def savings_lines(result: Study, timings: Sequence[Timing] = ()) -> tuple[Saving
     if result.recorded:
         found = tuple(pair.reduction for pair in result.recorded)
         lines.append(
-            SavingsLine("operations", "nodes of autograd's graph", dof, found, INK, "X", (0, (3, 1)))
+            SavingsLine(
+                "operations", "operations of autograd, equal ones once", dof, found, INK, "X", (0, (3, 1))
+            )
         )
     for method, look in zip(METHODS, ((GREEN, "^", "-."), (PURPLE, "D", ":")), strict=True):
         chosen = [t for t in timings if t.method == method]

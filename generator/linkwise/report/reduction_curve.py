@@ -57,7 +57,7 @@ class Study:
 
     uncombined: the points by the convention of `uncombined_terms`, as far as the budget reaches; none for
     energies that a user wrote
-    recorded: operations of autograd's graphs, where they were asked for
+    recorded: operations that autograd takes, where they were asked for
     spatial: whether the arm leaves a plane, as the paper's do not
     """
 
@@ -91,7 +91,7 @@ def study(
 ) -> Study:
     """Count the links of a serial arm, to `beyond` where possible, and report on first..last under `name`.
 
-    With `graphs`, which needs torch, operations of autograd's graphs are counted too.
+    With `graphs`, which needs torch, operations that autograd takes are counted too.
     """
     every = curve(system, last, budget, progress, beyond)
     points = every[first - 1 : last]

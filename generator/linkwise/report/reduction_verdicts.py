@@ -147,12 +147,12 @@ def _operations_verdict(last: CurvePoint) -> str:
 
 
 def _graph_verdict(result: Study) -> str:
-    """Say what is saved in the graph itself, and where that ends."""
+    """Say what is saved of autograd's recorded operations, and where that ends."""
     last, dof = result.recorded[-1], result.dof[-1]
     verdict = "Weaker" if last.reduction < result.points[-1].reduction else "Stronger"
     text = (
-        f"**{verdict}: the graph itself.** Of the {last.total} operations that autograd's graph of τ_1 "
-        f"has at {dof} DoF, its q̈_1 part needs {last.kept}: {last.reduction:.1%} are saved, where "
+        f"**{verdict}: autograd.** Of the {last.total} operations that autograd takes for τ_1 at {dof} DoF, "
+        f"equal ones counted once, its q̈_1 part needs {last.kept}: {last.reduction:.1%} are saved, where "
         f"{result.points[-1].reduction:.1%} of the terms are"
     )
     # One joint is different: it has no velocity forces.
