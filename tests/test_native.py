@@ -1,6 +1,7 @@
 """The native back end: what its compiled code must not get wrong."""
 
 import gc
+import inspect
 import multiprocessing
 import pickle
 import sys
@@ -249,6 +250,38 @@ def test_subclasses_and_negated_views_of_tensors_are_tensors(planar3: ModuleType
     assert torch.is_tensor(robot.inverse_dynamics(q.as_subclass(Special), q, q))
     view = torch._neg_view(q)
     torch.testing.assert_close(robot.inverse_dynamics(view, q, q), robot.inverse_dynamics(-q, q, q))
+
+
+def calls_of_motion(robot: Any) -> dict[str, int]:
+    """Calls of a robot that ask for q, qd and qdd alone, and for how many of them."""
+    asked = {}
+    for name in dir(robot):
+        call = getattr(type(robot), name, None)
+        if callable(call) and not name.startswith("_"):
+            given = inspect.signature(call).parameters
+            needed = [one.name for one in given.values() if one.default is one.empty][1:]
+            if needed and "tau" not in given and needed == ["q", "qd", "qdd"][: len(needed)]:
+                asked[name] = len(needed)
+    return asked
+
+
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float32], ids=str)
+@pytest.mark.parametrize("batch", [(), (4,)], ids=str)
+def test_tensors_without_gradient_are_answered_by_every_call_as_arrays_are(
+    planar3: ModuleType, batch: tuple[int, ...], dtype: torch.dtype
+) -> None:
+    robot = planar3.load("native")
+    motion = torch.linspace(-1.0, 1.0, 36, dtype=dtype).reshape(3, 4, 3)
+    motion = motion if batch else motion[:, 0]
+    calls = calls_of_motion(robot)
+    assert {"regressor", "coefficient_regressors", "mass_matrix", "energy", "packed"} <= calls.keys()
+    for name, count in calls.items():
+        few = motion[:count]
+        answers = [getattr(robot, name)(*given) for given in (few, few.numpy())]
+        fields = [each if isinstance(each, tuple) else (each,) for each in answers]
+        for ours, expected in zip(*fields, strict=True):
+            assert torch.is_tensor(ours), name
+            np.testing.assert_allclose(ours.numpy(), expected, rtol=0, atol=1e-5, err_msg=name)
 
 
 def test_an_interrupted_call_lets_nobody_write_to_its_memory_any_more(
