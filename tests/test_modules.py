@@ -408,6 +408,11 @@ def test_traced_by_torch_jit_a_call_is_right_or_refused(planar2: ModuleType) -> 
     for call in (robot.partial_torque, robot.module("partial_torque")):
         traced = torch.jit.trace(call, some)
         assert torch.equal(traced(*others), robot.partial_torque(*others))
+    for call in ("poses", "centre_of_mass"):  # of a robot that has no constants of theirs yet
+        traced = torch.jit.trace(getattr(planar2.load("torch").kinematics, call), some[:1])
+        ours, expected = (each(others[0]) for each in (traced, getattr(robot.kinematics, call)))
+        for one, other in zip(*((ours, expected) if call == "poses" else ([ours], [expected])), strict=True):
+            assert torch.equal(one, other), call
     differentiated, compiled = planar2.load("autograd"), planar2.load("native")
     for call in (
         differentiated,
