@@ -169,6 +169,17 @@ def test_arrays_refuse_tensors_that_would_lose_something(package_of: Callable[[s
         robot.partial_torque(torch.ones(3, dtype=torch.bfloat16), one, one)
 
 
+def test_what_needs_numbers_says_so_inside_of_transformations(
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    robot, q = package_of("planar3").load("torch"), torch.ones(2, 3, dtype=torch.float64)
+    told = r"^this needs the numbers of q, which torch\.func, .* hide; call it outside of them, or take"
+    with pytest.raises(TypeError, match=told):
+        torch.vmap(lambda each: robot.simulate(each, each, [0.0, 0.01]).q)(q)
+    with pytest.raises(TypeError, match=told):
+        torch.func.jacrev(lambda tau: robot.simulate(q[0], q[0], [0.0, 0.01], tau).q)(q[0])
+
+
 NOT_DENSE: dict[str, tuple[Callable[[], Any], str]] = {
     "sparse": (
         lambda: torch.ones(2, 3, dtype=torch.float64).to_sparse(),

@@ -68,7 +68,13 @@ def test_a_package_tells_how_it_was_asked_for_whoever_makes_it(tmp_path: Path) -
         for folder in (tmp_path / "out/odd", kept)
     ]
     read = [read(tmp_path / "odd.toml", options) for read in (read_system, read_robot)]
-    assert all(files == folders[0] for files in (folders[1], *(generate(robot, ["numpy"]) for robot in read)))
+    assert all(
+        files == folders[0]
+        for files in (
+            folders[1],
+            *(generate(*asked) for asked in zip(read, ("numpy", ["numpy"]), strict=True)),
+        )
+    )
     request = json.loads(folders[0][FILE])["request"]
     assert request == {"robot": "odd.toml", **options.request()} | {
         "backends": ["numpy"],

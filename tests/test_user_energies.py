@@ -17,6 +17,7 @@ from linkwise import (
     LinkwiseError,
     energy_system,
     generate,
+    read_robot,
     read_system,
     write_package,
 )
@@ -303,6 +304,14 @@ def test_defect_of_a_python_file_is_named(case: str, tmp_path: Path) -> None:
     with pytest.raises(LinkwiseError) as caught:
         read_system(tmp_path / "bad.py")
     assert str(caught.value).startswith(f"{tmp_path / 'bad.py'}: {message}")
+
+
+def test_a_python_file_is_no_robot_and_what_reads_it_is_told(tmp_path: Path) -> None:
+    (tmp_path / "puck.py").write_text(GOOD)
+    with pytest.raises(
+        LinkwiseError, match=r"puck.py: a Python file holds energies.*linkwise.read_system reads"
+    ):
+        read_robot(tmp_path / "puck.py")
 
 
 def test_what_a_python_file_uses_itself_is_its_own_matter(tmp_path: Path) -> None:

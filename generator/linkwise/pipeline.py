@@ -82,7 +82,7 @@ def plan(
     derivation: Method = "rule",
 ) -> PackagePlan:
     """What `generate` does with the same arguments, before anything is derived; raises as it does."""
-    asked = None if backends is None else tuple(backends)
+    asked = None if backends is None else (backends,) if isinstance(backends, str) else tuple(backends)
     system = constrained_system(rigid_system(robot) if isinstance(robot, Robot) else robot)
     kind = chosen_kernel(system, kernel, asked, derivation)
     chosen = chosen_backends(usual_backends(system, kind) if asked is None else asked, kind)
@@ -107,10 +107,10 @@ def generate(
 ) -> dict[str, str]:
     """Files of a package, {path inside the package: text}.
 
-    `backends` are all that the robot can have if not given. `kernel` is straight, loops, or auto, which
-    chooses by the robot's size; with loops no closed forms are derived, and `formulas` are not there.
-    `derivation` says how those of rigid links are: rule, which is cheaper, or energy, by Euler-Lagrange from
-    SymPy energies.
+    `backends`, several or one, are all that the robot can have if not given. `kernel` is straight, loops, or
+    auto, which chooses by the robot's size; with loops no closed forms are derived, and `formulas` are not
+    there. `derivation` says how those of rigid links are: rule, which is cheaper, or energy, by
+    Euler-Lagrange from SymPy energies.
 
     The manifest keeps these arguments, and the options that the robot was read with: how to make the package
     again. Raises LinkwiseError for a name, back end or kernel that cannot be, before anything is derived.

@@ -84,6 +84,8 @@ def _read_robot(spec: str | Path, options: Options) -> Robot:
 
 def reader_of(path: Path) -> Reader | None:
     """What reads a file; None for one that is none of a robot."""
+    if path.suffix.lower() == ".py":
+        raise LinkwiseError("a Python file holds energies, not a robot; linkwise.read_system reads it")
     reader = READERS.get(path.suffix.lower())
     return XML.get(root_tag(path), read_urdf) if reader is read_xml else reader
 
@@ -134,7 +136,11 @@ def _read_file(path: Path) -> Description:
     require_file(path, missing, "the robot's file")
     if path.suffix.lower() == ".xacro":
         raise LinkwiseError(XACRO)
+    if path.suffix.lower() == ".py":
+        raise LinkwiseError("a Python file holds energies, not a robot; linkwise.read_system reads it")
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise LinkwiseError(f"unknown kind of file {path.suffix!r}; give {', '.join(READERS)} or .py")
+        raise LinkwiseError(
+            f"unknown kind of file {path.suffix!r}; give {', '.join(READERS)}, or .py for energies"
+        )
     return reader(path)
