@@ -190,7 +190,7 @@ def _axis(
     if axis is None:
         return _numbers(transforms.rotate(own, (0.0, 0.0, 1.0)))
     numbers = numbers_of(axis, 3, place)
-    in_model = is_true(text_of(element, "axis/use_parent_model_frame"))
+    in_model = is_true(text_of(element, "axis/use_parent_model_frame"), "<use_parent_model_frame>", place)
     if version < (1, 5) or in_model:
         return _numbers(numbers)
     seen_in = axis.get("expressed_in", "") if version >= (1, 7) else ""
