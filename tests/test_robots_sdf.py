@@ -316,6 +316,11 @@ BAD = {
         ("<inertial><pose>0 0.1", "<inertial auto='yes'><pose>0 0.1"),
         "link 'lower': <inertial auto> is 'yes'; write true or false",
     ),
+    "an axis in the model as before 1.7": (
+        ("-0.6 0 0.8</xyz>", "-0.6 0 0.8</xyz><use_parent_model_frame>true</use_parent_model_frame>"),
+        "joint 'slide': <use_parent_model_frame> is no more from version 1.7 on; "
+        'write <xyz expressed_in="__model__">',
+    ),
 }
 
 
@@ -339,6 +344,11 @@ OLD = {
         ("<parent>upper", '<pose relative_to="upper">0 0 1 0 0 0</pose><parent>upper'),
         "joint 'slide': <pose relative_to='upper'> is not read in a file older than version 1.7",
     ),
+    "axis": (
+        ("<xyz>0 1 0", '<xyz expressed_in="__model__">0 1 0'),
+        "joint 'hip': <xyz expressed_in='__model__'> is not read in a file older than version 1.7; "
+        "raise its version, or write the axis without it",
+    ),
 }
 
 
@@ -355,6 +365,10 @@ def test_a_frame_that_an_old_file_names_is_refused_and_not_passed_over(place: st
 SAME = {
     "inertia in its own link": ("<inertial><pose>0 0.1", "<inertial><pose relative_to='lower'>0 0.1"),
     "inertia in no frame": ("<inertial><pose>0 0.1", "<inertial><pose relative_to=''>0 0.1"),
+    "axis not in the model": (
+        "-0.6 0 0.8</xyz>",
+        "-0.6 0 0.8</xyz><use_parent_model_frame>0</use_parent_model_frame>",
+    ),
     "angles": (' degrees="true"', ' degrees="true" rotation_format="euler_rpy"'),
 }
 
@@ -365,6 +379,17 @@ def test_what_says_only_what_is_so_anyway_changes_nothing(way: str, tmp_path: Pa
     assert RELATIVE.count(old) == 1
     assert numbers(robot_of(tmp_path, RELATIVE.replace(old, new))).tolist() == (
         numbers(robot_of(tmp_path, RELATIVE)).tolist()
+    )
+
+
+@pytest.mark.parametrize("text", [IN_THE_MODEL, IN_THE_JOINT], ids=["1.4", "1.6"])
+def test_an_axis_in_the_model_is_z_there_where_none_is_written(text: str, tmp_path: Path) -> None:
+    turned = text.replace("<pose>0 0.2 1.5 0 0 1.57", "<pose>0 0.2 1.5 1 0 1.57")
+    written = turned.replace("0 0.6 0.8", "0 0 1")
+    assert "<xyz>0 0 1</xyz>" in written
+    assert turned != text
+    assert numbers(robot_of(tmp_path, written.replace("<xyz>0 0 1</xyz>", ""))).tolist() == (
+        numbers(robot_of(tmp_path, written)).tolist()
     )
 
 
