@@ -122,6 +122,7 @@ EXTENDED = robot(
     '<loop_joint name="still" type="fixed"><link1 link="a"/><link2 link="a"/></loop_joint>',
     '<drake:linear_bushing_rpy><drake:bushing_frameA name="left"/></drake:linear_bushing_rpy>',
     '<gazebo><joint name="rod" type="ball"><parent>d</parent><child>b</child></joint></gazebo>',
+    '<gazebo><link name="weight"><inertial><mass>1</mass></inertial></link></gazebo>',
     '<drake:joint name="screw" type="screw"/>',
 ).replace("<robot", '<robot xmlns:drake="http://drake.mit.edu"')
 TOLD = (
@@ -129,6 +130,7 @@ TOLD = (
     "joint that closes a loop left out of the torques: close (c to d)",
     "bushing left out of the torques: linear_bushing_rpy",
     "Gazebo's joint left out of the torques: rod (d to b)",
+    "Gazebo's link left out of the torques: weight",
 )
 
 
