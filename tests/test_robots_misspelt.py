@@ -122,13 +122,16 @@ EXTENDED = robot(
     '<loop_joint name="still" type="fixed"><link1 link="a"/><link2 link="a"/></loop_joint>',
     '<drake:linear_bushing_rpy><drake:bushing_frameA name="left"/></drake:linear_bushing_rpy>',
     '<gazebo><joint name="rod" type="ball"><parent>d</parent><child>b</child></joint></gazebo>',
+    '<gazebo><link name="weight"><inertial><mass>1</mass></inertial></link></gazebo>',
     '<drake:joint name="screw" type="screw"/>',
 ).replace("<robot", '<robot xmlns:drake="http://drake.mit.edu"')
 TOLD = (
-    "ignored, as URDF has no such name: joint of http://drake.mit.edu (1 ×), link_group (1 ×)",
+    "ignored, as URDF has no such name there: joint of http://drake.mit.edu (1 × in robot 'test'), "
+    "link_group (1 × in robot 'test')",
     "joint that closes a loop left out of the torques: close (c to d)",
     "bushing left out of the torques: linear_bushing_rpy",
     "Gazebo's joint left out of the torques: rod (d to b)",
+    "Gazebo's link left out of the torques: weight",
 )
 
 
@@ -143,6 +146,99 @@ def test_generate_and_a_kept_package_say_what_was_ignored(
         f"warning: arm.urdf: {line}" for line in TOLD
     ]
     assert kept_package(path, "numpy").warnings == tuple(f"{path}: {line}" for line in TOLD)
+
+
+LOST = '<inertial><mass value="3"/></inertial>'
+STRAYS = {
+    "in a shape": (
+        URDF,
+        ("</link>", f'<visual name="v"><geometry><box/>{LOST}</geometry></visual></link>'),
+        "URDF has no such name there: inertial (3 × first in <visual> of link 'a')",
+    ),
+    "in a shape once": (
+        URDF,
+        ('<link name="b">', f'<link name="b"><collision>{LOST}</collision>'),
+        "URDF has no such name there: inertial (1 × in <collision> of link 'b')",
+    ),
+    "in a joint": (
+        URDF,
+        ('<parent link="b"/>', f'<parent link="b"/>{LOST}'),
+        "URDF has no such name there: inertial (1 × in joint 'bc')",
+    ),
+    "beside the inertia": (
+        URDF,
+        ('<link name="b">', '<link name="b"><mass value="3"/>'),
+        "URDF has no such name there: mass (1 × in link 'b')",
+    ),
+    "a joint in a link": (
+        URDF,
+        ('<link name="b">', '<link name="b"><visual><joint name="j"/></visual><joint name="k"/>'),
+        "URDF has no such name there: joint (2 × first in link 'b')",
+    ),
+    "an attribute": (
+        URDF,
+        ('<mass value="1.5"/>', '<mass value="1.5" unit="g"/>'),
+        "URDF has no such name there: unit of <mass> (3 × first in <inertial> of link 'a')",
+    ),
+    "an attribute of a link": (
+        URDF,
+        ('<link name="c">', '<link name="c" weight="3">'),
+        "URDF has no such name there: weight of <link> (1 × in link 'c')",
+    ),
+    "centre of mass": (
+        SDF,
+        ("</mass>", "</mass><com>0 0 1</com>"),
+        "SDFormat has no such name there: com (4 × first in <inertial> of link 'upper')",
+    ),
+    "SDFormat's shape": (
+        SDF,
+        ('<link name="tip">', '<link name="tip"><collision name="c"><inertial/></collision>'),
+        "SDFormat has no such name there: inertial (1 × in <collision> of link 'tip')",
+    ),
+    "SDFormat's mass": (
+        SDF,
+        ("</ixx>", "<mass>1</mass></ixx>"),
+        "SDFormat has no such name there: "
+        "mass (4 × first in <ixx> of <inertia> of <inertial> of link 'upper')",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", STRAYS)
+def test_what_stands_where_nothing_reads_it_is_told_with_its_place(case: str, tmp_path: Path) -> None:
+    text, (old, new), message = STRAYS[case]
+    path = tmp_path / ("arm.sdf" if text is SDF else "arm.urdf")
+    path.write_text(text)
+    before = effects(read_robot(path).notes)
+    assert old in text
+    path.write_text(text.replace(old, new))
+    assert effects(read_robot(path).notes) == (f"ignored, as {message}", *before)
+
+
+FOREIGN = {
+    "transmission": '<transmission name="t"><joint name="ab"/><actuator name="m"/></transmission>',
+    "control": '<ros2_control name="c" type="system"><joint name="ab"/></ros2_control>',
+    "plugin": '<link name="z"><visual><plugin><link>a</link><mass>1</mass></plugin></visual></link>',
+}
+
+
+@pytest.mark.parametrize("case", FOREIGN)
+def test_what_means_something_else_elsewhere_is_not_told(case: str, tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    fixed = '<joint name="az" type="fixed"><parent link="a"/><child link="z"/></joint>'
+    added = FOREIGN[case] + (fixed if "<link" in FOREIGN[case][:5] else "")
+    path.write_text(URDF.replace("</robot>", f"{added}</robot>"))
+    assert not [line for line in effects(read_robot(path).notes) if "no such name" in line]
+
+
+def test_a_line_on_many_places_stays_short(tmp_path: Path) -> None:
+    path, count = tmp_path / "arm.urdf", 200
+    names = [f"a_link_of_a_very_long_name_{k}" for k in range(count + 1)]
+    links = (link(name).replace("</link>", "<com/></link>") for name in names)
+    joints = (joint(f"j{k}", names[k], names[k + 1]) for k in range(count))
+    path.write_text(robot(*links, *joints))
+    (line,) = (note for note in read_robot(path).notes if note.subject == "com")
+    assert line.detail == "201 × first in link 'a_link_of_a…ong_name_0'"
 
 
 def test_what_an_sdformat_file_has_that_loads_joints_is_told(tmp_path: Path) -> None:

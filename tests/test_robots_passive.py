@@ -92,4 +92,7 @@ def test_numbers_that_the_format_does_not_have_are_told_as_ignored(tmp_path: Pat
     (tmp_path / "arm.urdf").write_text(robot(*map(link, "ab"), joint("ab", "a", "b", inner=own)))
     notes = read_robot(tmp_path / "arm.urdf").notes
     ignored = {note.subject: note.detail for note in notes if note.kind == "ignored"}
-    assert ignored == {"K of <dynamics>": "1 ×", "mu_coulomb of <dynamics>": "1 ×"}
+    assert ignored == {
+        "K of <dynamics>": "1 × in joint 'ab'",
+        "mu_coulomb of <dynamics>": "1 × in joint 'ab'",
+    }

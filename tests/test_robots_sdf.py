@@ -278,6 +278,49 @@ BAD = {
         ("0 0 0 0 0 1 0<", "0 0 0 0 0 0 0<"),
         "joint 'slide': <pose> has a quaternion of zeros",
     ),
+    "inertia in another link": (
+        ("<inertial><pose>0 0.1", "<inertial><pose relative_to='upper'>0 0.1"),
+        "link 'lower': the pose of <inertial> is relative to 'upper', which SDFormat does not have; "
+        "write it in the link's axes",
+    ),
+    "inertia in the model": (
+        ("<inertial><pose>0 0.1", "<inertial><pose relative_to='__model__'>0 0.1"),
+        "link 'lower': the pose of <inertial> is relative to '__model__'",
+    ),
+    "another order of a quaternion": (
+        ("quat_xyzw", "quat_wxyz"),
+        "joint 'slide': <pose rotation_format='quat_wxyz'> is not read; "
+        "give the turn as euler_rpy or quat_xyzw",
+    ),
+    "another way of angles": (
+        ("<inertial><pose>0 0.1", "<inertial><pose rotation_format='rpy'>0 0.1"),
+        "link 'lower': <pose rotation_format='rpy'> is not read; give the turn as euler_rpy or quat_xyzw",
+    ),
+    "six numbers with a quaternion": (
+        ("0 0 0 0 0 1 0<", "0 0 0 0 0 1<"),
+        "joint 'slide': <pose> is '0 0 0 0 0 1'; it needs 7 numbers",
+    ),
+    "a quaternion in degrees": (
+        ('rotation_format="quat_xyzw"', 'rotation_format="quat_xyzw" degrees="true"'),
+        "joint 'slide': <pose> has a quaternion in degrees; remove degrees, or write euler_rpy",
+    ),
+    "neither degrees nor not": (
+        ('degrees="true"', 'degrees="yes"'),
+        "joint 'hip': <pose degrees> is 'yes'; write true or false",
+    ),
+    "neither static nor not": (
+        ('<link name="lower">', '<static>on</static><link name="lower">'),
+        "model 'arm': <static> is 'on'; write true or false",
+    ),
+    "neither of shapes nor not": (
+        ("<inertial><pose>0 0.1", "<inertial auto='yes'><pose>0 0.1"),
+        "link 'lower': <inertial auto> is 'yes'; write true or false",
+    ),
+    "an axis in the model as before 1.7": (
+        ("-0.6 0 0.8</xyz>", "-0.6 0 0.8</xyz><use_parent_model_frame>true</use_parent_model_frame>"),
+        "joint 'slide': <use_parent_model_frame> is no more from version 1.7 on; "
+        'write <xyz expressed_in="__model__">',
+    ),
 }
 
 
@@ -289,6 +332,65 @@ def test_what_is_no_robot_is_refused_in_one_line(fault: str, tmp_path: Path) -> 
         robot_of(tmp_path, RELATIVE.replace(old, new))
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+OLD = {
+    "link": (
+        ('<link name="lower"><pose>', '<link name="lower"><pose relative_to="upper">'),
+        "link 'lower': <pose relative_to='upper'> is not read in a file older than version 1.7; "
+        "raise its version, or write the pose without it",
+    ),
+    "joint": (
+        ("<parent>upper", '<pose relative_to="upper">0 0 1 0 0 0</pose><parent>upper'),
+        "joint 'slide': <pose relative_to='upper'> is not read in a file older than version 1.7",
+    ),
+    "axis": (
+        ("<xyz>0 1 0", '<xyz expressed_in="__model__">0 1 0'),
+        "joint 'hip': <xyz expressed_in='__model__'> is not read in a file older than version 1.7; "
+        "raise its version, or write the axis without it",
+    ),
+}
+
+
+@pytest.mark.parametrize("place", OLD)
+def test_a_frame_that_an_old_file_names_is_refused_and_not_passed_over(place: str, tmp_path: Path) -> None:
+    (old, new), message = OLD[place]
+    assert IN_THE_JOINT.count(old) == 1
+    with pytest.raises(LinkwiseError) as caught:
+        robot_of(tmp_path, IN_THE_JOINT.replace(old, new))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+SAME = {
+    "inertia in its own link": ("<inertial><pose>0 0.1", "<inertial><pose relative_to='lower'>0 0.1"),
+    "inertia in no frame": ("<inertial><pose>0 0.1", "<inertial><pose relative_to=''>0 0.1"),
+    "axis not in the model": (
+        "-0.6 0 0.8</xyz>",
+        "-0.6 0 0.8</xyz><use_parent_model_frame>0</use_parent_model_frame>",
+    ),
+    "angles": (' degrees="true"', ' degrees="true" rotation_format="euler_rpy"'),
+}
+
+
+@pytest.mark.parametrize("way", SAME)
+def test_what_says_only_what_is_so_anyway_changes_nothing(way: str, tmp_path: Path) -> None:
+    old, new = SAME[way]
+    assert RELATIVE.count(old) == 1
+    assert numbers(robot_of(tmp_path, RELATIVE.replace(old, new))).tolist() == (
+        numbers(robot_of(tmp_path, RELATIVE)).tolist()
+    )
+
+
+@pytest.mark.parametrize("text", [IN_THE_MODEL, IN_THE_JOINT], ids=["1.4", "1.6"])
+def test_an_axis_in_the_model_is_z_there_where_none_is_written(text: str, tmp_path: Path) -> None:
+    turned = text.replace("<pose>0 0.2 1.5 0 0 1.57", "<pose>0 0.2 1.5 1 0 1.57")
+    written = turned.replace("0 0.6 0.8", "0 0 1")
+    assert "<xyz>0 0 1</xyz>" in written
+    assert turned != text
+    assert numbers(robot_of(tmp_path, written.replace("<xyz>0 0 1</xyz>", ""))).tolist() == (
+        numbers(robot_of(tmp_path, written)).tolist()
+    )
 
 
 def test_a_slide_that_closes_a_loop_is_refused(tmp_path: Path) -> None:

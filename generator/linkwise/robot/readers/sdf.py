@@ -18,11 +18,13 @@ from linkwise.robot.readers.sdf_joints import SdfJoint, sdf_joints
 from linkwise.robot.readers.sdf_poses import (
     WORLD,
     ModelPoses,
+    Pose,
     is_true,
     numbers_in,
     numbers_of,
     place_of,
     pose_in,
+    relative_to,
     text_of,
 )
 from linkwise.robot.readers.sdf_unmodelled import known, omissions
@@ -90,7 +92,7 @@ def _model(root: Element) -> Element:
             raise LinkwiseError(
                 f"the model {model.get('name')!r} has a <{tag}>; write all in one model, without others in it"
             )
-    if is_true(text_of(model, "static")):
+    if is_true(text_of(model, "static"), "<static>", place_of(model)):
         raise LinkwiseError(f"the model {model.get('name')!r} is <static>, and never moves; remove that")
     return model
 
@@ -103,7 +105,7 @@ def _body(link: Element, places: Mapping[str, Vec3]) -> Body:
         raise LinkwiseError(
             f"{place} has no <inertial>, which SDFormat takes for 1 kg and 1 kg m²; write it out"
         )
-    if is_true(inertial.get("auto", "")):
+    if is_true(inertial.get("auto", ""), "<inertial auto>", place):
         raise LinkwiseError(
             f"{place}: <inertial auto> is worked out of shapes by Gazebo; write the numbers out"
         )
@@ -113,10 +115,21 @@ def _body(link: Element, places: Mapping[str, Vec3]) -> Body:
     xx, yy, zz, xy, xz, yz = (
         numbers_in(inertial, f"inertia/i{key}", 0.0, place) for key in ("xx", "yy", "zz", "xy", "xz", "yz")
     )
-    com = pose_in(inertial, place)
+    com = _pose_of_inertia(inertial, name, place)
     turned = transforms.rotate_inertia(com.rotation, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
     origin = transforms.minus(places.get(name, ZERO3))
     return Body(name, numbers_in(inertial, "mass", 0.0, place), com.translation, turned, origin=origin)
+
+
+def _pose_of_inertia(inertial: Element, link: str, place: str) -> Pose:
+    """Where a link's inertia is in the link; raises LinkwiseError for a pose in another frame."""
+    relative = relative_to(inertial)
+    if relative not in ("", link):
+        raise LinkwiseError(
+            f"{place}: the pose of <inertial> is relative to {relative!r}, which SDFormat does not have; "
+            "write it in the link's axes"
+        )
+    return pose_in(inertial, place)
 
 
 def _free(links: Iterable[Element], tree: Sequence[SdfJoint], poses: ModelPoses) -> FreeRoot | None:

@@ -10,6 +10,7 @@ from linkwise.robot.description import IDENTITY, Anchor, AnchoredTie, Connection
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.notes import Omission
 from linkwise.robot.readers.sdf_poses import (
+    MODEL,
     WORLD,
     ModelPoses,
     Pose,
@@ -29,6 +30,8 @@ DYNAMICS = {
     "damping": "damping",
     "friction": "friction",
 }
+IN_MODEL = "use_parent_model_frame"
+"""The switch before version 1.7 for an axis in the model's axes."""
 ENDLESS = 1e16
 """SDFormat's own number for a limit that is none."""
 
@@ -185,15 +188,25 @@ def _joint(element: Element, poses: ModelPoses, version: tuple[int, int]) -> Sdf
 def _axis(
     element: Element, own: Rotation, poses: ModelPoses, version: tuple[int, int]
 ) -> tuple[float, float, float]:
-    """Axis of a joint in the model's axes, given in its own, or as its version has it."""
+    """Axis of a joint in the model's axes, given in its own, or as its version has it; z without <xyz>.
+
+    Raises LinkwiseError for the way of another version to name its frame.
+    """
     axis, place = element.find("axis/xyz"), place_of(element)
-    if axis is None:
-        return _numbers(transforms.rotate(own, (0.0, 0.0, 1.0)))
-    numbers = numbers_of(axis, 3, place)
-    in_model = is_true(text_of(element, "axis/use_parent_model_frame"))
+    numbers = (0.0, 0.0, 1.0) if axis is None else numbers_of(axis, 3, place)
+    seen_in = "" if axis is None else axis.get("expressed_in", "")
+    in_model = is_true(text_of(element, f"axis/{IN_MODEL}"), f"<{IN_MODEL}>", place)
+    if in_model and version >= (1, 7):
+        raise LinkwiseError(
+            f'{place}: <{IN_MODEL}> is no more from version 1.7 on; write <xyz expressed_in="{MODEL}">'
+        )
+    if seen_in and version < (1, 7):
+        raise LinkwiseError(
+            f"{place}: <xyz expressed_in={seen_in!r}> is not read in a file older than version 1.7; "
+            "raise its version, or write the axis without it"
+        )
     if version < (1, 5) or in_model:
         return _numbers(numbers)
-    seen_in = axis.get("expressed_in", "") if version >= (1, 7) else ""
     return _numbers(transforms.rotate(poses.named(seen_in, place).rotation if seen_in else own, numbers))
 
 

@@ -17,6 +17,8 @@ from linkwise.runtime.chosen_names import nearest_first
 
 MODEL, WORLD = "__model__", "world"
 PLACED = ("link", "joint", "frame")
+TURNS = {"euler_rpy": 6, "quat_xyzw": 7}
+"""How a pose may give its turn, with how many numbers it then has."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,7 @@ class ModelPoses:
         Raises LinkwiseError for a pose relative to what else the world has.
         """
         place = place_of(self._whole)
-        pose = self._whole.find("pose")
-        relative = "" if pose is None else pose.get("relative_to", "")
+        relative = relative_to(self._whole)
         if relative not in ("", WORLD):
             raise LinkwiseError(
                 f"the pose of {place} is relative to {relative!r}; write it in the axes of the world"
@@ -109,8 +110,12 @@ class ModelPoses:
 
     def _before(self, element: Element) -> Element | None:
         """What the pose of an element is relative to; None for the model."""
-        pose, place = element.find("pose"), place_of(element)
-        relative = pose.get("relative_to", "") if pose is not None and self._model else ""
+        relative, place = relative_to(element), place_of(element)
+        if relative and not self._model:
+            raise LinkwiseError(
+                f"{place}: <pose relative_to={relative!r}> is not read in a file older than version 1.7; "
+                "raise its version, or write the pose without it"
+            )
         if not relative and element.tag == "joint":
             relative = text_of(element, "child")
         if not relative and element.tag == "frame":
@@ -151,20 +156,32 @@ def pose_in(element: Element, place: str) -> Pose:
         return Pose()
     if pose.get("frame", ""):
         raise LinkwiseError(f"{place}: <pose frame={pose.get('frame')!r}> is obsolete; write relative_to")
-    quaternion = pose.get("rotation_format", "euler_rpy") == "quat_xyzw"
-    numbers = numbers_of(pose, 7 if quaternion else 6, place)
-    x, y, z, *turn = numbers
-    if quaternion:
-        b, c, d, a = turn
-        length = sum(e * e for e in turn) ** 0.5
-        if not length:
-            raise LinkwiseError(f"{place}: <pose> has a quaternion of zeros; give 0 0 0 1 for no turn")
-        rotation = transforms.from_quaternion(a / length, b / length, c / length, d / length)
-    else:
-        degrees = is_true(pose.get("degrees", ""))
+    way = pose.get("rotation_format", "euler_rpy")
+    if way not in TURNS:
+        raise LinkwiseError(
+            f"{place}: <pose rotation_format={way!r}> is not read; give the turn as {' or '.join(TURNS)}"
+        )
+    degrees = is_true(pose.get("degrees", ""), "<pose degrees>", place)
+    x, y, z, *turn = numbers_of(pose, TURNS[way], place)
+    if way == "euler_rpy":
         roll, pitch, yaw = (math.radians(e) if degrees else e for e in turn)
-        rotation = transforms.from_rpy(roll, pitch, yaw)
+        return Pose(transforms.snap(transforms.from_rpy(roll, pitch, yaw)), (x, y, z))
+    if degrees:
+        raise LinkwiseError(
+            f"{place}: <pose> has a quaternion in degrees; remove degrees, or write euler_rpy"
+        )
+    b, c, d, a = turn
+    length = sum(e * e for e in turn) ** 0.5
+    if not length:
+        raise LinkwiseError(f"{place}: <pose> has a quaternion of zeros; give 0 0 0 1 for no turn")
+    rotation = transforms.from_quaternion(a / length, b / length, c / length, d / length)
     return Pose(transforms.snap(rotation), (x, y, z))
+
+
+def relative_to(element: Element) -> str:
+    """The frame that <pose> of an element names; empty where it names none."""
+    pose = element.find("pose")
+    return "" if pose is None else pose.get("relative_to", "")
 
 
 def numbers_of(element: Element, count: int, place: str) -> tuple[float, ...]:
@@ -193,9 +210,15 @@ def text_of(element: Element, tag: str) -> str:
     return (element.findtext(tag) or "").strip()
 
 
-def is_true(text: str) -> bool:
-    """Whether a switch is on; SDFormat reads it in capitals, too."""
-    return text.strip().lower() in ("true", "1")
+def is_true(text: str, what: str, place: str) -> bool:
+    """Whether a switch is on, which it is not where it is empty; SDFormat reads it in capitals, too.
+
+    Raises LinkwiseError for what switches nothing on or off.
+    """
+    value = text.strip().lower()
+    if value not in ("", "true", "1", "false", "0"):
+        raise LinkwiseError(f"{place}: {what} is {text.strip()!r}; write true or false")
+    return value in ("true", "1")
 
 
 def place_of(element: Element) -> str:

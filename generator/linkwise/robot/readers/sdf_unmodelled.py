@@ -57,8 +57,16 @@ VOCABULARY = {
     "limit": Known(once=names("lower upper velocity effort"), idle=names("stiffness dissipation")),
     "dynamics": Known(once=names("damping friction spring_stiffness spring_reference")),
     "mimic": Known(once=names("multiplier offset reference"), attributes=names("joint axis")),
-}
-"""What is read of each element, and what is known beside it."""
+    "velocity_decay": Known(once=names("linear angular")),
+} | dict.fromkeys(
+    names(
+        "gravity static mass ixx iyy izz ixy ixz iyz parent child lower upper velocity effort damping "
+        "friction spring_stiffness spring_reference multiplier offset reference use_parent_model_frame "
+        "linear angular"
+    ),
+    Known(),
+)
+"""What is read of each element, and what is known beside it; the last ones hold text alone."""
 
 DECAYS = ("linear", "angular")
 

@@ -117,10 +117,13 @@ def omissions(robot: Element) -> Iterator[Omission]:
 
 
 def _ties(robot: Element, links: Collection[str]) -> Iterator[Omission]:
-    """What ties links together beside the joints, of the file or in Gazebo's part of it."""
+    """What ties links together beside the joints, of the file or in Gazebo's part of it, and links there."""
     parts = [(part, TIES.get(local_name(part.tag))) for part in robot]
     parts += [
-        (joint, "Gazebo's joint") for part in robot.findall("gazebo") for joint in part.findall("joint")
+        (inner, f"Gazebo's {tag}")
+        for part in robot.findall("gazebo")
+        for tag in ("joint", "link")
+        for inner in part.findall(tag)
     ]
     for part, what in parts:
         if what is not None:

@@ -1,11 +1,12 @@
 """What a format calls its elements and attributes: a name that is misspelt is not passed over.
 
 Near a name that is read, an unknown one is refused, as what it holds, a mass say, would vanish. Any other is
-noted, and told wherever the robot is used. Names with a namespace are extensions.
+noted, and told wherever the robot is used, with its place; so is what says how a robot moves but stands where
+nothing reads it, an <inertial> within a <visual> say. Names with a namespace are extensions.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TypeAlias
@@ -41,49 +42,84 @@ class Known:
     idle: Names = field(default=frozenset())
 
 
+STRAYS = names("model link joint inertial mass inertia mimic dynamics")
+"""Elements that say how a robot moves; they are looked for where nothing is read."""
+FOREIGN = names("actor components gazebo loop_joint plugin population ros2_control state transmission")
+"""Elements in which such names mean something else, or are told by themselves."""
+
+Place: TypeAlias = tuple[str, ...]
+"""An element from the nearest around it that has a name inwards."""
 Vocabulary: TypeAlias = Callable[[Element], Known | None]
 """What the format knows of an element; None for one that is not looked into."""
 
 
+@dataclass(frozen=True)
+class _Unread:
+    """What is not read: how often there is what is known, and the places of what is not."""
+
+    idle: Counter[str] = field(default_factory=Counter)
+    unknown: dict[str, list[Place]] = field(default_factory=dict)
+
+    def add(self, what: str, place: Place, count: int = 1) -> None:
+        """Note something unknown."""
+        self.unknown.setdefault(what, []).extend([place] * count)
+
+
 def ignored(elements: Iterable[Element], known: Vocabulary, format: str) -> tuple[Note, ...]:
-    """A note for each kind of child and attribute that is not read, with how often.
+    """A note for each kind of child and attribute that is not read, with how often, and where if unknown.
 
     Raises LinkwiseError for a name near one that is read, and for a second child where one is read.
     """
-    counts, unknown = Counter[str](), Counter[str]()
+    unread = _Unread()
     for element in elements:
-        _look_into(element, known, f"<{element.tag}>", counts, unknown)
-    effect = f"ignored, as {format} has no such name"
+        _look_into(element, known, (), unread)
+    effect = f"ignored, as {format} has no such name there"
     return (
-        *(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items())),
-        *(Note("ignored", what, f"{count} ×", effect) for what, count in sorted(unknown.items())),
+        *(Note("ignored", what, f"{count} ×") for what, count in sorted(unread.idle.items())),
+        *(Note("ignored", what, _times(places), effect) for what, places in sorted(unread.unknown.items())),
     )
 
 
-def _look_into(
-    element: Element, known: Vocabulary, place: str, counts: Counter[str], unknown: Counter[str]
-) -> None:
+def _times(places: list[Place]) -> str:
+    """How often, and where first."""
+    return f"{len(places)} ×{' first' if len(places) > 1 else ''} in {' of '.join(reversed(places[0]))}"
+
+
+def _look_into(element: Element, known: Vocabulary, outside: Place, unread: _Unread) -> None:
     here = known(element)
     if here is None:
         return
-    inside = place if element.get("name") is None else f"{element.tag} {short(repr(element.get('name')))}"
-    read = here.once | here.many
+    name = element.get("name")
+    path = (*outside, f"<{element.tag}>") if name is None else (f"{element.tag} {short(repr(name))}",)
+    inside, read = ", ".join(path), here.once | here.many
     seen = Counter(str(child.tag) for child in element)
     for tag, count in seen.items():
         if tag in here.once and count > 1:
             raise LinkwiseError(f"{inside} has <{tag}> {count} times; keep one")
         if local_name(tag) in here.idle:
-            counts[local_name(tag)] += count
+            unread.idle[local_name(tag)] += count
         elif tag not in read:
             refuse_misspelt(inside, f"<{short(tag)}>", tag, {f"<{name}>": name for name in read})
-            unknown[_shown(tag)] += count
-    for name in element.attrib:
-        if name not in here.attributes | here.idle:
-            refuse_misspelt(inside, f"{short(name)}=…", name, {f"{a}=…": a for a in here.attributes})
-            unknown[f"{_shown(name)} of <{element.tag}>"] += 1
+            unread.add(_shown(tag), path, count)
+    for key in element.attrib:
+        if key not in here.attributes | here.idle:
+            refuse_misspelt(inside, f"{short(key)}=…", key, {f"{a}=…": a for a in here.attributes})
+            unread.add(f"{_shown(key)} of <{element.tag}>", path if name is not None else outside or path)
     for child in element:
         if child.tag in read:
-            _look_into(child, known, f"{inside}, <{child.tag}>", counts, unknown)
+            _look_into(child, known, path, unread)
+        elif local_name(child.tag) in here.idle:
+            for tag in _strays(child):
+                unread.add(tag, (*path, f"<{local_name(child.tag)}>"))
+
+
+def _strays(element: Element) -> Iterator[str]:
+    """What of an element that is not read would say how the robot moves if it stood elsewhere."""
+    for child in element if local_name(element.tag) not in FOREIGN else ():
+        if child.tag in STRAYS:
+            yield child.tag
+        else:
+            yield from _strays(child)
 
 
 def refuse_misspelt(place: str, shown: str, name: str, meant: dict[str, str]) -> None:
