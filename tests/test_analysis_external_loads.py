@@ -117,7 +117,8 @@ def test_what_a_file_of_external_loads_says_for_nobody_is_told(leg: Path) -> Non
     path.write_text(path.read_text().replace("<groups/>", "<plates>2</plates>"))
     result = analyze(leg / "walk.csv", leg / "leg", loads=[path])
     assert result.load_warnings == (
-        "grf.xml: ignored, as OpenSim's ExternalLoads has no such name: plates (1 ×)",
+        "grf.xml: ignored, as OpenSim's ExternalLoads has no such name there: "
+        "plates (1 × in ExternalLoads 'walk')",
     )
 
 
