@@ -163,14 +163,12 @@ class Shown(html.parser.HTMLParser):
 
 
 def causes_of(result: Any, i: int) -> dict[str, float]:
-    """Mean sizes of all that loads joint i, from the result's arrays; links apart."""
-    motions = np.abs(result.acceleration[:, i]) + np.abs(result.velocity[:, i])
+    """Mean sizes of all that loads joint i, from the result's arrays; links together."""
+    motions = np.abs((result.acceleration + result.velocity)[:, i].sum(axis=1)).mean(axis=0)
     return {
-        "gravity": np.abs(result.gravity[:, i]).mean(axis=0).sum(),
+        "gravity": np.abs(result.gravity[:, i].sum(axis=1)).mean(),
         **{f"load {one.name}": size for one, size in zip(result.loads, load_sizes(result, i), strict=True)},
-        **dict(
-            zip((f"{name} motion" for name in COORDINATES), motions.mean(axis=0).sum(axis=0), strict=True)
-        ),
+        **dict(zip((f"{name} motion" for name in COORDINATES), motions, strict=True)),
     }
 
 

@@ -59,10 +59,10 @@ def test_shares_of_many_joints_are_their_own_the_largest_other_ones_and_the_rest
         "the movement alone, without gravity",
     ]
     widths = np.array([[patch.get_width() for patch in bar] for bar in figure.axes[1].containers])
-    sizes = np.zeros((3, 3))
-    for column, mean in zip(analysis.columns, analysis.totals.mean, strict=True):
-        if column.quantity in ("tau_qdd", "tau_qd"):
-            sizes[column.joint, column.cause] += mean
+    terms = np.stack([analysis.acceleration, analysis.velocity])  # (2, S, joint, link, cause)
+    sizes = np.abs(terms.sum(axis=(0, 3))).mean(axis=0)
+    apart = np.abs(terms).mean(axis=1).sum(axis=(0, 2))
+    assert (apart > 1.01 * sizes)[0].all()  # links, acceleration and velocity pull against each other
     first = (sizes - np.diag(sizes.diagonal())).argmax(axis=1)
     beside = figure.axes[2]
     assert [text.get_text() for text in beside.get_yticklabels()] == [JOINTS[k] for k in first]

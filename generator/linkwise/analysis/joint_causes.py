@@ -55,23 +55,28 @@ def causes_of(
 
 
 def sizes(result: AnalysisResult, causes: Sequence[Cause]) -> Array:
-    """Mean magnitudes over all samples on every joint with torques, (causes, joints), links added up."""
+    """Mean magnitudes over all samples of what each cause asks of every joint with torques, (causes, joints).
+
+    All links together: of links that pull against each other, and of an acceleration and a velocity that do,
+    the difference counts.
+    """
     place: dict[int | None, int] = {i: at for at, i in enumerate(result.robot.driven)}
-    return _summed(result, causes, place, result.totals.mean)
+    total = np.zeros((len(causes), len(place)))
+    for part in result.parts():
+        total += np.abs(_summed(part, causes, place)).sum(axis=-1)
+    return total / result.total
 
 
 def curves(result: AnalysisResult, causes: Sequence[Cause], i: int) -> Array:
     """What each cause asks of joint i, (causes, S), in its unit."""
-    return _summed(result, causes, {i: 0}, result.values)[:, 0]
+    return _summed(result, causes, {i: 0})[:, 0]
 
 
-def _summed(
-    result: AnalysisResult, causes: Sequence[Cause], place: Mapping[int | None, int], numbers: Array
-) -> Array:
-    """Of the numbers (columns, ...) those of each cause on each joint that has a place."""
+def _summed(result: AnalysisResult, causes: Sequence[Cause], place: Mapping[int | None, int]) -> Array:
+    """What each cause asks of each joint that has a place, (causes, joints, S)."""
     rows = {(name, one.number): row for row, one in enumerate(causes) for name in one.quantities}
-    out = np.zeros((len(causes), len(place), *numbers.shape[1:]))
-    for column, number in zip(result.columns, numbers, strict=True):
+    out = np.zeros((len(causes), len(place), result.values.shape[1]))
+    for column, number in zip(result.columns, result.values, strict=True):
         row = rows.get((column.quantity, column.cause))
         if row is not None and column.joint in place:
             out[row, place[column.joint]] += number

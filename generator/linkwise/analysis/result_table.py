@@ -14,7 +14,7 @@ HEAD = ("joint", "peak |τ|", "mean |τ|", "largest cause", "its share", "gave",
 def result_table(result: AnalysisResult) -> str:
     """HTML of a result; peaks, means, shares and work are over all samples of the movement.
 
-    Shares are those of `--figure shares`, a joint's acceleration and velocity together.
+    Shares are those of `--figure shares`, but for a joint's acceleration and velocity, which are together.
     """
     joints, totals = result.robot.joints, result.totals
     torques = {

@@ -17,7 +17,7 @@ LARGEST = "largest motion of another joint"
 
 @dataclass(frozen=True, eq=False)
 class SharePart:
-    """A part of every joint's bar, of mean magnitudes (joints,), and how it looks."""
+    """A part of every joint's bar, the mean sizes of a cause's torque (joints,), and how it looks."""
 
     label: str
     sizes: Array

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def shares(result: AnalysisResult, _: int) -> "Figure":
-    """Two bars for each joint: every cause, and those of the movement alone, in % of mean magnitudes."""
+    """Two bars for each joint: every cause, and those of the movement alone, in % of their mean sizes."""
     robot = result.robot
     movement = moving_parts(result)
     every = [*fixed_parts(result), *movement]
@@ -36,7 +36,7 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
         if part.names:
             _name_beside(right, part)
     for axis in (left, right):
-        axis.set_xlabel("% of the mean magnitude")
+        axis.set_xlabel("% of all causes' mean sizes")
     figure.suptitle(
         f"What loads each joint · {drawn(robot.name, 40)} · {drawn(result.source, 50)}",
         x=0.01,
