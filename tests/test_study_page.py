@@ -1,11 +1,13 @@
 """The study's page in a real browser: its numbers are the tables', and it leads to each trial."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from linkwise.study import run_study
+from linkwise.study.comparisons import Cluster, compared
 from selenium.webdriver.support.wait import WebDriverWait
 from studies import CHOICES, CYCLES, HEAD, TRIALS, Here, write_study
 
@@ -65,6 +67,22 @@ def test_a_trial_is_drawn_over_the_bands(page: Any) -> None:
     page.find_element("css selector", "#trials tbody tr").click()
     shown = page.execute_script(CURVES)
     assert (len(shown), shown[-1][0]) == (before + 1, "S1-fast-1")
+
+
+def test_numbers_have_the_digits_by_which_they_differ(
+    driver: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = Cluster(36.97, 37.01, 0.04996)
+
+    def of_that_part(*given: Any) -> Any:
+        tests, told = compared(*given)
+        return [replace(test, clusters=(part,)) for test in tests], told
+
+    monkeypatch.setattr("linkwise.study.study_results.compared", of_that_part)
+    file = write_study(tmp_path, HEAD, CHOICES, CYCLES, COMPARE, TRIALS, subjects=3, trials=1)
+    run_study(file, tmp_path / "out", Here())
+    opened(driver, (tmp_path / "out/study.html").as_uri())
+    assert "36.97–37.01 % (p = 0.04996)" in driver.find_element("id", "tests").text
 
 
 def test_it_fits_a_phone(page: Any) -> None:

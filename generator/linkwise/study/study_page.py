@@ -98,5 +98,6 @@ def _test(test: Compared) -> dict[str, object]:
         "factor": test.comparison.factor,
         "between": list(map(printable, test.comparison.between)),
         "subjects": min(len(side.each) for side in test.sides),
+        "alpha": test.comparison.alpha,
         "clusters": [[cluster.start, cluster.end, cluster.p] for cluster in test.clusters],
     }
