@@ -198,7 +198,7 @@ void planar3_mass_matrix(const double *q, double *mass);
    moving any mass, and then leaves qdd as it was. Near there, where rounding leaves fewer than half of the digits of qdd, it
    writes qdd and returns the number of such a joint, negative: of its inertia, less than the root of DBL_EPSILON, 1.5e-8, in
    float of FLT_EPSILON, 3.5e-4, is left when the others move freely, as within about 1e-4 rad,
-   in float 0.05 rad, of 90 degrees of a floating base's pitch. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
+   in float some hundredths of one, as the bodies are, of 90 degrees of a floating base's pitch. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
 int planar3_forward_dynamics(const double *q, const double *qd, const double *tau, double *qdd);
 
 /* Partial impedance of the joints, of one sample: the torques tau under which the robot, pushed by torques f from outside,
@@ -364,7 +364,7 @@ void planar3_mass_matrixf(const float *q, float *mass);
    moving any mass, and then leaves qdd as it was. Near there, where rounding leaves fewer than half of the digits of qdd, it
    writes qdd and returns the number of such a joint, negative: of its inertia, less than the root of DBL_EPSILON, 1.5e-8, in
    float of FLT_EPSILON, 3.5e-4, is left when the others move freely, as within about 1e-4 rad,
-   in float 0.05 rad, of 90 degrees of a floating base's pitch. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
+   in float some hundredths of one, as the bodies are, of 90 degrees of a floating base's pitch. Reads q, qd, tau (JOINTS); writes qdd (JOINTS). */
 int planar3_forward_dynamicsf(const float *q, const float *qd, const float *tau, float *qdd);
 
 /* Partial impedance of the joints, of one sample: the torques tau under which the robot, pushed by torques f from outside,

@@ -38,7 +38,7 @@ class InducedAccelerations(NamedTuple, Generic[Array]):
     gravity: Array
     """(..., r, N): by the weight of link j, and its other potentials."""
     passive: Array
-    """(..., r, 3, n): by spring, damping and friction of joint i; zeros unless they were asked for."""
+    """(..., r, 3, n): by spring, damping and friction of joint i; zeros where `passive` is False."""
     loads: Array
     """(..., r, L): by each load."""
     constraints: Array

@@ -150,8 +150,13 @@ def _array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
         array: NDArray[Any] = tensor.detach().resolve_conj().resolve_neg().numpy()
     except ValueError:
         raise too_many_axes({name: tensor}, tensor.shape[-1]) from None
-    except (TypeError, RuntimeError) as error:  # a dtype that NumPy lacks; inside torch.func
+    except TypeError as error:  # a dtype that NumPy lacks
         raise TypeError(f"{name} does not read as an array: {_first_line(error)}") from None
+    except RuntimeError:
+        raise TypeError(
+            f"this needs the numbers of {name}, which torch.func, torch.vmap and torch.export hide; call it "
+            "outside of them, or take gradients by torch.autograd"
+        ) from None
     return array
 
 

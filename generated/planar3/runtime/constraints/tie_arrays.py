@@ -175,7 +175,7 @@ def _weights(xp: Any, tables: TieTables, at: Ends, shift: Any) -> Any:
         turning = turned(taken(at.carried.axes, tables.row_pairs), tables.turning)
         weights = weights + xp.concat([turning, 0.0 * turning], 0)
     if tables.along is not None:
-        along = tables.along * taken(shift / _size(tables, shift), tables.row_pairs)
+        along = tables.along * taken(shift / _size(xp, tables, shift), tables.row_pairs)
         weights = weights + xp.concat([0.0 * along, along], 0)
     return weights
 
@@ -191,16 +191,20 @@ def _weight_rates(xp: Any, tables: TieTables, at: Pairs, changes: Changes) -> An
         turning = cross(taken(spin, tables.row_pairs), around(xp, own))
     if tables.along is not None:
         # the rate of d, as far as it stands across d, by |d|
-        size = _size(tables, at.shift)
+        size = _size(xp, tables, at.shift)
         speeds = changes.speeds
         u, slip = at.shift / size, speeds[:, : tables.pairs] - _seconds(xp, tables, speeds)
         along = tables.along * taken((slip - u * (u * slip).sum(0)) / size, tables.row_pairs)
     return xp.concat([turning, along], 0)
 
 
-def _size(tables: TieTables, shift: Any) -> Any:
-    """|d| of pairs whose length is held, 1 of others, (P, samples)."""
-    return ((shift * shift).sum(0) * tables.is_apart + (1.0 - tables.is_apart)) ** 0.5
+def _size(xp: Any, tables: TieTables, shift: Any) -> Any:
+    """|d| of pairs whose length is held, (P, samples); 1 of others, and where the ends coincide.
+
+    There d has no direction, and u = 0: phi is the whole length, and A, whose row is zero, has lost its rank.
+    """
+    squares = (shift * shift).sum(0) * tables.is_apart + (1.0 - tables.is_apart)
+    return xp.where(squares > 0.0, squares, 0.0 * squares + 1.0) ** 0.5
 
 
 def _arms(xp: Any, tables: TieTables, places: Any) -> Any:

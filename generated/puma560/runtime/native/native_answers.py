@@ -104,10 +104,10 @@ class NativeAnswers(SumAnswers):
         return super()._parts(call, motion)
 
     def _quickest(self, call: str, motion: Sequence[Any], into: Sequence[Any] | None) -> Any:
-        """Results for arrays from the compiled module, where there is one."""
-        if not self._compiled:
-            return self._run(call, motion, into)
+        """Results for arrays from the compiled module, where there is one and it has the call."""
         convention = {"propagation": ("closing",), "gradient_propagation": ("gradient",)}.get(call, ())
+        if not self._compiled or not (convention or call in COMPILED):
+            return self._run(call, motion, into)
         several = call in KINDS
         out = into if into is None else tuple(into) if several else into[0]
         answer = getattr(self._compiled, "propagation" if convention else call)(

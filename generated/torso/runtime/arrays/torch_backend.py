@@ -1,6 +1,7 @@
 """Closed forms and the vectorised rule on torch tensors."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -219,10 +220,22 @@ def _kept(values: Any, dtype: torch.dtype, device: torch.device) -> Tensor:
     """A tensor that is kept: a later call may need its gradient, or not be one that torch.export traces."""
     if torch.compiler.is_dynamo_compiling():
         return torch.as_tensor(values, dtype=dtype, device=device)
-    with torch.inference_mode(False), disable_proxy_modes_tracing(), unset_fake_temporarily():
+    with torch.inference_mode(False), disable_proxy_modes_tracing(), unset_fake_temporarily(), _unrecorded():
         # In memory of its own, and side by side: torch.export.save warns of anything else.
         kept = torch.as_tensor(values, dtype=dtype, device=device)
         return kept.clone(memory_format=torch.contiguous_format)
+
+
+@contextmanager
+def _unrecorded() -> Iterator[None]:
+    """Let torch.jit.trace not see what is made: it makes a graph twice, and wants the same."""
+    tracing: Any = torch._C
+    state = tracing._get_tracing_state()
+    tracing._set_tracing_state(None)
+    try:
+        yield
+    finally:
+        tracing._set_tracing_state(state)
 
 
 def _watched() -> bool:
