@@ -243,6 +243,16 @@ def test_a_motion_starts_from_the_independent_joints_alone(made: Callable[[str],
     assert open_by(model, moved.q) < 1e-9
 
 
+def test_a_gap_in_a_batch_leaves_a_gap_and_the_other_samples_close(
+    made: Callable[[str], tuple[Any, Any]],
+) -> None:
+    constraints = made("crank and rocker")[0].constraints
+    y = np.array([[0.1], [np.nan], [0.9]])
+    q = constraints.closed(y)
+    assert np.isnan(q[1]).all()
+    np.testing.assert_allclose(q[::2], constraints.closed(y[::2]), rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("backend", ["torch", "native"])
 def test_back_ends_lead_joints_alike_and_gradients_run_through(backend: str, tmp_path: Path) -> None:
     torch = pytest.importorskip("torch")

@@ -84,8 +84,6 @@ def _read_robot(spec: str | Path, options: Options) -> Robot:
 
 def reader_of(path: Path) -> Reader | None:
     """What reads a file; None for one that is none of a robot."""
-    if path.suffix.lower() == ".py":
-        raise LinkwiseError("a Python file holds energies, not a robot; linkwise.read_system reads it")
     reader = READERS.get(path.suffix.lower())
     return XML.get(root_tag(path), read_urdf) if reader is read_xml else reader
 
