@@ -41,7 +41,8 @@ def led(
             found, told = place_of(guess), "they would have to leap"
         except ValueError as error:
             found, told = None, error.reason if isinstance(error, DoesNotClose) else str(error)
-        if found is not None and bool((abs(found.q - guess) <= NEAR).all()):
+        # Written so, positions that are not numbers, of gaps in a batch, lead no other sample astray.
+        if found is not None and not bool((abs(found.q - guess) > NEAR).any()):
             at, done, step = found, done + step, 2.0 * step
             continue
         step /= 2.0
