@@ -164,11 +164,12 @@ class Shown(html.parser.HTMLParser):
 
 def causes_of(result: Any, i: int) -> dict[str, float]:
     """Mean sizes of all that loads joint i, from the result's arrays; links together."""
-    motions = np.abs((result.acceleration + result.velocity)[:, i].sum(axis=1)).mean(axis=0)
+    kinds = {"acceleration": result.acceleration, "velocity": result.velocity}
+    moved = {kind: np.abs(terms[:, i].sum(axis=1)).mean(axis=0) for kind, terms in kinds.items()}
     return {
         "gravity": np.abs(result.gravity[:, i].sum(axis=1)).mean(),
         **{f"load {one.name}": size for one, size in zip(result.loads, load_sizes(result, i), strict=True)},
-        **dict(zip((f"{name} motion" for name in COORDINATES), motions, strict=True)),
+        **{f"{name} {kind}": moved[kind][k] for k, name in enumerate(COORDINATES) for kind in kinds},
     }
 
 

@@ -52,6 +52,7 @@ def test_shares_fill_the_bars(analysis):
 
 
 def test_shares_of_many_joints_are_their_own_the_largest_other_ones_and_the_rest(analysis, monkeypatch):
+    monkeypatch.setattr("linkwise.analysis.joint_causes.FEW", 2)
     monkeypatch.setattr("linkwise.analysis.show.share_parts.MANY", 2)
     figure = analysis.figure("shares")
     assert [axis.get_title(loc="left") for axis in figure.axes[:2]] == [

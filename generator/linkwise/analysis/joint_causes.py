@@ -15,6 +15,8 @@ MOTIONS: dict[str, tuple[Quantity, ...]] = {
     "velocity": ("tau_qd",),
     "motion": ("tau_qdd", "tau_qd"),
 }
+FEW = 7
+"""Joints up to which a joint's acceleration and its velocity are two causes, unless chosen otherwise."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,13 @@ def causes_of(
     return tuple(found)
 
 
+def are_motions_whole(result: AnalysisResult) -> bool:
+    """Whether a joint's motion is one cause in shares and at first on the page, as it is of many joints."""
+    return len(result.robot.driven) > FEW
+
+
 def sizes(result: AnalysisResult, causes: Sequence[Cause]) -> Array:
-    """Mean magnitudes over all samples of what each cause asks of every joint with torques, (causes, joints).
+    """Mean size of each cause's net torque on every joint with torques, (causes, joints), over all samples.
 
     All links together: of links that pull against each other, and of an acceleration and a velocity that do,
     the difference counts.

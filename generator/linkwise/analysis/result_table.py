@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from linkwise.analysis.joint_causes import causes_of, sizes
+from linkwise.analysis.joint_causes import are_motions_whole, causes_of, sizes
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import load_unit
 from linkwise.analysis.work import Work
@@ -14,7 +14,7 @@ HEAD = ("joint", "peak |τ|", "mean |τ|", "largest cause", "its share", "gave",
 def result_table(result: AnalysisResult) -> str:
     """HTML of a result; peaks, means, shares and work are over all samples of the movement.
 
-    Shares are those of `--figure shares`, but for a joint's acceleration and velocity, which are together.
+    Causes and shares are those of `--figure shares`.
     """
     joints, totals = result.robot.joints, result.totals
     torques = {
@@ -22,7 +22,7 @@ def result_table(result: AnalysisResult) -> str:
         for column, mean, peak in zip(result.columns, totals.mean, totals.peak, strict=True)
         if column.quantity == "tau"
     }
-    causes = causes_of(result, joints)
+    causes = causes_of(result, joints, together=are_motions_whole(result))
     rows = []
     for i, loading in zip(result.robot.driven, sizes(result, causes).T, strict=True):
         unit, (mean, peak) = load_unit(result.robot.units[i]), torques[i]

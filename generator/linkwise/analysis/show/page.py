@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.joint_causes import are_motions_whole
 from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import Column
@@ -105,8 +106,7 @@ def page_data(result: AnalysisResult) -> str:
             for c in (result.columns[at] for at in shown)
         ],
         "values": encoded(instants.values[shown]),
-        "mean": result.totals.mean[shown].tolist(),
-        "peak": result.totals.peak[shown].tolist(),
+        "together": are_motions_whole(result),
         "curves": curve_data(result, stride > 1),
         "work": _work(result),
         "largestPower": _largest_power(result),

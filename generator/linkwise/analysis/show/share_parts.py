@@ -1,23 +1,24 @@
 """What the bars of the shares consist of: gravity, loads, what joints have of their own, motions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.analysis.joint_causes import causes_of, sizes
+from linkwise.analysis.joint_causes import Cause, are_motions_whole, causes_of, sizes
 from linkwise.analysis.result import AnalysisResult
 from linkwise.package.load import Array
 from linkwise.plotstyle import BLUE, GRAVITY, SKY, VERMILION, drawn, tone
 
 MANY = 12
 """Joints above which a bar has the joint's own motion, the largest other one, and the rest."""
-HATCHES = {"acceleration": "", "velocity": "////", "own": "....", "load": "xx"}
-LARGEST = "largest motion of another joint"
+HATCHES = {"motion": "", "acceleration": "", "velocity": "////", "own": "....", "load": "xx"}
+LARGEST, REST = "largest motion of another joint", "motions of all other joints, shares added"
 
 
 @dataclass(frozen=True, eq=False)
 class SharePart:
-    """A part of every joint's bar, the mean sizes of a cause's torque (joints,), and how it looks."""
+    """A part of every joint's bar, of mean sizes of net torques (joints,), and how it looks."""
 
     label: str
     sizes: Array
@@ -27,13 +28,22 @@ class SharePart:
     """Of what the part is, where that differs from joint to joint."""
 
 
-def fixed_parts(result: AnalysisResult) -> list[SharePart]:
+def share_parts(result: AnalysisResult) -> tuple[list[SharePart], list[SharePart]]:
+    """Gravity, loads and what joints have of their own; then motions, of many joints as `MANY` tells."""
+    robot = result.robot
+    causes = causes_of(result, robot.plot_joints, drawn, together=are_motions_whole(result))
+    found = list(zip(causes, sizes(result, causes), strict=True))
+    moving = [(cause, size) for cause, size in found if cause.is_motion]
+    fixed = [(cause, size) for cause, size in found if not cause.is_motion]
+    return _fixed(result, fixed), _few(result, moving) if len(robot.driven) > MANY else _each(result, moving)
+
+
+def _fixed(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
     """Gravity, loads, and what joints have of their own."""
-    causes = [cause for cause in causes_of(result, result.robot.plot_joints, drawn) if not cause.is_motion]
-    own = [cause for cause in causes if cause.kind == "own"]
-    tones = [*own, *(cause for cause in causes if cause.kind == "load")]  # as the page has them
+    own = [cause for cause, _ in found if cause.kind == "own"]
+    tones = [*own, *(cause for cause, _ in found if cause.kind == "load")]  # as the page has them
     out = []
-    for cause, values in zip(causes, sizes(result, causes), strict=True):
+    for cause, values in found:
         if cause.kind == "gravity":
             out.append(SharePart(cause.label, values, GRAVITY))
         else:
@@ -42,26 +52,19 @@ def fixed_parts(result: AnalysisResult) -> list[SharePart]:
     return out
 
 
-def moving_parts(result: AnalysisResult) -> list[SharePart]:
-    """Acceleration and velocity of each joint; of many joints those that `MANY` tells."""
-    return _few(result) if len(result.robot.driven) > MANY else _each(result)
-
-
-def _each(result: AnalysisResult) -> list[SharePart]:
-    """Acceleration and velocity of each joint."""
-    every = causes_of(result, result.robot.plot_joints, drawn, together=False)
-    causes = [cause for cause in every if cause.is_motion]
+def _each(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
+    """Every motion, or its acceleration and its velocity."""
     place = {k: at for at, k in enumerate(result.robot.driven)}
     return [
         SharePart(cause.label, values, tone(place[cause.number or 0]), HATCHES[cause.kind])
-        for cause, values in zip(causes, sizes(result, causes), strict=True)
+        for cause, values in found
     ]
 
 
-def _few(result: AnalysisResult) -> list[SharePart]:
-    """Of many joints: each one's own motion, the largest other motion, and the rest."""
+def _few(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
+    """Of many joints: each one's own motion, the largest other motion, and the shares of the rest."""
     driven, names = result.robot.driven, result.robot.plot_joints
-    by = sizes(result, [cause for cause in causes_of(result, names) if cause.is_motion]).T
+    by = np.array([size for _, size in found]).T
     own = by.diagonal()
     others = by * (1.0 - np.eye(len(driven)))
     largest = others.max(axis=1)
@@ -69,5 +72,5 @@ def _few(result: AnalysisResult) -> list[SharePart]:
     return [
         SharePart("its own motion", own, VERMILION),
         SharePart(LARGEST, largest, BLUE, names=first),
-        SharePart("motion of all other joints", others.sum(axis=1) - largest, SKY),
+        SharePart(REST, others.sum(axis=1) - largest, SKY),
     ]

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.show.share_parts import SharePart, fixed_parts, moving_parts
+from linkwise.analysis.show.share_parts import SharePart, share_parts
 from linkwise.extras import extra
 from linkwise.plotstyle import drawn
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 def shares(result: AnalysisResult, _: int) -> "Figure":
     """Two bars for each joint: every cause, and those of the movement alone, in % of their mean sizes."""
     robot = result.robot
-    movement = moving_parts(result)
-    every = [*fixed_parts(result), *movement]
+    fixed, movement = share_parts(result)
+    every = [*fixed, *movement]
     rows = -(-len(every) // 3)
     figure = extra("matplotlib.figure").Figure(
         figsize=(8.4, 1.3 + (0.42 if len(movement) > 3 else 0.3) * len(robot.driven) + 0.2 * rows),
@@ -36,7 +36,7 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
         if part.names:
             _name_beside(right, part)
     for axis in (left, right):
-        axis.set_xlabel("% of all causes' mean sizes")
+        axis.set_xlabel("mean size of the net torque, % of all")
     figure.suptitle(
         f"What loads each joint · {drawn(robot.name, 40)} · {drawn(result.source, 50)}",
         x=0.01,
