@@ -69,20 +69,30 @@ def test_a_trial_is_drawn_over_the_bands(page: Any) -> None:
     assert (len(shown), shown[-1][0]) == (before + 1, "S1-fast-1")
 
 
+@pytest.mark.parametrize(
+    ("alpha", "p", "said"),
+    [
+        (0.05, 0.04996, "p = 0.04996"),
+        (0.05, 0.0497, "p = 0.0497"),
+        (0.05, 0.0004, "p < 0.001"),
+        (0.0005, 0.0004, "p < 0.0005"),
+    ],
+)
 def test_numbers_have_the_digits_by_which_they_differ(
-    driver: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    driver: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, alpha: float, p: float, said: str
 ) -> None:
-    part = Cluster(36.97, 37.01, 0.04996)
+    part = Cluster(36.97, 37.01, p)
 
     def of_that_part(*given: Any) -> Any:
         tests, told = compared(*given)
         return [replace(test, clusters=(part,)) for test in tests], told
 
     monkeypatch.setattr("linkwise.study.study_results.compared", of_that_part)
-    file = write_study(tmp_path, HEAD, CHOICES, CYCLES, COMPARE, TRIALS, subjects=3, trials=1)
+    compare = f"{COMPARE}alpha = {alpha}\n"
+    file = write_study(tmp_path, HEAD, CHOICES, CYCLES, compare, TRIALS, subjects=3, trials=1)
     run_study(file, tmp_path / "out", Here())
     opened(driver, (tmp_path / "out/study.html").as_uri())
-    assert "36.97–37.01 % (p = 0.04996)" in driver.find_element("id", "tests").text
+    assert f"36.97–37.01 % ({said})" in driver.find_element("id", "tests").text
 
 
 def test_it_fits_a_phone(page: Any) -> None:
