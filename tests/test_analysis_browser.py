@@ -139,37 +139,7 @@ def test_numbers_in_the_table_are_the_files(page, result):
     assert cells[-1][0] == ["tau/joint1/link3"]
     sizes = [np.abs(table[name].to_numpy()).mean() for (name,), _, _ in cells[:-1]]
     assert sizes == sorted(sizes, reverse=True)
-    shares = bars(page, 0)
-    assert sorted(shares, reverse=True) == pytest.approx([100 * size / sum(sizes) for size in sizes])
-    assert "through link3, over all" in page.find_element("id", "shares-caption").text
     assert sum(value for _, value, _ in cells[:-1]) == pytest.approx(cells[-1][1], rel=1e-12)
-
-
-def bars(page, joint):
-    """Shares of a joint's causes, in %."""
-    return page.execute_script(
-        "return document.getElementById('shares').data.map((bar) => bar.x[arguments[0]])", joint
-    )
-
-
-@pytest.mark.parametrize(("together", "kinds"), [(True, ["tau_qd+tau_qdd"]), (False, ["tau_qd", "tau_qdd"])])
-def test_shares_are_of_what_causes_ask_for_links_together(page, result, together, kinds):
-    """Beside NumPy on the table of all samples."""
-    table = pq.read_table(result / "analysis.parquet")
-    choose(page, "link", "")
-    choose(page, "order", "everything")
-    choose(page, "motion", "together" if together else "apart")
-    for i in range(3):
-        terms = {name: [] for name in ("gravity", *(f"{kind} joint{k}" for kind in kinds for k in (1, 2, 3)))}
-        for name in table.column_names:
-            quantity, joint, *rest = (*name.split("/"), "", "")
-            if joint != f"joint{i + 1}" or quantity not in ("tau_gravity", "tau_qdd", "tau_qd"):
-                continue
-            kind = next((kind for kind in kinds if quantity in kind.split("+")), "gravity")
-            terms[kind if kind == "gravity" else f"{kind} {rest[1]}"].append(table[name].to_numpy())
-        sizes = [np.abs(np.sum(some, axis=0)).mean() if some else 0.0 for some in terms.values()]
-        found = bars(page, i)
-        assert sorted(found) == pytest.approx(sorted(100 * size / sum(sizes) for size in sizes))
 
 
 def test_what_accelerates_a_point_is_shown_by_source_and_adds_up(driver, tmp_path):
