@@ -29,7 +29,8 @@ from linkwise import (
     read_system,
     write_package,
 )
-from linkwise.check.as_generated import check_runtime
+from linkwise.check.as_generated import check_made
+from linkwise.check.compare import Result
 from linkwise.package.load import load_package, open_package
 from linkwise.package.manifest import Manifest
 from linkwise.version import VERSION
@@ -220,12 +221,21 @@ def test_a_result_given_twice_is_computed_once(tmp_path: Path) -> None:
     assert marks(tmp_path / "two")["manifest"] == "ok"
 
 
+@pytest.fixture
+def unread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No text is read before it runs, as if what is wrong were written within the grammar."""
+    held = Result("texts", True, None, "")
+    monkeypatch.setattr("linkwise.check.checks.check_texts", lambda directory, manifest: held)
+    monkeypatch.setattr("linkwise.package.importer.foreign_text", lambda *text: None)
+
+
+@pytest.mark.usefixtures("unread")
 def test_c_that_ends_the_process_fails(tmp_path: Path) -> None:
     package = tmp_path / "planar2"
     write_package(generate(read_system("planar2"), ["c"]), package)
     room = "    struct waiting room;\n"
     change_file(package, "c/planar2.c", room, room + "    *(volatile int *)0 = 0;\n")
-    failing = {result.name: result.detail for result in check_package(package, 10) if not result.passed}
+    failing = {result.name: result.detail for result in check_package(package, 10) if result.failed}
     assert failing == {"c: runs to its end": "it ended the process by SIGSEGV"}
 
 
@@ -319,7 +329,7 @@ def test_every_line_beside_the_formulas_is_read(case: str, copy_for: Copy) -> No
     file, old, new, line = FRAME[case]
     package = copy_for("numpy", "formulas")
     change_file(package, file, old, new)
-    wrong = [(result.name, result.detail) for result in check_package(package, 3) if not result.passed]
+    wrong = [(result.name, result.detail) for result in check_package(package, 3) if result.failed]
     assert wrong == [(f"{file}: lines", f"line {line} is not what linkwise writes there")]
 
 
@@ -363,16 +373,18 @@ def test_what_runs_c_that_is_wrong_is_not_called(tmp_path: Path) -> None:
     assert (found["c: planar2_link_2"], found["native: not called"]) == ("FAIL", "skip")
 
 
+@pytest.mark.usefixtures("unread")
 def test_c_that_does_not_compile_fails_with_the_compilers_words(copy_for: Copy) -> None:
     package = copy_for("c")
     change_file(package, "c/planar2.c", "struct block x[TILE];", "struct brick x[TILE];")
     (result,) = (result for result in check_package(package, 3) if result.name == "c: compiles")
-    assert not result.passed
+    assert result.failed
     assert "failed: " in result.detail
     assert "error: " in result.detail
 
 
 @needs_compiler
+@pytest.mark.usefixtures("unread")
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
@@ -391,7 +403,7 @@ def test_a_header_that_declares_other_functions_fails(old: str, new: str, fault:
     change_file(package, "c/planar2.h", old, new)
     found = {result.name: result for result in check_package(package, 3)}
     headers = found["c: numbers, indices and functions of the headers"]
-    assert not headers.passed
+    assert headers.failed
     assert fault in headers.detail
 
 
@@ -401,13 +413,14 @@ def test_a_c_function_is_called_whether_or_not_its_header_declares_it(copy_for: 
     text = (package / "c/planar2.h").read_text()
     for prototype in re.findall(r"void planar2_link_2f?\([^;]*;", text):
         change_file(package, "c/planar2.h", prototype, "")
-    results = {result.name: result.passed for result in check_package(package, 3)}
+    results = {result.name: result.held for result in check_package(package, 3)}
     assert results["c: planar2_link_2"]
     change_file(package, "c/planar2.c", "void API(link_2)(", "static void API(link_2)(")
     (wrong,) = (r for r in check_package(package, 3) if r.name == "c: planar2_link_2")
-    assert (wrong.passed, wrong.detail) == (False, "there is no such function")
+    assert (wrong.held, wrong.detail) == (False, "there is no such function")
 
 
+@pytest.mark.usefixtures("unread")
 @pytest.mark.parametrize(
     ("error", "mark"),
     [
@@ -429,43 +442,47 @@ def test_only_what_is_missing_here_is_left_out(
     monkeypatch.setattr("linkwise.check.checks.find_spec", lambda name: None)
     change_file(package, "forms/__init__.py", "from .", f"raise {error}\nfrom .", 1)
     found = marks(package)
-    assert (found.pop("hashes"), found.pop("manifest"), found.pop("runtime")) == ("ok", "ok", "ok")
+    assert {found.pop(name) for name in ("hashes", "texts", "manifest", "made")} == {"ok"}
     assert found.pop("back ends") == "FAIL"
     assert list(found.values()) == [mark]
 
 
+@pytest.mark.usefixtures("unread")
 def test_a_package_that_cannot_be_imported_or_asked_fails(package: Path) -> None:
     change_file(package, "runtime/dynamics.py", "class Dynamics", "def broken(:\nclass Dynamics")
-    assert marks(package) == {"hashes": "ok", "import": "FAIL"}
+    assert marks(package) == {"hashes": "ok", "texts": "ok", "import": "FAIL"}
     change_file(package, "runtime/dynamics.py", "def broken(:\n", "")
     change_file(package, "runtime/dynamics.py", "def partial_torque", "def full_torque")
-    assert marks(package)["answers"] == "FAIL"
+    assert marks(package)["numpy: coefficients and torques"] == "FAIL"
 
 
+@pytest.mark.usefixtures("unread")
 def test_a_library_that_is_here_is_not_called_missing(package: Path) -> None:
     pytest.importorskip("torch")
     change_file(package, "forms/link_1.py", "from collections", "from torch import Tensorr\nfrom collections")
     assert marks(package)["numpy: loads"] == "FAIL"
 
 
+@pytest.mark.usefixtures("unread")
 @pytest.mark.parametrize(
     ("file", "old", "failing"),
     [
         ("names.py", "ROBOT = ", "import"),
         ("forms/link_1.py", "def decomposition(", "numpy: loads"),
-        ("forms/link_1.py", "    return ", "answers"),
+        ("forms/link_1.py", "    return ", "numpy: coefficients and torques"),
     ],
 )
 def test_a_package_that_ends_the_process_fails(file: str, old: str, failing: str, package: Path) -> None:
     indent = old[: len(old) - len(old.lstrip())]
     change_file(package, file, old, f"{indent}raise SystemExit(0)\n{old}", 1)
-    found = {result.name: result.detail for result in check_package(package, 3) if not result.passed}
+    found = {result.name: result.detail for result in check_package(package, 3) if result.failed}
     assert found[failing] == "LinkwiseError: its code would end this process by SystemExit(0)"
     if failing == "import":
         with pytest.raises(LinkwiseError, match=r"cannot be imported .*SystemExit\(0\)"):
             open_package(package)
 
 
+@pytest.mark.usefixtures("unread")
 def test_a_package_that_cannot_be_imported_says_why_and_leaves_no_trace(package: Path) -> None:
     finders = list(sys.meta_path)
     change_file(package, "names.py", "ROBOT =", "1 / 0\nROBOT =", 1)
@@ -504,6 +521,7 @@ def test_a_lagrangian_that_is_not_the_one_that_a_user_wrote_fails(tmp_path: Path
     } <= failing
 
 
+@pytest.mark.usefixtures("unread")
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -516,7 +534,7 @@ def test_graphs_of_parts_are_run_against_the_recursion(old: str, new: str, copy_
     package = copy_for("autograd")
     change_file(package, "runtime/recorded/recorded_torques.py", old, new)
     failing = {name for name, mark in marks(package).items() if mark == "FAIL"}
-    assert failing == {"runtime", "autograd: graphs of parts of tau_ij against Newton-Euler recursion"}
+    assert failing == {"autograd: graphs of parts of tau_ij against Newton-Euler recursion"}
 
 
 def test_without_torch_a_users_energies_are_held_against_their_own_torques_which_is_said(
@@ -591,9 +609,9 @@ def test_what_is_right_for_the_parameters_own_values_alone_fails(
 
 def test_a_runtime_file_that_is_not_linkwises_own_fails(package: Path) -> None:
     change_file(package, "runtime/arguments.py", "import ", "import  ", 1)
-    wrong = [result for result in check_package(package, 3) if not result.passed]
+    wrong = [result for result in check_package(package, 3) if result.failed]
     assert [(result.name, result.detail.split(" is ")[0]) for result in wrong] == [
-        ("runtime", "runtime/arguments.py")
+        ("texts", "runtime/arguments.py")
     ]
 
 
@@ -602,10 +620,11 @@ def test_a_listed_file_of_the_runtime_that_linkwise_does_not_have_fails(package:
     (package / "runtime/deep/helper.py").touch()
     digest = hashlib.sha256(b"").hexdigest()
     change_manifest(package, lambda data: data["files"].update({"runtime/deep/helper.py": digest}))
-    (wrong,) = (result for result in check_package(package, 3) if not result.passed)
-    assert (wrong.name, wrong.detail.split(" is ")[0]) == ("runtime", "runtime/deep/helper.py")
+    (wrong,) = (result for result in check_package(package, 3) if result.failed)
+    assert (wrong.name, wrong.detail.split(" is ")[0]) == ("texts", "runtime/deep/helper.py")
 
 
+@pytest.mark.usefixtures("unread")
 @pytest.mark.parametrize(
     ("file", "old", "new"),
     [
@@ -631,8 +650,8 @@ def test_a_package_that_is_loaded_otherwise_fails(
 ) -> None:
     package = shutil.copytree(loaded_with_parameters, tmp_path / "odd")
     change_file(package, file, old, new, 1)
-    result = check_runtime(load_package(package, Manifest.read(package)))
-    assert not result.passed
+    result = check_made(load_package(package, Manifest.read(package)))
+    assert result.failed
     assert f"{file} is not what linkwise {VERSION} makes of the manifest" in result.detail
 
 
@@ -643,9 +662,9 @@ def test_of_another_version_it_is_said_what_was_not_checked(package: Path) -> No
     text = json.dumps(data["generator"], sort_keys=True)
     digest = hashlib.sha256(text.encode()).hexdigest()
     change_manifest(package, lambda data: data["checksums"].update(generator=digest))
-    (runtime,) = (result for result in check_package(package, 3) if result.name == "runtime")
-    assert runtime.mark == "skip"
-    assert runtime.detail.startswith("runtime/, __init__.py, names.py and tree.py were not checked")
+    (made,) = (result for result in check_package(package, 3) if result.name == "made")
+    assert made.mark == "skip"
+    assert made.detail.startswith("runtime/, __init__.py, names.py and tree.py were not checked")
 
 
 def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp_path: Path) -> None:
@@ -663,9 +682,7 @@ def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp
         assert found["energies: are defined"].detail.startswith(
             "numbers at 14 of " if name == "far" else "numbers at "
         )
-    wrong = {
-        result.name: result.detail for result in check_package(tmp_path / "nowhere") if not result.passed
-    }
+    wrong = {result.name: result.detail for result in check_package(tmp_path / "nowhere") if result.failed}
     assert wrong == {"energies: are defined": "numbers at 0 of 4108 random states: too few to prove anything"}
 
 
@@ -673,10 +690,11 @@ def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp
 def test_c_alone_is_compiled_and_held_against_what_there_is(spec: str, tmp_path: Path) -> None:
     write_package(generate(read_system(spec), ["c"], "robot_c"), tmp_path / "robot_c")
     results = check_package(tmp_path / "robot_c", 10)
-    assert all(result.passed for result in results)
+    assert not any(result.failed for result in results)
     assert {"c: robot_c_decomposition_blocksf", "c: robot_c_link_1"} <= {result.name for result in results}
 
 
+@pytest.mark.usefixtures("unread")
 def test_off_the_path_not_even_rounding_passes(tmp_path: Path) -> None:
     package = tmp_path / "cart"
     write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["numpy"]), package)
@@ -691,16 +709,22 @@ def test_numbers_too_large_for_single_precision_are_told(tmp_path: Path) -> None
     system = energy_system("heavy", [x], [LinkEnergy("star", 1e20 * x.qd**2, 0)])
     write_package(generate(system, ["numpy"]), tmp_path / "heavy")
     found = marks(tmp_path / "heavy")
-    assert found.pop("numpy: single precision") == "skip"
-    assert set(found.values()) == {"ok"}
+    skipped = {name for name, mark in found.items() if mark == "skip"}
+    assert skipped == {
+        "numpy: single precision",
+        "numpy: sums in single precision",
+        "numpy: induced accelerations in single precision",
+    }
+    assert set(found.values()) == {"ok", "skip"}
 
 
 def test_formulas_alone_are_held_against_the_energies(tmp_path: Path) -> None:
     write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["formulas"]), tmp_path / "cart")
     assert [(r.name, r.mark) for r in check_package(tmp_path / "cart")] == [
         ("hashes", "ok"),
+        ("texts", "ok"),
         ("manifest", "ok"),
-        ("runtime", "ok"),
+        ("made", "ok"),
         ("back ends", "skip"),
         ("formulas.txt: lines", "ok"),
         ("formulas.txt: tau_ij against energies differentiated", "ok"),
@@ -835,6 +859,6 @@ def test_a_manifest_that_lists_no_files_fails(package: Path) -> None:
 
 def test_a_manifest_at_odds_with_its_package_is_refused(package: Path) -> None:
     change_manifest(package, lambda data: data["links"].pop())
-    assert marks(package) == {"hashes": "ok", "manifest": "FAIL"}
+    assert marks(package) == {"hashes": "ok", "texts": "ok", "manifest": "FAIL"}
     with pytest.raises(LinkwiseError, match=r"the entry links of manifest.json was changed"):
         open_package(package)

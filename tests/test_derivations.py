@@ -11,7 +11,7 @@ def test_derivations_are_held_together_by_check(tmp_path: Path) -> None:
     files = generate(read_system("puma560"), ["numpy", "autograd"], "puma", derivation="energy")
     write_package(files, tmp_path / "puma")
     results = {result.name: result for result in check_package(tmp_path / "puma", samples=20)}
-    assert all(result.passed for result in results.values())
+    assert not any(result.failed for result in results.values())
     for pair in (
         "closed forms (from energies) against rule",
         "closed forms (from energies) against Lagrangians",

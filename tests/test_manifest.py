@@ -235,7 +235,7 @@ def another(value: Any) -> Any:
 def complaint(package: Path) -> str:
     """What `check` says of a manifest."""
     try:
-        [wrong] = [result for result in check_package(package, 1)[:2] if not result.passed]
+        [wrong] = [result for result in check_package(package, 1)[:2] if result.failed]
     except LinkwiseError as error:
         return str(error).removeprefix(str(package / "manifest.json"))
     assert wrong.name == "manifest"

@@ -291,7 +291,7 @@ def test_armature_is_that_of_pinocchios_inverse_dynamics(tmp_path: Path) -> None
 def test_check_holds_them_against_the_manifest(tmp_path: Path) -> None:
     directory = written(tmp_path, ["numpy"])
     told = {result.name: result for result in check_package(directory, 20)}
-    assert all(result.passed for result in told.values())
+    assert not any(result.failed for result in told.values())
     assert "numpy: passive torques of the joints" in told
     for file, old, new in (
         ("names.py", "damping=0.7", "damping=0.8"),
@@ -301,7 +301,7 @@ def test_check_holds_them_against_the_manifest(tmp_path: Path) -> None:
         text = (directory / file).read_text()
         assert old in text
         forged(directory, file, text.replace(old, new))
-        failed = {result.name for result in check_package(directory, 20) if not result.passed}
+        failed = {result.name for result in check_package(directory, 20) if result.failed}
         assert {"runtime", "numpy: passive torques of the joints"} <= failed
         forged(directory, file, text)
 

@@ -67,4 +67,4 @@ def test_arms_of_the_torso_mirror_each_other() -> None:
 def test_torso_agrees_with_an_independent_recursion(tmp_path: Path) -> None:
     files = generate(read_system("torso"), ["numpy", "c"])
     write_package(files, tmp_path / "torso")
-    assert all(result.passed for result in check_package(tmp_path / "torso", samples=20))
+    assert not any(result.failed for result in check_package(tmp_path / "torso", samples=20))

@@ -15,3 +15,7 @@ def within(place: str) -> Iterator[None]:
         yield
     except LinkwiseError as error:
         raise LinkwiseError(f"{place}: {error}") from error
+
+
+class LinkwiseWarning(UserWarning):
+    """What a user is to know before they trust a result; the command line tells it in a line."""

@@ -2,16 +2,16 @@
 
 import re
 from collections.abc import Iterator
-from importlib.resources import files
 from pathlib import Path
 
-from linkwise.check.compare import Result, Skipped
+from linkwise.check.compare import Result, skipped
 from linkwise.emit.backend import backends_of
 from linkwise.emit.shared_texts import BodyText, init_text, names_text
 from linkwise.emit.tree_file import tree_text
 from linkwise.package.agreement import disagreements, miscounted
 from linkwise.package.bytecode import caches, is_compiled_from_source
 from linkwise.package.contents import added, changed
+from linkwise.package.emitted_text import foreign
 from linkwise.package.load import Package
 from linkwise.package.manifest import Manifest, altered_entries
 from linkwise.version import VERSION
@@ -43,8 +43,15 @@ def check_files(directory: Path, manifest: Manifest) -> list[Result]:
     results = [_result("hashes", wrong, f"{len(manifest.files)} files as generated")]
     others = sorted({cache.python for cache in compiled if cache.finished and not cache.readable})
     if others:
-        results.append(Skipped("__pycache__", f"compiled by {', '.join(others)}: not checked by this Python"))
+        results.append(skipped("__pycache__", f"compiled by {', '.join(others)}: not checked by this Python"))
     return results
+
+
+def check_texts(directory: Path, manifest: Manifest) -> Result:
+    """Read every file that could run as text: nothing is imported or compiled that linkwise doesn't write."""
+    version = manifest.generator.get("linkwise")
+    wrong = foreign(directory, manifest.files, manifest.name, version)
+    return _result("texts", wrong, "hold arithmetic and calls of the runtime alone, read before they run")
 
 
 def check_manifest(package: Package) -> Result:
@@ -57,34 +64,16 @@ def check_manifest(package: Package) -> Result:
     return _result("manifest", wrong, "agrees with the package")
 
 
-def check_runtime(package: Package) -> Result:
-    """Hold the files that linkwise has or makes alike for every package, where this version wrote it."""
-    directory, manifest = package.directory, package.manifest
-    version = manifest.generator.get("linkwise")
+def check_made(package: Package) -> Result:
+    """Hold the files that linkwise makes alike of every manifest, where this version wrote it."""
+    version = package.manifest.generator.get("linkwise")
     if version != VERSION:
         unchecked = "runtime/, __init__.py, names.py and tree.py were not checked"
-        return Skipped("runtime", f"{unchecked}: of linkwise {version}, which is not at hand to compare with")
-    own = {path: _own(path) for path in manifest.files}
+        return skipped("made", f"{unchecked}: of linkwise {version}, which is not at hand to compare with")
     wrong = [
-        f"{path} is not that of linkwise {VERSION}"
-        for path, text in own.items()
-        if text != (directory / path).read_bytes() and (text is not None or path.startswith("runtime/"))
-    ]
-    wrong += [
         f"{path} is not what linkwise {VERSION} makes of the manifest" for path in _made_otherwise(package)
     ]
-    return _result(
-        "runtime", wrong, f"{sum(text is not None for text in own.values())} files are linkwise's own"
-    )
-
-
-def _own(path: str) -> bytes | None:
-    """The file of linkwise that a package has a copy of at this path; None where that is no copy."""
-    folder, _, name = path.partition("/")
-    places = {"runtime": files("linkwise.runtime"), "c": files("linkwise.runtime").joinpath("c")}
-    if folder in places and (file := places[folder].joinpath(name)).is_file():
-        return file.read_text(encoding="utf-8").encode()  # as it was written, whatever ends lines here
-    return None
+    return _result("made", wrong, "__init__.py, names.py and tree.py are what linkwise makes of the manifest")
 
 
 def _made_otherwise(package: Package) -> Iterator[str]:

@@ -6,18 +6,18 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from linkwise.check.compare import Entries, Result, Skipped, compare
+from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype, declared
 from linkwise.check.control_functions import CONTROL, control_calls, control_prototypes
 from linkwise.check.frame_reference import FrameReference
 from linkwise.check.impedance_functions import NOT_CALLED, impedance_calls, impedance_prototypes
 from linkwise.check.model_calls import FLOAT32
-from linkwise.check.packed_layout import IndexRows, Rows
+from linkwise.check.packed_layout import IndexRows, Rows, packed
 from linkwise.check.reference import Reference, dense_quantities
+from linkwise.check.states import NUMBERS
 from linkwise.errors import LinkwiseError
 from linkwise.escape import identifiers
 from linkwise.package.load import Array
@@ -103,7 +103,7 @@ class CFunctions:
                     calls = control_calls(self._call, function, self.manifest, reference, references.frames)
                 else:
                     calls = self._calls(function, reference)
-                yield compare(name, list(calls), **single)
+                yield compare(name, calls, **single)
             except _OutOfBounds as error:
                 yield Result(name, False, None, f"{error.args[0]} wrote beyond its arrays")
 
@@ -135,17 +135,18 @@ class CFunctions:
         )
         for what, size in sizes.items():
             flat = found[what].reshape(len(at) // width, size, width).swapaxes(1, 2).reshape(len(at), size)
-            yield _packed(what, flat, self.rows.of(what), reference, at)
+            yield packed(what, flat, self.rows.of(what), reference, at)
 
     def _dense(
         self, function: Prototype, reference: Reference, expected: Mapping[str, tuple[Array, Array]]
     ) -> Iterator[Entries]:
         """Calls of a function whose results have their zeros."""
-        for count, shift in product(ROWS, (0, 1)):
+        what, names = (DENSE | REGRESSORS)[function.short]
+        shapes = [expected[quantity][0].shape[1:] for quantity in what]
+        most = max(1, NUMBERS // max(map(math.prod, shapes)))
+        for count, shift in product((count for count in ROWS if count <= most), (0, 1)):
             at = np.arange(count) * 3 % max(len(reference.states.q), 1)
             given = dict(zip(("q", "qd", "qdd"), reference.states.at(at).motion, strict=True))
-            what, names = (DENSE | REGRESSORS)[function.short]
-            shapes = [expected[quantity][0].shape[1:] for quantity in what]
             sizes = {name: count * math.prod(shape) for name, shape in zip(names, shapes, strict=True)}
             found = self._call(function, count, given, sizes, shift)
             for quantity, name, shape in zip(what, names, shapes, strict=True):
@@ -163,7 +164,7 @@ class CFunctions:
             motion = zip(("q", "qd", "qdd"), reference.states.at(row).motion, strict=True)
             found = self._call(function, 1, dict(motion), {k: len(v) for k, v in own.items()}, row % 2)
             for what, rows in own.items():
-                yield _packed(what, found[what][None], rows, reference, np.array([row]))
+                yield packed(what, found[what][None], rows, reference, np.array([row]))
 
     def _call(
         self,
@@ -225,7 +226,7 @@ def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[Com
     try:
         compiled = CompiledPackage(manifest.name, directory / "c", MANY * results)
     except RuntimeError as error:
-        return None, Skipped("c: not checked", " ".join(str(error).split()))
+        return None, skipped("c: not checked", " ".join(str(error).split()))
     except (LinkwiseError, OSError) as error:
         return None, Result("c: compiles", False, None, " ".join(str(error).split()))
     wrong = (
@@ -283,10 +284,3 @@ def _wrong_function(manifest: Manifest, compiled: CompiledPackage, rows: IndexRo
 def _blocks(motion: Array, width: int) -> Array:
     """Samples (count, n) in blocks of `width`, samples innermost; rows for a width of 1."""
     return motion.reshape(-1, width, motion.shape[-1]).swapaxes(1, 2)
-
-
-def _packed(what: str, value: Any, rows: Rows, reference: Reference, at: Rows) -> Entries:
-    picked, scale = (
-        source[what][at][(slice(None), *rows.T)] for source in (reference.values, reference.scales)
-    )
-    return Entries(what, value, picked, scale)

@@ -1,18 +1,22 @@
 """The checks of `linkwise check`."""
 
+import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from linkwise.check.as_generated import check_files, check_manifest, check_runtime
+from linkwise.check.as_generated import check_files, check_made, check_manifest, check_texts
 from linkwise.check.body_reference import body_reference
 from linkwise.check.c_functions import CFunctions, References, compile_c
-from linkwise.check.compare import Result, Skipped
+from linkwise.check.compare import Result, skipped
 from linkwise.check.compiled_c import CompiledPackage
+from linkwise.check.contact_checks import Contacts
 from linkwise.check.derivations import derivations
 from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.formula_texts import check_formulas
@@ -20,11 +24,9 @@ from linkwise.check.frame_reference import FrameReference, frame_calls, frame_re
 from linkwise.check.impedance_checks import impedance_calls
 from linkwise.check.induced_checks import induced_calls
 from linkwise.check.loop_checks import loop_calls
-from linkwise.check.loop_induced import induced_loop_calls
 from linkwise.check.loop_reference import LoopReference, loop_reference
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.model_calls import Named, against_reference
-from linkwise.check.motion_checks import MotionReference
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.own_process import Ended, in_own_process
 from linkwise.check.packed_layout import IndexRows
@@ -33,41 +35,51 @@ from linkwise.check.passive_reference import passive_calls
 from linkwise.check.recorded_parts import recorded_parts
 from linkwise.check.reference import Reference
 from linkwise.check.regressor_reference import regressor_calls, regressor_reference
-from linkwise.check.states import random_states
+from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion, simulation_calls
+from linkwise.check.states import AT_REST, States, affordable, random_states
 from linkwise.check.sum_checks import sums_against_reference
 from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.torque_reference import states_of_torques, torque_reference
+from linkwise.package.entries import PassiveEntry, RigidTree
 from linkwise.package.load import Array, Model, Package, load_package, staying
 from linkwise.package.manifest import Manifest
 
 OPTIONAL = ("torch",)
 """Libraries that a package's back ends may need beside NumPy."""
+LEAST = 10
+"""States below which nothing is proved of energies that are not defined everywhere."""
 
 
 def check_package(directory: Path, samples: int = 100) -> list[Result]:
     """Run every check on a package; raises LinkwiseError when `directory` holds none that can be read."""
+    return list(results_of(directory, samples))
+
+
+def results_of(directory: Path, samples: int = 100) -> Iterator[Result]:
+    """The same, each result as soon as it is there."""
     manifest = Manifest.read(directory)
-    results = check_files(directory, manifest)
-    if not results[0].passed:
-        return results
+    files = check_files(directory, manifest)
+    yield from files
+    if any(result.failed for result in files):
+        return
+    yield (texts := check_texts(directory, manifest))
+    if texts.failed:
+        return
     try:
         with staying():
             package = load_package(directory, manifest)
-            results.append(check_manifest(package))
-            if not results[-1].passed:
-                return results
-            results.append(check_runtime(package))
+            agrees, made = check_manifest(package), check_made(package)
     except Exception as error:
-        return [*results, Result("import", False, None, _line(error))]
-    loaded, missing = _load(package)
-    results += missing
-    checks = _Checks(package, loaded, samples)
-    try:
-        with staying(), np.errstate(all="ignore"):  # energies of a user's own need not be defined everywhere
-            results += checks.run()
-    except Exception as error:
-        results.append(Result("answers", False, None, _line(error)))
-    return results
+        yield Result("import", False, None, _line(error))
+        return
+    yield agrees
+    if agrees.failed:
+        return
+    yield made
+    with staying():
+        loaded, missing = _load(package)
+    yield from missing
+    yield from _guarded("answers", _numbers(package, loaded, samples))
 
 
 class Way(NamedTuple):
@@ -84,7 +96,7 @@ class Way(NamedTuple):
 
 def _load(package: Package) -> tuple[dict[Way, Model], list[Result]]:
     if not package.backends:
-        return {}, [Skipped("back ends", "nothing to load: C and formulas only")]
+        return {}, [skipped("back ends", "nothing to load: C and formulas only")]
     loaded: dict[Way, Model] = {}
     missing: list[Result] = []
     for name in package.backends:
@@ -95,12 +107,27 @@ def _load(package: Package) -> tuple[dict[Way, Model], list[Result]]:
                 loaded[Way(name, kernel)] = package.load(name, kernel=kernel)
         except Exception as error:
             if _lacks(error):
-                missing.append(Skipped(f"{name}: not checked", " ".join(str(error).split())))
+                missing.append(skipped(f"{name}: not checked", " ".join(str(error).split())))
             else:
                 missing.append(Result(f"{name}: loads", False, None, _line(error)))
     if not loaded:
         missing.append(Result("back ends", False, None, "none could be loaded; nothing was checked"))
     return loaded, missing
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let torch compute in one thread where it is loaded: of few samples, others only wait."""
+    torch = sys.modules.get("torch")
+    if torch is None:
+        yield
+        return
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
 
 
 def _lacks(error: Exception) -> bool:
@@ -112,173 +139,300 @@ def _lacks(error: Exception) -> bool:
     return isinstance(error, RuntimeError) and here and " failed: " not in str(error)
 
 
-LEAST = 10
-"""States below which nothing is proved."""
+def _numbers(package: Package, loaded: Mapping[Way, Model], samples: int) -> Iterator[Result]:
+    """Everything for the parameters as generated, and, where there are some, for others too."""
+    manifest = package.manifest
+    rows = IndexRows.of_paths([link.path for link in manifest.links], package.module.ROBOT.linear)
+    compiled = None
+    if f"c/{manifest.name}.h" in manifest.files:
+        compiled, result = compile_c(manifest, package.directory, rows)
+        yield result
+    few = affordable(samples, len(manifest.joints), len(manifest.links))
+    if few < samples:
+        told = f"{few} random ones instead of {samples}, and {AT_REST} at rest: that is what memory is for"
+        yield Result("states", True, None, told)
+    values = dict(manifest.parameters)
+    yield from _Subject(package, "", values, loaded, rows, compiled, few).results()
+    if values:
+        # Every parameter changed a little: equal ones tell no longer one from another, and none is zero.
+        values = changed_values(manifest.parameters, manifest.tree)
+        loaded = {way: package.load(way.backend, values, way.kernel) for way in loaded}
+        yield from _Subject(package, ", other parameters", values, loaded, rows, compiled, few).results()
 
 
 @dataclass(frozen=True)
-class _Checks:
-    """The checks of one package's numbers: its formulas, its C, and the back ends that load here."""
+class _Subject:
+    """A package for given values of its parameters, and what its numbers are held against.
+
+    label: what tells its results from those for other values
+    """
 
     package: Package
+    label: str
+    parameters: Mapping[str, float]
     loaded: Mapping[Way, Model]
+    rows: IndexRows
+    compiled: CompiledPackage | None
     samples: int
 
-    def run(self) -> Iterator[Result]:
-        """Everything for the parameters as generated, and, where there are some, for others too."""
-        manifest = self.package.manifest
-        rows = IndexRows.of_paths([link.path for link in manifest.links], self.package.module.ROBOT.linear)
-        compiled = None
-        if f"c/{manifest.name}.h" in manifest.files:
-            compiled, result = compile_c(manifest, self.package.directory, rows)
-            yield result
-        values = dict(manifest.parameters)
-        yield from self._numbers("", values, self.loaded, rows, compiled)
-        if values:
-            yield from self._other_parameters(rows, compiled)
-
-    def _numbers(
-        self,
-        label: str,
-        values: Mapping[str, float],
-        loaded: Mapping[Way, Model],
-        rows: IndexRows,
-        compiled: CompiledPackage | None,
-    ) -> Iterator[Result]:
-        manifest, c_passes = self.package.manifest, True
-        if manifest.tree is not None and values:
+    def results(self) -> Iterator[Result]:
+        """The bodies, the texts, the C, and every back end."""
+        manifest, label = self.package.manifest, self.label
+        if manifest.tree is not None and self.parameters:
             unphysical = bool(manifest.request.get("allow_unphysical"))
-            yield from check_bodies(
-                manifest.tree, self.package.module.ROBOT.bodies, values, unphysical, label
-            )
-        functions = CFunctions(manifest, compiled, rows, values) if compiled else None
-        reference, tried = self._reference(values, loaded, functions)
+            bodies = self.package.module.ROBOT.bodies
+            yield from check_bodies(manifest.tree, bodies, self.parameters, unphysical, label)
+        reference, tried = self._found
         if manifest.energies is not None:
             yield from _told(f"energies{label}", reference, tried, self.samples)
         if reference is None and tried:
             return
-        yield from check_formulas(self.package, rows, values, label, reference)
+        yield from check_formulas(self.package, self.rows, self.parameters, label, reference)
         if reference is None:
-            yield Skipped(f"numbers{label}", "nothing here computes with the energies")
+            yield skipped(f"numbers{label}", "nothing here computes with the energies")
             return
-        regressors, frames = self._regressors(values, reference), self._frames(values, reference)
-        loops = self._loops(values, reference)
-        if loops is None and self._is_tied:
-            yield Skipped(f"constraints{label}", "loops close near none of the states")
-        motions = None
-        if manifest.tree is not None and (loops is not None or not self._is_tied):
-            closed = reference.states if loops is None else loops.states
-            motions = MotionReference.of(manifest, tree_with(manifest.tree, values), closed)
-        references = References(reference, regressors, frames)
-        for result in _c_results(functions, f"c{label}", references) if functions else ():
-            c_passes &= result.passed
+        if self.tied and self.loops is None:
+            told = "loops close near none of the states, or only next to singular positions"
+            yield skipped(f"constraints{label}", told)
+        functions, wrong = self.functions, False
+        for result in _c_results(functions, f"c{label}", self) if functions else ():
+            wrong |= result.failed
             yield result
-        for way, model in loaded.items():
-            if way.backend == "native" and not c_passes:
+        for way, model in self.loaded.items():
+            name = f"{way.label}{label}"
+            if way.backend == "native" and wrong:
                 # What writes beyond its arrays takes the interpreter with it.
-                yield Skipped(f"{way.label}{label}: not called", "its C is wrong, see above")
-            else:
-                yield from against_reference(Named(f"{way.label}{label}", model, rows, reference), manifest)
-                if way.backend == "autograd":
-                    yield recorded_parts(Named(f"{way.label}{label}", model, rows, reference))
-                yield from sums_against_reference(f"{way.label}{label}", model, reference)
-                if regressors is not None and model.backend.rule is not None:
-                    yield from regressor_calls(f"{way.label}{label}", model, regressors)
-                if frames is not None and way.kernel != "rule":  # no kernel has a part in it
-                    yield from frame_calls(f"{way.label}{label}", model, frames)
-                if loops is not None and way.kernel != "rule":
-                    yield from loop_calls(f"{way.label}{label}", model, loops)
-                    yield from induced_loop_calls(f"{way.label}{label}", model, loops)
-                if way.kernel != "rule" and motions is not None:
-                    yield from motions.calls(f"{way.label}{label}", model, self.package.module.Contact)
-                joints = manifest.tree.passive if manifest.tree is not None else ()
-                yield from passive_calls(f"{way.label}{label}", model, joints, reference.states)
-                if way.kernel != "rule":  # they are composed of what every kernel was held against
-                    record = self.package.module.AppliedLoad
-                    yield from induced_calls(f"{way.label}{label}", model, joints, reference, frames, record)
-                    natural = self.package.module.Natural
-                    yield from impedance_calls(f"{way.label}{label}", model, joints, reference, natural)
-        if manifest.tree is not None:
+                yield skipped(f"{name}: not called", "its C is wrong, see above")
+                continue
+            for check in CHECKS:
+                if check.concerns(self, way):
+                    yield from _guarded(f"{name}: {check.title}", check.run(self, name, model))
+        if self.tree is not None:
             how = "from energies" if manifest.request.get("derivation") == "energy" else "by the rigid rule"
-            ways = {way.label: model for way, model in loaded.items()}
-            yield from derivations(ways, rows, reference, how, label)
+            ways = {way.label: model for way, model in self.loaded.items()}
+            yield from derivations(ways, self.rows, reference, how, label)
 
-    def _other_parameters(self, rows: IndexRows, compiled: CompiledPackage | None) -> Iterator[Result]:
-        """Every parameter changed a little: equal ones tell no longer one from another, and none is zero."""
-        changed = changed_values(self.package.manifest.parameters, self.package.manifest.tree)
-        loaded = {way: self.package.load(way.backend, changed, way.kernel) for way in self.loaded}
-        yield from self._numbers(", other parameters", changed, loaded, rows, compiled)
+    @property
+    def manifest(self) -> Manifest:
+        """That of the package."""
+        return self.package.manifest
 
-    def _reference(
-        self, values: Mapping[str, float], loaded: Mapping[Way, Model], functions: CFunctions | None
-    ) -> tuple[Reference | None, int]:
+    @cached_property
+    def tree(self) -> RigidTree | None:
+        """Rigid bodies with these parameters; energies have none."""
+        tree = self.package.manifest.tree
+        return None if tree is None else tree_with(tree, self.parameters)
+
+    @property
+    def tied(self) -> bool:
+        """Whether loops of the open tree are closed."""
+        return self.tree is not None and self.tree.tied
+
+    @property
+    def passive(self) -> tuple[PassiveEntry, ...]:
+        """What joints take of their own."""
+        return () if self.tree is None else self.tree.passive
+
+    @cached_property
+    def functions(self) -> CFunctions | None:
+        """The C, if it compiled."""
+        if self.compiled is None:
+            return None
+        return CFunctions(self.package.manifest, self.compiled, self.rows, self.parameters)
+
+    @property
+    def reference(self) -> Reference:
+        """What torques and their coefficients are held against."""
+        return _made(self._found[0])
+
+    @cached_property
+    def regressors(self) -> Reference | None:
+        """What regressors are held against; energies have none."""
+        if self.tree is None:
+            return None
+        return regressor_reference(self.manifest, self.tree, self.reference.states)
+
+    @cached_property
+    def frames(self) -> FrameReference | None:
+        """What kinematics is held against; energies have none."""
+        return None if self.tree is None else frame_reference(self.manifest, self.tree, self.reference.states)
+
+    @cached_property
+    def loops(self) -> LoopReference | None:
+        """What constraints are held against; a robot without ties has none."""
+        if self.tree is None or not self.tied:
+            return None
+        return loop_reference(self.manifest, self.tree, self.reference.states)
+
+    @property
+    def closed(self) -> States | None:
+        """States that the robot can move on from: where ties close."""
+        if not self.tied:
+            return None if self.tree is None else self.reference.states
+        return None if self.loops is None else self.loops.states
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """What contacts are held against."""
+        return Contacts(self.manifest, _made(self.tree), _made(self.closed))
+
+    @cached_property
+    def simulated(self) -> SimulatedMotion:
+        """A short motion."""
+        return simulated_motion(self.manifest, _made(self.tree), _made(self.closed))
+
+    @cached_property
+    def _found(self) -> tuple[Reference | None, int]:
         """What numbers are held against, None if nothing can compute or at no state; how many were tried."""
-        manifest = self.package.manifest
-        n = len(manifest.joints)
-        if manifest.tree is not None:
-            tree, states = tree_with(manifest.tree, values), random_states(n, self.samples)
-            recursion, magnitudes = NewtonEuler(manifest, tree), Magnitudes(manifest, tree)
+        manifest = self.manifest
+        if self.tree is not None:
+            states = random_states(manifest.joints, self.samples)
+            recursion, magnitudes = NewtonEuler(manifest, self.tree), Magnitudes(manifest, self.tree)
             return body_reference(recursion, magnitudes, states), len(states.q)
         if manifest.energies is not None and find_spec("torch"):
             noises = (None, 1, 2, 3)
             exact, *noisy = (
-                [TextLagrangian(energy, values, noise) for energy in manifest.energies] for noise in noises
+                [TextLagrangian(energy, self.parameters, noise) for energy in manifest.energies]
+                for noise in noises
             )
-            found = states_of_energies(exact, n, self.samples)
+            found = states_of_energies(exact, manifest.joints, self.samples)
             defined = len(found.states.q) > 0
             return energy_reference(exact, noisy, found.states) if defined else None, found.tried
-        return self._own_reference(loaded, functions)
+        return self._own_reference()
 
-    def _regressors(self, values: Mapping[str, float], reference: Reference) -> Reference | None:
-        """What regressors are held against; energies have none."""
-        manifest = self.package.manifest
-        if manifest.tree is None:
-            return None
-        return regressor_reference(manifest, tree_with(manifest.tree, values), reference.states)
-
-    def _frames(self, values: Mapping[str, float], reference: Reference) -> FrameReference | None:
-        """What kinematics is held against; energies have none."""
-        manifest = self.package.manifest
-        if manifest.tree is None:
-            return None
-        return frame_reference(manifest, tree_with(manifest.tree, values), reference.states)
-
-    @property
-    def _is_tied(self) -> bool:
-        tree = self.package.manifest.tree
-        return tree is not None and tree.tied
-
-    def _loops(self, values: Mapping[str, float], reference: Reference) -> LoopReference | None:
-        """What constraints are held against; a robot without ties has none."""
-        manifest = self.package.manifest
-        if manifest.tree is None or not self._is_tied:
-            return None
-        return loop_reference(manifest, tree_with(manifest.tree, values), reference.states)
-
-    def _own_reference(
-        self, loaded: Mapping[Way, Model], functions: CFunctions | None
-    ) -> tuple[Reference | None, int]:
+    def _own_reference(self) -> tuple[Reference | None, int]:
         """The torques of one of the package's back ends, else those of its C."""
-        n = len(self.package.manifest.joints)
 
         def of(name: str, torque: Callable[[Array, Array, Array], Array]) -> tuple[Reference | None, int]:
-            found = states_of_torques(torque, n, self.samples)
+            found = states_of_torques(torque, self.manifest.joints, self.samples)
             reference = torque_reference(name, torque, found.states) if len(found.states.q) else None
             return reference, found.tried
 
-        if loaded:
-            way, model = next(iter(loaded.items()))
+        if self.loaded:
+            way, model = next(iter(self.loaded.items()))
             return of(way.label, model.partial_torque)
+        functions = self.functions
         if functions is None:
             return None, 0
         return in_own_process(lambda: of("c", functions.torque))
+
+
+@dataclass(frozen=True)
+class Check:
+    """Calls of a back end that are held against one thing.
+
+    title: what is told where the check itself does not come to its end
+    run: its results, from the subject, the back end's label and its model
+    by_rule: whether it concerns the vectorised rule too; what is composed of answers that both kernels were
+    held against does not
+    """
+
+    title: str
+    run: Callable[[_Subject, str, Model], Iterator[Result]]
+    by_rule: bool = False
+    of: Callable[[_Subject, Way], bool] = lambda subject, way: True
+
+    def concerns(self, subject: _Subject, way: Way) -> bool:
+        """Whether this back end of this package has such calls."""
+        return (self.by_rule or way.kernel != "rule") and self.of(subject, way)
+
+
+T = TypeVar("T")
+
+
+def _is_rigid(subject: _Subject, way: Way) -> bool:
+    return subject.tree is not None
+
+
+def _made(what: T | None) -> T:
+    """What a check that concerns a subject finds there."""
+    assert what is not None
+    return what
+
+
+CHECKS = (
+    Check(
+        "coefficients and torques",
+        lambda s, name, model: against_reference(Named(name, model, s.rows, s.reference), s.manifest),
+        by_rule=True,
+    ),
+    Check(
+        "recorded graphs",
+        lambda s, name, model: iter([recorded_parts(Named(name, model, s.rows, s.reference))]),
+        of=lambda s, way: way.backend == "autograd",
+    ),
+    Check(
+        "sums over the links",
+        lambda s, name, model: sums_against_reference(name, model, s.reference),
+        by_rule=True,
+    ),
+    Check(
+        "regressors",
+        lambda s, name, model: regressor_calls(name, model, _made(s.regressors)),
+        by_rule=True,
+        of=lambda s, way: s.tree is not None and s.loaded[way].backend.rule is not None,
+    ),
+    Check("frames", lambda s, name, model: frame_calls(name, model, _made(s.frames)), of=_is_rigid),
+    Check(
+        "constraints",
+        lambda s, name, model: loop_calls(name, model, _made(s.loops)),
+        of=lambda s, way: s.loops is not None,
+    ),
+    Check(
+        "contacts",
+        lambda s, name, model: s.contacts.calls(name, model, s.package.module.Contact),
+        of=lambda s, way: s.closed is not None,
+    ),
+    Check(
+        "a simulated motion",
+        lambda s, name, model: simulation_calls(name, model, s.simulated),
+        of=lambda s, way: s.closed is not None,
+    ),
+    Check(
+        "passive torques",
+        lambda s, name, model: passive_calls(name, model, s.passive, s.reference),
+        by_rule=True,
+    ),
+    Check(
+        "induced accelerations",
+        lambda s, name, model: induced_calls(
+            name, model, s.passive, s.reference, s.frames, s.package.module.AppliedLoad
+        ),
+    ),
+    Check(
+        "controllers",
+        lambda s, name, model: impedance_calls(name, model, s.passive, s.reference, s.package.module.Natural),
+    ),
+)
+"""What is held of each back end, in the order in which it is told."""
+
+
+def _guarded(title: str, results: Iterator[Result]) -> Iterator[Result]:
+    """Results up to where a check breaks off, and that it did: the others are made all the same.
+
+    Each is computed by itself, for what holds while it is must not hold for whoever takes it.
+    """
+    while True:
+        try:
+            # Energies of a user's own need not be defined everywhere.
+            with staying(), np.errstate(all="ignore"), _one_thread():
+                result = next(results, None)
+        except MemoryError as error:
+            yield skipped(title, f"it takes more memory than there is here: {error}")
+            return
+        except Exception as error:
+            yield Result(title, False, None, _line(error))
+            return
+        if result is None:
+            return
+        yield result
 
 
 def _told(name: str, reference: Reference | None, tried: int, samples: int) -> Iterator[Result]:
     """What is to be known of energies that a user wrote: what they are held against, and where."""
     if not find_spec("torch"):
         own = "a user's own, and no torch here to differentiate them: its own torques are what counts"
-        yield Skipped(f"{name}: not held against their text", own)
+        yield skipped(f"{name}: not held against their text", own)
     kept = len(reference.states.q) if reference else 0
     detail = f"numbers at {kept} of {tried} random states"
     if tried and kept < min(LEAST, samples / 2):
@@ -287,8 +441,9 @@ def _told(name: str, reference: Reference | None, tried: int, samples: int) -> I
         yield Result(f"{name}: are defined", True, None, detail)
 
 
-def _c_results(functions: CFunctions, name: str, references: References) -> list[Result]:
+def _c_results(functions: CFunctions, name: str, subject: _Subject) -> list[Result]:
     """What each function of the C gives; a wrong one may write anywhere."""
+    references = References(subject.reference, subject.regressors, subject.frames)
     try:
         return in_own_process(lambda: list(functions.check(name, references)))
     except Ended as ended:

@@ -1,53 +1,65 @@
 """Entries against a reference: each value by its own size, or by the rounding of what it is summed from."""
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwise.check.reference import TOLERANCE, Reference
 from linkwise.package.load import Array
 
-ROUNDINGS = 10.0
+ROUNDINGS = 30.0
 """Roundings that a value may gather, each as large as that of the numbers that it is summed from."""
+
+
+BLOCK = 1 << 20
+"""Entries compared at a time."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """One check: its name, whether it passed, the largest error (None: not a number's matter), and a line."""
+    """One check: its name, whether it held, the largest error (None: not a number's matter), and a line.
+
+    held is None for what could not be checked here, which speaks neither for the package nor against it;
+    the line says why.
+    """
 
     name: str
-    passed: bool
+    held: bool | None
     error: float | None
     detail: str
 
     @property
-    def mark(self) -> str:
-        """Return ok, FAIL or skip."""
-        return "ok" if self.passed else "FAIL"
-
-
-class Skipped(Result):
-    """A check that could not be made here, which speaks neither for the package nor against it."""
-
-    def __init__(self, name: str, detail: str) -> None:
-        super().__init__(name, True, None, detail)
+    def failed(self) -> bool:
+        """Whether the package is wrong."""
+        return self.held is False
 
     @property
     def mark(self) -> str:
-        """Return skip."""
-        return "skip"
+        """Return ok, FAIL or skip."""
+        return {True: "ok", False: "FAIL", None: "skip"}[self.held]
+
+
+def skipped(name: str, reason: str) -> Result:
+    """What could not be checked, and why."""
+    return Result(name, None, None, reason)
 
 
 @dataclass(frozen=True)
 class Entries:
-    """Values beside those expected, samples first; scale: size of the numbers that each is the sum of."""
+    """Values beside those expected, samples first; scale: size of the numbers that each is the sum of.
+
+    rows: of packed values (samples, count), the indices (count, 2 or 3) that they are told by, from 0
+    """
 
     what: str
     value: Array
     expected: Array
     scale: Array
+    rows: NDArray[np.intp] | None = None
 
 
 def compare(
@@ -67,16 +79,36 @@ def compare(
             )
         if not value.size:
             continue
-        least = ROUNDINGS * epsilon / tolerance * entries.scale
-        own = np.maximum(np.abs(expected), np.maximum(least, 1e-300))
-        errors = np.abs(value.astype(float) - expected) / own
-        errors = np.where(np.isnan(errors), np.inf, errors)
-        if errors.max() > worst:
-            worst, (_, *at) = float(errors.max()), np.unravel_index(errors.argmax(), errors.shape)
-            indices = f"({', '.join(str(index + 1) for index in at)})" if at else ""
+        scale = np.broadcast_to(entries.scale, expected.shape)
+        for block in _blocks(expected.shape):
+            own = np.maximum(scale[block] * (ROUNDINGS * epsilon / tolerance), 1e-300)
+            own = np.maximum(own, np.abs(expected[block]))
+            errors = np.abs(np.subtract(value[block], expected[block], dtype=float)) / own
+            if np.isnan(errors.max()):
+                errors[np.isnan(errors)] = np.inf
+            if errors.max() <= worst:
+                continue
+            worst, (_, *at) = (
+                float(errors.max()),
+                [int(k) for k in np.unravel_index(errors.argmax(), errors.shape)],
+            )
+            if at:
+                at[0] += block[1].start
+            shown = at if entries.rows is None else entries.rows[at[0]]
+            indices = f"({', '.join(str(index + 1) for index in shown)})" if at else ""
             place = f"{entries.what}{indices}"
     detail = f"largest relative error {worst:.1e}"
     return Result(name, worst <= tolerance, worst, detail if worst <= tolerance else f"{detail} at {place}")
+
+
+def _blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
+    """Parts of an array along its second axis, so that no more than BLOCK entries are compared at a time."""
+    if len(shape) < 2:
+        yield (slice(None),)
+        return
+    step = max(1, BLOCK * shape[1] // math.prod(shape))
+    for start in range(0, shape[1], step):
+        yield slice(None), slice(start, start + step)
 
 
 def dense(what: str, value: Array, reference: Reference, rows: Any = slice(None)) -> Entries:

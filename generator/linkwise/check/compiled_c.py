@@ -124,8 +124,8 @@ class _Guarded:
     @property
     def whole(self) -> bool:
         """Whether nothing outside the array was written to."""
-        outside = np.delete(self._memory, self._inside)
-        return bool((outside == 0xA5).all())
+        around = self._memory[: self._inside.start], self._memory[self._inside.stop :]
+        return all(bool((outside == 0xA5).all()) for outside in around)
 
 
 def _constants(name: str, header: str) -> dict[str, int]:

@@ -4,18 +4,18 @@ The two rows of a hinge's turns stand along axes that are the package's choice: 
 are compared.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from linkwise.check.compare import Entries, Result, compare
+from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.contact_equations import KINDS, ContactEquations
-from linkwise.check.loop_checks import loop_entries
 from linkwise.check.loop_equations import RANK, LoopEquations
-from linkwise.check.loop_reference import FAR, held_motion, steady
+from linkwise.check.loop_reference import condition_of, far_from_singular, held_motion, steady
 from linkwise.check.newton_euler import NewtonEuler
+from linkwise.check.rounding import measured
 from linkwise.check.states import States
 from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array, Model
@@ -25,44 +25,147 @@ STATES = 2
 TRIED = 6
 
 
-def contact_calls(
-    name: str, model: Model, manifest: Manifest, tree: RigidTree, states: States, contact: Callable[..., Any]
-) -> Iterator[Result]:
-    """Of the frame that most joints move, one result for all kinds; states: in which ties close.
+class Contacts:
+    """Contacts of each kind on the frame that most joints move, at states in which ties close."""
 
-    contact: the package's own record
-    """
-    recursion = NewtonEuler(manifest, tree)
-    frame = max((f for f in tree.frames if f.body is not None), key=lambda f: _depth(tree, f.body))
-    ties = LoopEquations(recursion, tree) if tree.tied else None
-    entries: list[Entries] = []
-    for kind in KINDS:
-        held = ContactEquations(recursion, ties, frame, kind)
-        entries += _of_one(model, held, states.at(slice(0, TRIED)), contact)
-    if entries:
-        yield compare(f"{name}: contacts against least squares", entries)
+    def __init__(self, manifest: Manifest, tree: RigidTree, states: States) -> None:
+        at = max((f for f in tree.frames if f.body is not None), key=lambda f: _depth(tree, f.body))
+        self.manifest, self.tree, self.frame = manifest, tree, tree.frames.index(at)
+        self.states = states.at(slice(0, TRIED))
+        self._kept: dict[tuple[str, tuple[int, ...]], _Expected | None] = {}
+
+    def calls(self, name: str, model: Model, contact: Callable[..., Any]) -> Iterator[Result]:
+        """One result of a back end for all kinds; contact: the package's own record."""
+        kinds = [kind for kind in KINDS if self._leaves_freedom(kind)]
+        entries = [entry for kind in kinds for entry in self._compared(model, kind, contact)]
+        if not kinds:
+            return
+        if entries:
+            yield compare(f"{name}: contacts against least squares", entries)
+        else:
+            told = "each is next to a singular position, or to a singular mass matrix, at every state"
+            yield skipped(f"{name}: contacts", told)
+
+    def equations(self, kind: str, tree: RigidTree) -> ContactEquations:
+        """Those of a tree, which may be a noisy one."""
+        recursion = NewtonEuler(self.manifest, tree)
+        ties = LoopEquations(recursion, tree) if tree.tied else None
+        return ContactEquations(recursion, ties, tree.frames[self.frame], kind)
+
+    def _leaves_freedom(self, kind: str) -> bool:
+        """Whether joints can move under a contact of this kind."""
+        q = self.states.q
+        sizes = np.linalg.svd(self.equations(kind, self.tree).rows(q), compute_uv=False)
+        freedoms = q.shape[1] - (sizes > RANK * np.maximum(sizes[:, :1], 1.0)).sum(-1)
+        return bool(freedoms.min() > 0)
+
+    def _compared(self, model: Any, kind: str, contact: Callable[..., Any]) -> Iterator[Entries]:
+        """Entries of one kind; none where it is far enough from singular positions at no state."""
+        held = self.equations(kind, self.tree)
+        made = model.constrained(contacts=[contact(**held.asked)])
+        own = tuple(model.joint_names.index(name) for name in made.independent)
+        if (kind, own) not in self._kept:
+            self._kept[kind, own] = self._expected(held, own)
+        expected = self._kept[kind, own]
+        if expected is not None:
+            for what, found in _found(made, held, expected.moved, expected.given).items():
+                yield Entries(f"{kind}: {what}", found, expected.values[what], expected.scales[what])
+
+    def _expected(self, held: ContactEquations, own: tuple[int, ...]) -> "_Expected | None":
+        """The answers, where these joints move the others."""
+        q = self.states.q
+        rest, rows = [k for k in range(q.shape[1]) if k not in own], held.rows(q)
+        clear = far_from_singular(rows[..., rest])
+        if not clear.size:
+            return None
+        clear = clear[steady(held.recursion, q[clear], _mapped(rows[clear], list(own), rest))][:STATES]
+        given, condition = (
+            _Given(self.states.at(clear), list(own), rest),
+            condition_of(rows[clear][..., rest]),
+        )
+
+        def answers(tree: RigidTree) -> dict[str, Array]:
+            return _answers(self.equations(held.kind, tree), given)
+
+        values, scales = measured(answers, self.tree, condition**2)
+        return _Expected(given, given.moved(values["velocity"], values["acceleration"]), values, scales)
 
 
 def _depth(tree: RigidTree, body: int | None) -> int:
     return 0 if body is None else 1 + _depth(tree, tree.bodies[body].parent)
 
 
-def _of_one(
-    model: Any, held: ContactEquations, states: States, contact: Callable[..., Any]
-) -> Iterator[Entries]:
-    """Entries of one kind; none where it leaves nothing to move, or at no state enough."""
-    rows = held.rows(states.q)
-    values = np.linalg.svd(rows, compute_uv=False)
-    if (values > RANK * np.maximum(values[:, :1], 1.0)).sum(-1).max() == states.q.shape[1]:
-        return
-    made = model.constrained(contacts=[contact(**held.asked)])
-    own = [model.joint_names.index(name) for name in made.independent]
-    rest = [k for k in range(states.q.shape[1]) if k not in own]
-    sizes = np.linalg.svd(rows[..., rest], compute_uv=False)
-    clear = np.flatnonzero(sizes[:, -1] > FAR * sizes[:, 0])
-    if clear.size:
-        clear = clear[steady(held.recursion, states.q[clear], _mapped(rows[clear], own, rest))][:STATES]
-        yield from _compared(made, held, states.at(clear), own, rest)
+@dataclass(frozen=True)
+class _Expected:
+    """Answers to a motion by name, and the scales of their rounding."""
+
+    given: "_Given"
+    moved: States
+    values: Mapping[str, Array]
+    scales: Mapping[str, Array]
+
+
+class _Given:
+    """States, of which the independent joints' motion counts, and which joints these are."""
+
+    def __init__(self, states: States, own: list[int], rest: list[int]) -> None:
+        self.states, self.own, self.rest = states, own, rest
+        self.tau = np.random.default_rng(8).uniform(-1.0, 1.0, states.q.shape)
+        self.yd, self.ydd = states.qd[:, own], states.qdd[:, own]
+
+    def moved(self, qd: Array, qdd: Array) -> States:
+        """The motion of all joints."""
+        return replace(self.states, qd=qd, qdd=qdd)
+
+
+def _answers(held: ContactEquations, given: _Given) -> dict[str, Array]:
+    q, own, rest = given.states.q, given.own, given.rest
+    rows = held.rows(q)
+    inverse, follows = np.linalg.pinv(rows[..., rest]), _mapped(rows, own, rest)
+    qd = (follows @ given.yd[..., None])[..., 0]
+    rates = held.rates(q, qd)
+    qdd = (follows @ given.ydd[..., None])[..., 0]
+    qdd[:, rest] -= (inverse @ rates @ qd[..., None])[..., 0]
+    torque, back = held.recursion.partial_torque(q, qd, qdd), np.swapaxes(follows, -1, -2)
+    basis = np.linalg.svd(rows[..., rest])[0][..., : len(rest)]
+    onto = np.swapaxes(basis, -1, -2)
+    states = given.moved(qd, qdd)
+    moved, forces = held_motion(held.recursion, states, onto @ rows, onto @ rates, given.tau)
+    forces = (basis @ forces[..., None])[..., 0]
+    return {
+        **_of_rows(held, rows, rates, forces),
+        "velocity": qd,
+        "acceleration": qdd,
+        "tau^": back @ torque,
+        "qdd": moved,
+    }
+
+
+def _found(made: Any, held: ContactEquations, moved: States, given: _Given) -> dict[str, Array]:
+    """The same of a package."""
+    q, qd, qdd = moved.motion
+    answer = made.forward_dynamics(q, qd, given.tau, passive=False)
+    return {
+        **_of_rows(held, made.jacobian(q), made.jacobian_rate(q, qd), answer.forces),
+        "velocity": made.velocity(q, given.yd),
+        "acceleration": made.acceleration(q, qd, given.ydd),
+        "tau^": made.partial_torque(q, qd, qdd),
+        "qdd": answer.qdd,
+    }
+
+
+def _of_rows(held: ContactEquations, rows: Array, rates: Array, forces: Array) -> dict[str, Array]:
+    """What of A, its rate and lambda does not depend on the axes that a hinge's rows stand along."""
+    contact = held.own(rows)
+    same = slice(contact.start + 2 * (held.kind == "hinged"), contact.stop)
+    own = rows[:, contact]
+    return {
+        "A^T A": np.swapaxes(own, -1, -2) @ own,
+        "A": rows[:, same],
+        "dA/dt": rates[:, same],
+        "A^T lambda": (np.swapaxes(rows, -1, -2) @ forces[..., None])[..., 0],
+        "lambda": forces[:, slice(contact.stop - 3, contact.stop)],
+    }
 
 
 def _mapped(rows: Array, own: list[int], rest: list[int]) -> Array:
@@ -70,43 +173,3 @@ def _mapped(rows: Array, own: list[int], rest: list[int]) -> Array:
     found = np.zeros((len(rows), rows.shape[2], len(own)))
     found[:, own], found[:, rest] = np.eye(len(own)), -np.linalg.pinv(rows[..., rest]) @ rows[..., own]
     return found
-
-
-def _compared(
-    made: Any, held: ContactEquations, states: States, own: list[int], rest: list[int]
-) -> Iterator[Entries]:
-    q, yd, ydd = states.q, states.qd[:, own], states.qdd[:, own]
-    rows = held.rows(q)
-    inverse, follows = np.linalg.pinv(rows[..., rest]), _mapped(rows, own, rest)
-    qd = (follows @ yd[..., None])[..., 0]
-    rates = held.rates(q, qd)
-    qdd = (follows @ ydd[..., None])[..., 0]
-    qdd[:, rest] -= (inverse @ rates @ qd[..., None])[..., 0]
-    what, contact, found = f"{held.kind}: ", held.own(rows), made.jacobian(q)
-    yield loop_entries(what + "A^T A", _square(found[:, contact]), _square(rows[:, contact]))
-    same = slice(contact.start + 2 * (held.kind == "hinged"), contact.stop)
-    yield loop_entries(what + "A", found[:, same], rows[:, same])
-    yield loop_entries(what + "dA/dt", made.jacobian_rate(q, qd)[:, same], rates[:, same])
-    yield loop_entries(what + "velocity", made.velocity(q, yd), qd)
-    yield loop_entries(what + "acceleration", made.acceleration(q, qd, ydd), qdd)
-    torque, back = held.recursion.partial_torque(q, qd, qdd), np.swapaxes(follows, -1, -2)
-    yield loop_entries(what + "tau^", made.partial_torque(q, qd, qdd), back @ torque)
-    tau = np.random.default_rng(8).uniform(-1.0, 1.0, q.shape)
-    basis = np.linalg.svd(rows[..., rest])[0][..., : len(rest)]
-    onto = np.swapaxes(basis, -1, -2)
-    moved, forces = held_motion(held.recursion, replace(states, qd=qd), onto @ rows, onto @ rates, tau)
-    answer = made.forward_dynamics(q, qd, tau, passive=False)
-    yield loop_entries(what + "qdd", answer.qdd, moved)
-    forces = (basis @ forces[..., None])[..., 0]
-    size = float(np.abs(forces).max(initial=0.0))
-    yield loop_entries(what + "A^T lambda", _borne(found, answer.forces), _borne(rows, forces), size)
-    shifts = slice(contact.stop - 3, contact.stop)
-    yield loop_entries(what + "lambda", answer.forces[:, shifts], forces[:, shifts], size)
-
-
-def _square(rows: Array) -> Array:
-    return np.swapaxes(rows, -1, -2) @ rows
-
-
-def _borne(rows: Any, forces: Any) -> Any:
-    return (np.swapaxes(rows, -1, -2) @ forces[..., None])[..., 0]

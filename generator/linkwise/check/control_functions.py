@@ -11,7 +11,7 @@ from linkwise.check.frame_reference import FrameReference
 from linkwise.check.passive_reference import passive_reference
 from linkwise.check.reference import Reference
 from linkwise.check.states import States
-from linkwise.check.sum_checks import REGULAR, acceleration_scales, regular
+from linkwise.check.sum_checks import REGULAR, SINGLE, acceleration_scales, regular
 from linkwise.package.entries import PassiveEntry
 from linkwise.package.manifest import Manifest
 
@@ -28,8 +28,6 @@ CONTROL = {
 
 MOST = 8
 """States that each function is called at."""
-SINGLE = 1e-3
-"""Least eigenvalue, as `REGULAR`, from which accelerations are looked at in single precision."""
 
 Call = Callable[..., dict[str, Numbers]]
 """A function, its number, what it is given, sizes of its outputs, and their place beside a cache line."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 from linkwise.check.compare import Entries, Result, compare
-from linkwise.check.packed_layout import IndexRows, spread
+from linkwise.check.packed_layout import IndexRows
 from linkwise.check.reference import Reference
 from linkwise.package.load import Array, Model
 
@@ -31,7 +31,7 @@ def derivations(
         for derivation, names in NAMES.items()
     }
     answers = {
-        f"{derivation} ({how})" if derivation == "closed forms" else derivation: _dense(
+        f"{derivation} ({how})" if derivation == "closed forms" else derivation: _answers(
             model, rows, reference
         )
         for derivation, model in found.items()
@@ -39,16 +39,17 @@ def derivations(
     }
     for one, other in combinations(answers, 2):
         entries = [
-            Entries(what, value, answers[other][what], reference.scales[what])
-            for what, value in answers[one].items()
+            Entries(what, value, answers[other][what][0], scale, None if what == "c0" else rows.of(what))
+            for what, (value, scale) in answers[one].items()
         ]
         yield compare(f"derivations{label}: {one} against {other}", entries, reference.tolerance)
 
 
-def _dense(model: Model, rows: IndexRows, reference: Reference) -> dict[str, Array]:
+def _answers(model: Model, rows: IndexRows, reference: Reference) -> dict[str, tuple[Array, Array]]:
+    """Packed values and slopes by position, each beside its scale."""
     motion = reference.states.motion
-    values = {**rows.fields(model.packed(*motion)), "c0": model.position_gradient(*motion)}
-    return {
-        what: value if what == "c0" else spread(value, rows.of(what), reference, what)
-        for what, value in values.items()
+    found = {
+        what: (value, reference.scales[what][(slice(None), *rows.of(what).T)])
+        for what, value in rows.fields(model.packed(*motion)).items()
     }
+    return found | {"c0": (model.position_gradient(*motion), reference.scales["c0"])}

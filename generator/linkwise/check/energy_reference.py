@@ -9,6 +9,7 @@ from linkwise.check.reference import TOLERANCE, Reference, link_sizes
 from linkwise.check.states import Found, States, states_where
 from linkwise.check.text_lagrangian import NOISE, TextLagrangian
 from linkwise.extras import extra
+from linkwise.package.entries import JointEntry
 from linkwise.package.load import Array
 
 NAMES = ("tau", "c2", "c1", "g", "c0", "h1")
@@ -35,7 +36,7 @@ def energy_reference(exact: Lagrangians, noisy: Sequence[Lagrangians], states: S
     return Reference("energies differentiated", TOLERANCE, states, values, scales, dict(pairs), power)
 
 
-def states_of_energies(lagrangians: Lagrangians, n: int, samples: int) -> Found:
+def states_of_energies(lagrangians: Lagrangians, joints: Sequence[JointEntry], samples: int) -> Found:
     """States at which the energies and every quantity are numbers."""
 
     def defined(states: States) -> Any:
@@ -43,7 +44,7 @@ def states_of_energies(lagrangians: Lagrangians, n: int, samples: int) -> Found:
         parts = (*energies, *values.values())
         return np.all([np.isfinite(part).reshape(len(part), -1).all(axis=1) for part in parts], axis=0)
 
-    return states_where(defined, n, samples)
+    return states_where(defined, joints, samples)
 
 
 def _values(lagrangians: Lagrangians, states: States) -> tuple[dict[str, Array], Array, Array]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.check.compare import Entries, Result, Skipped, compare
+from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.latex_reader import LatexReader, Unreadable
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.reference import Reference
@@ -53,7 +53,7 @@ def check_formulas(
         if not label:
             yield _lines(manifest, ending, text, found)
         if reference is None:
-            yield Skipped(f"{file}{label}: not checked", "there is nothing to hold it against")
+            yield skipped(f"{file}{label}: not checked", "there is nothing to hold it against")
             continue
         formulas = [readers[ending](formula) for *_, formula in found]
         yield _numbers(f"{file}{label}", formulas, rows, parameters, reference)
@@ -63,7 +63,7 @@ def _lines(manifest: Manifest, ending: str, text: str, found: Sequence[Row]) -> 
     """Hold the text against the page that linkwise makes of the same formulas."""
     name, version = f"formulas.{ending}: lines", manifest.generator.get("linkwise")
     if version != VERSION:
-        return Skipped(name, f"those of linkwise {version}, which is not at hand to compare with")
+        return skipped(name, f"those of linkwise {version}, which is not at hand to compare with")
     joints, links = ([part.name for part in parts] for parts in (manifest.joints, manifest.links))
     page = formula_page(ending, found, joints, links, list(manifest.parameters)).split("\n")
     lines = zip_longest(text.split("\n"), page)

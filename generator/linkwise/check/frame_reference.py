@@ -74,7 +74,7 @@ def frame_reference(manifest: Manifest, tree: RigidTree, states: States) -> Fram
 
 def chosen_rows(count: int) -> NDArray[np.intp]:
     """Which of `count` states the reference is for."""
-    return np.linspace(0, count - 1, STATES).astype(np.intp)
+    return np.linspace(0, count - 1, min(STATES, max(2, count // 2))).astype(np.intp)
 
 
 def _columns(

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.check.compare import Entries, Result, Skipped, compare
+from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.passive_reference import passive_reference
 from linkwise.check.reference import Reference
 from linkwise.check.states import States
@@ -29,7 +29,7 @@ def impedance_calls(
         return
     rows = np.flatnonzero(regular(reference))
     if not rows.size:
-        yield Skipped(f"{name}: controllers", "no mass matrix can be inverted here")
+        yield skipped(f"{name}: controllers", "no mass matrix can be inverted here")
         return
     # an impedance is there where M is positive, which that of negative masses is not
     positive = rows[np.linalg.eigvalsh(reference.values["c2"][rows].sum(2)).min(-1) > 0.0]

@@ -1,78 +1,77 @@
-"""Each call of a back end's constraints against `loop_reference`."""
+"""Each call of a back end's constraints, and its induced accelerations in loops, against `loop_reference`."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from linkwise.check.compare import Entries, Result, compare
-from linkwise.check.loop_reference import FAR, LoopReference
+from linkwise.check.loop_reference import LoopReference
 from linkwise.package.load import Array, Model
 
 TOLD = "in closed loops against least squares"
 PERTURBED = 1e-3
 """How far dependent joints are moved away before they are closed again, in rad and m."""
+SETTLED = 1e-11
+"""How near loops are closed again, of positions of size 1."""
 
 
 def loop_calls(name: str, model: Model, reference: LoopReference) -> Iterator[Result]:
     """The answers of one back end."""
-    constraints: Any = model.constraints
-    yield compare(f"{name}: velocities {TOLD}", _velocities(constraints, reference))
-    yield compare(f"{name}: shares {TOLD}", _shares(constraints, reference))
-    yield compare(f"{name}: forces and accelerations {TOLD}", _forces(constraints, reference))
+    yield compare(f"{name}: velocities {TOLD}", _velocities(model, reference))
+    yield compare(f"{name}: shares {TOLD}", _shares(model, reference))
+    yield compare(f"{name}: forces and accelerations {TOLD}", _forces(model, reference))
+    for what, call in (("accelerations", "induced_accelerations"), ("reactions", "induced_reactions")):
+        q, qd, _ = reference.states.motion
+        found = getattr(model, call)(q, qd, reference.tau, passive=False)
+        entries = [
+            _entries(reference, f"{source}: {what}", getattr(found, source))
+            for source in ("actuators", "velocity", "gravity", "constraints")
+        ]
+        yield compare(f"{name}: induced {what} {TOLD}", entries)
 
 
-def _velocities(constraints: Any, reference: LoopReference) -> Iterator[Entries]:
+def _entries(reference: LoopReference, what: str, found: Any) -> Entries:
+    return Entries(what, found, reference.values[what], reference.scales[what])
+
+
+def _velocities(model: Model, reference: LoopReference) -> Iterator[Entries]:
     (q, qd, qdd), own = reference.states.motion, list(reference.independent)
+    constraints = model.constraints
     away = np.random.default_rng(6).uniform(-PERTURBED, PERTURBED, q.shape)
     away[:, own] = 0.0
-    yield loop_entries("closed", constraints.closed(q + away), q, 1.0 + np.abs(q).max())
-    yield loop_entries(
-        "violation", constraints.violation(q), reference.equations.violation(q), 1.0 + np.abs(q).max()
-    )
-    yield loop_entries("jacobian", constraints.jacobian(q), reference.rows)
-    yield loop_entries("jacobian_rate", constraints.jacobian_rate(q, qd), reference.rates)
-    yield loop_entries("velocity_map", constraints.velocity_map(q), reference.map)
-    yield loop_entries("velocity", constraints.velocity(q, qd[:, own]), qd)
-    yield loop_entries("acceleration", constraints.acceleration(q, qd, qdd[:, own]), qdd)
-    bias = qdd - (reference.map @ qdd[:, own, None])[..., 0]
-    causes = constraints.velocity_accelerations(q, qd).sum(-1)
-    yield loop_entries("velocity_accelerations", causes, bias, np.abs(qdd).max())
+    # Least steps end where they no longer matter: a position is as near as that, not as rounding allows.
+    size = np.broadcast_to(1.0 + np.abs(q).max(-1, keepdims=True), q.shape)
+    yield Entries("closed", constraints.closed(q + away), q, size * SETTLED / np.finfo(float).eps)
+    found = {
+        "violation": constraints.violation(q),
+        "jacobian": constraints.jacobian(q),
+        "jacobian_rate": constraints.jacobian_rate(q, qd),
+        "velocity_map": constraints.velocity_map(q),
+        "velocity": constraints.velocity(q, qd[:, own]),
+        "acceleration": constraints.acceleration(q, qd, qdd[:, own]),
+        "velocity_accelerations": constraints.velocity_accelerations(q, qd).sum(-1),
+    }
+    yield from (_entries(reference, what, value) for what, value in found.items())
 
 
-def _shares(constraints: Any, reference: LoopReference) -> Iterator[Entries]:
-    motion, own = reference.states.motion, list(reference.independent)
-    q, qd, qdd = motion
-    yield loop_entries("tau^", constraints.partial_torque(*motion), reference.shares)
-    total = reference.shares.sum(-1)
-    yield loop_entries(
-        "sum of tau^", constraints.inverse_dynamics(*motion), total, np.abs(reference.shares).max()
-    )
-    for what, found, expected in zip(
-        ("c2^", "c1^", "g^"), constraints.coefficients(q, qd), reference.coefficients, strict=True
-    ):
-        yield loop_entries(what, found, expected)
-    c2, c1, g = reference.coefficients
-    parts = c2 * qdd[:, None, None, own], c1 * qd[:, None, None, own], g
-    for what, found, expected in zip(
-        ("c2^ ydd", "c1^ yd", "gravity"), constraints.propagation(*motion), parts, strict=True
-    ):
-        yield loop_entries(what, found, expected, np.abs(expected).max())
-    expected = (np.swapaxes(reference.map, -1, -2) @ reference.tau[..., None])[..., 0]
-    yield loop_entries("projected", constraints.projected(q, reference.tau), expected)
+def _shares(model: Model, reference: LoopReference) -> Iterator[Entries]:
+    constraints, motion = model.constraints, reference.states.motion
+    (q, qd, qdd), own = motion, list(reference.independent)
+    yield _entries(reference, "tau^", constraints.partial_torque(*motion))
+    yield _entries(reference, "sum of tau^", constraints.inverse_dynamics(*motion))
+    coefficients, parts = constraints.coefficients(q, qd), constraints.propagation(*motion)
+    factors: Sequence[Array] = (qdd[:, None, None, own], qd[:, None, None, own], np.ones((1, 1, 1)))
+    for what, value, part, factor in zip(("c2^", "c1^", "g^"), coefficients, parts, factors, strict=True):
+        yield _entries(reference, what, value)
+        expected, scale = (source[what] for source in (reference.values, reference.scales))
+        yield Entries(f"{what} times its motion", part, expected * factor, scale * np.abs(factor).max())
+    yield _entries(reference, "projected", constraints.projected(q, reference.tau))
 
 
-def _forces(constraints: Any, reference: LoopReference) -> Iterator[Entries]:
-    motion = reference.states.motion
-    q, qd, _ = motion
-    forces = reference.link_forces
-    yield loop_entries("lambda of links", constraints.forces(*motion), forces)
+def _forces(model: Model, reference: LoopReference) -> Iterator[Entries]:
+    constraints, (q, qd, qdd) = model.constraints, reference.states.motion
+    yield _entries(reference, "lambda of links", constraints.forces(q, qd, qdd))
     found = constraints.forward_dynamics(q, qd, reference.tau, passive=False)
-    yield loop_entries("qdd", found.qdd, reference.qdd)
-    yield loop_entries("lambda", found.forces, reference.forces)
-
-
-def loop_entries(what: str, value: Any, expected: Array, scale: float = 0.0) -> Entries:
-    """Solving makes rounding larger, by no more than A_d is badly conditioned."""
-    size = max(float(np.abs(expected).max(initial=0.0)), scale)
-    return Entries(what, value, expected, np.full(expected.shape, size / FAR**2))
+    yield _entries(reference, "qdd", found.qdd)
+    yield _entries(reference, "lambda", found.forces)

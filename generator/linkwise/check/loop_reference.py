@@ -8,45 +8,45 @@ Loops may be open by some micrometres, where a file's numbers are rounded: rows 
 and U^T dA/dt for U^T lambda, which are as good as all of them where loops close.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwise.check.body_reference import by_unit
 from linkwise.check.loop_equations import LoopEquations
 from linkwise.check.newton_euler import NewtonEuler
-from linkwise.check.reference import columns
+from linkwise.check.rounding import measured
 from linkwise.check.states import States
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest, RigidTree
 
 STATES = 12
 TRIED = 60
-FAR = 1e-2
-"""Least singular value of A_d, as part of the largest: nearer to a singular position rounding counts more."""
+FAR = 100.0
+"""Condition of A_d, the dependent joints' columns, below which a position is far from singular ones."""
+MOST = 1e6
+"""The same, above which nothing is left to compare."""
+STEADY = 1e-2
+"""Least eigenvalue of a mass matrix beside that of others."""
+SMALL = 1e-7
+"""Singular values below this part of the largest are those of rows that follow from others."""
 
 
 @dataclass(frozen=True)
 class LoopReference:
-    """Answers to `states`, in which loops close; samples first. tau: (samples, n), on all joints."""
+    """Answers to `states`, in which loops close, by name, samples first, and the scales of their rounding.
+
+    tau: (samples, n), on all joints
+    """
 
     equations: LoopEquations
     independent: tuple[int, ...]
     states: States
     tau: Array
-    rows: Array
-    rates: Array
-    basis: Array
-    map: Array
-    qdd: Array
-    forces: Array
-    """Of tau."""
-    shares: Array
-    """(samples, m, N)"""
-    link_forces: Array
-    """(samples, C, N)"""
-    coefficients: tuple[Array, Array, Array]
+    values: Mapping[str, Array]
+    scales: Mapping[str, Array]
 
 
 def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopReference | None:
@@ -54,37 +54,120 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     equations = LoopEquations(NewtonEuler(manifest, tree), tree)
     own = tree.independent
     rest = [k for k in range(len(manifest.joints)) if k not in own]
-    # Half as far around where the package has them closed: somewhere there is always one.
+    # Ever less far around where the package has them closed: somewhere there is always one.
     tried = states.q[:TRIED]
-    q = equations.closed_near(np.concatenate([tried, tree.closed_position + tried / 2.0]))
-    sizes = np.linalg.svd(equations.rows(q)[..., rest], compute_uv=False)
-    q = q[sizes[:, -1] > FAR * sizes[:, 0]]
+    starts = [tried, *(tree.closed_position + tried * part for part in (0.5, 0.1, 0.02))]
+    q = equations.closed_near(np.concatenate(starts))
+    q = q[far_from_singular(equations.rows(q)[..., rest])]
     if not len(q):
         return None
     q = q[steady(equations.recursion, q, equations.velocity_map(q))][: min(STATES, len(states.q))]
-    rows, basis = equations.rows(q), equations.basis(q)
-    back = np.swapaxes(basis, -1, -2)
-    followed = _Followed(equations, own, rest, q)
+    condition = condition_of(equations.rows(q)[..., rest])
     yd, ydd = states.qd[: len(q), own], states.qdd[: len(q), own]
-    qd = followed.velocity(yd)
-    moved = States(q, qd, followed.acceleration(qd, ydd))
     tau = np.random.default_rng(5).uniform(-1.0, 1.0, q.shape)
-    rates = equations.rates(q, qd)
-    qdd, forces = held_motion(equations.recursion, moved, back @ rows, back @ rates, tau)
-    shares, link_forces = _shared(equations, own, back @ rows, moved)
-    rest_yd = 0.0 * yd
 
-    def share(speed: Array, change: Array) -> Array:
-        full = followed.velocity(speed)
-        return _shared(equations, own, back @ rows, States(q, full, followed.acceleration(full, change)))[0]
+    def answers(tree: RigidTree) -> dict[str, Array]:
+        return _answers(LoopEquations(NewtonEuler(manifest, tree), tree), (q, yd, ydd), tau)
 
-    weight = share(rest_yd, rest_yd)
-    c2 = columns(lambda unit: share(rest_yd, rest_yd + unit) - weight, len(own))
+    values, scales = measured(answers, tree, condition**2)
+    moved = States(q, values["velocity"], values["acceleration"])
+    return LoopReference(equations, own, moved, tau, values, scales)
+
+
+def condition_of(rows: Array) -> Array:
+    """Condition number of A_d (samples, C, d), (samples,)."""
+    sizes = np.linalg.svd(rows, compute_uv=False)
+    condition: Array = sizes[:, 0] / np.maximum(sizes[:, -1], 1e-300)
+    return condition
+
+
+def far_from_singular(rows: Array) -> NDArray[np.intp]:
+    """Which of A_d (samples, C, d) are, the best ones first if none is as far as one would like."""
+    condition = condition_of(rows)
+    found = np.flatnonzero(condition < FAR)
+    return found if found.size else np.argsort(condition)[: np.count_nonzero(condition < MOST)]
+
+
+def _answers(equations: LoopEquations, motion: tuple[Array, Array, Array], tau: Array) -> dict[str, Array]:
+    """Everything that a package says of q, yd and ydd, and of torques."""
+    (q, yd, ydd), own = motion, equations.tree.independent
+    rest = [k for k in range(q.shape[1]) if k not in own]
+    rows, basis = equations.rows(q), equations.basis(q)
+    onto = np.swapaxes(basis, -1, -2)
+    held = onto @ rows
+    followed = _Followed(equations, own, rest, q)
+    qd = followed.velocity(yd)
+    qdd, rates = followed.acceleration(qd, ydd), equations.rates(q, qd)
+    accelerations, forces = held_motion(equations.recursion, States(q, qd, qd), held, onto @ rates, tau)
+    shares, link_forces = _shared(equations, own, held, States(q, qd, qdd))
+
+    def share(speed: Array, change: Array, gravity: bool = False) -> Array:
+        """Of each q, for as many motions in turn as there are for one."""
+        times = len(speed) // len(q)
+        again = np.repeat(q, times, 0)
+        other = _Followed(equations, own, rest, again)
+        full = other.velocity(speed)
+        states = States(again, full, other.acceleration(full, change))
+        return _shared(equations, own, np.repeat(held, times, 0), states, gravity)[0]
+
+    of_own = States(yd, yd, ydd)
+    c2 = by_unit(lambda y, yd, ydd, e: share(0.0 * yd, e), of_own)
     # A quadratic form of yd, whose central difference is its derivative; the closing convention takes half.
-    c1 = columns(lambda unit: (share(yd + unit, rest_yd) - share(yd - unit, rest_yd)) / 4.0, len(own))
-    forces, link_forces = (basis @ forces[..., None])[..., 0], basis @ link_forces
-    found = (rows, rates, basis, followed.map, qdd, forces, shares, link_forces, (c2, c1, weight))
-    return LoopReference(equations, own, moved, tau, *found)
+    c1 = by_unit(lambda y, yd, ydd, e: (share(yd + e, 0.0 * yd) - share(yd - e, 0.0 * yd)) / 4.0, of_own)
+    found = {
+        "violation": equations.violation(q),
+        "jacobian": rows,
+        "jacobian_rate": rates,
+        "velocity_map": followed.map,
+        "velocity": qd,
+        "acceleration": qdd,
+        "velocity_accelerations": qdd - (followed.map @ ydd[..., None])[..., 0],
+        "projected": (np.swapaxes(followed.map, -1, -2) @ tau[..., None])[..., 0],
+        "tau^": shares,
+        "sum of tau^": shares.sum(-1),
+        "c2^": c2,
+        "c1^": c1,
+        "g^": share(0.0 * yd, 0.0 * yd, gravity=True),
+        "lambda of links": basis @ link_forces,
+        "qdd": accelerations,
+        "lambda": (basis @ forces[..., None])[..., 0],
+    }
+    return found | _induced(equations, States(q, qd, qd), (held, onto @ rates, basis), tau)
+
+
+def _induced(
+    equations: LoopEquations, states: States, tied: tuple[Array, Array, Array], tau: Array
+) -> dict[str, Array]:
+    """Accelerations (samples, n, ...) and forces of ties (samples, C, ...) by source.
+
+    Each source x with force F_x, and the constraints' own with A q̈ = b, b = −Ȧ_s q̇_s, has
+
+        q̈_x = N (Nᵀ M N)⁻¹ Nᵀ (F_x − M p_x) + p_x,  p_x = A⁺ b_x      λ_x: what Aᵀ λ_x = M q̈_x − F_x fits best
+    """
+    (rows, rates, basis), torque = tied, equations.recursion.partial_torque
+    q, qd, _ = states.motion
+    n, rest = q.shape[1], 0.0 * q
+    mass = mass_matrix(equations.recursion, q)
+    velocity = by_unit(lambda q, qd, _, e: 0.5 * torque(q, qd + 1j * e, 0.0 * q, gravity=False).imag, states)
+    forces = {
+        "actuators": np.eye(n) * tau[:, None, :],
+        "velocity": -velocity * qd[:, None, None, :],
+        "gravity": -torque(q, rest, rest),
+        "constraints": np.zeros((*q.shape, n)),
+    }
+    null = np.swapaxes(np.linalg.svd(rows)[2][:, rows.shape[1] :], -1, -2)
+    back, turned = np.swapaxes(null, -1, -2), np.swapaxes(rows, -1, -2)
+    own = -np.linalg.pinv(rows, rcond=SMALL) @ (rates * qd[:, None, :])
+    found = {}
+    for source, force in forces.items():
+        flat = force.reshape(*force.shape[:2], -1)
+        bias = own if source == "constraints" else 0.0 * flat
+        driven = np.linalg.solve(back @ mass @ null, back @ (flat - mass @ bias))
+        shares = null @ driven + bias
+        held = np.linalg.pinv(turned, rcond=SMALL) @ (mass @ shares - flat)
+        found[f"{source}: accelerations"] = shares.reshape(force.shape)
+        found[f"{source}: reactions"] = (basis @ held).reshape(len(q), -1, *force.shape[2:])
+    return found
 
 
 @dataclass(frozen=True)
@@ -130,7 +213,7 @@ def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]
     mass = np.swapaxes(mapped, -1, -2) @ mass_matrix(recursion, q) @ mapped
     size = np.sqrt(mass.diagonal(0, -2, -1))
     least = np.linalg.eigvalsh(mass / (size[:, :, None] * size[:, None, :]))[:, 0]
-    found: NDArray[np.bool_] = least >= FAR * np.median(least)
+    found: NDArray[np.bool_] = least >= STEADY * np.median(least)
     return found
 
 
@@ -139,22 +222,24 @@ def held_motion(
 ) -> tuple[Array, Array]:
     """qdd and lambda of torques under rows that do not follow from each other."""
     q, qd, _ = states.motion
-    free, mass = q.shape[1] - rows.shape[1], mass_matrix(recursion, q)
+    mass = mass_matrix(recursion, q)
     bias = recursion.partial_torque(q, qd, 0.0 * q).sum(-1)
-    null = np.swapaxes(np.linalg.svd(rows)[2][:, -free:], -1, -2)
+    null = np.swapaxes(np.linalg.svd(rows)[2][:, rows.shape[1] :], -1, -2)
     back = np.swapaxes(null, -1, -2)
-    moved = -np.linalg.pinv(rows, rcond=1e-7) @ (rates @ qd[..., None])
+    moved = -np.linalg.pinv(rows, rcond=SMALL) @ (rates @ qd[..., None])
     driven = back @ ((tau - bias)[..., None] - mass @ moved)
     qdd = null @ np.linalg.solve(back @ mass @ null, driven) + moved
     left = mass @ qdd + (bias - tau)[..., None]
-    forces = np.linalg.pinv(np.swapaxes(rows, -1, -2), rcond=1e-7) @ left
+    forces = np.linalg.pinv(np.swapaxes(rows, -1, -2), rcond=SMALL) @ left
     return qdd[..., 0], forces[..., 0]
 
 
-def _shared(equations: LoopEquations, own: Sequence[int], rows: Array, states: States) -> tuple[Array, Array]:
+def _shared(
+    equations: LoopEquations, own: Sequence[int], rows: Array, states: States, gravity: bool = True
+) -> tuple[Array, Array]:
     """What independent joints and ties bear of each link: S tau^ + A^T lambda = tau_j."""
     samples, _, n = rows.shape
     driven = np.broadcast_to(np.eye(n)[:, own], (samples, n, len(own)))
     both = np.concatenate([driven, np.swapaxes(rows, -1, -2)], -1)
-    found = np.linalg.pinv(both, rcond=1e-7) @ equations.recursion.partial_torque(*states.motion)
+    found = np.linalg.pinv(both, rcond=SMALL) @ equations.recursion.partial_torque(*states.motion, gravity)
     return found[:, : len(own)], found[:, len(own) :]

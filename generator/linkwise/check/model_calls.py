@@ -5,16 +5,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from linkwise.check.compare import Entries, Result, Skipped, compare, dense
-from linkwise.check.packed_layout import IndexRows, Rows, spread
+from linkwise.check.compare import Entries, Result, compare, dense, skipped
+from linkwise.check.packed_layout import IndexRows, Rows, packed
 from linkwise.check.reference import Reference
-from linkwise.check.states import States
+from linkwise.check.states import NUMBERS, States
 from linkwise.extras import extra
 from linkwise.package.load import Array, Model
 from linkwise.package.manifest import Manifest
 
 FLOAT32 = {"tolerance": 1e-5, "epsilon": 2.0**-23}
 """How exact single precision is asked to be."""
+TOO_LARGE = "the numbers are too large for it at every state"
 
 
 class Named(NamedTuple):
@@ -31,20 +32,19 @@ def against_reference(checked: Named, manifest: Manifest) -> Iterator[Result]:
     name, model, rows, reference = checked
     states = reference.states
     yield _layout(checked)
-    packed = model.packed(*states.motion)
-    fields = {**rows.fields(packed), "c0": model.position_gradient(*states.motion)}
-    for what, value in fields.items():
+    every, told = np.arange(len(states.q)), f"against {reference.name}"
+    for what, value in rows.fields(model.packed(*states.motion)).items():
         shown = {"tau": "tau_ij", "c2": "M^j"}.get(what, what)
-        full = value if what == "c0" else spread(value, rows.of(what), reference, what)
-        yield compare(
-            f"{name}: {shown} against {reference.name}", [dense(what, full, reference)], reference.tolerance
-        )
+        entries = packed(what, value, rows.of(what), reference, every)
+        yield compare(f"{name}: {shown} {told}", [entries], reference.tolerance)
+    slopes = dense("c0", model.position_gradient(*states.motion), reference)
+    yield compare(f"{name}: c0 {told}", [slopes], reference.tolerance)
     yield compare(f"{name}: all calls agree with these", _calls(checked), reference.tolerance)
     yield compare(f"{name}: single samples and odd batches", _batches(checked), reference.tolerance)
     if reference.fits_single().any():
         yield compare(f"{name}: single precision", _single(checked), **FLOAT32)
     else:
-        yield Skipped(f"{name}: single precision", "the numbers are too large for it at every state")
+        yield skipped(f"{name}: single precision", TOO_LARGE)
     if hasattr(model.backend, "modules"):
         yield from _energies(checked)
     yield from _structure(checked, manifest)
@@ -71,7 +71,7 @@ def _calls(checked: Named) -> Iterator[Entries]:
     _, model, rows, reference = checked
     q, qd, qdd = reference.states.motion
     values, scales = reference.values, reference.scales
-    yield dense("tau", spread(model.packed_torque(q, qd, qdd), rows.tau, reference, "tau"), reference)
+    yield packed("tau", model.packed_torque(q, qd, qdd), rows.tau, reference, np.arange(len(q)))
     yield dense("tau", model.partial_torque(q, qd, qdd), reference)
     sums = Entries("tau_i", model.inverse_dynamics(q, qd, qdd), values["tau"].sum(-1), scales["tau"].sum(-1))
     yield sums
@@ -103,7 +103,10 @@ def _batches(checked: Named) -> Iterator[Entries]:
     states, count = reference.states, len(reference.states.q)
     if not count:
         return
+    most = max(6, NUMBERS // reference.values["c0"][0].size)
     for shape in ((), (1,), (7,), (9,), (17,), (2, 3), (0,)):
+        if np.prod(shape) > most:
+            continue
         at = np.arange(int(np.prod(shape))).reshape(shape) * 5 % count
         yield from _few(checked, states.at(at), at)
     same = np.zeros(5, dtype=int)
@@ -113,11 +116,10 @@ def _batches(checked: Named) -> Iterator[Entries]:
 
 def _few(checked: Named, states: States, at: Rows) -> Iterator[Entries]:
     _, model, rows, reference = checked
-    packed = rows.fields(model.packed(*states.motion))
-    values = {what: spread(value, rows.of(what), reference, what) for what, value in packed.items()}
+    for what, value in rows.fields(model.packed(*states.motion)).items():
+        yield packed(what, value, rows.of(what), reference, at)
     if at.size in (1, 7, 6):
-        values["c0"] = model.position_gradient(*states.motion)
-    yield from (_flat(what, value, reference, at) for what, value in values.items())
+        yield _flat("c0", model.position_gradient(*states.motion), reference, at)
     yield _flat("tau", model.partial_torque(*states.motion), reference, at)
 
 
@@ -136,10 +138,9 @@ def _single(checked: Named) -> Iterator[Entries]:
     fitting = np.flatnonzero(reference.fits_single())
     for at in (fitting, fitting[:7], fitting[:1]):
         motion: list[Any] = [x[at].astype(np.float32) for x in reference.states.motion]
-        packed = rows.fields(model.packed(*motion))
-        for what, value in packed.items():
-            yield dense(what, spread(value, rows.of(what), reference, what), reference, at)
-        yield dense("tau", spread(model.packed_torque(*motion), rows.tau, reference, "tau"), reference, at)
+        for what, value in rows.fields(model.packed(*motion)).items():
+            yield packed(what, value, rows.of(what), reference, at)
+        yield packed("tau", model.packed_torque(*motion), rows.tau, reference, at)
         yield dense("c0", model.position_gradient(*motion), reference, at)
 
 
@@ -197,7 +198,7 @@ def _structure(checked: Named, manifest: Manifest) -> Iterator[Result]:
         f"smallest eigenvalue, scaled, {smallest:.1e}",
     )
     if smallest <= 0 and unphysical:
-        yield Skipped(check, f"it is not, which is allowed here: {detail}")
+        yield skipped(check, f"it is not, which is allowed here: {detail}")
     else:
         yield Result(check, smallest > 0, smallest, detail)
 

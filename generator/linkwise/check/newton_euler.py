@@ -32,13 +32,27 @@ class _FrameMotion:
 
 @dataclass(frozen=True)
 class _BodyMotion:
-    """A body's frame, its joint's axis, its centre of mass and that one's velocity and a − gravity."""
+    """A body's frame, its joint's axis, and where its centre of mass is beside the frame's origin."""
 
     frame: _FrameMotion
     axis: Array
-    com: Array
-    v_com: Array
-    a_com: Array
+    lever: Array
+
+    @property
+    def com(self) -> Array:
+        """Centre of mass."""
+        return self.frame.origin + self.lever
+
+    @property
+    def v_com(self) -> Array:
+        """Its velocity."""
+        return self.frame.v + _cross(self.frame.omega, self.lever)
+
+    @property
+    def a_com(self) -> Array:
+        """Its acceleration, less gravity."""
+        turning = _cross(self.frame.omega, _cross(self.frame.omega, self.lever))
+        return self.frame.a + _cross(self.frame.alpha, self.lever) + turning
 
 
 class NewtonEuler:
@@ -59,13 +73,14 @@ class NewtonEuler:
             body, motion = self.bodies[at], motions[at]
             omega, inertia = motion.frame.omega, _inertia(body, motion)
             force = body.mass * motion.a_com
-            spin = np.cross(omega, _applied(inertia, omega))
+            spin = _cross(omega, _applied(inertia, omega))
             moment = _applied(inertia, motion.frame.alpha) + spin
             back: int | None = at
+            com = motion.com
             while back is not None:
                 upper, joint = self.bodies[back], motions[back]
-                lever = motion.com - joint.frame.origin
-                about = moment + np.cross(lever, force) if upper.kind == "revolute" else force
+                lever = com - joint.frame.origin
+                about = moment + _cross(lever, force) if upper.kind == "revolute" else force
                 tau[:, upper.coordinate, j] += displacement(upper, q, 1)[:, 0] * _dot(joint.axis, about)
                 back = upper.parent
         return tau
@@ -77,9 +92,8 @@ class NewtonEuler:
         for at in self.links:
             body, motion = self.bodies[at], motions[at]
             spin = _applied(_inertia(body, motion), motion.frame.omega)
-            kinetic.append(
-                0.5 * (body.mass * _dot(motion.v_com, motion.v_com) + _dot(motion.frame.omega, spin))
-            )
+            v_com = motion.v_com
+            kinetic.append(0.5 * (body.mass * _dot(v_com, v_com) + _dot(motion.frame.omega, spin)))
             potential.append(-body.mass * motion.com @ self.gravity)
         return np.stack(kinetic, -1), np.stack(potential, -1)
 
@@ -104,8 +118,8 @@ class NewtonEuler:
         speeds, changes = [], []
         for at, (_, place) in zip(self._carriers([b for b, _ in points], q, qd, qdd), points, strict=True):
             arm = at.rotation @ place
-            speed = np.cross(at.omega, arm)
-            change = np.cross(at.alpha, arm) + np.cross(at.omega, speed)
+            speed = _cross(at.omega, arm)
+            change = _cross(at.alpha, arm) + _cross(at.omega, speed)
             speeds.append(np.concatenate([at.omega, at.v + speed], -1))
             changes.append(np.concatenate([at.alpha, at.a + change], -1))
         return np.stack(speeds, 1), np.stack(changes, 1)
@@ -139,20 +153,18 @@ def _moved(body: BodyEntry, up: _FrameMotion, turn: Array, rate: Array, change: 
     axis, arm = rotation[:, :, 2], up.rotation @ np.array(body.translation)
     if body.kind == "prismatic":
         arm = arm + turn * axis
-    v = up.v + np.cross(omega, arm)
-    a = up.a + np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm))
+    v = up.v + _cross(omega, arm)
+    a = up.a + _cross(alpha, arm) + _cross(omega, _cross(omega, arm))
     if body.kind == "prismatic":
         v = v + rate * axis
-        a = a + 2 * np.cross(omega, rate * axis) + change * axis
+        a = a + 2 * _cross(omega, rate * axis) + change * axis
     else:
-        alpha = alpha + change * axis + np.cross(omega, rate * axis)
+        alpha = alpha + change * axis + _cross(omega, rate * axis)
         omega = omega + rate * axis
         rotation = rotation @ _about_z(turn[:, 0])
     origin, lever = up.origin + arm, rotation @ np.array(body.com)
-    v_com = v + np.cross(omega, lever)
-    a_com = a + np.cross(alpha, lever) + np.cross(omega, np.cross(omega, lever))
     frame = _FrameMotion(rotation, origin, v, omega, alpha, a)
-    return _BodyMotion(frame, axis, origin + lever, v_com, a_com)
+    return _BodyMotion(frame, axis, lever)
 
 
 def _inertia(body: BodyEntry, motion: _BodyMotion) -> Array:
@@ -160,6 +172,11 @@ def _inertia(body: BodyEntry, motion: _BodyMotion) -> Array:
     turn = motion.frame.rotation
     inertia: Array = turn @ np.array(body.inertia) @ turn.transpose(0, 2, 1)
     return inertia
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Vector product of each pair, as np.cross gives it in ten times the time."""
+    return np.stack([a[:, i] * b[:, j] - a[:, j] * b[:, i] for i, j in ((1, 2), (2, 0), (0, 1))], -1)
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwise.check.compare import Entries
 from linkwise.check.reference import Reference
 from linkwise.package.load import Array
 
@@ -47,16 +48,15 @@ class IndexRows:
         )
 
 
-def spread(packed: Array, rows: Rows, reference: Reference, what: str) -> Array:
-    """Packed values (..., count) over (..., n, N[, n]); as they are where the count is wrong."""
-    packed = np.asarray(packed)
-    if packed.shape[-1] != len(rows):
-        return packed
-    full = np.zeros((*packed.shape[:-1], *reference.values[what].shape[1:]), packed.dtype)
-    full[(..., *rows.T)] = packed
-    if what == "c2":
-        full[(..., *rows.T[::-1])] = packed
-    return full
+def packed(what: str, value: Any, rows: Rows, reference: Reference, at: Rows) -> Entries:
+    """Packed values (..., count) of samples `at`, of whose shape their batch is, beside the reference's."""
+    value = np.asarray(value)
+    picked, scale = (
+        source[what][(at.reshape(-1, 1), *rows.T)] for source in (reference.values, reference.scales)
+    )
+    if value.shape != (*at.shape, len(rows)):
+        return Entries(what, value, np.empty((*at.shape, len(rows))), scale)
+    return Entries(what, value.reshape(picked.shape), picked, scale, rows)
 
 
 def _table(rows: Sequence[Sequence[int]], width: int) -> Rows:

@@ -7,6 +7,7 @@ import numpy as np
 
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.check.model_calls import FLOAT32
+from linkwise.check.reference import Reference
 from linkwise.check.states import States
 from linkwise.check.sum_checks import is_tied
 from linkwise.package.entries import PassiveEntry
@@ -16,9 +17,10 @@ SHARES = ("spring", "damping", "friction", "armature")
 
 
 def passive_calls(
-    name: str, model: Model, joints: Sequence[PassiveEntry], states: States
+    name: str, model: Model, joints: Sequence[PassiveEntry], reference: Reference
 ) -> Iterator[Result]:
     """The call for many states, for one, and in single precision; all zeros where no joint has anything."""
+    states = reference.states
     values, scales = passive_reference(joints, states)
 
     def entries(dtype: Any, rows: Any) -> Iterator[Entries]:
@@ -27,28 +29,35 @@ def passive_calls(
         for what, value, expected, scale in zip(SHARES, found, values, scales, strict=True):
             # Rows of one state stand for a batch of one, as errors are told by sample.
             shape = (-1, expected.shape[1])
-            yield Entries(what, np.asarray(value).reshape(shape), expected[rows].reshape(shape), scale[rows])
+            yield Entries(
+                what,
+                np.asarray(value).reshape(shape),
+                expected[rows].reshape(shape),
+                scale[rows].reshape(shape),
+            )
 
     every = [*entries(float, slice(None)), *(entries(float, 0) if len(states.q) else ())]
     yield compare(f"{name}: passive torques of the joints", every)
     single = entries(np.float32, slice(None))
     yield compare(f"{name}: passive torques in single precision", single, **FLOAT32)
     if joints and len(states.q) and not is_tied(model):
-        moved = [_torques_of_accelerations(model, joints, states)]
+        moved = [_torques_of_accelerations(model, joints, reference)]
         yield compare(f"{name}: accelerations that passive torques leave", moved)
 
 
-def _torques_of_accelerations(model: Model, joints: Sequence[PassiveEntry], states: States) -> Entries:
-    """Torques that forward dynamics was given, against those that its accelerations take."""
-    q, qd, qdd = states.motion
-    values, scales = passive_reference(joints, states)
+def _torques_of_accelerations(model: Model, joints: Sequence[PassiveEntry], reference: Reference) -> Entries:
+    """Torques that forward dynamics was given, against those that its accelerations take.
+
+    Both are summed from what links ask for, at rest too: their weight alone has rounding.
+    """
+    q, qd, qdd = reference.states.motion
+    values, scales = passive_reference(joints, reference.states)
     tau = model.inverse_dynamics(q, qd, qdd) + values.sum(0)
     found = model.forward_dynamics(q, qd, tau)
     taken, sizes = passive_reference(joints, States(q, qd, found))
-    links = model.inverse_dynamics(q, qd, found)
-    inertial = np.abs(model.mass_matrix(q)) @ (np.abs(qdd) + np.abs(found))[..., None]
-    scale = np.abs(links) + inertial[..., 0] + scales.sum(0) + sizes.sum(0)
-    return Entries("tau", links + taken.sum(0), tau, scale)
+    mass = reference.scales["c2"].sum(2) @ (np.abs(found) + np.abs(qdd))[..., None]
+    scale = reference.scales["tau"].sum(-1) + mass[..., 0] + scales.sum(0) + sizes.sum(0)
+    return Entries("tau", model.inverse_dynamics(q, qd, found) + taken.sum(0), tau, scale)
 
 
 def passive_reference(joints: Sequence[PassiveEntry], states: States) -> tuple[Array, Array]:

@@ -7,6 +7,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,16 @@ class Reference:
             return None
         (kinetic, size), (potential, other) = self.energies.values()
         return kinetic - potential, size + other
+
+    @cached_property
+    def regularity(self) -> Array:
+        """Least eigenvalue of each mass matrix with ones on its diagonal, in size, (samples,)."""
+        mass = self.values["c2"].sum(2)
+        size = np.sqrt(np.abs(np.einsum("sii->si", mass)))
+        size = np.where(size > 0, size, 1.0)
+        scaled = mass / (size[:, :, None] * size[:, None, :])
+        least: Array = np.abs(np.linalg.eigvalsh(scaled)).min(-1)
+        return least
 
     def fits_single(self) -> NDArray[np.bool_]:
         """Samples (samples,) whose numbers are small enough for single precision, squares included."""

@@ -1,24 +1,23 @@
 """What regressors are held against: the recursion, for bodies that have one inertial parameter each."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from linkwise.check.body_reference import by_unit
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.model_calls import FLOAT32
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.packed_layout import Rows
 from linkwise.check.reference import TOLERANCE, Reference
-from linkwise.check.states import States
+from linkwise.check.states import NUMBERS, States
 from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array, Model
 from linkwise.package.manifest import Manifest
 
-NUMBERS = 1 << 20
-"""Torques computed at a time: a robot of many joints is looked at in fewer states."""
 MOST = 12
 """States, at most."""
 MOMENTS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
@@ -31,7 +30,7 @@ Body = tuple[float, tuple[float, ...], Array]
 def regressor_reference(manifest: Manifest, tree: RigidTree, states: States) -> Reference:
     """Y of tau, c2, c1 and g, of the first few states."""
     n, links = len(manifest.joints), len(manifest.links)
-    few = states.at(slice(max(1, min(MOST, NUMBERS // (n * n * links)))))
+    few = states.at(slice(max(1, min(MOST, NUMBERS // (10 * n * n * links)))))
     found = [_rows(manifest, tree, few, body) for body in _unit_bodies()]
     values, scales = (
         {what: np.stack([one[at][what] for one in found], -1) for what in found[0][at]} for at in (0, 1)
@@ -49,15 +48,14 @@ def regressor_calls(name: str, model: Model, reference: Reference) -> Iterator[R
 
     def entries(kind: type, rows: Rows) -> Iterator[Entries]:
         motion: list[Any] = [a.astype(kind) for a in states.at(rows).motion]
-        found = {"Y": model.regressor(*motion)}
         parts = zip(("Y c2", "Y c1", "Y g"), model.coefficient_regressors(*motion[:2]), strict=True)
-        for what, value in (found | dict(parts)).items():
-            expected, scale = (
-                source[what][rows.reshape(-1)] for source in (reference.values, reference.scales)
-            )
+        at = slice(None) if rows.size == len(states.q) else rows.reshape(-1)  # large: nothing is copied
+        for what, value in (("Y", model.regressor(*motion)), *parts):
+            expected, scale = (source[what][at] for source in (reference.values, reference.scales))
             yield Entries(what, value.reshape(rows.size, *value.shape[rows.ndim :]), expected, scale)
 
-    groups = [each for rows in (every, every[:0], every[0]) for each in entries(np.float64, np.asarray(rows))]
+    batches = (every, every[:0], every[0])
+    groups = (each for rows in batches for each in entries(np.float64, np.asarray(rows)))
     yield compare(f"{name}: regressors against {reference.name}", groups, reference.tolerance)
     fitting = np.flatnonzero(reference.fits_single())
     yield compare(f"{name}: regressors in single precision", entries(np.float32, fitting), **FLOAT32)
@@ -88,29 +86,23 @@ def _rows(
     rest = 0.0 * q
     values = {
         "Y": torque(q, qd, qdd),
-        "Y c2": _by_cause(lambda q, qd, e: torque(q, 0.0 * qd, e, gravity=False), q, qd),
-        "Y c1": _by_cause(lambda q, qd, e: 0.5 * torque(q, qd + 1j * e, 0.0 * q, gravity=False).imag, q, qd),
+        "Y c2": by_unit(lambda q, qd, _, e: torque(q, 0.0 * qd, e, gravity=False), states),
+        "Y c1": by_unit(
+            lambda q, qd, _, e: 0.5 * torque(q, qd + 1j * e, 0.0 * q, gravity=False).imag, states
+        ),
         "Y g": torque(q, rest, rest),
     }
     at, speed, change = (np.abs(x) for x in states.motion)
+    most = States(at, speed, change)
 
     def moving(q: Array, qd: Array) -> Array:
         return size(q, qd, 0.0 * q, gravity=False)
 
     scales = {
         "Y": size(at, speed, change),
-        "Y c2": _by_cause(lambda q, qd, e: size(q, 0.0 * qd, e, gravity=False), at, speed),
+        "Y c2": by_unit(lambda q, qd, _, e: size(q, 0.0 * qd, e, gravity=False), most),
         # Of a bound B that is quadratic in qd, 1/2 dB/dqd_k = 1/2 (B(qd + e_k) - B(qd) - B(e_k)).
-        "Y c1": _by_cause(
-            lambda q, qd, e: 0.5 * (moving(q, qd + e) - moving(q, qd) - moving(q, e)), at, speed
-        ),
+        "Y c1": by_unit(lambda q, qd, _, e: 0.5 * (moving(q, qd + e) - moving(q, qd) - moving(q, e)), most),
         "Y g": size(at, rest, rest),
     }
     return values, scales
-
-
-def _by_cause(torque: Callable[[Array, Array, Array], Array], q: Array, qd: Array) -> Array:
-    """Torques for each unit vector, side by side on a last axis: all of them in one call."""
-    n = q.shape[1]
-    found = torque(np.repeat(q, n, axis=0), np.repeat(qd, n, axis=0), np.tile(np.eye(n), (len(q), 1)))
-    return np.moveaxis(found.reshape(len(q), n, *found.shape[1:]), 1, -1)

@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from linkwise.check.compare import Entries, Result, compare
-from linkwise.check.loop_checks import loop_entries
 from linkwise.check.loop_equations import LoopEquations
 from linkwise.check.loop_reference import held_motion, mass_matrix
+from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.newton_euler import NewtonEuler
+from linkwise.check.rounding import measured
 from linkwise.check.states import States
 from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array, Model
@@ -27,13 +28,14 @@ CLOSED = 1e-12
 
 
 class SimulatedMotion(NamedTuple):
-    """Torques tau that act from a state on, and what comes of it."""
+    """Torques tau that act from a state on, and what comes of it: q, qd and work, and their scales."""
 
     q: Array
     qd: Array
     tau: Array
-    ends: tuple[Array, Array, Array]
-    """q, qd and work."""
+    ends: dict[str, Array]
+    scales: dict[str, Array]
+    energies: Magnitudes
 
 
 def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion:
@@ -44,16 +46,22 @@ def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Sim
     recursion, n = NewtonEuler(manifest, tree), states.q.shape[1]
     own = list(tree.independent) if tree.tied else list(range(n))
 
-    def motion(tau: Array) -> Rates:
-        return _tied(recursion, tree, tau) if tree.tied else _free(recursion, tau)
+    def motion(tree: RigidTree, tau: Array) -> Rates:
+        noisy = NewtonEuler(manifest, tree)
+        return _tied(noisy, tree, tau) if tree.tied else _free(noisy, tau)
 
     tried = states.at(slice(0, TRIED))
-    sizes = np.abs(motion(np.ones(n) + 0.0 * tried.q)(tried.q, tried.qd[:, own])[2]).max(axis=-1)
+    sizes = np.abs(motion(tree, np.ones(n) + 0.0 * tried.q)(tried.q, tried.qd[:, own])[2]).max(axis=-1)
     calm = np.array([int(np.where(np.isfinite(sizes), sizes, np.inf).argmin())])
     q, qd, _ = states.at(calm).motion
     qdd = np.random.default_rng(9).uniform(-1.0, 1.0, q.shape)  # that of states may be none
     tau = recursion.partial_torque(q, qd, qdd).sum(-1)
-    return SimulatedMotion(q, qd, tau, _integrated(motion(tau), (q, qd[:, own], np.zeros(1))))
+
+    def ends(tree: RigidTree) -> dict[str, Array]:
+        found = _integrated(motion(tree, tau), (q, qd[:, own], np.zeros(1)))
+        return dict(zip(("q", "qd", "work"), found, strict=True))
+
+    return SimulatedMotion(q, qd, tau, *measured(ends, tree), Magnitudes(manifest, tree))
 
 
 def simulation_calls(name: str, model: Model, expected: SimulatedMotion) -> Iterator[Result]:
@@ -61,15 +69,17 @@ def simulation_calls(name: str, model: Model, expected: SimulatedMotion) -> Iter
     calls: Any = model
     time = [STEP * k for k in range(STEPS + 1)]
     found = calls.simulate(expected.q, expected.qd, time, expected.tau, passive=False)
-    entries = _compared(calls, found, expected.ends)
+    entries = _compared(calls, found, expected)
     yield compare(f"{name}: a simulated motion against Newton-Euler recursion", entries)
 
 
-def _compared(calls: Any, found: Any, expected: tuple[Array, Array, Array]) -> Iterator[Entries]:
-    for what, value, own in zip(("q", "qd", "work"), (found.q, found.qd, found.work), expected, strict=True):
-        yield loop_entries(what, np.asarray(value)[-1], own)
-    energy = np.asarray(calls.energy(found.q[-1], found.qd[-1]).total).sum(-1)
-    yield loop_entries("energy", np.asarray(found.energy)[-1], energy)
+def _compared(calls: Any, found: Any, expected: SimulatedMotion) -> Iterator[Entries]:
+    for what, value in expected.ends.items():
+        yield Entries(what, np.asarray(getattr(found, what))[-1], value, expected.scales[what])
+    q, qd = found.q[-1], found.qd[-1]
+    energy = np.asarray(calls.energy(q, qd).total).sum(-1)
+    size = expected.energies.lagrangian(np.abs(q), np.abs(qd)).sum(-1)
+    yield Entries("energy", np.asarray(found.energy)[-1], energy, size)
 
 
 Rates = Callable[[Array, Array], tuple[Array, Array, Array, Array]]

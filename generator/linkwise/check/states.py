@@ -1,16 +1,21 @@
 """The states at which answers are held against each other."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwise.package.entries import JointEntry
 from linkwise.package.load import Array
 
 DRAWS = 40
 """How many times as many states are tried as were asked for, where energies are not defined everywhere."""
+AT_REST = 4
+"""States beside the random ones: without acceleration, without velocity, without either, twice."""
+NUMBERS = 1 << 21
+"""Numbers of a quantity (samples, n, N, n) that are computed at a time: large robots have fewer states."""
 
 
 @dataclass(frozen=True)
@@ -39,34 +44,56 @@ class Found:
     tried: int
 
 
-def random_states(n: int, samples: int, seed: int = 0) -> States:
-    """Random states over all four quadrants, no rate near 0, and states at rest; float32 holds them."""
+def affordable(samples: int, n: int, links: int) -> int:
+    """How many of `samples` random states the memory of a check allows, 2 at least."""
+    return min(samples, max(2, NUMBERS // (n * n * links) - AT_REST))
+
+
+def random_states(joints: Sequence[JointEntry], samples: int, seed: int = 0) -> States:
+    """Random states, no rate near 0, and states at rest; float32 holds them.
+
+    Every other position is within the limits of the joints, the others are in all four quadrants, for
+    formulas do not know of limits. A slide without limits moves within half a metre.
+    """
     generator = np.random.default_rng(seed)
-    q = generator.uniform(-np.pi, np.pi, (samples, n))
+    lower, upper = np.array([_range(joint) for joint in joints]).reshape(-1, 2).T
+    q = generator.uniform(0.0, 1.0, (samples, len(joints)))
+    wide = np.array([np.pi if joint.unit == "rad" else 0.5 for joint in joints])
+    q = np.where(np.arange(samples)[:, None] % 2 == 0, lower + q * (upper - lower), (2 * q - 1) * wide)
     return _states(q, samples, generator)
 
 
-def states_where(defined: Callable[[States], NDArray[np.bool_]], n: int, samples: int) -> Found:
+def _range(joint: JointEntry) -> tuple[float, float]:
+    """Limits, where both are there and leave something to move; else all around, or half a metre."""
+    wide = np.pi if joint.unit == "rad" else 0.5
+    if joint.lower is None or joint.upper is None or not 0.0 < joint.upper - joint.lower < 2 * wide:
+        return -wide, wide
+    return joint.lower, joint.upper
+
+
+def states_where(
+    defined: Callable[[States], NDArray[np.bool_]], joints: Sequence[JointEntry], samples: int
+) -> Found:
     """States that `defined` says True of, (count,) for `count` of them, up to `samples` and those at rest.
 
     If that is less than half of the random ones, positions of other sizes are tried too, 1 mm to 30 rad.
     """
-    states = random_states(n, samples)
+    states = random_states(joints, samples)
     kept = states.at(defined(states))
     if 2 * len(kept.q) >= samples:
         return Found(kept, len(states.q))
-    generator, shape = np.random.default_rng(1), (DRAWS * samples, n)
+    generator, shape = np.random.default_rng(1), (DRAWS * samples, len(joints))
     q = generator.uniform(-1.0, 1.0, shape) * 10.0 ** generator.uniform(-3.0, 1.5, shape)
     more = _states(q, len(q), generator)
     other = more.at(defined(more))
     both = States(*(np.concatenate(pair) for pair in zip(kept.motion, other.motion, strict=True)))
-    return Found(both.at(slice(0, samples + 4)), len(states.q) + len(more.q))
+    return Found(both.at(slice(0, samples + AT_REST)), len(states.q) + len(more.q))
 
 
 def _states(q: Array, samples: int, generator: np.random.Generator) -> States:
     n = q.shape[1]
     rates = generator.uniform(0.25, 2.5, (2, samples, n)) * generator.choice([-1.0, 1.0], (2, samples, n))
-    still = np.zeros((4, n))
+    still = np.zeros((AT_REST, n))
     q, qd, qdd = (
         np.concatenate([random, still]).astype(np.float32).astype(float) for random in (q, rates[0], rates[1])
     )

@@ -6,15 +6,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwise.check.compare import Entries, Result, Skipped, compare
-from linkwise.check.model_calls import FLOAT32
+from linkwise.check.compare import Entries, Result, compare, skipped
+from linkwise.check.model_calls import FLOAT32, TOO_LARGE
 from linkwise.check.reference import Reference
+from linkwise.check.states import NUMBERS
 from linkwise.package.load import Array, Model
 
 REGULAR = 1e-8
 """Least eigenvalue of a mass matrix, with ones on its diagonal, from which accelerations are looked at."""
-PAIRS, MOST = 1 << 20, 12
-"""Christoffel symbols computed at a time, and states, at most: of many joints, fewer."""
+SINGLE = 1e-3
+"""The same, in single precision."""
+MOST = 12
+"""States of Christoffel symbols; of many joints, fewer."""
+
+FLOAT = " in single precision"
+LARGEST = 1 << 27
+"""Bytes of Christoffel symbols by link that are asked for."""
 
 Samples = NDArray[np.intp]
 
@@ -23,55 +30,70 @@ def sums_against_reference(name: str, model: Model, reference: Reference) -> Ite
     """Every call, of all states, of none and of one, and in single precision."""
     every = np.arange(len(reference.states.q))
     batches = [every, every[:0], *([every[0], every[:1, None]] if len(every) else [])]
-    groups = [each for at in batches for each in _sums(model, reference, at)]
+    groups = (each for at in batches for each in _sums(model, reference, at))
     yield compare(f"{name}: sums over the links", groups, reference.tolerance)
+    yield from _symbols(f"{name}: Christoffel symbols", model, reference)
     powers = _power(model, reference)
     yield compare(f"{name}: power is what each link's energy gains", powers, reference.tolerance)
     if reference.energies:
-        energies = [each for at in batches for each in _energies(model, reference, at)]
+        energies = (each for at in batches for each in _energies(model, reference, at))
         yield compare(f"{name}: energies of the links", energies, reference.tolerance)
     invertible = every[regular(reference)]
     if invertible.size:
-        moved = [each for at in (invertible, invertible[0]) for each in _accelerations(model, reference, at)]
+        moved = (each for at in (invertible, invertible[0]) for each in _accelerations(model, reference, at))
         yield compare(f"{name}: forward dynamics undoes inverse dynamics", moved, reference.tolerance)
     else:
-        yield Skipped(f"{name}: forward dynamics", "no mass matrix can be inverted here")
+        yield skipped(f"{name}: forward dynamics", "no mass matrix can be inverted here")
     fitting = np.flatnonzero(reference.fits_single())
     if fitting.size:
         single = _sums(model, reference, fitting, np.float32)
         yield compare(f"{name}: sums in single precision", single, **FLOAT32)
+    else:
+        yield skipped(f"{name}: sums in single precision", TOO_LARGE)
 
 
 def _sums(model: Model, reference: Reference, at: Any, kind: Any = float) -> Iterator[Entries]:
-    """Matrices, gravity and Christoffel symbols of some samples, whole and link by link.
-
-    Christoffel symbols are right if they make the Coriolis matrix of velocities at random, but for what
-    terms of energies linear in them have in it.
-    """
+    """Matrices and gravity of some samples, whole and link by link."""
     q, qd, _ = (a.astype(kind) for a in reference.states.at(at).motion)
-    count = max(1, min(MOST, PAIRS // (q.shape[-1] ** 3 * len(model.link_names))))
-    few = np.asarray(at).reshape(-1)[:count]
-    some, rates = (a[few].astype(kind) for a in (reference.states.q, reference.states.qd))
     for by_link in (False, True):
-
-        def entries(what: str, value: Array, shares: str, rows: Any = at, by_link: bool = by_link) -> Entries:
-            rows = np.asarray(rows)
-            source, scale = (
-                kept[rows] if by_link else kept[rows].sum(rows.ndim + 1)
-                for kept in (_values(reference)[shares], reference.scales[shares.removesuffix(" alone")])
-            )
-            return _flat(f"{what}{' by link' * by_link}", value, source, scale, rows.ndim)
-
-        yield entries("M", model.mass_matrix(q, by_link=by_link), "c2")
-        yield entries("C", model.coriolis_matrix(q, qd, by_link=by_link), "c1")
-        yield entries("g", model.gravity_torque(q, by_link=by_link), "g")
-        symbols = model.christoffel(some, by_link=by_link)
-        yield entries("Gamma qd", np.einsum("s...l,sl->s...", symbols, rates), "c1 alone", few)
+        calls = (
+            ("M", "c2", model.mass_matrix(q, by_link=by_link)),
+            ("C", "c1", model.coriolis_matrix(q, qd, by_link=by_link)),
+            ("g", "g", model.gravity_torque(q, by_link=by_link)),
+        )
+        for what, shares, value in calls:
+            yield _summed(what, value, (reference.values[shares], reference.scales[shares]), at, by_link)
 
 
-def _values(reference: Reference) -> dict[str, Array]:
-    """The reference's values; c1 alone is what no energy's terms linear in the velocities have a part in."""
-    return {**reference.values, "c1 alone": reference.values["c1"] - reference.values["h1"]}
+def _summed(what: str, value: Array, shares: tuple[Array, Array], at: Any, by_link: bool) -> Entries:
+    at = np.asarray(at)
+    source, scale = (kept[at] if by_link else kept[at].sum(at.ndim + 1) for kept in shares)
+    return _flat(f"{what}{' by link' * by_link}", value, source, scale, at.ndim)
+
+
+def _symbols(name: str, model: Model, reference: Reference) -> Iterator[Result]:
+    """Christoffel symbols are right if they make the Coriolis matrix of velocities at random.
+
+    That is but for what terms of energies linear in the velocities have in it.
+    """
+    n, links = len(model.joint_names), len(model.link_names)
+    few = np.arange(min(max(1, min(MOST, NUMBERS // (n**3 * links))), len(reference.states.q)))
+    shares = reference.values["c1"] - reference.values["h1"], reference.scales["c1"]
+
+    def entries(by_link: bool, kind: Any) -> Iterator[Entries]:
+        for at in (few, few[:0], *few[:1]):
+            q, qd = (a[at].astype(kind) for a in (reference.states.q, reference.states.qd))
+            symbols = model.christoffel(q, by_link=by_link)
+            value = np.einsum("...l,...l->...", symbols, qd[(..., *[None] * (2 + by_link), slice(None))])
+            yield _summed("Gamma qd", value, shares, at, by_link)
+
+    ways = (False, True) if 8 * n**3 * links <= LARGEST else (False,)
+    for told, kind, how in (("", float, {"tolerance": reference.tolerance}), (FLOAT, np.float32, FLOAT32)):
+        groups = (each for by_link in ways for each in entries(by_link, kind))
+        yield compare(f"{name}{told}", groups, **how)
+    if len(ways) == 1:
+        size = 8 * n**3 * links / 2**30
+        yield skipped(f"{name} by link", f"one sample of {n} joints and {links} links takes {size:.1f} GiB")
 
 
 def _power(model: Model, reference: Reference) -> Iterator[Entries]:
@@ -134,11 +156,7 @@ def acceleration_scales(
 
 def regular(reference: Reference, least: float = REGULAR) -> NDArray[np.bool_]:
     """Samples whose mass matrix is far from singular, however its joints are measured."""
-    mass = reference.values["c2"].sum(2)
-    size = np.sqrt(np.abs(np.einsum("sii->si", mass)))
-    size = np.where(size > 0, size, 1.0)
-    scaled = mass / (size[:, :, None] * size[:, None, :])
-    far: NDArray[np.bool_] = np.abs(np.linalg.eigvalsh(scaled)).min(-1) > least
+    far: NDArray[np.bool_] = reference.regularity > least
     return far
 
 

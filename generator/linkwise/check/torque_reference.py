@@ -1,12 +1,13 @@
 """A package's own torques as a reference, where there is no other: all else is differences of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from linkwise.check.reference import Reference, columns, link_sizes
 from linkwise.check.states import Found, States, states_where
+from linkwise.package.entries import JointEntry
 from linkwise.package.load import Array
 
 DIFFERENCE_TOLERANCE = 1e-6
@@ -43,13 +44,15 @@ def torque_reference(name: str, torque: Callable[[Array, Array, Array], Array], 
     return Reference(name, DIFFERENCE_TOLERANCE, states, values, link_sizes(values, states))
 
 
-def states_of_torques(torque: Callable[[Array, Array, Array], Array], n: int, samples: int) -> Found:
+def states_of_torques(
+    torque: Callable[[Array, Array, Array], Array], joints: Sequence[JointEntry], samples: int
+) -> Found:
     """States at which the torques are numbers."""
 
     def defined(states: States) -> Any:
         return np.isfinite(torque(*states.motion)).all(axis=(1, 2))
 
-    return states_where(defined, n, samples)
+    return states_where(defined, joints, samples)
 
 
 def _sixth_order(f: Callable[[Array], Array], x: Array, direction: Array) -> Array:

@@ -10,8 +10,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from linkwise.cli import tell
 from linkwise.cli.endings import CLOSED_PIPE, FAULT, INTERRUPTED, MISTAKE, TRACEBACK, ended_in_one_line
-from linkwise.errors import LinkwiseError
+from linkwise.errors import LinkwiseError, LinkwiseWarning
 from linkwise.version import VERSION
 
 COMMANDS = {
@@ -129,6 +130,8 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")  # whatever letters the terminal lacks
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # of libraries, to programmers
+        warnings.simplefilter("default", LinkwiseWarning)
+    warnings.showwarning = lambda message, *_, **__: tell(f"warning: {message}", err=True)
     status = 0
     with ended_in_one_line():
         command = command_of(app)

@@ -1,6 +1,7 @@
 """The command `check`."""
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -8,12 +9,15 @@ from typing import Annotated, Any
 
 import typer
 
-from linkwise.check import check_package
-from linkwise.check.compare import Result, Skipped
+from linkwise.check import results_of
+from linkwise.check.compare import Result
 from linkwise.cli import Json, counted, tell
 from linkwise.escape import json_text
 
 app = typer.Typer(add_completion=False)
+
+WIDTH = 64
+"""Columns of a check's name, for each is told as soon as it is made."""
 
 
 @app.command()
@@ -23,27 +27,31 @@ def check(
     as_json: Json = False,
 ) -> None:
     """Prove a package right: hashes, and every entry of every formula, back end and C function."""
-    results = check_package(package, samples)
+    results = []
+    for result in results_of(package, samples):
+        results.append(result)
+        if not as_json:
+            tell(f"{result.mark:<4}  {result.name:<{WIDTH}}  {result.detail}")
+            sys.stdout.flush()
     if as_json:
         print(json_text([_row(result) for result in results], indent=1))
     else:
-        width = max(len(result.name) for result in results)
-        for result in results:
-            tell(f"{result.mark:<4}  {result.name:<{width}}  {result.detail}")
         tell(verdict(results))
-    if not all(result.passed for result in results):
+    if any(result.failed for result in results):
         raise typer.Exit(1)
 
 
 def verdict(results: Sequence[Result]) -> str:
-    """Of all checks in one line: how many held, or which failed, and how many could not be made."""
-    failed = [result.name for result in results if not result.passed]
-    skipped = sum(isinstance(result, Skipped) for result in results)
-    made = counted(len(results) - skipped, "check")
-    beside = f"; {skipped} could not be made here, see skip above" if skipped else ""
-    if failed:
-        return f"{len(failed)} of {made} failed: {'; '.join(failed)}{beside}"
-    return f"all {made} held{beside}"
+    """Of all checks in one line: how many held, how many failed, and how many could not be made."""
+    failed = [result.name for result in results if result.failed]
+    held = sum(result.held is True for result in results)
+    left = len(results) - held - len(failed)
+    told = [
+        f"{counted(held, 'check')} held",
+        f"{len(failed)} failed" + (f" ({'; '.join(failed)})" if failed else ""),
+        f"{left} could not be made here" + (", see skip above" if left else ""),
+    ]
+    return ", ".join(told)
 
 
 def _row(result: Result) -> dict[str, Any]:

@@ -5,7 +5,7 @@ import importlib
 import importlib.util
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.abc import MetaPathFinder, SourceLoader
 from importlib.machinery import ModuleSpec
@@ -13,14 +13,15 @@ from pathlib import Path
 from types import ModuleType
 
 from linkwise.package.contents import link_on_the_way
-from linkwise.package.manifest import FILE
+from linkwise.package.emitted_text import foreign_text
+from linkwise.package.manifest import FILE, Manifest
 
 
-def import_listed(directory: Path, files: Mapping[str, str]) -> ModuleType:
+def import_listed(directory: Path, manifest: Manifest) -> ModuleType:
     """Import a package by its listed files, under a name of its own; nothing is put on sys.path.
 
-    files: SHA-256 by path. Neither `__pycache__` nor anything else that is not listed is read. Raises
-    ImportError for a file that differs, and passes on whatever the package raises.
+    Neither `__pycache__` nor anything else that is not listed is read. Raises ImportError for a file that
+    differs from its SHA-256 or says what linkwise doesn't write, and passes on whatever the package raises.
     """
     path = Path(os.path.realpath(directory))
     # Of place and content, so that a package generated anew is imported anew.
@@ -28,7 +29,7 @@ def import_listed(directory: Path, files: Mapping[str, str]) -> ModuleType:
     name = f"_linkwise_{digest}"
     if name in sys.modules:
         return sys.modules[name]
-    finder = _Listed(name, path, files)
+    finder = _Listed(name, path, manifest)
     sys.meta_path.insert(0, finder)
     try:
         return importlib.import_module(name)
@@ -43,7 +44,7 @@ class _Listed(MetaPathFinder):
 
     name: str
     directory: Path
-    files: Mapping[str, str]
+    manifest: Manifest
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -53,10 +54,10 @@ class _Listed(MetaPathFinder):
         if package != self.name:
             return None
         for parts in ([*inner, "__init__.py"], [*inner[:-1], f"{inner[-1]}.py"] if inner else []):
-            if (file := "/".join(parts)) in self.files:
+            if (file := "/".join(parts)) in self.manifest.files:
                 # No folder to search: there would be caches and libraries in it.
                 search: list[str] | None = [] if parts[-1] == "__init__.py" else None
-                loader = _Verified(self.directory, file, self.files[file])
+                loader = _Verified(self.directory, file, self.manifest)
                 return importlib.util.spec_from_file_location(
                     fullname, self.directory / file, loader=loader, submodule_search_locations=search
                 )
@@ -65,20 +66,24 @@ class _Listed(MetaPathFinder):
 
 @dataclass(frozen=True)
 class _Verified(SourceLoader):
-    """Compiles one source, if it is as listed; without a time of change Python looks for no cache."""
+    """Compiles one source, if it is as listed and as linkwise writes; without a time of change Python looks
+    for no cache."""
 
     directory: Path
     file: str
-    digest: str
+    manifest: Manifest
 
     def get_filename(self, fullname: str) -> str:
         """Path of the source."""
         return str(self.directory / self.file)
 
     def get_data(self, path: str | bytes) -> bytes:
-        """The source; raises ImportError if it isn't as listed."""
+        """The source; raises ImportError if it isn't as listed, or says anything else than linkwise."""
+        told: str | None = "was changed"
         if link_on_the_way(self.directory, self.file) is None:
-            data = (self.directory / self.file).read_bytes()
-            if hashlib.sha256(data).hexdigest() == self.digest:
-                return data
-        raise ImportError(f"{self.file} was changed", path=str(self.directory / self.file))
+            data, manifest = (self.directory / self.file).read_bytes(), self.manifest
+            if hashlib.sha256(data).hexdigest() == manifest.files[self.file]:
+                told = foreign_text(self.file, data, manifest.name, manifest.generator.get("linkwise"))
+                if told is None:
+                    return data
+        raise ImportError(f"{self.file} {told}", path=str(self.directory / self.file))

@@ -1,5 +1,6 @@
 """A generated package, imported from its folder, and its back ends with NumPy arrays in and out."""
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,12 +11,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwise.errors import LinkwiseError
+from linkwise.errors import LinkwiseError, LinkwiseWarning
 from linkwise.extras import extra
 from linkwise.package.agreement import disagreements
 from linkwise.package.contents import changed
+from linkwise.package.emitted_text import foreign
 from linkwise.package.importer import import_listed
 from linkwise.package.manifest import Manifest, altered_entries
+from linkwise.version import VERSION
 
 Array = NDArray[np.float64]
 
@@ -167,6 +170,15 @@ def open_package(directory: Path) -> Package:
     manifest = Manifest.read(directory)
     for fault in (*altered_entries(directory), *changed(directory, manifest.files)):
         raise LinkwiseError(f"{directory}: {fault}; generate the robot again")
+    version = manifest.generator.get("linkwise")
+    if version != VERSION:
+        told = f"its runtime is that of linkwise {version}, which is not at hand to compare with"
+        mend = "its code runs as it is; generate the robot again if you do not know where it comes from"
+        warnings.warn(f"{directory}: {told}: {mend}", LinkwiseWarning, stacklevel=2)
+    # Its Python is read as it is imported, its C before any compiler sees it.
+    others = [path for path in manifest.files if not path.endswith(".py")]
+    for fault in foreign(directory, others, manifest.name, version):
+        raise LinkwiseError(f"{directory}: {fault}; do not open it: it is not what linkwise generates")
     try:
         package = load_package(directory, manifest)
     except Exception as error:  # a damaged file may raise anything
@@ -182,13 +194,13 @@ def open_package(directory: Path) -> Package:
 def load_package(directory: Path, manifest: Manifest) -> Package:
     """Import the package of a manifest; passes on whatever the package raises."""
     with staying():
-        return Package(directory, manifest, import_listed(directory, manifest.files))
+        return Package(directory, manifest, import_listed(directory, manifest))
 
 
 def import_package(directory: Path) -> ModuleType:
     """Import a package from its folder; raises LinkwiseError for a damaged manifest, ImportError for files
     other than that lists."""
-    return import_listed(directory, Manifest.read(directory).files)
+    return import_listed(directory, Manifest.read(directory))
 
 
 class TensorModel:
