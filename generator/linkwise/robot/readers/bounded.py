@@ -45,7 +45,10 @@ def check_toml_bounds(text: str) -> None:
     """
     structure = STRINGS_AND_COMMENTS.sub(lambda found: "s" + "\n" * found[0].count("\n"), text)
     if number := ENDLESS.search(structure):
-        line, digits = 1 + structure.count("\n", 0, number.start()), len(number[number.lastindex or 0].replace("_", ""))
+        line, digits = (
+            1 + structure.count("\n", 0, number.start()),
+            len(number[number.lastindex or 0].replace("_", "")),
+        )
         raise LinkwiseError(f"line {line} has a number of {digits} digits; 1e308 is about the largest")
     depth = deepest = 0
     for bracket in re.findall(r"[\[\]{}]", structure):
