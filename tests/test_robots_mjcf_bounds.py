@@ -146,7 +146,9 @@ def test_compiler_that_does_not_end_is_ended(tmp_path: Path, monkeypatch: pytest
 @pytest.mark.parametrize("size", ['nrow="30000" ncol="20000"', 'nrow="2000000000" ncol="2000000000"'])
 def test_compiler_that_takes_too_much_memory_is_refused_it(size: str, tmp_path: Path) -> None:
     path = written(tmp_path, asset=f'<hfield name="t" {size} size="1 1 1 1"/>')
-    with pytest.raises(LinkwiseError, match="MuJoCo's compiler takes more than 1 GiB of memory; repeat less"):
+    with pytest.raises(
+        LinkwiseError, match="MuJoCo's compiler takes more than 750 MiB of memory; repeat less"
+    ):
         read_system(path)
 
 

@@ -27,7 +27,7 @@ TYPES = ("floating", "ball", "prismatic", "revolute")
 """Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
 
 
-LIMITS = ProcessLimits(seconds=30, memory=1 << 30)
+LIMITS = ProcessLimits(seconds=15, memory=750 << 20)
 """What MuJoCo may take for a file; the largest robots known take 1 s."""
 
 
@@ -41,7 +41,7 @@ def read_mjcf(path: Path, text: bytes | None = None) -> Description:
     try:
         return in_own_process(lambda: _described(mujoco, path, *compiled(mujoco, files, text)), LIMITS)
     except MemoryError:
-        fault = f"takes more than {LIMITS.memory >> 30} GiB of memory"
+        fault = f"takes more than {LIMITS.memory >> 20} MiB of memory"
     except OutOfTime:
         fault = f"takes more than {LIMITS.seconds} s of processor time"
     except Ended as end:
