@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from bags import states, write_bag
 from linkwise import LinkwiseError, analyze
 from linkwise.own_process import ProcessLimits, in_own_process
 from motion_logs import JOINTS, PLANAR3, smooth
@@ -124,3 +125,13 @@ def test_long_text_that_every_row_has_is_not_read(tmp_path: Path) -> None:
     table = pa.table({"time": TIME, **dict.fromkeys(JOINTS, long)})
     pq.write_table(table, tmp_path / "a.parquet", store_schema=False)
     assert refusal(tmp_path / "a.parquet") == "column 'joint1' holds string, not numbers"
+
+
+def test_pipe_in_the_folder_of_a_bag_is_refused(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", states(TABLE, JOINTS), "mcap")
+    (bag / "bag.mcap").unlink()
+    os.mkfifo(bag / "bag.mcap")
+    told = f"{bag / 'bag.mcap'}: this is a pipe, which cannot be read twice; give a file"
+    with pytest.raises(LinkwiseError) as caught:
+        analyze(bag, PLANAR3)
+    assert str(caught.value) == told
