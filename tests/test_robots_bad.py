@@ -1,5 +1,6 @@
 """A robot that cannot be: one line that names the joint or link, and the remedy."""
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -186,6 +187,7 @@ BAD_TOML = {
         toml("-1_" + "1" * 5000, head='schema = 1\nname = """\n"""'),
         "line 6 has a number of 5001 digits; 1e308 is about the largest",
     ),
+    "endless schema": ("schema = 0x" + "f" * 5000, "line 1 has a number of 5000 digits; 1e308 is about"),
     "zero over": (
         toml('"1/(l1-l1)"', head=PARAMETER.format(0.3)),
         "'1/(l1-l1)' has no value: division by zero",
@@ -222,6 +224,10 @@ BAD_TOML = {
         "schema = 1\n[" + " . ".join(["'a.b'", '"#c"'] * 200) + "]",
         "malformed TOML: a dotted key 400 deep",
     ),
+    "long key behind a string": (
+        'schema = 1\nname = ["""a"""", {' + ".".join(["a"] * 40_000) + " = 1}]",
+        "malformed TOML: a dotted key 40000 deep",
+    ),
     "large": (
         "#" * (2**20 + 1),
         "the file is larger than 1 MiB, which no robot's description is; give one",
@@ -239,6 +245,15 @@ def test_defect_of_a_toml_file_is_named(case: str, parameters: Any, tmp_path: Pa
     assert message in str(caught.value)
     assert str(caught.value).startswith(f"{tmp_path / 'bad.toml'}: ")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("opening", ['"', '"""'])
+def test_string_that_does_not_end_takes_no_time(opening: str, tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text(f"schema = 1\nname = {opening}" + r"\"" * 40_000)
+    start = time.process_time()
+    with pytest.raises(LinkwiseError, match="malformed TOML: Unterminated string"):
+        read_system(tmp_path / "bad.toml")
+    assert time.process_time() - start < 2.0
 
 
 def test_toml_may_start_with_a_byte_order_mark(tmp_path: Path) -> None:

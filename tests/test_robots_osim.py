@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from linkwise import LinkwiseError, Options, generate, read_robot, read_system, write_package
+from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.package.load import import_package
 from linkwise.robot.notes import effects
 from linkwise.robot.robot import Limits
@@ -51,6 +52,13 @@ def test_what_opensim_reads_though_it_is_no_xml_is_read(tmp_path: Path) -> None:
     assert robot_of(tmp_path, odd).links == robot_of(tmp_path, plain).links
     (tmp_path / "model.osim").write_bytes(plain.replace("body0", "fémur").encode("latin-1"))
     assert [link.name for link in read_robot(tmp_path / "model.osim").links] == ["fémur"]
+
+
+def test_comments_that_do_not_end_take_no_time(tmp_path: Path) -> None:
+    path = tmp_path / "bad.osim"
+    path.write_text('<OpenSimDocument Version="40000">' + "<!--" * 20_000)
+    with pytest.raises(LinkwiseError, match=r"bad.osim: malformed XML: no element found"):
+        in_own_process(lambda: read_system(path), ProcessLimits(seconds=2, memory=1 << 28))
 
 
 def test_frames_are_found_by_their_whole_paths(tmp_path: Path) -> None:

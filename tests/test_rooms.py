@@ -28,6 +28,7 @@ ROOMS = (
     "symbolic",
     "robot",
     "output",
+    "own_process",
     "runtime",
     "plotstyle",
     "extras",

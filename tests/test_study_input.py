@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pytest
 from linkwise import LinkwiseError
+from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.study import run_study
+from linkwise.study.column_patterns import fitting
 from studies import CHOICES, HEAD, TRIALS, Here, write_study
 
 BAD: dict[str, tuple[tuple[str, ...], str]] = {
@@ -99,3 +101,33 @@ def test_a_folder_of_another_study_stays(tmp_path: Path) -> None:
     with pytest.raises(LinkwiseError, match="is of the study 'arms', whose trials would go"):
         run_study(other, tmp_path / "out", Here())
     assert len(list((tmp_path / "out/trials").iterdir())) == 2
+
+
+NAMES = ["tau/knee", "tau/knee/foot", "q/knee", "a" * 60, "a/" * 30]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "fits"),
+    [
+        ("tau/*", NAMES[:1]),
+        ("tau/**", NAMES[:2]),
+        ("*/k*e", [NAMES[0], NAMES[2]]),
+        ("**o*t", NAMES[1:2]),
+        ("***/knee", [NAMES[0], NAMES[2]]),
+        ("*a" * 30, NAMES[3:4]),
+        ("**a" * 30 + "*", NAMES[3:4]),
+        ("*a**" * 25 + "b", None),
+        ("**" * 400_000, NAMES),
+        ("*a" * 400_000, None),
+    ],
+)
+def test_columns_that_a_pattern_fits_are_found_at_once(pattern: str, fits: list[str] | None) -> None:
+    def found() -> list[str]:
+        return fitting("'columns'", NAMES, [pattern])
+
+    limits = ProcessLimits(seconds=2, memory=1 << 28)
+    if fits is not None:
+        assert in_own_process(found, limits) == fits
+        return
+    with pytest.raises(LinkwiseError, match=r"'columns' has '.*', which no column is called; nearest are"):
+        in_own_process(found, limits)

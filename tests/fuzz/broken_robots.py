@@ -60,9 +60,22 @@ size="0.05 0.1" mass="0.5"/><site name="s" pos="0 0 0.1"/><body name="c"><joint 
 <actuator><motor joint="j1" gear="2"/></actuator></mujoco>"""
 
 
+COSTLY = (
+    '<asset><texture name="t" type="2d" builtin="checker" width="{0}" height="{0}"/></asset>',
+    '<asset><hfield name="t" nrow="{0}" ncol="{0}" size="1 1 1 1"/></asset>',
+    '<asset><mesh name="t" builtin="plate" params="{0} {0}"/></asset>',
+    '<worldbody><flexcomp name="t" type="grid" count="{0} {0} 1" spacing="1 1 1"/></worldbody>',
+    '<include file="/dev/zero"/>',
+    '<asset><mesh name="t" file="/dev/zero"/></asset>',
+)
+"""What may cost MuJoCo gigabytes; how large it is comes in."""
+
+
 def mjcf(rng: Random) -> Case:
     """A robot in MJCF."""
     text = MJCF.format(free="" if rng.random() < 0.7 else '<freejoint name="f"/>')
+    if rng.random() < 0.2:
+        text = text.replace("<equality>", rng.choice(COSTLY).format(10 ** rng.randint(1, 5)) + "<equality>")
     if rng.random() < 0.8:
         text = mutated_xml(rng, text)
     if rng.random() < 0.3:

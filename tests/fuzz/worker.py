@@ -48,9 +48,13 @@ class Outcome:
 
 
 def most_memory() -> int:
-    """Most bytes that this process has held; ru_maxrss begins with those of the process that started it."""
+    """Most bytes that this process has held, or one that it forked.
+
+    ru_maxrss begins with those of the process that started one: of this one's it would tell another's.
+    """
     status = Path("/proc/self/status").read_text(encoding="ascii")
-    return int(re.findall(r"VmHWM:\s+(\d+) kB", status)[0]) * 1024
+    own = int(re.findall(r"VmHWM:\s+(\d+) kB", status)[0])
+    return max(own, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) * 1024
 
 
 class Hang(BaseException):

@@ -28,7 +28,6 @@ from linkwise.check.loop_reference import LoopReference, loop_reference
 from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.model_calls import Named, against_reference
 from linkwise.check.newton_euler import NewtonEuler
-from linkwise.check.own_process import Ended, in_own_process
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.parametric_tree import changed_values, check_bodies, tree_with
 from linkwise.check.passive_reference import passive_calls
@@ -40,6 +39,7 @@ from linkwise.check.states import AT_REST, States, affordable, random_states
 from linkwise.check.sum_checks import sums_against_reference
 from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.torque_reference import states_of_torques, torque_reference
+from linkwise.own_process import Ended, in_own_process
 from linkwise.package.entries import PassiveEntry, RigidTree
 from linkwise.package.load import Array, Model, Package, load_package, staying
 from linkwise.package.manifest import Manifest

@@ -20,6 +20,8 @@ from linkwise.symbolic.system import EnergySystem, System
 
 LESS = "…"
 """In place of an end that a joint does not have."""
+ALLOWING = "--allow-unphysical"
+"""What is told wherever a body that cannot exist is refused."""
 
 app = typer.Typer(add_completion=False)
 
@@ -54,6 +56,8 @@ def _system(robot: str, options: Options) -> tuple[System, str]:
         return pipeline.read_system(robot, options), ""
     except LinkwiseError as error:
         refused = str(error)
+        if ALLOWING not in refused:  # it would cost the same again, to be refused again
+            raise
         try:
             return pipeline.read_system(robot, replace(options, allow_unphysical=True)), refused
         except LinkwiseError:

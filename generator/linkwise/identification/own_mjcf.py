@@ -11,7 +11,8 @@ from linkwise.identification.own_file import Friction, LinkMass, NotWrittenBack,
 from linkwise.identification.placed_xml import Edit, PlacedXml, tag
 from linkwise.package.load import Array
 from linkwise.robot.description import Body
-from linkwise.robot.readers.mjcf import body_name, joint_name, mjcf_files, read_mjcf_text
+from linkwise.robot.readers.mjcf import body_name, joint_name, read_mjcf
+from linkwise.robot.readers.mjcf_files import mjcf_files
 
 AXES = ("fullinertia", "quat", "axisangle", "euler", "xyaxes", "zaxis")
 """Attributes of <inertial> for which `diaginertia` and `quat` stand."""
@@ -41,7 +42,8 @@ class OwnMjcf(OwnFile):
     def lost(self, friction: Mapping[str, Array]) -> Iterator[str]:
         """See OwnFile; meshes and what a file includes are found by paths from its folder."""
         yield from super().lost(friction)
-        if len(mjcf_files(self.path)) > 1:
+        files = mjcf_files(self.path)
+        if files.others or len(files.documents) > 1:
             yield (
                 f"{self.path.name} reads other files, by paths from its own folder: put it there, under "
                 "another name, for MuJoCo to find them"
@@ -63,7 +65,7 @@ class OwnMjcf(OwnFile):
     def _read_again(self, text: bytes, links: Mapping[str, LinkMass], friction: Friction) -> None:
         """Raise NotWrittenBack where MuJoCo makes something else of the file than was written."""
         try:
-            again = read_mjcf_text(self.path, text)
+            again = read_mjcf(self.path, text)
         except LinkwiseError as error:
             raise NotWrittenBack(f"{self.path.name} would not compile: {error}") from None
         for body in again.bodies:

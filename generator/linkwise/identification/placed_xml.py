@@ -11,7 +11,6 @@ NAME = re.compile(rb"<[^\s/>]+")
 ATTRIBUTE = re.compile(rb"""\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")
 COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 TAG_END = re.compile(rb"\s*(/?)>")
-BLANKS = re.compile(rb"\s*\Z")
 
 
 class Edit(NamedTuple):
@@ -77,9 +76,9 @@ class PlacedXml:
         place, last = self._places[parent], next(reversed(parent), None)
         if last is not None:
             own = self._places[last]
-            blanks = BLANKS.search(self.data, 0, own.start)
-            assert blanks is not None
-            return Edit(own.stop, own.stop, b"".join(blanks[0] + tag.encode() for tag in tags))
+            before = self.data[: own.start]
+            blanks = before[len(before.rstrip()) :]
+            return Edit(own.stop, own.stop, b"".join(blanks + tag.encode() for tag in tags))
         inside = escape(text).encode() + "".join(tags).encode()
         if place.inside_stop < place.stop and self.data[place.inside_stop : place.inside_stop + 2] == b"</":
             return Edit(place.inside_stop, place.inside_stop, inside)

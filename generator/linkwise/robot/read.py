@@ -14,7 +14,8 @@ from linkwise.robot.builtin.planar import planar
 from linkwise.robot.constrained import check_constraints
 from linkwise.robot.description import Description
 from linkwise.robot.parameters import numeric
-from linkwise.robot.readers.mjcf import mjcf_files, read_mjcf
+from linkwise.robot.readers.mjcf import read_mjcf
+from linkwise.robot.readers.mjcf_files import mjcf_files
 from linkwise.robot.readers.osim import read_osim
 from linkwise.robot.readers.sdf import read_sdf
 from linkwise.robot.readers.toml import read_toml
@@ -103,7 +104,8 @@ def robot_files(spec: str | Path, options: Options) -> tuple[Path, ...]:
     path = Path(spec)
     own: tuple[Path, ...] = () if is_built_in(spec) else (path,)
     if own and reader_of(path) is read_mjcf:
-        own = tuple(dict.fromkeys((path, *mjcf_files(path))))
+        files = mjcf_files(path)
+        own = (*files.documents, *files.others)
     return own if options.constraints is None else (*own, Path(options.constraints))
 
 

@@ -4,10 +4,12 @@ import re
 from collections.abc import Iterable, Sequence
 
 from linkwise.errors import LinkwiseError
-from linkwise.escape import listed
+from linkwise.escape import listed, short
 from linkwise.runtime.chosen_names import nearest_first
 
-WILD = re.compile(r"\*\*|\*")
+WILD = re.compile(r"(\*+)")
+LONGEST = 200
+"""Characters of a pattern that a message shows, and that names are compared with."""
 
 
 def fitting(place: str, names: Iterable[str], patterns: Sequence[str]) -> list[str]:
@@ -17,18 +19,35 @@ def fitting(place: str, names: Iterable[str], patterns: Sequence[str]) -> list[s
     """
     names = list(names)
     found = set[str]()
-    for pattern in patterns:
-        expression = _expression(pattern)
-        fits = {name for name in names if expression.fullmatch(name)}
+    for pattern in dict.fromkeys(patterns):
+        pieces = WILD.split(pattern)
+        fits = {name for name in names if _fits(pieces, name)}
         if not fits:
-            near = listed(map(repr, nearest_first(pattern, names)))
-            raise LinkwiseError(f"{place} has {pattern!r}, which no column is called; nearest are {near}")
+            near = listed(map(repr, nearest_first(pattern[:LONGEST], names)))
+            raise LinkwiseError(
+                f"{place} has {short(pattern, LONGEST)!r}, which no column is called; nearest are {near}"
+            )
         found |= fits
     return [name for name in names if name in found]
 
 
-def _expression(pattern: str) -> re.Pattern[str]:
-    plain = WILD.split(pattern)
-    wild = [".*" if sign == "**" else "[^/]*" for sign in WILD.findall(pattern)]
-    pieces = [re.escape(text) + sign for text, sign in zip(plain, [*wild, ""], strict=True)]
-    return re.compile("".join(pieces), re.DOTALL)
+def _fits(pieces: Sequence[str], name: str) -> bool:
+    """Whether texts, and the stars between them, are all of a name.
+
+    Goes along the pieces with all ends that what is before may have in the name. A regular expression tries
+    them one after the other, which takes for ever for a dozen stars.
+    """
+    first, *rest = pieces
+    ends = {len(first)} if name.startswith(first) else set[int]()
+    for stars, text in zip(rest[::2], rest[1::2], strict=True):
+        starts = {at for end in ends for at in _reached(name, end, len(stars) > 1)}
+        ends = {at + len(text) for at in starts if name.startswith(text, at)}
+        if not ends:
+            return False
+    return len(name) in ends
+
+
+def _reached(name: str, end: int, over_parts: bool) -> range:
+    """Where what follows a star may begin."""
+    slash = -1 if over_parts else name.find("/", end)
+    return range(end, (len(name) if slash < 0 else slash) + 1)

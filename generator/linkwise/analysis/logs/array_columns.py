@@ -4,6 +4,7 @@ Names are paths, `arm/q`. What an array is called says which quantity it holds; 
 column by its own name.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,8 @@ NAMES = ("joint_names", "joints", "names", "name", "columns")
 UNITS = dict.fromkeys(("deg", "degs", "degree", "degrees", "°"), True)
 UNITS |= dict.fromkeys(("rad", "rads", "radian", "radians"), False)
 """What an attribute calls units of angles, and whether these are degrees."""
+MOST_COLUMNS, MOST_NAMES = 10_000, 10_000
+"""Numbers that a sample has in an array, and texts in one that names joints."""
 NUMBERS = "fiub"
 """NumPy's kinds of what is a number."""
 WORDS = {
@@ -33,9 +36,13 @@ RANK = {word: rank for rank, word in enumerate(ENDING_OF)}
 
 @dataclass(frozen=True)
 class StoredArray:
-    """An array in a file: its shape, whether it holds numbers, and the texts of one that names joints."""
+    """An array in a file: its shape, whether it holds numbers, and the texts of one that names joints.
+
+    bytes: what memory it takes
+    """
 
     shape: tuple[int, ...]
+    bytes: int = 0
     is_numeric: bool = True
     texts: tuple[str, ...] = ()
     unit: str = ""
@@ -82,6 +89,12 @@ class ArrayColumns:
         places: dict[str, Place] = {}
         for array in sorted(self._beside(), key=lambda array: RANK.get(word_of(array), len(RANK))):
             width = width_of(self.found[array].shape, self.samples)
+            if width > MOST_COLUMNS and word_of(array) not in ENDING_OF:
+                continue  # pictures, say
+            if width > MOST_COLUMNS:
+                raise LinkwiseError(
+                    f"array {array!r} has {width:,} numbers a sample, which no robot has; leave it out"
+                )
             name = array.removeprefix(f"{self.group}/")
             raw = [name] if width == 1 else [f"{name}[{at}]" for at in range(width)]
             columns = self._columns(array, name, width) or raw
@@ -247,7 +260,8 @@ def word_of(array: str) -> str:
 
 def names_joints(array: str, shape: tuple[int, ...]) -> bool:
     """Whether an array, if it holds texts, names joints."""
-    return word_of(array) in NAMES and len(shape) > 0 and sum(size != 1 for size in shape) <= 1
+    is_list = len(shape) > 0 and sum(size != 1 for size in shape) <= 1
+    return word_of(array) in NAMES and is_list and math.prod(shape) <= MOST_NAMES
 
 
 def width_of(shape: tuple[int, ...], samples: int) -> int:

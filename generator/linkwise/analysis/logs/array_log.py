@@ -10,6 +10,7 @@ import numpy as np
 
 from linkwise.analysis.logs.array_columns import WORDS, ArrayColumns, Place, StoredArray, array_columns
 from linkwise.analysis.logs.named_once import named_once
+from linkwise.analysis.logs.promised_size import require_held
 from linkwise.analysis.settings import Reading
 from linkwise.errors import within
 from linkwise.escape import listed
@@ -65,11 +66,16 @@ class ArrayLog:
 
     @classmethod
     def of(cls, source: ArrayFile, columns: ArrayColumns, time: str | None) -> "ArrayLog":
-        """Columns that were found, the time by the name that was asked for; raises LinkwiseError likewise."""
+        """Columns that were found, the time by the name that was asked for; raises LinkwiseError likewise.
+
+        And for arrays that are far larger than the file, before any is read.
+        """
         called = time or columns.time.rpartition("/")[2]
         named_once((called, *columns.places))
         places = {called: Place(columns.time, 0)} | columns.places
         columns.check()
+        used = {place.array for place in places.values()}
+        require_held(source.path, sum(columns.found[array].bytes for array in used))
         return cls(source, places, columns.samples, degrees=columns.degrees)
 
     @property

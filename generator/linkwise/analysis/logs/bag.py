@@ -13,6 +13,7 @@ from linkwise.analysis.logs.named_once import named_once
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed, short
 from linkwise.extras import extra
+from linkwise.input_file import require_file
 from linkwise.package.load import Array
 
 MCAP_MAGIC, MCAP_BEFORE, MCAP_OF_ROS = b"\x89MCAP0\r\n", 8 + 1 + 8, "ros2"
@@ -86,6 +87,10 @@ def _opened(path: Path) -> Iterator[Any]:
         raise LinkwiseError(
             f"{path}: this is a directory, not that of a bag: it has no metadata.yaml; give a file"
         )
+    for file in path.iterdir() if path.is_dir() else ():
+        if not file.is_dir():
+            with within(str(file)):
+                require_file(file)
     if (profile := _profile(path)) != MCAP_OF_ROS:
         raise LinkwiseError(
             f"{path}: MCAP with the profile {short(profile)!r}, and not {MCAP_OF_ROS!r}; record it with ros2"

@@ -1,5 +1,6 @@
 """Datasets by path in HDF5 files."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,6 +11,8 @@ import numpy as np
 
 from linkwise.analysis.logs.array_columns import NAMES, NUMBERS, StoredArray, names_joints
 from linkwise.analysis.logs.damaged_files import read_as
+from linkwise.analysis.logs.promised_size import require_held
+from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
 
 
@@ -26,17 +29,34 @@ class Hdf5Arrays:
 
         def visit(name: str, item: Any) -> None:
             found.update(_named_by_attributes(name, item))
-            if not isinstance(item, library.Dataset) or item.shape is None:
+            if not isinstance(item, library.Dataset):
+                return
+            # Asked before the shape, for which HDF5 opens other files.
+            if item.is_virtual or item.external:
+                raise LinkwiseError(
+                    f"dataset {name!r} has its numbers in other files; write them into this one"
+                )
+            if item.shape is None:
                 return
             texts: tuple[str, ...] = ()
             if names_joints(name, item.shape) and library.check_string_dtype(item.dtype):
-                texts = tuple(item.asstr()[()].ravel().tolist())
-            found[name] = StoredArray(item.shape, item.dtype.kind in NUMBERS, texts, _unit(item))
+                texts = self._texts(item)
+            found[name] = StoredArray(item.shape, _size(item), item.dtype.kind in NUMBERS, texts, _unit(item))
 
         with self._file() as file:
             found.update(_named_by_attributes("", file))
             file.visititems(visit)
         return found
+
+    def _texts(self, item: Any) -> tuple[str, ...]:
+        """Texts of a dataset, one after the other: many may refer to one that is long."""
+        require_held(self.path, _size(item))
+        texts, length, readable = list[str](), 0, item.asstr()
+        for at in np.ndindex(item.shape):
+            texts.append(str(readable[at]))
+            length += len(texts[-1])
+            require_held(self.path, length)
+        return tuple(texts)
 
     @contextmanager
     def opened(self) -> Iterator[Callable[[str], Any]]:
@@ -49,6 +69,12 @@ class Hdf5Arrays:
         library = extra("h5py")
         with read_as("an HDF5 file", self.path), library.File(self.path, "r") as file:
             yield file
+
+
+def _size(item: Any) -> int:
+    """Bytes that a dataset takes in memory, or one of its chunks if that is more."""
+    count: int = max(math.prod(item.shape), math.prod(item.chunks or ()))
+    return count * int(item.dtype.itemsize)
 
 
 def _unit(item: Any) -> str:

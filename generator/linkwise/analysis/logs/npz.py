@@ -1,5 +1,6 @@
 """Arrays by name in NumPy's .npz files."""
 
+import math
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ import numpy as np
 from linkwise.analysis.logs.array_columns import NUMBERS, StoredArray, names_joints
 from linkwise.analysis.logs.damaged_files import read_as
 from linkwise.analysis.logs.named_once import named_once
+from linkwise.analysis.logs.promised_size import require_held
 from linkwise.errors import LinkwiseError
 
 
@@ -28,19 +30,25 @@ class NpzArrays:
         """
         found = {}
         with self.opened() as get, zipfile.ZipFile(self.path) as file:
-            members = file.namelist()
-            names = named_once([member.removesuffix(".npy") for member in members], "arrays")
+            members = file.infolist()
+            names = named_once([member.filename.removesuffix(".npy") for member in members], "arrays")
             for name, member in zip(names, members, strict=True):
                 with file.open(member) as array:
-                    shape, kind = _header(array)
+                    shape, dtype = _header(array)
+                size = math.prod(shape) * dtype.itemsize
+                if dtype.kind != "O" and size > member.file_size:
+                    raise LinkwiseError(
+                        f"array {name!r} has {member.file_size:,} of its {size:,} bytes; write the file again"
+                    )
                 texts: tuple[str, ...] = ()
-                if names_joints(name, shape) and kind == "O":
+                if names_joints(name, shape) and dtype.kind == "O":
                     raise LinkwiseError(
                         f"array {name!r} holds Python objects; save texts, as numpy.array([...]) makes them"
                     )
-                if names_joints(name, shape) and kind in "US":
+                if names_joints(name, shape) and dtype.kind in "US":
+                    require_held(self.path, size)
                     texts = tuple(get(name).astype(str).ravel().tolist())
-                found[name] = StoredArray(shape, kind in NUMBERS, texts)
+                found[name] = StoredArray(shape, size, dtype.kind in NUMBERS, texts)
         return found
 
     @contextmanager
@@ -50,11 +58,11 @@ class NpzArrays:
             yield np.load(file, allow_pickle=False).__getitem__
 
 
-def _header(array: IO[bytes]) -> tuple[tuple[int, ...], str]:
-    """Shape of an array, and the kind of its numbers."""
+def _header(array: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape of an array, and the type of its numbers."""
     version = np.lib.format.read_magic(array)
     if version > (2, 0):  # fields with names in Unicode: a table of its own, and not an array
-        return (), "V"
+        return (), np.dtype("V")
     reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, dtype = reader(array)
-    return shape, dtype.kind
+    return shape, dtype

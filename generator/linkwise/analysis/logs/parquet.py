@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.errors import LinkwiseError
+from linkwise.analysis.logs.promised_size import require_held
+from linkwise.errors import LinkwiseError, within
 from linkwise.escape import one_line
 from linkwise.extras import extra
 from linkwise.package.load import Array
 
 LONGEST_REASON = 200
 """Characters of what pyarrow says."""
+FLOAT64 = 8
+"""Bytes of a number."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,8 @@ class ParquetLog:
             names = tuple(metadata.schema.to_arrow_schema().names)
         except _unreadable(arrow) as error:
             raise LinkwiseError(f"{path}: not Parquet, or cut off") from error
+        with within(str(path)):
+            require_held(path, FLOAT64 * metadata.num_rows)
         return cls(path, names, metadata.num_rows)
 
     def read(self, columns: Sequence[int], rows: int = 65536) -> Iterator[tuple[Array, int]]:
@@ -49,6 +54,11 @@ class ParquetLog:
         names, done = [self.columns[column] for column in columns], 0
         # A buffer ahead of the reader would keep all of the file in memory until its end.
         with extra("pyarrow.parquet").ParquetFile(self.path, pre_buffer=False) as file:
+            for name in names:
+                kind = file.schema_arrow.field(name).type
+                # Before any is read: a row may refer to a text that is as long as the file.
+                if not _is_numeric(arrow.types, kind):
+                    raise LinkwiseError(f"{self.path}: column {name!r} holds {kind}, not numbers")
             batches = file.iter_batches(rows, columns=names)
             while (batch := self._next(batches, done)) is not None:
                 block = np.empty((batch.num_rows, len(names)))
@@ -71,6 +81,13 @@ class ParquetLog:
             raise LinkwiseError(
                 f"{self.path}: after row {done}: damaged ({reason}); write the file again"
             ) from error
+
+
+def _is_numeric(types: Any, kind: Any) -> bool:
+    """Whether a type of pyarrow's is of numbers, or of nothing but empty cells."""
+    kind = kind.value_type if types.is_dictionary(kind) else kind
+    asked = types.is_integer, types.is_floating, types.is_boolean, types.is_decimal, types.is_null
+    return any(is_kind(kind) for is_kind in asked)
 
 
 def _unreadable(arrow: Any) -> tuple[type[Exception], ...]:

@@ -4,18 +4,19 @@ A hinge's or slide's coordinate is its qpos. Where MuJoCo has a quaternion, a ba
 and a free joint by those after x, y, z of the world.
 """
 
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-from warnings import catch_warnings, simplefilter
 
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
+from linkwise.own_process import Ended, OutOfTime, ProcessLimits, in_own_process
 from linkwise.robot import transforms
 from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Description, Site
 from linkwise.robot.notes import WARNED, Note
+from linkwise.robot.readers.mjcf_compiled import compiled
 from linkwise.robot.readers.mjcf_equality import equalities
+from linkwise.robot.readers.mjcf_files import mjcf_files
 from linkwise.robot.readers.mjcf_options import switched_off
 from linkwise.robot.readers.mjcf_passive import limits_of, passive_of
 from linkwise.robot.readers.mjcf_tendons import joints_of
@@ -26,16 +27,29 @@ TYPES = ("floating", "ball", "prismatic", "revolute")
 """Joint types in the order of MuJoCo's mjtJoint: free, ball, slide, hinge."""
 
 
-def read_mjcf(path: Path) -> Description:
-    """Read a robot; raises LinkwiseError with MuJoCo's own words, or when MuJoCo is missing."""
-    mujoco = extra("mujoco")
-    return _described(mujoco, path, *_compiled(mujoco, path))
+LIMITS = ProcessLimits(seconds=15, memory=750 << 20)
+"""What MuJoCo may take for a file; the largest robots known take 1 s."""
 
 
-def read_mjcf_text(path: Path, text: bytes) -> Description:
-    """Read a robot as if the file had another text; raises LinkwiseError as `read_mjcf` does."""
-    mujoco = extra("mujoco")
-    return _described(mujoco, path, *_compiled(mujoco, path, text))
+def read_mjcf(path: Path, text: bytes | None = None) -> Description:
+    """Read a robot, as if the file had another text if one is given.
+
+    Raises LinkwiseError with MuJoCo's own words, for a file that takes it too much time or memory, or when
+    MuJoCo is missing.
+    """
+    mujoco, files = extra("mujoco"), mjcf_files(path)
+    try:
+        return in_own_process(lambda: _described(mujoco, path, *compiled(mujoco, files, text)), LIMITS)
+    except MemoryError:
+        fault = f"takes more than {LIMITS.memory >> 20} MiB of memory"
+    except OutOfTime:
+        fault = f"takes more than {LIMITS.seconds} s of processor time"
+    except Ended as end:
+        fault = f"does not survive it: {end}"
+    raise LinkwiseError(
+        f"MuJoCo's compiler {fault}; repeat less, leave out what does not move, and give bodies an"
+        " <inertial>, which spares their meshes"
+    )
 
 
 def _described(mujoco: Any, path: Path, model: Any, warnings: list[str]) -> Description:
@@ -64,45 +78,6 @@ def _described(mujoco: Any, path: Path, model: Any, warnings: list[str]) -> Desc
         driven=_driven(mujoco, model, joints),
         ordered=True,
     )
-
-
-def mjcf_files(path: Path) -> tuple[Path, ...]:
-    """Return the files that MuJoCo reads of a robot: its own, what it includes, and its assets.
-
-    Meshes are among them, for a body without an inertia of its own gets that of its meshes.
-    """
-    mujoco = extra("mujoco")
-    if not hasattr(mujoco, "mju_getXMLDependencies"):  # before MuJoCo 3.4
-        return (path,)
-    return tuple(Path(name) for name in mujoco.mju_getXMLDependencies(str(path)))
-
-
-def _compiled(mujoco: Any, path: Path, text: bytes | None = None) -> tuple[Any, list[str]]:
-    """Compiled model, and MuJoCo's warnings, which it would write into a file in the working directory.
-
-    text: what stands in the file's place
-    """
-    warnings: list[str] = []
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(warnings.append)
-    try:
-        if text is None:
-            return mujoco.MjModel.from_xml_path(str(path)), warnings
-        included = [
-            own for own in mjcf_files(path) if own.suffix == ".xml" and own.resolve() != path.resolve()
-        ]
-        spec = mujoco.MjSpec.from_string(
-            text.decode(), {os.path.relpath(own, path.parent): own.read_bytes() for own in included}
-        )
-        spec.modelfiledir = str(path.parent)
-        with catch_warnings(record=True) as noted:
-            simplefilter("always")
-            return spec.compile(), [*warnings, *(str(one.message) for one in noted)]
-    except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
-        told = "; ".join(" ".join(text.split()) for text in (str(error), *warnings))
-        raise LinkwiseError(f"MuJoCo cannot compile it: {told}") from None
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def _driven(mujoco: Any, model: Any, joints: list[str]) -> tuple[str, ...]:

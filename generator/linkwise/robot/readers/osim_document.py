@@ -13,7 +13,8 @@ from linkwise.robot.readers.xml_file import parse
 
 LARGEST = 64 * MIB
 """Models of a whole spine have hundreds of muscles."""
-COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+COMMENT = re.compile(rb"<!--.*?(?:-->|\Z)", re.DOTALL)
+"""One that does not end is one to the file's end: tried again from each that begins, it takes for ever."""
 BLACK = re.compile(rb"[^\n]")
 CLASS_OF_CLASS = re.compile(rb"(</?\w+)::")
 """As in <HuntCrossleyForce::ContactParametersSet>, which OpenSim writes and XML forbids."""

@@ -11,6 +11,8 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot.readers.bounded import MIB, content
 
 XACRO = "this is xacro, a language of macros; expand it first: xacro FILE > robot.urdf"
+LARGEST = 4 * MIB
+"""Bytes of a file."""
 MAX_DEPTH = 256
 """Most elements inside each other: MJCF nests the links of a chain."""
 
@@ -42,7 +44,7 @@ class _Builder(TreeBuilder):
         return super().end(tag)
 
 
-def parse(path: Path, largest: int = 4 * MIB, as_xml: Callable[[bytes], bytes] | None = None) -> Element:
+def parse(path: Path, largest: int = LARGEST, as_xml: Callable[[bytes], bytes] | None = None) -> Element:
     """Root element; raises LinkwiseError for malformed XML, and for xacro, which is to be expanded first.
 
     largest: most bytes of the file; as_xml: what makes XML of a file that is not quite

@@ -1,0 +1,104 @@
+"""Work that a fault of compiled code may end, or that may not end, done in a process of its own."""
+
+import faulthandler
+import os
+import pickle
+import signal
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from linkwise.runtime.native.native_system import system_here
+
+T = TypeVar("T")
+
+ON_THE_CLOCK = 10
+"""Seconds of the clock for each of processor time: so much slower is a machine that many share."""
+
+
+class Ended(Exception):
+    """The process ended before it answered; the message says by what."""
+
+
+class OutOfTime(Ended):
+    """It took more time than it had."""
+
+
+@dataclass(frozen=True)
+class ProcessLimits:
+    """What work may take: s of processor time, and bytes of memory beyond what this process holds."""
+
+    seconds: int
+    memory: int
+
+
+def in_own_process(work: Callable[[], T], limits: ProcessLimits | None = None) -> T:
+    """Answer of `work`, from a fork of this process; raises Ended where a signal ends that one.
+
+    What `work` raises comes back too, a MemoryError where it wants more than the limits have. Where a fork
+    cannot compute, it is done in this process, without limits.
+    """
+    if not system_here().forks:
+        return work()
+    reader, writer = os.pipe()
+    with warnings.catch_warnings():  # `work` computes with NumPy or MuJoCo alone, which fork beside threads
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if not child:
+        _answer(work, writer, limits)
+    os.close(writer)
+    try:
+        with os.fdopen(reader, "rb") as pipe:
+            answer = pipe.read()
+    except BaseException:  # above all an interrupt, which compiled code does not heed
+        os.kill(child, signal.SIGKILL)
+        raise
+    finally:
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if limits and -status in (signal.SIGXCPU, signal.SIGALRM):
+        raise OutOfTime(f"it took more than {limits.seconds} s")
+    if status < 0:
+        raise Ended(f"it ended the process by {signal.Signals(-status).name}")
+    if not answer:
+        raise Ended("it ended the process")
+    succeeded, result = pickle.loads(answer)
+    if not succeeded:
+        raise result
+    return result  # type: ignore[no-any-return]
+
+
+def _answer(work: Callable[[], T], writer: int, limits: ProcessLimits | None) -> None:
+    """Write what `work` gives or raises, and end this process without more ado."""
+    faulthandler.disable()  # the parent tells by what signal it ended, in a line
+    try:
+        if limits:
+            _hold(limits)
+        try:
+            answer = pickle.dumps((True, work()))
+        except Exception as error:
+            answer = pickle.dumps((False, error))
+        with os.fdopen(writer, "wb") as pipe:
+            pipe.write(answer)
+    finally:
+        os._exit(0)
+
+
+def _hold(limits: ProcessLimits) -> None:
+    """Have the system end this process, or refuse it memory, where it would take more than the limits."""
+    import resource  # is there where forks are
+
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # what C++ says of its end; the parent says it in a line
+    for number in (signal.SIGXCPU, signal.SIGALRM):
+        signal.signal(number, signal.SIG_DFL)
+    signal.alarm(ON_THE_CLOCK * limits.seconds)
+    most = {resource.RLIMIT_CORE: 0, resource.RLIMIT_CPU: limits.seconds}
+    with suppress(OSError):  # no /proc, as on BSD: there the limit would not be of memory that is mapped
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5])
+        most[resource.RLIMIT_DATA] = pages * resource.getpagesize() + limits.memory
+    for kind, wanted in most.items():
+        hard = resource.getrlimit(kind)[1]
+        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+        resource.setrlimit(kind, (soft, hard))

@@ -1,0 +1,56 @@
+"""Work apart: its answer and its errors come back, and it ends when its limits or this process say so."""
+
+import os
+import signal
+import time
+from types import FrameType
+
+import pytest
+from linkwise.errors import LinkwiseError
+from linkwise.own_process import Ended, OutOfTime, ProcessLimits, in_own_process
+
+LIMITS = ProcessLimits(seconds=1, memory=64 << 20)
+
+
+def fail() -> None:
+    raise LinkwiseError("so it is")
+
+
+def turn() -> None:
+    while True:
+        pass
+
+
+def test_answers_and_errors_come_back() -> None:
+    assert in_own_process(lambda: os.getpid()) != os.getpid()
+    with pytest.raises(LinkwiseError, match="so it is"):
+        in_own_process(fail, LIMITS)
+    with pytest.raises(Ended, match="by SIGABRT"):
+        in_own_process(os.abort, LIMITS)
+
+
+def test_limits_are_of_what_the_work_takes_itself() -> None:
+    held = bytearray(256 << 20)
+    assert in_own_process(lambda: len(bytearray(16 << 20)), LIMITS) == 16 << 20
+    with pytest.raises(MemoryError):
+        in_own_process(lambda: len(bytearray(128 << 20)), LIMITS)
+    with pytest.raises(OutOfTime, match="it took more than 1 s"):
+        in_own_process(turn, LIMITS)
+    assert len(held) == 256 << 20
+
+
+def test_an_interrupt_ends_the_work_too() -> None:
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.2)
+    start = time.monotonic()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            in_own_process(lambda: time.sleep(60))
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert time.monotonic() - start < 20
+    with pytest.raises(ChildProcessError):  # and no child is left
+        os.waitpid(-1, os.WNOHANG)
