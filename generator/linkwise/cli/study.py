@@ -20,7 +20,10 @@ WhichEngine = Annotated[
 ]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one for each core if not given")]
 Address = Annotated[
-    str | None, typer.Option(help="Address of Ray's cluster; one that is running if not given")
+    str | None,
+    typer.Option(
+        help="Address of Ray's cluster, auto for one that runs here; one of this machine alone if not given"
+    ),
 ]
 TrustPython = Annotated[
     bool,
