@@ -9,13 +9,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from glob import escape, glob
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.input_file import require_file
+from linkwise.output import passing_folder
 
 STORES = ("s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "oss", "http", "https")
 """Kinds of addresses that are read."""
@@ -76,8 +76,8 @@ def opened_here(path: str) -> Iterator[Path]:
     name = path.rpartition("/")[2]
     if name in ("", ".", ".."):
         raise LinkwiseError(f"{path}: an address of a folder; give one of a file")
-    with TemporaryDirectory() as folder:
-        copy = Path(folder) / name
+    with passing_folder() as folder:
+        copy = folder / name
         copied_here(path, copy)
         yield copy
 
