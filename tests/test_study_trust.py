@@ -63,6 +63,15 @@ def test_python_beside_a_study_is_run_only_where_that_is_asked_for_and_then_told
     assert f"note: {tmp_path}/cart.py is a Python program, which was run" in done.stderr.splitlines()
 
 
+def test_a_trial_of_a_changed_program_is_done_again(tmp_path: Path) -> None:
+    file, out = with_program(tmp_path, "cart.py"), tmp_path / "out"
+    fresh = []
+    for _ in range(2):
+        fresh += [run_study(file, out, Here(), trust_python=True).fresh for _ in range(2)]
+        (tmp_path / "cart.py").write_text(ENERGIES.replace("M: 2.0", "M: 3.0"))
+    assert fresh == [1, 0, 1, 0]
+
+
 @pytest.mark.parametrize(
     "command",
     [
