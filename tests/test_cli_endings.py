@@ -180,6 +180,36 @@ def test_a_full_disk_behind_stdout_is_one_line() -> None:
     )
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="needs ulimit -v")
+def test_bounded_addresses_are_enough_or_told(tmp_path: Path) -> None:
+    """Arrow reserves a gigabyte otherwise, and ends the process where what is left does not suffice."""
+    pytest.importorskip("pyarrow")
+    shown = "from linkwise.extras import extra; print(extra('pyarrow').default_memory_pool().backend_name)"
+
+    def run(bound: int) -> subprocess.CompletedProcess[str]:
+        words = ["sh", "-c", f'ulimit -v {bound}; exec "$@"', "sh", sys.executable, "-c", shown]
+        return subprocess.run(words, capture_output=True, text=True, check=False)
+
+    assert run(1_500_000).stdout == "system\n"
+    assert (
+        "LinkwiseError: ulimit -v leaves 0.92 GB of addresses, too few for pyarrow; allow a"
+        in run(900_000).stderr
+    )
+
+
+@pytest.mark.parametrize("closed", ["2>&-", ">&-", "<&- >&- 2>&-"])
+def test_streams_that_the_caller_closed_change_nothing_else(closed: str, tmp_path: Path) -> None:
+    def run(*words: str) -> tuple[int, str]:
+        command = ["sh", "-c", f'exec "$@" {closed}', "sh", *COMMAND, *words]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
+        return done.returncode, done.stdout
+
+    assert run("inspect", "gone.toml") == (2, "")
+    status, printed = run("generate", "planar1", "--out", "out", "--backend", "numpy")
+    assert (status, printed) == (0, "")
+    assert (tmp_path / "out/planar1/manifest.json").is_file()
+
+
 def test_letters_that_the_terminal_lacks_are_written_as_escapes() -> None:
     done = subprocess.run(
         [*COMMAND, "report", "terms", "planar1"],

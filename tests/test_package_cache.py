@@ -128,10 +128,12 @@ def test_a_package_is_itself_and_what_is_neither_is_refused_in_a_line(tmp_path: 
         assert not (tmp_path / "out").exists()
 
 
-def test_a_cache_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("LINKWISE_CACHE", str(tmp_path / "file"))
-    with pytest.raises(LinkwiseError, match=r"knee\.osim: no package of it can be kept: .*LINKWISE_CACHE"):
+@pytest.mark.parametrize("blocked", ["cache", "cache/packages"])
+def test_a_cache_that_cannot_be_written_is_told_with_the_mend(blocked: str, cache: Path) -> None:
+    (cache.parent / blocked).parent.mkdir(mode=0o700, exist_ok=True)
+    (cache.parent / blocked).touch()
+    mend = r"knee\.osim: no package of it can be kept: .*; set LINKWISE_CACHE to another directory$"
+    with pytest.raises(LinkwiseError, match=mend):
         kept_package(KNEE)
 
 

@@ -80,6 +80,3 @@ def test_what_is_not_in_the_store_is_told(store: Any, tmp_path: Path) -> None:
     file = write_study(tmp_path, HEAD, trial)
     with pytest.raises(LinkwiseError, match=r"trial 'a': s3://lab/gone\.csv: no such file"):
         run_study(file, tmp_path / "out", Here())
-    file.write_text(HEAD + trial.replace("s3://", "nowhere://"))
-    with pytest.raises(LinkwiseError, match=r"nowhere://lab/gone\.csv: Protocol not known"):
-        run_study(file, tmp_path / "out", Here())

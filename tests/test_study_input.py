@@ -7,7 +7,7 @@ from linkwise import LinkwiseError
 from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.study import run_study
 from linkwise.study.column_patterns import fitting
-from studies import CHOICES, HEAD, TRIALS, Here, write_study
+from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 
 BAD: dict[str, tuple[tuple[str, ...], str]] = {
     "unknown key": ((HEAD, "speed = 1\n", TRIALS), "the file has the unknown key 'speed'; known are "),
@@ -92,6 +92,36 @@ def test_a_folder_of_something_else_stays(tmp_path: Path) -> None:
     (tmp_path / "out/mine.txt").touch()
     with pytest.raises(LinkwiseError, match="exists and is not a former study"):
         run_study(file, tmp_path / "out", Here())
+
+
+DAMAGED = {
+    "no state": ('"state": "done"', '"state": 5', "state is not 'begun' or 'done'"),
+    "no name": ('"files": [', '"files": ["..", ', "'..' among 'files' is not a file's name"),
+    "cut": ('"state"', "", "Expecting property name"),
+    "deep": ('"done"', "[" * 100_000, "nested too deeply"),
+}
+
+
+@pytest.mark.parametrize("case", DAMAGED)
+def test_a_damaged_mark_of_a_study_is_told_and_what_is_there_stays(case: str, tmp_path: Path) -> None:
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
+    run_study(file, out, Here())
+    right, wrong, reason = DAMAGED[case]
+    mark = out / "study.json"
+    mark.write_text(mark.read_text().replace(right, wrong))
+    before = sorted(out.rglob("*"))
+    with pytest.raises(LinkwiseError) as caught:
+        run_study(file, out, Here())
+    assert str(caught.value).startswith(f"{mark} is damaged: {reason}")
+    assert str(caught.value).endswith("; give another --out")
+    assert sorted(out.rglob("*")) == before
+
+
+def test_a_damaged_record_of_a_trial_has_it_done_again(tmp_path: Path) -> None:
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
+    run_study(file, out, Here())
+    (out / "trials/S1-fast-1/_record.json").write_text("[" * 100_000)
+    assert run_study(file, out, Here()).fresh == 1
 
 
 def test_a_folder_of_another_study_stays(tmp_path: Path) -> None:

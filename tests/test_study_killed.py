@@ -115,12 +115,19 @@ import multiprocessing, os, pathlib, signal
 opened = pathlib.Path.open
 
 def deadly(self, mode="r", *rest, **more):
-    if self.name == "fast_1.csv" and mode == "rb" and multiprocessing.parent_process():
-        os.kill(os.getpid(), {0})
+    if self.name == "fast_1.csv" and mode == "rb" and {who} multiprocessing.parent_process():
+        os.kill(os.getpid(), signal.{deadly})
     return opened(self, mode, *rest, **more)
 
 pathlib.Path.open = deadly
 """
+
+
+def killing(folder: Path, who: str, deadly: str) -> dict[str, str]:
+    """Surroundings in which processes are ended so: workers, or "not" workers."""
+    (folder / "sitecustomize.py").write_text(KILLER.format(who=who, deadly=deadly))
+    paths = [str(folder), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {"PYTHONPATH": os.pathsep.join(paths)}
 
 
 @pytest.mark.parametrize("deadly", ["SIGKILL", "SIGTERM"])
@@ -128,10 +135,23 @@ def test_a_process_that_dies_takes_its_trial_alone(tmp_path: Path, deadly: str) 
     """A worker is ended whenever it opens one of the logs, as the system does where memory ends."""
     file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1)
     out = tmp_path / "out"
-    (tmp_path / "sitecustomize.py").write_text(KILLER.format(f"signal.{deadly}"))
-    study = begun(file, out, PYTHONPATH=str(tmp_path))
+    study = begun(file, out, **killing(tmp_path, "", deadly))
     said, told = study.communicate(timeout=60)
     assert study.returncode == 1, told
     assert "broken: S1-fast-1: its process died" in told
     assert said.startswith("1 trials done, 0 of them before, 1 broken")
-    assert not list(out.rglob(".linkwise-*")) or deadly == "SIGKILL"
+    assert not list(out.rglob(".linkwise-*"))
+
+
+def test_what_a_killed_study_left_among_passing_files_goes_with_the_next(tmp_path: Path) -> None:
+    """It is killed while it looks at the first log, whose samples are then in a folder that passes."""
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1)
+    (passing := tmp_path / "passing").mkdir()
+    study = begun(file, tmp_path / "out", TMPDIR=str(passing), **killing(tmp_path, "not", "SIGKILL"))
+    study.communicate(timeout=60)
+    assert study.returncode == -signal.SIGKILL
+    assert list(passing.iterdir())
+    study = begun(file, tmp_path / "out", TMPDIR=str(passing))
+    _, told = study.communicate(timeout=60)
+    assert study.returncode == 0, told
+    assert not list(passing.iterdir())

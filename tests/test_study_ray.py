@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -59,6 +61,50 @@ def test_every_trial_is_there_once_though_a_worker_dies(nodes: Any, tmp_path: Pa
     counts = pd.read_parquet(tmp_path / "out/trials").groupby("trial", observed=True).size()
     assert len(counts) == 12
     assert set(counts) == {300}
+
+
+LISTENING = """
+import os
+from pathlib import Path
+from linkwise.study import RayCluster
+
+before = dict(os.environ)
+assert list(RayCluster().outcomes(())) == []
+assert {name: os.environ.get(name) for name in before} == before
+parents = {int(stat.parent.name): int(stat.read_text().rpartition(")")[2].split()[1])
+           for stat in Path("/proc").glob("[0-9]*/stat") if stat.exists()}
+
+def is_ours(pid):
+    return pid == os.getpid() or pid in parents and is_ours(parents[pid])
+
+sockets = {os.readlink(file) for pid in filter(is_ours, parents) for file in Path(f"/proc/{pid}/fd").glob("*")
+           if os.path.lexists(file)}
+for table in ("tcp", "tcp6"):
+    for row in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+        columns = row.split()
+        if columns[3] == "0A" and f"socket:[{columns[9]}]" in sockets:
+            print(columns[1].partition(":")[0])
+"""
+"""Begins a cluster, and prints the addresses that its processes listen at, as Linux writes them."""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+def test_a_cluster_of_this_machine_is_heard_by_no_other() -> None:
+    environment = os.environ | {"RAY_USAGE_STATS_ENABLED": "0"}
+    environment.pop("RAY_ADDRESS", None)
+    command = [sys.executable, "-c", LISTENING]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    found = set(done.stdout.split())
+    assert found
+    assert found <= {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
+
+
+def test_a_ray_that_would_listen_to_other_machines_is_not_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    with pytest.raises(LinkwiseError, match=r"^Ray was imported before .* call ray\.init yourself$"):
+        next(RayCluster().outcomes(()))
+    assert not ray.is_initialized()
 
 
 def test_a_cluster_that_does_not_answer_is_told_at_once() -> None:

@@ -18,7 +18,7 @@ from linkwise.pipeline import plan, read_system
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, is_description, robot_files
 from linkwise.robot.notes import effects
-from linkwise.runtime.native.native_cache import cache_directory, locked
+from linkwise.runtime.native.native_cache import ELSEWHERE, cache_directory, locked
 
 USUAL = ("numpy", "native")
 """Back ends that an analysis asks for by itself."""
@@ -58,13 +58,22 @@ def kept_package(
         return KeptPackage(Path(robot))
     backends = USUAL if backend is None else (backend,)
     try:
-        kept = cache_directory() / "packages"
-        kept.mkdir(exist_ok=True)
+        kept = _all_kept()
         with locked(kept / ".lock", lambda _: None):
             folder = kept / _key(robot, backends, options)
             return _kept(robot, folder, backends, options, progress)
     except (RuntimeError, OSError) as error:
         raise LinkwiseError(f"{robot}: no package of it can be kept: {error}") from error
+
+
+def _all_kept() -> Path:
+    """The folder of all packages, made if need be; raises RuntimeError where it cannot be."""
+    kept = cache_directory() / "packages"
+    try:
+        kept.mkdir(exist_ok=True)
+    except OSError as error:
+        raise RuntimeError(f"cannot make {kept}: {error.strerror}; {ELSEWHERE}") from error
+    return kept
 
 
 def _kept(

@@ -33,11 +33,18 @@ from linkwise.robot.robot import Robot
 from linkwise.symbolic.system import System, rigid_system
 from linkwise.symbolic.user_energies import read_energies
 
+PYTHON = ".py"
+
+
+def is_program(spec: str | Path) -> bool:
+    """Whether a robot is a Python file of energies, which is run to read it."""
+    return Path(spec).suffix == PYTHON and is_file(Path(spec))
+
 
 def read_system(spec: str | Path, options: Options | None = None) -> System:
     """System of a built-in robot, a robot's file, or a Python file of energies; raises LinkwiseError."""
     options = options or Options()
-    if Path(spec).suffix == ".py" and is_file(Path(spec)):
+    if is_program(spec):
         with within(str(spec)):
             rigid = [f"--{name.replace('_', '-')}" for name in options.given if name != "parameters"]
             if rigid:

@@ -27,7 +27,7 @@ def ended_in_one_line() -> Iterator[None]:
     """Turn what is raised inside into a line on stderr and SystemExit."""
     try:
         yield
-        _flush()  # a full disk or a closed pipe shows here, and not after the end
+        sys.stdout.flush()  # a full disk or a closed pipe shows here, and not after the end
     except (Exception, KeyboardInterrupt) as error:
         if isinstance(error, OSError):
             _let_go_of_output()
@@ -43,16 +43,11 @@ def ended_in_one_line() -> Iterator[None]:
 def _let_go_of_output() -> None:
     """Print what waits; where that cannot be, send it nowhere, as Python would try again at its end."""
     try:
-        _flush()
+        sys.stdout.flush()
     except OSError:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
-
-
-def _flush() -> None:
-    if sys.stdout is not None:  # closed by the caller
-        sys.stdout.flush()
 
 
 def ending(error: BaseException) -> tuple[str, int]:

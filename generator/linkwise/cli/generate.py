@@ -16,7 +16,7 @@ import typer
 from linkwise import pipeline
 from linkwise.cli import Details, counted, tell
 from linkwise.cli.depfile import depfile_text, own_modules
-from linkwise.cli.options import RobotNames, reads_robot
+from linkwise.cli.options import RobotNames, reads_robot, tell_run
 from linkwise.dynamics.derive import Method
 from linkwise.emit.backend import BACKENDS
 from linkwise.errors import LinkwiseError
@@ -129,6 +129,7 @@ def generate(
         sweep(out)  # also where this one is refused: an earlier one may have died in its exchange
     asked = Choices(options, out, name, tuple(backend or ()), kernel, derivation, replace)
     orders = [_order(spec, asked) for spec in robot]
+    tell_run(*robot)
     _check_places(orders)
     if depfile is not None or stamp is not None:
         _check_side_files(orders, [place for place in (depfile, stamp) if place is not None], options)

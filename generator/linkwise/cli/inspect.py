@@ -9,7 +9,7 @@ import typer
 from linkwise import pipeline
 from linkwise.cli import Json, counted
 from linkwise.cli.inspect_page import SUBJECTS, page
-from linkwise.cli.options import RobotName, reads_robot
+from linkwise.cli.options import RobotName, reads_robot, tell_run
 from linkwise.emit.definition import joint_entries, rigid_tree
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, listed, printable
@@ -39,6 +39,7 @@ def inspect(
 ) -> None:
     """Show a robot's joints, links, parameters, and what was merged, locked, ignored or left out."""
     system, refused = _system(robot, options)
+    tell_run(robot)
     data = inspection(system, details, refused)
     if as_json:
         print(json_text(data, indent=1))

@@ -9,7 +9,9 @@ from typing import Annotated, Any, Literal, cast
 
 import typer
 
+from linkwise.cli import tell
 from linkwise.errors import LinkwiseError
+from linkwise.pipeline import is_program
 from linkwise.robot import DESCRIPTIONS, Options
 
 Parameters = Literal["numeric", "nonzero", "symbolic"]
@@ -20,6 +22,12 @@ PANEL = "Reading the robot"
 
 def _flag(*names: str, help: str, metavar: str | None = None) -> Any:
     return typer.Option(*names, help=help, rich_help_panel=PANEL)
+
+
+def tell_run(*robots: str | Path) -> None:
+    """Say, in a line each, which of these robots are programs, and so were run to be read."""
+    for robot in filter(is_program, robots):
+        tell(f"note: {robot} is a Python program, which was run", err=True)
 
 
 def robot_options(

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from linkwise.cli import BUDGET, Budget, Json, ReportOut
-from linkwise.cli.options import reads_robot
+from linkwise.cli.options import reads_robot, tell_run
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
 from linkwise.output import require_writable, write_files
@@ -65,6 +65,7 @@ def reduction(
     """Draw the share of terms of τ_1 that its q̈_1 part does not need (the paper's Fig. 15)."""
     first, last = (1, ASKED_FOR) if dof is None else dof_range(dof)
     name, system, beyond = _arm(robot, last, options)
+    tell_run(robot)
     if dof is None:
         last = min(last, len(system.links))
     found = None if seconds is None else read_seconds(seconds)

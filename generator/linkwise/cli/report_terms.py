@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from linkwise.cli import BUDGET, Budget, Json, ReportOut, tell
-from linkwise.cli.options import RobotName, reads_robot
+from linkwise.cli.options import RobotName, reads_robot, tell_run
 from linkwise.errors import LinkwiseError
 from linkwise.output import require_writable, write_files
 from linkwise.package.write import refuse_inside_package
@@ -48,6 +48,7 @@ def terms(
             f"--order is {order}; choose 2 for acceleration, 1 for velocity, 0 for potential energy"
         )
     system = read_system(robot, options)
+    tell_run(robot)
     joints, links = [c.name for c in system.coordinates], system.link_names
     query = TermQuery(
         None if joint == "all" else position(joint, joints, "--joint"),

@@ -7,6 +7,7 @@ import typer
 
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.cli import tell
+from linkwise.cli.options import tell_run
 from linkwise.package_cache import kept_package
 from linkwise.progress import Progress
 from linkwise.robot import Options
@@ -17,8 +18,12 @@ RobotOption = Annotated[
 
 
 def opened_robot(robot: Path, backend: str | None, options: Options, progress: Progress) -> LoadedRobot:
-    """The robot, loaded; says what of a file touches the torques. Raises LinkwiseError."""
+    """The robot, loaded; says that it was run, if it is a program, and what of a file touches the torques.
+
+    Raises LinkwiseError.
+    """
     kept = kept_package(robot, backend, options, progress)
+    tell_run(robot)
     for warning in kept.warnings:
         tell(f"warning: {warning}", err=True)
     return load_robot(kept.directory, backend)

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from linkwise.cli import tell
+from linkwise.cli.options import tell_run
 from linkwise.progress import progress as shown_progress
 from linkwise.study import ProcessPool, RayCluster, run_study
 
@@ -19,7 +20,17 @@ WhichEngine = Annotated[
 ]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one for each core if not given")]
 Address = Annotated[
-    str | None, typer.Option(help="Address of Ray's cluster; one that is running if not given")
+    str | None,
+    typer.Option(
+        help="Address of Ray's cluster, auto for one that runs here; one of this machine alone if not given"
+    ),
+]
+TrustPython = Annotated[
+    bool,
+    typer.Option(
+        "--trust-python",
+        help="Run robots of the study that are Python files; refused otherwise, as code may do anything",
+    ),
 ]
 
 app = typer.Typer(add_completion=False)
@@ -32,11 +43,13 @@ def study(
     engine: WhichEngine = "processes",
     workers: Workers = None,
     address: Address = None,
+    trust_python: TrustPython = False,
 ) -> None:
     """Many recordings: every trial analysed, and what they say together; also on a cluster."""
     chosen = ProcessPool(workers) if engine == "processes" else RayCluster(address)
     with shown_progress({"trials": "trials"}) as progress:
-        found = run_study(file, out, chosen, progress)
+        found = run_study(file, out, chosen, progress, trust_python)
+    tell_run(*dict.fromkeys(trial.robot for trial in found.plan.trials))
     for warning in found.warnings:
         tell(f"warning: {warning}", err=True)
     for one in found.broken:

@@ -5,7 +5,7 @@ it made is put in place by one step of the file system, `exchange`. After a kill
 or the new one is there whole, and the next linkwise that comes by removes what the dead one left.
 """
 
-from linkwise.output.workplace import sweep
+from linkwise.output.workplace import passing_folder, sweep
 from linkwise.output.writer import require_writable, whole_directory, write_files
 
-__all__ = ["require_writable", "sweep", "whole_directory", "write_files"]
+__all__ = ["passing_folder", "require_writable", "sweep", "whole_directory", "write_files"]

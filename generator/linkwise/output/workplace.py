@@ -51,6 +51,17 @@ def workplace(parent: Path) -> Iterator[Path]:
 
 
 @contextmanager
+def passing_folder() -> Iterator[Path]:
+    """Yield a new folder where the system keeps what passes, for what nobody is to find; it goes at the end.
+
+    After a kill it goes with the next sweep of that place.
+    """
+    with workplace(Path(tempfile.gettempdir())) as work:
+        (work / NEW).mkdir()
+        yield work / NEW
+
+
+@contextmanager
 def signals_held() -> Iterator[None]:
     """Let signals wait till the end of a few steps that must not be parted."""
     mask = _hold_signals()

@@ -51,7 +51,7 @@ def _record(kind: Any, data: Any, place: str, also: Iterable[str]) -> Any:
     require(not lost, place, f"an object with {', '.join(lost)}")
     unknown = [name for name in data if name not in wanted]
     if unknown:
-        raise ValueError(f"{f'{place}.{_key(unknown[0])}'.lstrip('.')} is not an entry of a manifest")
+        raise ValueError(f"{f'{place}.{_key(unknown[0])}'.lstrip('.')} is not a known entry")
     return kind(**{name: decoded(hint, data[name], f"{place}.{name}") for name, hint in hints.items()})
 
 

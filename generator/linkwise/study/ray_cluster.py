@@ -1,7 +1,14 @@
-"""Trials on a cluster of Ray: the same work, on whatever node has a core free."""
+"""Trials on a cluster of Ray: the same work, on whatever node has a core free.
 
+Who reaches a cluster runs code on it. One that is begun here is of this machine alone, so that it listens on
+the loopback interface and on no other.
+"""
+
+import os
 import socket
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from ipaddress import ip_address
 from typing import Any
 
 from linkwise.errors import LinkwiseError
@@ -12,28 +19,34 @@ RETRIES = 3
 """How often a trial is begun anew whose worker or node died."""
 AHEAD = 4
 """Trials handed out for each core, so that none waits for work."""
+OWN = "local"
+"""Ray's name for a cluster that is begun anew, whatever others run."""
+JOINED = "RAY_ADDRESS"
+"""Ray's variable for the cluster that is meant where no address is given."""
+MANY_MACHINES = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
+"""Ray's variable, read when it is imported; at 0 its processes listen on loopback, as they do there."""
 
 
 class RayCluster:
-    """An engine of all cores of a cluster: the one at `address`, else one that runs, else this machine."""
+    """An engine of all cores of a cluster: the one at `address`, or else one of this machine alone.
+
+    address: HOST:PORT, "auto" for one that runs on this machine; of RAY_ADDRESS if not given
+    """
 
     def __init__(self, address: str | None = None) -> None:
-        self._ray: Any = extra("ray")
-        self._address = address
-        _require_answer(address)
+        self._address = address or os.environ.get(JOINED) or OWN
+        with self._kept_here():
+            self._ray: Any = extra("ray")
+        _require_answer(self._address)
 
     def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
-        """Outcomes of all tasks, as they come. Raises LinkwiseError where no cluster is."""
+        """Outcomes of all tasks, as they come.
+
+        Raises LinkwiseError where no cluster is, and where Ray would listen beyond this machine.
+        """
         ray = self._ray
         if not ray.is_initialized():
-            try:
-                ray.init(
-                    address=self._address,
-                    log_to_driver=False,
-                    include_dashboard=False if not self._address else None,
-                )
-            except (ConnectionError, ValueError, RuntimeError) as error:
-                raise LinkwiseError(f"no cluster of Ray at {self._address}: {error}") from error
+            self._join()
         remote = ray.remote(num_cpus=1, max_retries=RETRIES)(run_trial)
         most = AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
         waiting, running = list(reversed(tasks)), dict[Any, TrialTask]()
@@ -55,11 +68,37 @@ class RayCluster:
             for unwanted in running:
                 ray.cancel(unwanted, force=True)
 
+    def _join(self) -> None:
+        ray, is_own = self._ray, self._address == OWN
+        if is_own and not ip_address(ray.util.get_node_ip_address()).is_loopback:
+            raise LinkwiseError(
+                "Ray was imported before the RayCluster was made, and would listen to other machines; make it"
+                " before, or call ray.init yourself"
+            )
+        with self._kept_here():
+            try:
+                ray.init(self._address, log_to_driver=False, include_dashboard=False if is_own else None)
+            except (ConnectionError, ValueError, RuntimeError) as error:
+                raise LinkwiseError(f"no cluster of Ray at {self._address}: {error}") from error
 
-def _require_answer(address: str | None) -> None:
+    @contextmanager
+    def _kept_here(self) -> Iterator[None]:
+        """Have Ray, and what it begins, keep to this machine if the cluster is to be of it alone."""
+        former = os.environ.get(MANY_MACHINES)
+        if self._address == OWN:
+            os.environ[MANY_MACHINES] = "0"
+        try:
+            yield
+        finally:
+            os.environ.pop(MANY_MACHINES, None)
+            if former is not None:
+                os.environ[MANY_MACHINES] = former
+
+
+def _require_answer(address: str) -> None:
     """Raise LinkwiseError where nothing listens at HOST:PORT, for which Ray would wait for minutes."""
-    host, sign, port = (address or "").rpartition("://")[2].rpartition(":")
-    if not sign:  # "auto", or none
+    host, sign, port = address.rpartition("://")[2].rpartition(":")
+    if not sign:  # "auto" or "local"
         return
     try:
         socket.create_connection((host, int(port)), timeout=10).close()

@@ -1,11 +1,10 @@
 """Columns that a study asks for, held against those of a trial before any begins."""
 
 from collections.abc import Collection
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from linkwise.analysis.result_columns import Column
 from linkwise.errors import LinkwiseError, within
+from linkwise.output import passing_folder
 from linkwise.study.band_figure import figure_columns
 from linkwise.study.comparisons import compared_columns
 from linkwise.study.study_plan import StudyPlan
@@ -38,8 +37,8 @@ def _columns(plan: StudyPlan, before: Collection[str]) -> tuple[Column, ...]:
         if trial.name in before:
             continue
         try:
-            with within(f"trial {trial.name!r}"), trial_here(trial) as here, TemporaryDirectory() as buffer:
-                return prepared_trial(plan, here, Path(buffer)).decomposer.columns
+            with within(f"trial {trial.name!r}"), trial_here(trial) as here, passing_folder() as buffer:
+                return prepared_trial(plan, here, buffer).decomposer.columns
         except LinkwiseError as reason:
             reasons.append(reason)
     if reasons and not before:

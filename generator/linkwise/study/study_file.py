@@ -40,8 +40,11 @@ TOP = [
 ]
 
 
-def read_study(path: Path) -> StudyPlan:
-    """Read a study; raises LinkwiseError, in one line with the file, for what cannot be."""
+def read_study(path: Path, trust_python: bool = False) -> StudyPlan:
+    """Read a study; raises LinkwiseError, in one line with the file, for what cannot be.
+
+    trust_python: whether robots that are Python files are run, once they are asked for
+    """
     with within(str(path)):
         require_file(path)
         data = known_keys("the file", toml_data(path), TOP)
@@ -60,6 +63,7 @@ def read_study(path: Path) -> StudyPlan:
             tuple(filled(Comparison, "[[compare]]", item) for item in tables(data, "compare")),
             tuple(filled(PaperFigure, "[[figure]]", item) for item in tables(data, "figure")),
             given_flag(data, "pages"),
+            trust_python,
         )
         _check(plan)
     return plan

@@ -4,9 +4,11 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import gettempdir
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names
+from linkwise.output import sweep
 from linkwise.runtime.native.native_system import system_here
 from linkwise.study.study_mark import StudyMark
 from linkwise.study.study_paths import removed
@@ -33,7 +35,10 @@ def _folder_name(name: str) -> str:
 
 @contextmanager
 def held_study(out: Path) -> Iterator[None]:
-    """Keep other processes away from a study's folder; raises LinkwiseError where one is at work there."""
+    """Keep other processes away from a study's folder; raises LinkwiseError where one is at work there.
+
+    What killed ones left, of this study and of its copies of files, goes before and after.
+    """
     try:
         out.mkdir(parents=True, exist_ok=True)
         file = (out / LOCK).open("a")
@@ -42,7 +47,16 @@ def held_study(out: Path) -> Iterator[None]:
     with file:
         if not _locked(file.fileno()):
             raise LinkwiseError(f"{out}: another linkwise is at work there; wait, or give another --out")
-        yield
+        _sweep(out)
+        try:
+            yield
+        finally:
+            _sweep(out)
+
+
+def _sweep(out: Path) -> None:
+    for place in (out, out / TRIALS, Path(gettempdir())):
+        sweep(place)
 
 
 def _locked(descriptor: int) -> bool:

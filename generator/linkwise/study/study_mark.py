@@ -1,11 +1,15 @@
 """`study.json`: what a study was asked, and what came of it."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
+from linkwise.errors import LinkwiseError
+from linkwise.input_file import is_file
+from linkwise.package.decode import decoded, parsed, require
+from linkwise.package.manifest import is_inside
 from linkwise.study.study_plan import StudyPlan
 from linkwise.study.trial_ledger import MARK
 from linkwise.study.trial_work import TrialOutcome
@@ -18,20 +22,20 @@ class StudyMark:
     study: str
     """Its name."""
     state: Literal["begun", "done"]
-    factors: list[str]
-    trials: dict[str, dict[str, str]]
+    factors: tuple[str, ...]
+    trials: Mapping[str, Mapping[str, str]]
     """Level of each factor, by the trial's name."""
-    broken: dict[str, str]
+    broken: Mapping[str, str]
     """Reasons, by the trial's name."""
     key: str
     """Hash of all that `files` are made of; empty while they are not made."""
-    files: list[str]
+    files: tuple[str, ...]
     """Names of what is in the folder beside trials."""
 
     @classmethod
     def begun(cls, plan: StudyPlan, files: Sequence[str]) -> "StudyMark":
         """That of a study at work, whose folder has files of a former run."""
-        return cls(plan.name, "begun", list(plan.factors), _trials(plan), {}, "", list(files))
+        return cls(plan.name, "begun", plan.factors, _trials(plan), {}, "", tuple(files))
 
     @classmethod
     def done(
@@ -39,19 +43,26 @@ class StudyMark:
     ) -> "StudyMark":
         """That of a study whose trials are done or broken."""
         reasons = {one.name: one.reason for one in broken}
-        return cls(plan.name, "done", list(plan.factors), _trials(plan), reasons, key, list(files))
+        return cls(plan.name, "done", plan.factors, _trials(plan), reasons, key, tuple(files))
 
     @classmethod
     def read(cls, out: Path) -> "StudyMark | None":
-        """That of a study's folder; None where there is none that can be read."""
-        try:
-            return cls(**json.loads((out / MARK).read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):
+        """That of a study's folder, None where there is none; raises LinkwiseError for a damaged one."""
+        path = out / MARK
+        if not is_file(path):
             return None
+        try:
+            mark: StudyMark = decoded(cls, parsed(path.read_text(encoding="utf-8")), "")
+            for name in mark.files:
+                require(is_inside(name) and "/" not in name, f"{name!r} among 'files'", "a file's name")
+        except (ValueError, RecursionError) as error:
+            reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+            raise LinkwiseError(f"{path} is damaged: {reason}; give another --out") from error
+        return mark
 
     def files_in(self, out: Path) -> tuple[Path, ...]:
         """Paths of its files, and of its own."""
-        return tuple(out / Path(name).name for name in (*self.files, MARK))
+        return tuple(out / name for name in (*self.files, MARK))
 
     def text(self) -> bytes:
         """As JSON."""

@@ -1,16 +1,27 @@
-"""Paths of a study: files beside it, or addresses, s3://bucket/walk.mot, that fsspec reads."""
+"""Paths of a study: files beside it, or addresses, s3://bucket/walk.mot, that fsspec reads.
+
+Of what fsspec knows, only stores that hand out bytes are asked: others open files of this machine, hand an
+address on to another kind, or run what a file says.
+"""
 
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from glob import escape, glob
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.input_file import require_file
+from linkwise.output import passing_folder
+
+STORES = ("s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "oss", "http", "https")
+"""Kinds of addresses that are read."""
+LOCAL = "file://"
+CHAINED = "::"
+"""Between addresses of which fsspec opens one inside the other."""
 
 
 def is_address(path: str) -> bool:
@@ -19,7 +30,8 @@ def is_address(path: str) -> bool:
 
 
 def resolved(path: str, folder: Path) -> str:
-    """An address itself; of other paths those from a folder on."""
+    """An address itself; of other paths, file:// before them or not, those from a folder on."""
+    path = path.removeprefix(LOCAL)
     return path if is_address(path) else (folder / path).as_posix()
 
 
@@ -61,8 +73,11 @@ def opened_here(path: str) -> Iterator[Path]:
     if not is_address(path):
         yield Path(path)
         return
-    with TemporaryDirectory() as folder:
-        copy = Path(folder) / path.rpartition("/")[2]
+    name = path.rpartition("/")[2]
+    if name in ("", ".", ".."):
+        raise LinkwiseError(f"{path}: an address of a folder; give one of a file")
+    with passing_folder() as folder:
+        copy = folder / name
         copied_here(path, copy)
         yield copy
 
@@ -85,6 +100,12 @@ def removed(folder: Path) -> None:
 
 
 def _system(path: str) -> tuple[Any, str]:
+    """What serves an address, and its path there; raises LinkwiseError for kinds that are not read."""
+    if path.partition("://")[0] not in STORES or CHAINED in path:
+        raise LinkwiseError(
+            f"{path}: give a file, or an address of {listed(STORES, len(STORES))} without {CHAINED!r}; others"
+            " are not read, as they may run or open what they name"
+        )
     try:
         files, name = extra("fsspec.core").url_to_fs(path)
     except (ImportError, ValueError) as error:

@@ -116,3 +116,5 @@ class StudyPlan:
     comparisons: tuple[Comparison, ...] = ()
     figures: tuple[PaperFigure, ...] = ()
     pages: bool = True
+    trust_python: bool = field(default=False, repr=False)
+    """Whether robots that are Python files are run; no result depends on it."""

@@ -9,8 +9,9 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.package.manifest import FILE, Manifest
 from linkwise.package_cache import KeptPackage, kept_package
+from linkwise.pipeline import PYTHON
 from linkwise.progress import Progress
-from linkwise.robot import Options, is_description
+from linkwise.robot import is_description
 from linkwise.study.study_paths import is_address, opened_here, version_of
 from linkwise.study.study_plan import StudyPlan
 
@@ -30,7 +31,7 @@ def check_robots(plan: StudyPlan, progress: Progress) -> tuple[str, ...]:
     for number, robot in enumerate(robots):
         progress("robots", number, len(robots))
         with within(f"{plan.file}: {_owner(plan, robot)}"):
-            kept = package_of(robot, plan.options)
+            kept = package_of(robot, plan)
             told += kept.warnings
             manifest = Manifest.read(kept.directory)
             if first is not None:
@@ -44,17 +45,36 @@ def _owner(plan: StudyPlan, robot: str) -> str:
     return f"trial {next(trial.name for trial in plan.trials if trial.robot == robot)!r}"
 
 
-def package_of(robot: str, options: Options) -> KeptPackage:
-    """The package of a trial's robot: itself, or the one that is kept of its file, address or name."""
+def package_of(robot: str, plan: StudyPlan) -> KeptPackage:
+    """The package of a trial's robot: itself, or the one that is kept of its file, address or name.
+
+    Raises LinkwiseError, before it is fetched or run, for a Python file that nobody vouches for.
+    """
+    if Path(robot).suffix == PYTHON:
+        _refuse_untrusted(robot, plan)
+    options = plan.options
     if is_description(robot) and not is_address(robot) and not Path(robot).exists():
         return kept_package(robot, options=options)
     with opened_here(robot) as path:
         return kept_package(path, options=options)
 
 
-def loaded_robot(robot: str, options: Options) -> LoadedRobot:
+def _refuse_untrusted(robot: str, plan: StudyPlan) -> None:
+    if is_address(robot):
+        raise LinkwiseError(
+            f"robot {robot} is a Python program from elsewhere, which is never run; fetch it, read it, and"
+            " name your copy"
+        )
+    if not plan.trust_python:
+        raise LinkwiseError(
+            f"robot {robot} is a Python program, which a study does not run by itself; read it, and give"
+            " --trust-python if you trust it"
+        )
+
+
+def loaded_robot(robot: str, plan: StudyPlan) -> LoadedRobot:
     """A trial's robot, ready to be asked; those of the last trials are kept in memory."""
-    directory = package_of(robot, options).directory
+    directory = package_of(robot, plan).directory
     return _loaded(directory, version_of(str(directory / FILE)))
 
 

@@ -47,14 +47,19 @@ class StudyOutcome:
 
 
 def run_study(
-    file: str | Path, out: str | Path, engine: Engine | None = None, progress: Progress = silent
+    file: str | Path,
+    out: str | Path,
+    engine: Engine | None = None,
+    progress: Progress = silent,
+    trust_python: bool = False,
 ) -> StudyOutcome:
     """Do what of a study is not done yet, and say what all trials say together.
 
     file: its TOML; out: its folder; engine: a `ProcessPool` with all cores if not given
+    trust_python: run robots that are Python files of this machine, which are refused otherwise
     Raises LinkwiseError, before any trial begins, for a file, a robot or a folder that cannot be.
     """
-    plan, out = read_study(Path(file)), Path(out)
+    plan, out = read_study(Path(file), trust_python), Path(out)
     refuse_unless_study(out, plan)
     require_writable(out)
     out = out.absolute()  # workers may be in folders of their own

@@ -8,7 +8,7 @@ from pathlib import Path
 from linkwise.analysis.loads.external_loads import data_files
 from linkwise.errors import LinkwiseError
 from linkwise.package.manifest import FILE
-from linkwise.robot import is_description, robot_files
+from linkwise.robot import robot_files
 from linkwise.study.study_paths import beside, copied_here, is_address, opened_here
 from linkwise.study.study_plan import StudyPlan, Trial
 
@@ -23,7 +23,7 @@ def trial_files(plan: StudyPlan, trial: Trial) -> Iterator[str]:
         yield str(Path(trial.robot) / FILE)
     elif is_address(trial.robot):
         yield trial.robot
-    elif is_description(trial.robot):
+    else:
         yield from (str(path) for path in robot_files(trial.robot, plan.options) if path.is_file())
     if plan.cycles is not None and plan.cycles.table:
         yield plan.cycles.table

@@ -48,7 +48,7 @@ class TrialRecord:
             data = json.loads((folder / RECORD).read_text(encoding="utf-8"))
             files = {path: SeenFile(*seen) for path, seen in data.pop("files").items()}
             return cls(files=files, **data | {"warnings": tuple(data["warnings"])})
-        except (OSError, ValueError, TypeError, KeyError, AttributeError):
+        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
             return None
 
 

@@ -134,7 +134,7 @@ def prepared_trial(plan: StudyPlan, trial: Trial, buffer: Path) -> Job:
 
     buffer: a directory that keeps the samples
     """
-    loaded, choices = loaded_robot(trial.robot, plan.options), trial.choices
+    loaded, choices = loaded_robot(trial.robot, plan), trial.choices
     robot = standing_on(carrying(loaded, choices.payloads(loaded)), choices.contacts(loaded))
     wanted = choices.wanted(page=plan.pages)
     if plan.cycles is not None and plan.cycles.what:

@@ -1,0 +1,126 @@
+"""What a study's file may have done: it names files to read, and runs no code by itself."""
+
+import zipfile
+from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+
+import pytest
+from command_line import run_linkwise
+from conftest import DATA
+from linkwise import LinkwiseError
+from linkwise.study import run_study
+from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
+
+ENERGIES = (DATA / "cart_pendulum.py").read_text()
+
+
+def with_program(folder: Path, robot: str) -> Path:
+    """A study of a robot of energies that leaves a file when it is run."""
+    (folder / "cart.py").write_text(f"{ENERGIES}\nopen({str(folder / 'ran')!r}, 'w').close()\n")
+    rows = "\n".join(f"{k / 100},{k % 5},{k % 7}" for k in range(50))
+    (folder / "log.csv").write_text(f"time,x,theta\n{rows}\n")
+    trial = f'[[trial]]\nname = "a"\nlog = "log.csv"\nrobot = "{robot}"\ncondition = "x"\n'
+    return write_study(folder, HEAD, "pages = false\n", trial, subjects=0)
+
+
+@pytest.fixture
+def web(tmp_path: Path) -> Iterator[str]:
+    """The address of a server of the test's folder."""
+    pytest.importorskip("aiohttp")
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(tmp_path))) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+@pytest.mark.parametrize("name", ["cart.py", "arm.urdf?/cart.py"])
+def test_python_at_an_address_is_never_run(name: str, web: str, tmp_path: Path) -> None:
+    file = with_program(tmp_path, f"{web}/{name}")
+    with pytest.raises(LinkwiseError, match=r"trial 'a': robot http.* from elsewhere, which is never run"):
+        run_study(file, tmp_path / "out", Here(), trust_python=True)
+    assert not (tmp_path / "ran").exists()
+
+
+def test_python_beside_a_study_is_run_only_where_that_is_asked_for_and_then_told(tmp_path: Path) -> None:
+    file, ran = with_program(tmp_path, "file://cart.py"), tmp_path / "ran"
+    done = run_linkwise("study", file, "--out", "out", "--workers", 1, folder=tmp_path)
+    assert (done.returncode, done.stdout, ran.exists()) == (2, "", False)
+    (said,) = done.stderr.splitlines()
+    assert said.startswith(
+        f"linkwise: error: {file}: trial 'a': robot {tmp_path}/cart.py is a Python program"
+    )
+    assert "--trust-python" in said
+    done = run_linkwise("study", file, "--out", "out", "--workers", 1, "--trust-python", folder=tmp_path)
+    assert (done.returncode, ran.exists()) == (0, True)
+    assert f"note: {tmp_path}/cart.py is a Python program, which was run" in done.stderr.splitlines()
+
+
+def test_a_trial_of_a_changed_program_is_done_again(tmp_path: Path) -> None:
+    file, out = with_program(tmp_path, "cart.py"), tmp_path / "out"
+    fresh = []
+    for _ in range(2):
+        fresh += [run_study(file, out, Here(), trust_python=True).fresh for _ in range(2)]
+        (tmp_path / "cart.py").write_text(ENERGIES.replace("M: 2.0", "M: 3.0"))
+    assert fresh == [1, 0, 1, 0]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("generate", "cart.py", "--out", "out"),
+        ("inspect", "cart.py", "--json"),
+        ("report", "terms", "cart.py"),
+        ("report", "reduction", "--robot", "cart.py"),
+        ("analyze", "log.csv", "--robot", "cart.py", "--out", "out", "--no-page"),
+    ],
+    ids=" ".join,
+)
+def test_a_program_named_on_the_command_line_is_told_to_have_been_run(
+    command: tuple[str, ...], tmp_path: Path
+) -> None:
+    with_program(tmp_path, "cart.py")
+    done = run_linkwise(*command, folder=tmp_path)
+    assert done.returncode == 0
+    assert "note: cart.py is a Python program, which was run" in done.stderr.splitlines()
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "zip://data/S1/slow_1.csv::file://{here}/logs.zip",
+        "simplecache::file://{here}/data/S1/slow_1.csv",
+        "s3://lab/log.csv::file://{here}/data/S1/slow_1.csv",
+        "reference://log.csv",
+        "local://{here}/data/S1/slow_1.csv",
+        "dir://{here}/data/S1/slow_1.csv",
+        "nowhere://log.csv",
+    ],
+)
+def test_only_addresses_of_stores_are_read(address: str, tmp_path: Path) -> None:
+    file = write_study(tmp_path, subjects=1, trials=1)
+    with zipfile.ZipFile(tmp_path / "logs.zip", "w") as packed:
+        packed.write(tmp_path / "data/S1/slow_1.csv", "data/S1/slow_1.csv")
+    log = address.format(here=tmp_path)
+    trial = f'[[trial]]\nname = "a"\nlog = "{log}"\nrobot = "planar3"\ncondition = "x"\n'
+    file.write_text("".join((HEAD, QUICK, CHOICES, trial)))
+    with pytest.raises(LinkwiseError) as caught:
+        run_study(file, tmp_path / "out", Here())
+    assert str(caught.value).startswith(f"{file}: trial 'a': {log}: give a file, or an address of s3, ")
+
+
+def test_a_file_called_by_its_scheme_lies_where_paths_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the study's file on, and not from wherever the command was given."""
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS.replace('"data', '"file://data'), subjects=1)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert len(run_study(file, tmp_path / "out", Here()).done) == 4
