@@ -1,6 +1,7 @@
 """Sums over the links of a generated package: shapes, places, dtypes, gradients, names and messages."""
 
 from collections.abc import Callable
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -78,6 +79,21 @@ def test_sums_are_those_of_the_shares(backend: str, robot: str, package_of: Pack
     assert np.abs(symbols - symbols.swapaxes(-1, -2)).max() <= 1e-14 * np.abs(symbols).max()
 
 
+@pytest.mark.parametrize("robot", ["planar3", str(DATA / "turntable.py")])
+def test_christoffel_symbols_of_many_samples_are_slopes_of_the_mass_matrix(
+    robot: str, package_of: Packages, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In pieces of four samples, of which the last is short."""
+    model = package_of(robot).load("numpy")
+    summed = import_module(f"{package_of(robot).__name__}.runtime.sums.summed")
+    monkeypatch.setattr(summed, "AT_ONCE", 4 * model.n * sum(model.structure.sizes))
+    q = motion_of(model, 11)[0]
+    found, steps = model.christoffel(q), 1e-5 * np.eye(model.n)
+    slope = np.stack([model.mass_matrix(q + s) - model.mass_matrix(q - s) for s in steps], -1) / 2e-5
+    expected = (slope + slope.swapaxes(-1, -2) - np.moveaxis(slope, -1, -3)) / 2.0
+    assert relative_error(found, expected) <= 1e-8
+
+
 CROOKED = f"{DATA / 'crane.urdf'} loops"
 
 
@@ -147,9 +163,11 @@ def test_gradients_flow_through_forward_dynamics(backend: str, package_of: Packa
     assert torch.autograd.gradcheck(model.christoffel, motion[:1])
 
 
-def test_forward_dynamics_runs_under_vmap_and_jacrev(package_of: Packages) -> None:
+def test_sums_run_under_vmap_and_jacrev(package_of: Packages) -> None:
     robot = package_of("planar3").load("torch")
     motion = motion_of(robot, 4)
+    symbols = torch.func.vmap(robot.christoffel)(motion[0])
+    assert relative_error(symbols, np.asarray(robot.christoffel(motion[0]))) <= 1e-14
     mapped = torch.func.vmap(robot.forward_dynamics)(*motion)
     assert relative_error(mapped, robot.forward_dynamics(*motion)) <= 1e-14
     slope = torch.func.vmap(torch.func.jacrev(robot.forward_dynamics, 2))(*motion)
