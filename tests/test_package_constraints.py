@@ -190,6 +190,8 @@ def test_a_wheel_rolls_along_the_ground_without_slip(cart: ModuleType) -> None:
     constraints = robot.constrained(["x"], [cart.Contact("wheel", "rolling", radius=0.5)])
     q = np.array([0.3, 2.0])
     np.testing.assert_allclose(constraints.velocity(q, np.array([1.0])), [1.0, 2.0], atol=1e-15)
+    on_a_floor = cart.Contact("wheel", "rolling", radius=0.5, normal=(0.0, 0.0, 3.0))
+    np.testing.assert_array_equal(robot.constrained(["x"], [on_a_floor]).jacobian(q), constraints.jacobian(q))
     # (m_cart + m_wheel + I / r^2) a, of which the ground's friction turns the wheel.
     torque = constraints.inverse_dynamics(q, np.zeros(2), np.array([1.0, 0.0]))
     assert torque == pytest.approx([5.0 + 0.4 / 0.25])

@@ -11,6 +11,7 @@ from answers import relative_error
 from conftest import DATA, PANDA, needs_compiler
 from linkwise import Coordinate, LinkEnergy, energy_system, generate, write_package
 from linkwise.package.load import import_package
+from linkwise.runtime.sums.inertia_solve import solved
 
 torch = pytest.importorskip("torch")
 
@@ -203,6 +204,20 @@ def test_a_singular_mass_matrix_is_refused_with_sample_and_joints(
     qdd = np.asarray(robot.forward_dynamics(q, qd, tau))
     assert np.isnan(qdd[2]).all()
     assert np.isfinite(qdd[[0, 1, 3]]).all()
+
+
+@pytest.mark.parametrize("kind", ["array", "tensor"])
+def test_a_mass_matrix_is_singular_also_where_no_pivot_says_so(kind: str) -> None:
+    """Kahan's matrix, whose pivots are all above its least eigenvalue; and one that is not positive."""
+    s, n = 0.5757627118644068, 32
+    r = np.diag(s ** np.arange(n)) @ (np.eye(n) - (1.0 - s * s) ** 0.5 * np.triu(np.ones((n, n)), 1))
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    for matrix in (r.T @ r, turn @ np.diag([2.0, 0.0, -1.0]) @ turn.T):
+        names = [f"joint{k}" for k in range(len(matrix))]
+        given = [matrix, np.ones(len(matrix))]
+        mass, force = map(torch.from_numpy, given) if kind == "tensor" else given
+        with pytest.raises(ValueError, match="the mass matrix is singular: the joints joint0, .* together"):
+            solved(mass, force, names)
 
 
 def test_joints_and_links_have_numbers_by_name(package_of: Packages) -> None:

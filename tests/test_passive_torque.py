@@ -245,6 +245,9 @@ def test_loops_move_as_mujocos_matrices_say(backend: str, four_bar: ModuleType) 
     assert relative_error(found.qdd, expected) <= 1e-7
     assert relative_error(found.forces, pinned) <= 1e-7
     assert relative_error(robot.induced_accelerations(q, qd, tau).total, expected) <= 1e-7
+    moved = robot.simulate(q, qd, [0.0, 1e-4, 2e-4], tau)
+    assert relative_error((4.0 * moved.qd[1] - 3.0 * moved.qd[0] - moved.qd[2]) / 2e-4, expected) <= 1e-3
+    assert float(abs(moved.energy_drift).max()) <= 1e-9 * float(abs(moved.energy).max())
     # Without ties, if that is asked for, each is free.
     free = robot.simulate(q, qd, [0.0, 1e-4, 2e-4], tau, constraints=False).qd
     alone = np.linalg.solve(inertia(model, data), force)
