@@ -215,6 +215,35 @@ def test_contacts_stay_where_they_took_hold(tmp_path: Path) -> None:
     np.testing.assert_allclose(constraints.closed(moved, held_at=NEAR), [*NEAR[:2], moved[2]], atol=1e-12)
 
 
+@needs_compiler
+@pytest.mark.parametrize(("kind", "limit"), [(np.float64, 1e-11), (np.float32, 2e-4)])
+def test_what_c_says_of_a_contact_at_one_sample_is_what_arrays_say_of_many(
+    kind: Any, limit: float, package_of: Callable[[str], ModuleType]
+) -> None:
+    """A hand is held by a pin askew, and rolls besides with a point of its other one."""
+    module = package_of("torso")
+    contacts = [
+        module.Contact("left_forearm", "hinged", (0.1, -0.2, 0.3), axis=(1.0, 2.0, -2.0)),
+        module.Contact("right_forearm", "rolling", (0.2, 0.1, 0.0), normal=(0.0, 1.0, 2.0), radius=0.1),
+    ]
+    draw = np.random.default_rng(2)
+    q, qd, tau = draw.uniform(-0.8, 0.8, (3, 4, 7))
+    for held in (contacts[:1], contacts[1:]):
+        known, own = (module.load(name).constrained(contacts=held) for name in ("numpy", "native"))
+        rest = np.zeros(len(known.independent))
+        expected = [
+            *(known.jacobian(q), known.acceleration(q, qd, rest), known.closed(q + 0.01, held_at=q)),
+            *known.forward_dynamics(q, qd, tau),
+        ]
+        for s in range(len(q)):
+            a, b, c = (x[s].astype(kind) for x in (q, qd, tau))
+            one = [own.jacobian(a), own.acceleration(a, b, rest), own.closed(a + kind(0.01), held_at=a)]
+            for found, whole in zip([*one, *own.forward_dynamics(a, b, c)], expected, strict=True):
+                assert found.dtype == kind
+                size = max(1.0, np.abs(whole[s]).max())
+                np.testing.assert_allclose(found, whole[s], atol=limit * size)
+
+
 def test_a_hinged_contact_leaves_turns_about_its_axis(tmp_path: Path) -> None:
     module = package(tmp_path, FOURBAR.split("[[constraint]]")[0])
     robot: Any = module.load("numpy")
