@@ -215,6 +215,22 @@ def test_contacts_stay_where_they_took_hold(tmp_path: Path) -> None:
     np.testing.assert_allclose(constraints.closed(moved, held_at=NEAR), [*NEAR[:2], moved[2]], atol=1e-12)
 
 
+def test_a_motion_keeps_contacts_where_they_took_hold(package_of: Callable[[str], ModuleType]) -> None:
+    """However long its steps: joints that follow are closed from there, and not from where they came."""
+    module, point = package_of("torso"), (0.1, -0.2, 0.3)
+    robot: Any = module.load("numpy")
+    held = robot.constrained(contacts=[module.Contact("left_forearm", "point", point)])
+    draw = np.random.default_rng(2)
+    q, tau = draw.uniform(-0.8, 0.8, (2, robot.n))
+    qd = held.velocity(q, draw.uniform(-1.0, 1.0, len(held.independent)))
+    found = robot.simulate(q, qd, [0.0, 0.1, 0.2], tau, step=0.05, constraints=held)
+    places = robot.kinematics.pose(found.q, "left_forearm") @ [*point, 1.0]
+    np.testing.assert_allclose(places, places[[0, 0, 0]], atol=1e-10)
+    assert np.abs(found.q[-1] - q).max() > 0.05
+    speeds = robot.kinematics.velocity(found.q, found.qd, "left_forearm", point)[:, 3:]
+    np.testing.assert_allclose(speeds, 0.0 * speeds, atol=1e-10)
+
+
 @needs_compiler
 @pytest.mark.parametrize(("kind", "limit"), [(np.float64, 1e-11), (np.float32, 2e-4)])
 def test_what_c_says_of_a_contact_at_one_sample_is_what_arrays_say_of_many(
