@@ -284,6 +284,11 @@ def test_an_open_loop_is_refused_and_closed(one: Any) -> None:
     message = " mm at sample 1; give positions in which ties close, as closed(q) answers"
     refused(lambda: one.constraints.velocity_map(q), message)
     one.constrained(["crank"], tolerance=0.1).velocity_map(q)
+    closed = one.constraints.closed(NEAR)
+    for kind, most in ((np.float64, 1e-6), (np.float32, 1e-4)):  # in m, of what joints could close
+        off = [(closed + [0.0, 0.0, share * most / 0.5]).astype(kind) for share in (0.3, 3.0)]
+        one.constraints.velocity_map(off[0])
+        refused(lambda q=off[1]: one.constraints.velocity_map(q), "pin is open by ")
     one.constraints.velocity_map(one.constraints.closed(q))
 
 

@@ -243,6 +243,9 @@ def test_hand_written_energies_are_controlled_too(package_of: Packages) -> None:
     expected = (-2.0 * qd - 5.0 * (q - at)) / 4.0
     assert relative_error(model.forward_dynamics(q, qd, controller(q, qd, at)), expected) <= 1e-12
     assert not controller.dissipative
+    natural, step = model.natural_impedance(q, qd, at), 1e-6 * np.eye(model.n)
+    slopes = [model.partial_torque(q, qd + e, at) - model.partial_torque(q, qd - e, at) for e in step]
+    np.testing.assert_allclose(natural.damping, np.stack(slopes, -1) / 2e-6, atol=1e-7)
     with pytest.raises(ValueError, match="are energies, which do not say where anything is"):
         model.partial_impedance(frame=package.FrameImpedance(0))
 
