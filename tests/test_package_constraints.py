@@ -286,9 +286,10 @@ def test_an_open_loop_is_refused_and_closed(one: Any) -> None:
     one.constrained(["crank"], tolerance=0.1).velocity_map(q)
     closed = one.constraints.closed(NEAR)
     for kind, most in ((np.float64, 1e-6), (np.float32, 1e-4)):  # in m, of what joints could close
-        off = [(closed + [0.0, 0.0, share * most / 0.5]).astype(kind) for share in (0.3, 3.0)]
-        one.constraints.velocity_map(off[0])
-        refused(lambda q=off[1]: one.constraints.velocity_map(q), "pin is open by ")
+        moved = most / 0.5 * np.array([0.0, 0.0, 1.0])  # of the rocker, whose end is 0.5 m out
+        near, far = ((closed + share * moved).astype(kind) for share in (0.3, 3.0))
+        one.constraints.velocity_map(near)
+        refused(lambda q=far: one.constraints.velocity_map(q), "pin is open by ")
     one.constraints.velocity_map(one.constraints.closed(q))
 
 
