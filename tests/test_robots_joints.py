@@ -21,7 +21,18 @@ SLIDE = joint("bc", "b", "c", type="prismatic", axis="1 -2 0.5")
 TREE = robot(
     *map(link, "abcdef"), AB, SLIDE, joint("ad", "a", "d"), joint("de", "d", "e"), joint("df", "d", "f")
 )
+BARE = robot(
+    link("a"),
+    link("b").replace('<origin xyz="0.1 -0.02 0.05" rpy="0.1 0.2 0.3"/>', '<origin xyz="0.1 -0.02 0.05"/>'),
+    link("c").replace('<origin xyz="0.1 -0.02 0.05" rpy="0.1 0.2 0.3"/>', ""),
+    link("d"),
+    AB.replace('<axis xyz="0 0.6 0.8"/>', "").replace(' rpy="0.4 -0.3 0.2"', ""),
+    BC.replace('<origin xyz="0.2 0.1 0.3" rpy="0.4 -0.3 0.2"/>', ""),
+    joint("cd", "c", "d", inner='<mimic joint="ab"/>').replace('xyz="0.2 0.1 0.3" ', ""),
+)
+"""With the least that a file must say."""
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
+    "defaults": (BARE, {}),
     "revolute": (chain(AB, BC), {}),
     "continuous": (chain(AB, joint("bc", "b", "c", type="continuous", axis="0 0 -1")), {}),
     "negative axes": (
