@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from answers import random_states, relative_error
-from linkwise import Options, generate, read_system, write_package
+from linkwise import Options, generate, read_robot, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise.robot import effects
 from urdf_text import chain, joint, link, mimic, robot
@@ -94,6 +94,12 @@ def test_torques_are_pinocchios(case: str, tmp_path: Path) -> None:
     text, options = CASES[case]
     (tmp_path / "robot.urdf").write_text(text)
     compare(tmp_path / "robot.urdf", options, tmp_path)
+
+
+def test_a_joint_follows_one_to_one_where_its_file_says_no_more(tmp_path: Path) -> None:
+    (tmp_path / "robot.urdf").write_text(BARE)
+    robot = read_robot(tmp_path / "robot.urdf")
+    assert [(f.name, f.coordinate, f.curve.line) for f in robot.followers] == [("cd", "ab", (0.0, 1.0))]
 
 
 PARTS = {
