@@ -143,6 +143,22 @@ def test_constraints_close_where_opensims_do(kind: str, more: str, old: bool, tm
         assert np.abs(numbers(state.getQErr())).max() <= (ROUNDED if old else LIMIT)
 
 
+def test_a_coupling_is_scaled_as_opensim_scales_it(tmp_path: Path) -> None:
+    coupled = coupler("joint1_angle", "joint0_angle", ROLLS).replace(
+        "</coupled_coordinates_function>", "</coupled_coordinates_function><scale_factor>-1.7</scale_factor>"
+    )
+    file = tmp_path / "model.osim"
+    file.write_text(chain(["PinJoint", "PinJoint"], constraints(coupled)))
+    (follower,) = read_robot(file).followers
+    model = opensim.Model(str(file))
+    state = model.initSystem()
+    for at in (-1.3, 0.2, 0.9):
+        for name, value in (("joint0_angle", at), (follower.name, follower.curve(at))):
+            model.getCoordinateSet().get(name).setValue(state, value, False)
+        model.realizePosition(state)
+        assert np.abs(numbers(state.getQErr())).max() <= LIMIT
+
+
 TURNS = {
     "a line": coefficients("LinearFunction", 1.0, 0.3),
     "there and back": coefficients("LinearFunction", -1.0, 0.0),
