@@ -184,6 +184,22 @@ def test_they_are_the_torques_of_the_controllers_in_python(robots: Any, package_
     np.testing.assert_allclose(found, tau, rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("angle", [-1e-6, 3e-5, 1e-4, -3e-4, 2e-3, 0.0099, -0.02, 0.3])
+def test_a_frame_is_pulled_by_its_angle_however_small(angle: float, robots: Any, package_of: Any) -> None:
+    """In a plane the turn from the target is the sum of the joints' ways."""
+    model, c = robots("planar3 symbolic")
+    package, (q, qd) = package_of("planar3 symbolic"), np.array([[0.3, -0.7, 0.9], [0.0, 0.0, 0.0]])
+    frame, pose = model.kinematics.frames[-1], model.kinematics.pose(q - [0.0, 0.0, angle], "link3")
+    given, target = {"rows": (2,), "stiffness": 1e4 * np.eye(1)}, (pose, None, None)
+    in_c = c.frame(q, qd, frame, given, target)[1]
+    wanted = package.FrameImpedance(frame, stiffness=1e4, rows=("rz",))
+    in_python = model.partial_impedance(frame=wanted)(q, qd, package.Target(pose=pose))
+    # C takes a sine for the angle next to 0.
+    for found, digits in ((in_c, 1e-8), (in_python, 1e-11)):
+        pull = (found - model.gravity_torque(q)) / 1e4
+        np.testing.assert_allclose(pull, -angle * np.ones(3), rtol=digits, atol=1e-15)
+
+
 @pytest.mark.parametrize("robot", ["torso", TURNTABLE], ids=["rigid", "energies"])
 @pytest.mark.parametrize("dtype", PRECISION, ids=["double", "float"])
 def test_a_joint_whose_inertia_cannot_be_is_told(robot: str, dtype: Any, robots: Any) -> None:

@@ -104,6 +104,45 @@ def test_it_is_made_once_and_again_when_the_file_changes(tmp_path: Path) -> None
     assert masses == [8.4, 8.5]
 
 
+ROD = """<mujoco><include file="part.xml"/></mujoco>"""
+PART = """<mujoco><worldbody><body name="rod"><joint name="hinge" axis="0 1 0"/>
+<inertial pos="0.1 0 0" mass="{}" diaginertia="0.1 0.1 0.1"/></body></worldbody></mujoco>"""
+
+
+def test_it_is_made_again_when_anything_changes_that_it_is_made_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file that is included, one of constraints beside, linkwise itself; and for other back ends."""
+    pytest.importorskip("mujoco")
+    (tmp_path / "rod.xml").write_text(ROD)
+    masses = []
+    for mass in (1.0, 2.0):
+        (tmp_path / "part.xml").write_text(PART.format(mass))
+        kept = kept_package(tmp_path / "rod.xml", "numpy").directory
+        masses.append(json.loads((kept / FILE).read_text())["tree"]["bodies"][0]["mass"])
+    assert masses == [1.0, 2.0]
+    ties, lengths = tmp_path / "ties.toml", []
+    (tmp_path / "bar.toml").write_text((DATA / "fourbar.toml").read_text().partition("[[constraint]]")[0])
+    for reach in (0.31, 0.3):
+        ties.write_text(
+            'schema = 1\n[[constraint]]\nname = "pin"\ntype = "point"\n'
+            f'first = {{ frame = "rod", xyz = [{reach}, 0, 0] }}\n'
+            'second = { frame = "rocker", xyz = [0.24, 0, 0] }\n'
+        )
+        kept = kept_package(tmp_path / "bar.toml", "numpy", Options(constraints=str(ties))).directory
+        (first,) = (
+            f for f in json.loads((kept / FILE).read_text())["tree"]["frames"] if f["name"] == "pin_first"
+        )
+        lengths.append(first["translation"][0])
+    assert lengths == [0.31, 0.3]
+    here = kept_package(KNEE, "numpy").directory
+    assert kept_package(KNEE, "c").directory != here
+    monkeypatch.setattr("linkwise.package_cache.generator_files", lambda: [str(ties)])
+    elsewhere = kept_package(KNEE, "numpy").directory
+    ties.write_text("changed")
+    assert len({here, elsewhere, kept_package(KNEE, "numpy").directory}) == 3
+
+
 def test_what_a_file_leaves_out_is_told_each_time(tmp_path: Path) -> None:
     file = tmp_path / "leg.osim"
     forces = '<ForceSet><objects><BushingForce name="disc"/></objects></ForceSet></Model>'

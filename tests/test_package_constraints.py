@@ -190,6 +190,8 @@ def test_a_wheel_rolls_along_the_ground_without_slip(cart: ModuleType) -> None:
     constraints = robot.constrained(["x"], [cart.Contact("wheel", "rolling", radius=0.5)])
     q = np.array([0.3, 2.0])
     np.testing.assert_allclose(constraints.velocity(q, np.array([1.0])), [1.0, 2.0], atol=1e-15)
+    on_a_floor = cart.Contact("wheel", "rolling", radius=0.5, normal=(0.0, 0.0, 3.0))
+    np.testing.assert_array_equal(robot.constrained(["x"], [on_a_floor]).jacobian(q), constraints.jacobian(q))
     # (m_cart + m_wheel + I / r^2) a, of which the ground's friction turns the wheel.
     torque = constraints.inverse_dynamics(q, np.zeros(2), np.array([1.0, 0.0]))
     assert torque == pytest.approx([5.0 + 0.4 / 0.25])
@@ -211,6 +213,51 @@ def test_contacts_stay_where_they_took_hold(tmp_path: Path) -> None:
         constraints.violation(moved, held_at=NEAR), (way @ [0.7, 0.0, 0.0, 1.0])[:3], atol=1e-15
     )
     np.testing.assert_allclose(constraints.closed(moved, held_at=NEAR), [*NEAR[:2], moved[2]], atol=1e-12)
+
+
+def test_a_motion_keeps_contacts_where_they_took_hold(package_of: Callable[[str], ModuleType]) -> None:
+    """However long its steps: joints that follow are closed from there, and not from where they came."""
+    module, point = package_of("torso"), (0.1, -0.2, 0.3)
+    robot: Any = module.load("numpy")
+    held = robot.constrained(contacts=[module.Contact("left_forearm", "point", point)])
+    draw = np.random.default_rng(2)
+    q, tau = draw.uniform(-0.8, 0.8, (2, robot.n))
+    qd = held.velocity(q, draw.uniform(-1.0, 1.0, len(held.independent)))
+    found = robot.simulate(q, qd, [0.0, 0.1, 0.2], tau, step=0.05, constraints=held)
+    places = robot.kinematics.pose(found.q, "left_forearm") @ [*point, 1.0]
+    np.testing.assert_allclose(places, places[[0, 0, 0]], atol=1e-10)
+    assert np.abs(found.q[-1] - q).max() > 0.05
+    speeds = robot.kinematics.velocity(found.q, found.qd, "left_forearm", point)[:, 3:]
+    np.testing.assert_allclose(speeds, 0.0 * speeds, atol=1e-10)
+
+
+@needs_compiler
+@pytest.mark.parametrize(("kind", "limit"), [(np.float64, 1e-11), (np.float32, 2e-4)])
+def test_what_c_says_of_a_contact_at_one_sample_is_what_arrays_say_of_many(
+    kind: Any, limit: float, package_of: Callable[[str], ModuleType]
+) -> None:
+    """A hand is held by a pin askew, and rolls besides with a point of its other one."""
+    module = package_of("torso")
+    contacts = [
+        module.Contact("left_forearm", "hinged", (0.1, -0.2, 0.3), axis=(1.0, 2.0, -2.0)),
+        module.Contact("right_forearm", "rolling", (0.2, 0.1, 0.0), normal=(0.0, 1.0, 2.0), radius=0.1),
+    ]
+    draw = np.random.default_rng(2)
+    q, qd, tau = draw.uniform(-0.8, 0.8, (3, 4, 7))
+    for held in (contacts[:1], contacts[1:]):
+        known, own = (module.load(name).constrained(contacts=held) for name in ("numpy", "native"))
+        rest = np.zeros(len(known.independent))
+        expected = [
+            *(known.jacobian(q), known.acceleration(q, qd, rest), known.closed(q + 0.01, held_at=q)),
+            *known.forward_dynamics(q, qd, tau),
+        ]
+        for s in range(len(q)):
+            a, b, c = (x[s].astype(kind) for x in (q, qd, tau))
+            one = [own.jacobian(a), own.acceleration(a, b, rest), own.closed(a + kind(0.01), held_at=a)]
+            for found, whole in zip([*one, *own.forward_dynamics(a, b, c)], expected, strict=True):
+                assert found.dtype == kind
+                size = max(1.0, np.abs(whole[s]).max())
+                np.testing.assert_allclose(found, whole[s], atol=limit * size)
 
 
 def test_a_hinged_contact_leaves_turns_about_its_axis(tmp_path: Path) -> None:
@@ -237,6 +284,12 @@ def test_an_open_loop_is_refused_and_closed(one: Any) -> None:
     message = " mm at sample 1; give positions in which ties close, as closed(q) answers"
     refused(lambda: one.constraints.velocity_map(q), message)
     one.constrained(["crank"], tolerance=0.1).velocity_map(q)
+    closed = one.constraints.closed(NEAR)
+    for kind, most in ((np.float64, 1e-6), (np.float32, 1e-4)):  # in m, of what joints could close
+        moved = most / 0.5 * np.array([0.0, 0.0, 1.0])  # of the rocker, whose end is 0.5 m out
+        near, far = ((closed + share * moved).astype(kind) for share in (0.3, 3.0))
+        one.constraints.velocity_map(near)
+        refused(lambda q=far: one.constraints.velocity_map(q), "pin is open by ")
     one.constraints.velocity_map(one.constraints.closed(q))
 
 

@@ -173,14 +173,17 @@ def test_a_controller_maps_over_samples(package_of: Packages) -> None:
     assert relative_error(mapped, controller(q, qd, at)) <= 1e-12
 
 
-def test_joints_own_torques_are_compensated_and_armature_is_kept(sprung: ModuleType) -> None:
-    model = sprung.load()
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_joints_own_torques_are_compensated_and_armature_is_kept(backend: str, sprung: ModuleType) -> None:
+    model, known = sprung.load(backend), sprung.load("numpy")
     q, qd, at, force = (np.array(row) for row in ([0.3, -0.5], [0.7, 0.4], [0.1, 0.2], [1.0, -2.0]))
     armature = np.diag([0.3, 0.1])
 
-    def accelerated(controller: Any) -> Any:
-        torque = controller(q, qd, at, force) + force
-        return model.forward_dynamics(q, qd, torque, passive=True)
+    def torque(controller: Any, *state: Any) -> Any:
+        return np.asarray(controller(*as_kind(backend, *state)))
+
+    def accelerated(controller: Any, passive: bool = True) -> Any:
+        return known.forward_dynamics(q, qd, torque(controller, q, qd, at, force) + force, passive=passive)
 
     pull = force - 2.0 * qd - 5.0 * (q - at)
     smooth = {"friction_width": 1e-3}  # so narrow that all of it is compensated
@@ -191,12 +194,12 @@ def test_joints_own_torques_are_compensated_and_armature_is_kept(sprung: ModuleT
     beside = model.partial_impedance(shares, 2.0, 5.0, **smooth)
     assert relative_error(accelerated(beside), np.linalg.solve(4.0 * np.eye(2) + armature, pull)) <= 1e-12
     natural = model.partial_impedance(damping=2.0, stiffness=5.0, **smooth)
-    assert relative_error(natural(q, qd, at), natural(q, qd, at, force)) <= 1e-12  # no force need be measured
-    mass = model.mass_matrix(q) + armature
+    unmeasured = torque(natural, q, qd, at)  # no force need be measured
+    assert relative_error(unmeasured, torque(natural, q, qd, at, force)) <= 1e-12
+    mass = known.mass_matrix(q) + armature
     assert relative_error(accelerated(natural), np.linalg.solve(mass, pull)) <= 1e-12
     bare = model.partial_impedance(4.0, 2.0, 5.0, passive=False)
-    alone = model.forward_dynamics(q, qd, bare(q, qd, at, force) + force, passive=False)
-    assert relative_error(alone, pull / 4.0) <= 1e-12
+    assert relative_error(accelerated(bare, passive=False), pull / 4.0) <= 1e-12
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
@@ -240,6 +243,9 @@ def test_hand_written_energies_are_controlled_too(package_of: Packages) -> None:
     expected = (-2.0 * qd - 5.0 * (q - at)) / 4.0
     assert relative_error(model.forward_dynamics(q, qd, controller(q, qd, at)), expected) <= 1e-12
     assert not controller.dissipative
+    natural, step = model.natural_impedance(q, qd, at), 1e-6 * np.eye(model.n)
+    slopes = [model.partial_torque(q, qd + e, at) - model.partial_torque(q, qd - e, at) for e in step]
+    np.testing.assert_allclose(natural.damping, np.stack(slopes, -1) / 2e-6, atol=1e-7)
     with pytest.raises(ValueError, match="are energies, which do not say where anything is"):
         model.partial_impedance(frame=package.FrameImpedance(0))
 

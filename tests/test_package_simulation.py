@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -144,6 +145,44 @@ def test_steps_of_all_kinds_lead_to_one_place(package_of: Packages) -> None:
         np.testing.assert_array_equal(one.time, time)
         assert relative_error(one.q, expected[:, 0]) <= bound
         assert relative_error(one.qd, expected[:, 1]) <= bound
+
+
+def test_no_step_is_longer_than_asked_and_torques_are_those_of_its_instants(rod: ModuleType) -> None:
+    """Under a torque that grows with time's square Runge and Kutta's steps, and Simpson's rule, are exact."""
+    model, time, step = rod.load(), np.array([0.5, 0.55, 0.85, 0.86]), 0.02
+    inertia, asked = 0.05 + 2.0 * 0.3**2, []
+
+    def torque(t: float, q: Any, qd: Any) -> Any:
+        asked.append(t)
+        return model.inverse_dynamics(q, 0.0 * qd, 0.0 * qd) + inertia * (1.0 - 2.0 * t + 3.0 * t * t)
+
+    def motion(t: Any) -> Any:
+        return t**2 / 2.0 - t**3 / 3.0 + t**4 / 4.0, t - t**2 + t**3
+
+    start = motion(0.5)
+    found = model.simulate([start[0]], [start[1]], time, torque, step=step)
+    assert np.abs(found.q[:, 0] - motion(time)[0]).max() <= 1e-12
+    assert np.abs(found.qd[:, 0] - motion(time)[1]).max() <= 1e-12
+    instants = np.unique(np.round(asked, 9))
+    middles = [m for a, b in pairwise(time) for m in middles_of(a, b, step)]
+    ends = [e for a, b in pairwise(time) for e in np.linspace(a, b, 1 + len(middles_of(a, b, step)))]
+    np.testing.assert_allclose(instants, np.unique(np.round([*ends, *middles], 9)), atol=1e-9)
+    asked.clear()
+    model.simulate([start[0]], [start[1]], time, torque, step=step, method="RK45")
+    assert np.diff(np.unique(asked)).max() <= step
+
+
+def middles_of(begin: float, end: float, step: float) -> Any:
+    """Of the fewest equal steps that are none longer than asked."""
+    count = next(n for n in range(1, 100) if (end - begin) / n <= step + 1e-12)
+    return begin + (np.arange(count) + 0.5) * (end - begin) / count
+
+
+def test_a_solvers_motion_has_the_dtype_of_its_start(rod: ModuleType) -> None:
+    start = np.zeros(1, np.float32)
+    for how in ({}, {"method": "RK45"}):
+        found = rod.load().simulate(start, start, [0.0, 0.1], **how)
+        assert {str(a.dtype) for a in found} == {"float32"}
 
 
 def test_gradients_flow_through_the_steps(package_of: Packages) -> None:

@@ -1,6 +1,7 @@
 """Sums over the links of a generated package: shapes, places, dtypes, gradients, names and messages."""
 
 from collections.abc import Callable
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -10,6 +11,7 @@ from answers import relative_error
 from conftest import DATA, PANDA, needs_compiler
 from linkwise import Coordinate, LinkEnergy, energy_system, generate, write_package
 from linkwise.package.load import import_package
+from linkwise.runtime.sums.inertia_solve import solved
 
 torch = pytest.importorskip("torch")
 
@@ -76,6 +78,21 @@ def test_sums_are_those_of_the_shares(backend: str, robot: str, package_of: Pack
     product = (symbols @ np.asarray(qd)[..., None, :, None])[..., 0]
     assert relative_error(product, (c1 - rest).sum(-2)) <= 1e-14
     assert np.abs(symbols - symbols.swapaxes(-1, -2)).max() <= 1e-14 * np.abs(symbols).max()
+
+
+@pytest.mark.parametrize("robot", ["planar3", "spherical"])
+def test_christoffel_symbols_of_many_samples_are_slopes_of_the_mass_matrix(
+    robot: str, package_of: Packages, spherical: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In pieces of four samples, of which the last is short."""
+    package = spherical if robot == "spherical" else package_of(robot)
+    model, summed = package.load("numpy"), import_module(f"{package.__name__}.runtime.sums.summed")
+    monkeypatch.setattr(summed, "AT_ONCE", 4 * model.n * sum(model.structure.sizes))
+    q = motion_of(model, 11)[0]
+    found, steps = model.christoffel(q), 1e-5 * np.eye(model.n)
+    slope = np.stack([model.mass_matrix(q + s) - model.mass_matrix(q - s) for s in steps], -1) / 2e-5
+    expected = (slope + slope.swapaxes(-1, -2) - np.moveaxis(slope, -1, -3)) / 2.0
+    assert relative_error(found, expected) <= 1e-8
 
 
 CROOKED = f"{DATA / 'crane.urdf'} loops"
@@ -147,9 +164,11 @@ def test_gradients_flow_through_forward_dynamics(backend: str, package_of: Packa
     assert torch.autograd.gradcheck(model.christoffel, motion[:1])
 
 
-def test_forward_dynamics_runs_under_vmap_and_jacrev(package_of: Packages) -> None:
+def test_sums_run_under_vmap_and_jacrev(package_of: Packages) -> None:
     robot = package_of("planar3").load("torch")
     motion = motion_of(robot, 4)
+    symbols = torch.func.vmap(robot.christoffel)(motion[0])
+    assert relative_error(symbols, np.asarray(robot.christoffel(motion[0]))) <= 1e-14
     mapped = torch.func.vmap(robot.forward_dynamics)(*motion)
     assert relative_error(mapped, robot.forward_dynamics(*motion)) <= 1e-14
     slope = torch.func.vmap(torch.func.jacrev(robot.forward_dynamics, 2))(*motion)
@@ -158,11 +177,11 @@ def test_forward_dynamics_runs_under_vmap_and_jacrev(package_of: Packages) -> No
 
 @pytest.fixture(scope="module")
 def spherical(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A mass on a string: its turn phi about the vertical moves nothing where the string hangs down."""
+    """A mass on a string, in axes that turn: phi about the vertical moves nothing where it hangs down."""
     import sympy as sp
 
     theta, phi = Coordinate("theta"), Coordinate("phi")
-    kinetic = (theta.qd**2 + sp.sin(theta.q) ** 2 * phi.qd**2) / 2
+    kinetic = (theta.qd**2 + sp.sin(theta.q) ** 2 * (phi.qd + 0.7) ** 2) / 2
     bob = LinkEnergy("bob", kinetic, -9.81 * sp.cos(theta.q))
     folder = tmp_path_factory.mktemp("sums") / "spherical"
     write_package(generate(energy_system("spherical", [theta, phi], [bob])), folder)
@@ -185,6 +204,20 @@ def test_a_singular_mass_matrix_is_refused_with_sample_and_joints(
     qdd = np.asarray(robot.forward_dynamics(q, qd, tau))
     assert np.isnan(qdd[2]).all()
     assert np.isfinite(qdd[[0, 1, 3]]).all()
+
+
+@pytest.mark.parametrize("kind", ["array", "tensor"])
+def test_a_mass_matrix_is_singular_also_where_no_pivot_says_so(kind: str) -> None:
+    """Kahan's matrix, whose pivots are all above its least eigenvalue; and one that is not positive."""
+    s, n = 0.5757627118644068, 32
+    r = np.diag(s ** np.arange(n)) @ (np.eye(n) - (1.0 - s * s) ** 0.5 * np.triu(np.ones((n, n)), 1))
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    for matrix in (r.T @ r, turn @ np.diag([2.0, 0.0, -1.0]) @ turn.T):
+        names = [f"joint{k}" for k in range(len(matrix))]
+        given = [matrix, np.ones(len(matrix))]
+        mass, force = map(torch.from_numpy, given) if kind == "tensor" else given
+        with pytest.raises(ValueError, match=r"the mass matrix is singular: the joints joint0, .* together"):
+            solved(mass, force, names)
 
 
 def test_joints_and_links_have_numbers_by_name(package_of: Packages) -> None:

@@ -212,6 +212,20 @@ def test_c_moves_them_so_too(dtype: str, bound: float, arm: Path, tmp_path: Path
     assert relative_error(answer("passive_torque", Q, QD, data.qacc), own) <= bound
 
 
+@needs_compiler
+def test_c_takes_friction_by_the_sense_of_motion_and_none_at_rest(hand: ModuleType, tmp_path: Path) -> None:
+    directory = Path(str(hand.__file__)).parent
+    compile_library(directory, tmp_path / "hand.so")
+    library, q, qdd = ctypes.CDLL(str(tmp_path / "hand.so")), [0.4, -0.7], [0.3, -0.6]
+    for qd in ([0.0, -0.3], [0.2, 0.0], [-0.0, 0.3], [-1e-30, 0.0]):
+        for suffix, dtype, most in (("", "f8", 1e-14), ("f", "f4", 1e-5)):
+            arrays = [*(np.array(a, dtype) for a in (q, qd, qdd)), np.full(2, np.nan, dtype)]
+            pointers = [ctypes.c_void_p(a.ctypes.data) for a in arrays]
+            getattr(library, f"{name_of(directory)}_passive_torque{suffix}")(*pointers)
+            expected = sum(by_hand(*(a.astype(float) for a in arrays[:3])))
+            np.testing.assert_allclose(arrays[3], expected, rtol=0, atol=most)
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_loops_move_as_mujocos_matrices_say(backend: str, four_bar: ModuleType) -> None:
     loop = four_bar.load("numpy").constraints
@@ -224,11 +238,16 @@ def test_loops_move_as_mujocos_matrices_say(backend: str, four_bar: ModuleType) 
     rows, drift = data.efc_J[:9].reshape(3, 3), (ahead - behind) @ qd / 2e-5
     whole = np.block([[inertia(model, data), -rows.T], [rows, np.zeros((3, 3))]])
     force = tau + data.qfrc_passive - data.qfrc_bias
-    expected = np.linalg.lstsq(whole, np.r_[force, -drift], rcond=1e-9)[0][:3]
+    expected, pinned = np.split(np.linalg.lstsq(whole, np.r_[force, -drift], rcond=1e-9)[0], 2)
     robot = four_bar.load(backend)
     q, qd, tau = taken(robot, [q, qd, tau])
-    assert relative_error(robot.constraints.forward_dynamics(q, qd, tau).qdd, expected) <= 1e-7
+    found = robot.constraints.forward_dynamics(q, qd, tau)
+    assert relative_error(found.qdd, expected) <= 1e-7
+    assert relative_error(found.forces, pinned) <= 1e-7
     assert relative_error(robot.induced_accelerations(q, qd, tau).total, expected) <= 1e-7
+    moved = robot.simulate(q, qd, [0.0, 1e-4, 2e-4], tau)
+    assert relative_error((4.0 * moved.qd[1] - 3.0 * moved.qd[0] - moved.qd[2]) / 2e-4, expected) <= 1e-3
+    assert float(abs(moved.energy_drift).max()) <= 1e-9 * float(abs(moved.energy).max())
     # Without ties, if that is asked for, each is free.
     free = robot.simulate(q, qd, [0.0, 1e-4, 2e-4], tau, constraints=False).qd
     alone = np.linalg.solve(inertia(model, data), force)

@@ -87,9 +87,8 @@ def planar_link(name: str, mass: float, com: str, inertia: tuple[float, float, f
     )
 
 
-def test_one_mechanism_answers_alike_in_every_format(tmp_path: Path) -> None:
-    pytest.importorskip("mujoco")
-    urdf = urdf_text.robot(
+def planar_urdf(more: str = "") -> str:
+    return urdf_text.robot(
         '<link name="base"/>',
         planar_link("crank", 0.4, "0.06 0.01 0", (0.0001, 0.0005, 0.0006)),
         planar_link("rod", 0.9, "0.155 0 0.02", (0.0002, 0.007, 0.0071)),
@@ -100,18 +99,25 @@ def test_one_mechanism_answers_alike_in_every_format(tmp_path: Path) -> None:
         '<axis xyz="0 0 1"/></joint>',
         '<joint name="c" type="continuous"><parent link="base"/><child link="rocker"/>'
         '<origin xyz="0.28 0 0"/><axis xyz="0 0 1"/></joint>',
+        more,
     )
-    loop = """schema = 1
+
+
+LOOP = """schema = 1
         parameters = { rod = 0.31 }
         [[constraint]]
         name = "pin"
         type = "point"
         first = { frame = "rod", xyz = ["rod", 0, 0] }
         second = { frame = "rocker", xyz = [0.24, 0, 0] }"""
-    beside = str(written(tmp_path, "loop.toml", loop))
+
+
+def test_one_mechanism_answers_alike_in_every_format(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    beside = str(written(tmp_path, "loop.toml", LOOP))
     robots = [
         loaded(FOURBAR, tmp_path),
-        loaded(written(tmp_path, "bar.urdf", urdf), tmp_path, constraints=beside),
+        loaded(written(tmp_path, "bar.urdf", planar_urdf()), tmp_path, constraints=beside),
         loaded(written(tmp_path, "same.xml", PLANAR.format(more="")), tmp_path),
     ]
     own = robots[0].constraints
@@ -131,9 +137,25 @@ def test_joints_with_motors_then_with_springs_are_rather_independent(tmp_path: P
     pytest.importorskip("mujoco")
     motor = '<actuator><motor joint="c"/></actuator>'
     sprung = PLANAR.replace('name="b"/>', 'name="b" stiffness="2"/>')
-    assert robot_of(written(tmp_path, "driven.xml", PLANAR.format(more=motor))).independent == (2,)
+    cord = '<tendon><fixed name="cord"><joint joint="c" coef="2"/></fixed></tendon>'
+    for how in (
+        motor,
+        motor.replace("joint=", "jointinparent="),
+        cord + motor.replace('joint="c"', 'tendon="cord"'),
+    ):
+        assert robot_of(written(tmp_path, "driven.xml", PLANAR.format(more=how))).independent == (2,)
     assert robot_of(written(tmp_path, "sprung.xml", sprung.format(more=""))).independent == (1,)
     assert robot_of(written(tmp_path, "both.xml", sprung.format(more=motor))).independent == (2,)
+
+
+def test_joints_that_urdf_files_have_actuators_on_are_rather_independent(tmp_path: Path) -> None:
+    beside = str(written(tmp_path, "loop.toml", LOOP))
+    commanded = '<ros2_control><joint name="c"><command_interface name="effort"/></joint></ros2_control>'
+    seen = commanded.replace("command_interface", "state_interface")
+    geared = '<transmission name="t"><joint name="c"/><actuator name="m"/></transmission>'
+    for more, own in (("", (0,)), (seen, (0,)), (commanded, (2,)), (geared, (2,))):
+        path = written(tmp_path, "bar.urdf", planar_urdf(more))
+        assert robot_of(path, constraints=beside).independent == own, more
 
 
 ARMS = """<mujoco model="arms"><compiler angle="radian"/><option jacobian="dense"/><worldbody>
@@ -196,6 +218,31 @@ def test_equality_of_mjcf_is_mujocos_own(equality: str, tmp_path: Path) -> None:
     if turns:  # the last position is a closed one, where both take the same motions away
         singular = np.linalg.svd(np.vstack([rows, own[1]]))[1]
         assert np.linalg.matrix_rank(rows) == len(rows) == int((singular > 1e-9).sum())
+
+
+def test_ends_in_a_file_beside_stand_in_the_sites_of_an_mjcf_file(tmp_path: Path) -> None:
+    mujoco, rotations = pytest.importorskip("mujoco"), pytest.importorskip("scipy.spatial.transform")
+    path = written(tmp_path, "arms.xml", ARMS.format(equality=""))
+    ends = {"grip": ([0.1, 0.2, -0.3], [0.4, -0.5, 0.6]), "palm": ([-0.2, 0.0, 0.1], [0.2, 0.1, -0.3])}
+    told = [f'{{ frame = "{site}", xyz = {xyz}, rpy = {rpy} }}' for site, (xyz, rpy) in ends.items()]
+    text = (
+        f'schema = 1\n[[constraint]]\nname = "weld"\ntype = "frame"\nfirst = {told[0]}\nsecond = {told[1]}\n'
+    )
+    beside = str(written(tmp_path, "weld.toml", text))
+    constraints = loaded(path, tmp_path, constraints=beside).constraints
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    for q in np.random.default_rng(0).uniform(-1.0, 1.0, (5, model.nq)):
+        data.qpos = q
+        mujoco.mj_forward(model, data)
+        places, turns = [], []
+        for site, (xyz, rpy) in ends.items():
+            turn = data.site(site).xmat.reshape(3, 3)
+            places.append(data.site(site).xpos + turn @ xyz)
+            turns.append(rotations.Rotation.from_matrix(turn) * rotations.Rotation.from_euler("xyz", rpy))
+        found, apart = constraints.violation(q), (turns[0] * turns[1].inv()).magnitude()
+        np.testing.assert_allclose(found[3:], places[0] - places[1], atol=1e-12)
+        assert np.linalg.norm(found[:3]) == pytest.approx(2.0 * np.sin(apart / 2.0), abs=1e-12)
 
 
 BAR = """schema = 1

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from answers import random_states, relative_error
-from linkwise import Options, generate, read_system, write_package
+from linkwise import Options, generate, read_robot, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise.robot import effects
 from urdf_text import chain, joint, link, mimic, robot
@@ -21,7 +21,18 @@ SLIDE = joint("bc", "b", "c", type="prismatic", axis="1 -2 0.5")
 TREE = robot(
     *map(link, "abcdef"), AB, SLIDE, joint("ad", "a", "d"), joint("de", "d", "e"), joint("df", "d", "f")
 )
+BARE = robot(
+    link("a"),
+    link("b").replace('<origin xyz="0.1 -0.02 0.05" rpy="0.1 0.2 0.3"/>', '<origin xyz="0.1 -0.02 0.05"/>'),
+    link("c").replace('<origin xyz="0.1 -0.02 0.05" rpy="0.1 0.2 0.3"/>', ""),
+    link("d"),
+    AB.replace('<axis xyz="0 0.6 0.8"/>', "").replace(' rpy="0.4 -0.3 0.2"', ""),
+    BC.replace('<origin xyz="0.2 0.1 0.3" rpy="0.4 -0.3 0.2"/>', ""),
+    joint("cd", "c", "d", inner='<mimic joint="ab"/>').replace('xyz="0.2 0.1 0.3" ', ""),
+)
+"""With the least that a file must say."""
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
+    "defaults": (BARE, {}),
     "revolute": (chain(AB, BC), {}),
     "continuous": (chain(AB, joint("bc", "b", "c", type="continuous", axis="0 0 -1")), {}),
     "negative axes": (
@@ -83,6 +94,12 @@ def test_torques_are_pinocchios(case: str, tmp_path: Path) -> None:
     text, options = CASES[case]
     (tmp_path / "robot.urdf").write_text(text)
     compare(tmp_path / "robot.urdf", options, tmp_path)
+
+
+def test_a_joint_follows_one_to_one_where_its_file_says_no_more(tmp_path: Path) -> None:
+    (tmp_path / "robot.urdf").write_text(BARE)
+    robot = read_robot(tmp_path / "robot.urdf")
+    assert [(f.name, f.coordinate, f.curve.line) for f in robot.followers] == [("cd", "ab", (0.0, 1.0))]
 
 
 PARTS = {

@@ -168,6 +168,9 @@ def test_constraints_between_bodies_close_loops(tmp_path: Path) -> None:
     bars = ["PlanarJoint", "PlanarJoint"]
     (tie,) = robot_of(tmp_path, chain(bars, pin)).ties
     assert (tie.name, tie.kind) == ("pin", "point")
+    for switch in ("<isEnforced>false</isEnforced>", "<isDisabled>true</isDisabled>"):
+        off = pin.replace("</PointConstraint>", f"{switch}</PointConstraint>")
+        assert robot_of(tmp_path, chain(bars, off)).ties == ()
 
 
 def test_a_function_may_stand_without_a_name(tmp_path: Path) -> None:

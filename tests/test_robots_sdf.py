@@ -24,13 +24,15 @@ URDF = """<robot name="arm">
   <limit lower="0" upper="1" effort="1" velocity="1"/><dynamics damping="0.3" friction="0.1"/></joint>
 <joint name="slide" type="prismatic"><parent link="upper"/><child link="lower"/><origin xyz="0 0 0.5"/>
   <axis xyz="0.6 0 0.8"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint>
+<gazebo reference="hip"><springStiffness>7</springStiffness><springReference>0.4</springReference></gazebo>
 </robot>"""
 
 UPPER = """<inertial><pose>0.1 0 0.2 0.3 0 0</pose><mass>2</mass><inertia>
   <ixx>0.02</ixx><iyy>0.03</iyy><izz>0.04</izz><ixy>0.001</ixy></inertia></inertial>"""
 LOWER = """<inertial><pose>0 0.1 0 0 0 0</pose><mass>1</mass><inertia>
   <ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"""
-HIP = "<dynamics><damping>0.3</damping><friction>0.1</friction></dynamics>"
+HIP = """<dynamics><damping>0.3</damping><friction>0.1</friction>
+  <spring_stiffness>7</spring_stiffness><spring_reference>0.4</spring_reference></dynamics>"""
 
 # Both links are turned by a quarter from the model: 0.6 0 0.8 in their axes is 0 0.6 0.8 in the model's.
 IN_THE_MODEL = f"""<sdf version="1.4"><model name="arm">
@@ -108,6 +110,7 @@ PLACED = {
 
 def loaded(folder: Path, text: str, **options: Any) -> Any:
     """A package of the model, on NumPy, and what was said of it."""
+    folder.mkdir(exist_ok=True)
     (folder / "poses.sdf").write_text(text)
     system = read_system(folder / "poses.sdf", Options(**options))
     write_package(generate(system, ["numpy"]), folder / "poses")
@@ -210,6 +213,30 @@ def test_a_joint_that_closes_a_loop_becomes_a_constraint_where_it_is(
     # At q = 0 the links stand where the file shows them, and the loop is closed.
     places = [_place(robot, end) for end in ends]
     np.testing.assert_allclose(places, [[0.5, 0.0, 0.3]] * 2, atol=1e-15)
+
+
+@pytest.mark.parametrize("closing", ["revolute", "fixed"])
+def test_what_closes_a_loop_has_its_axes_from_links_that_stand_askew(closing: str, tmp_path: Path) -> None:
+    """Pins of a planar loop all turn about y, so that what a ball closes a hinge leaves as it is."""
+    text = FOUR_BAR.replace("<xyz>0 1 0</xyz>", '<xyz expressed_in="__model__">0 1 0</xyz>')
+    text = text.replace("0 0 0.3 0 0 0</pose>{inertial}", "0 0 0.3 0.3 0.2 0.1</pose>{inertial}")
+    text = text.replace("0.5 0 0 0 0 0</pose>{inertial}", "0.5 0 0 -0.2 0.4 0.6</pose>{inertial}")
+    text = text.replace(
+        "<pose>0 0 0.3 0 0 0</pose><parent>", "<pose relative_to='__model__'>{pin}</pose><parent>"
+    )
+    for name, place in (("bend", "0 0 0.3 0.5 0.4 0.3"), ("swing", "0.5 0 0 0.1 0.7 0.2")):
+        end = f'name="{name}" type="revolute">'
+        text = text.replace(end, f"{end}<pose relative_to='__model__'>{place}</pose>")
+    first, last = text.index('<joint name="close"'), text.index('<joint name="swing"')
+    end = text.index("</model>")
+    text = text[:first] + text[last:end] + text[first:last] + text[end:]
+    given = {"inertial": LOWER, "pin": "0.5 0 0.3 0.2 -0.4 0.5", "damping": 0}
+    ball, _ = loaded(tmp_path / "ball", text.format(closing="ball", **given), base="fixed")
+    base = {"base": "fixed"} if closing == "revolute" else {}  # welded bars do not turn
+    robot, _ = loaded(tmp_path / closing, text.format(closing=closing, **given), **base)
+    closed = [ball.constraints.closed(np.array([0.4, 0.1, 0.4]))] if base else []
+    for q in (np.zeros(robot.n), *closed):
+        np.testing.assert_allclose(robot.constraints.violation(q), np.zeros(5 if base else 6), atol=1e-12)
 
 
 def _place(robot: Any, frame: Any) -> Any:

@@ -82,14 +82,29 @@ def test_parameters_and_bodies_may_be_those_of_no_samples(
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("parameters", ["none", "one a sample"])
 def test_large_batches_in_pieces_are_what_single_samples_are(
-    backend: str, package_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
+    backend: str,
+    parameters: str,
+    arm: ModuleType,
+    package_of: Callable[[str], ModuleType],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    robot = told(package_of("torso").load(backend, kernel="rule"), False, monkeypatch)
-    motion = motion_of(backend, robot.n, 23)
-    whole = robot.packed(*motion)
+    if parameters == "none":
+        robot = package_of("torso").load(backend, kernel="rule")
+    else:
+        given = {name: value * np.linspace(0.9, 1.05, 23) for name, value in arm.parameters.items()}
+        robot = arm.load(backend, given, allow_unphysical=True, kernel="rule")
+    told(robot, False, monkeypatch)
+    q, qd, qdd = motion_of(backend, robot.n, 23)
+
+    def answers() -> list[Any]:
+        regressors = robot.regressor(q, qd, qdd), *robot.coefficient_regressors(q, qd)
+        return [*robot.packed(q, qd, qdd), *robot.energy(q, qd), *regressors]
+
+    whole = answers()
     monkeypatch.setattr(type(robot.backend), "chunk", lambda self, motion, most: 5)
-    for piece, one in zip(robot.packed(*motion), whole, strict=True):
+    for piece, one in zip(answers(), whole, strict=True):
         if one.shape[-1]:
             assert relative_error(piece, one) <= 1e-15
 

@@ -2,9 +2,12 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
-from linkwise import read_robot
+from linkwise import generate, read_robot, read_system, write_package
+from linkwise.package.load import import_package
 from osim_text import (
     KNEE,
     LINEAR,
@@ -28,8 +31,11 @@ pytest.importorskip(
 import opensim
 
 from numeric.opensim_beside import Beside
+from numeric.opensim_model import numbers
 
 LIMIT = 1e-12
+ROUNDED = 1e-4
+"""OpenSim keeps six digits of the frames of a format 3 file."""
 CHAINS: dict[str, Sequence[Kind]] = {
     "pin, slider": ["PinJoint", "SliderJoint"],
     "universal, gimbal": ["UniversalJoint", "GimbalJoint"],
@@ -89,6 +95,68 @@ def test_a_locked_coordinate_and_limits(tmp_path: Path) -> None:
     assert list(both.names) == ["joint0_second", "joint1_angle"]
     assert -0.2 <= both.motion[0, 1] <= 0.1
     assert max(both.errors()) <= LIMIT
+
+
+ENDS = (("body2", "0.1 -0.2 0.3", "0.4 -0.7 1.1"), ("ground", "0.5 0.6 -0.4", "-0.3 0.5 0.2"))
+"""Body, place and turn of each end of a constraint."""
+
+
+def held_by(kind: str, old: bool, more: str) -> str:
+    """A constraint with its ends on bodies, or in offset frames of theirs, as a WeldConstraint has them."""
+    ends = frames = ""
+    for n, (body, place, turn) in enumerate(ENDS, 1):
+        path = f"/{body}" if body == "ground" else f"/bodyset/{body}"
+        if kind == "WeldConstraint" and not old:
+            ends += f"<socket_frame{n}>end{n}</socket_frame{n}>"
+            frames += (
+                f'<PhysicalOffsetFrame name="end{n}"><socket_parent>{path}</socket_parent>'
+                f"<translation>{place}</translation><orientation>{turn}</orientation></PhysicalOffsetFrame>"
+            )
+            continue
+        ends += f"<body_{n}>{body}</body_{n}>" if old else f"<socket_body_{n}>{path}</socket_body_{n}>"
+        ends += f"<location_body_{n}>{place}</location_body_{n}>"
+        ends += f"<orientation_body_{n}>{turn}</orientation_body_{n}>" if kind == "WeldConstraint" else ""
+    return constraints(f'<{kind} name="tie">{ends}<frames>{frames}</frames>{more}</{kind}>')
+
+
+@pytest.mark.parametrize("old", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "more"),
+    [
+        ("PointConstraint", ""),
+        ("WeldConstraint", ""),
+        ("ConstantDistanceConstraint", "<constant_distance>0.7</constant_distance>"),
+    ],
+)
+def test_constraints_close_where_opensims_do(kind: str, more: str, old: bool, tmp_path: Path) -> None:
+    file = tmp_path / "model.osim"
+    file.write_text(chain(["FreeJoint", "PinJoint", "GimbalJoint"], held_by(kind, old, more), old=old))
+    write_package(generate(read_system(file), ["numpy"], kernel="loops"), tmp_path / "package")
+    robot: Any = import_package(tmp_path / "package").load("numpy")
+    model = opensim.Model(str(file))
+    state = model.initSystem()
+    beside = robot.constraints.closed_position + np.random.default_rng(1).uniform(-0.05, 0.05, (3, robot.n))
+    for q in robot.constraints.closed(beside):
+        for name, value in zip(robot.joint_names, q, strict=True):
+            model.getCoordinateSet().get(name).setValue(state, float(value), False)
+        model.realizePosition(state)
+        assert np.abs(numbers(state.getQErr())).max() <= (ROUNDED if old else LIMIT)
+
+
+def test_a_coupling_is_scaled_as_opensim_scales_it(tmp_path: Path) -> None:
+    coupled = coupler("joint1_angle", "joint0_angle", ROLLS).replace(
+        "</coupled_coordinates_function>", "</coupled_coordinates_function><scale_factor>-1.7</scale_factor>"
+    )
+    file = tmp_path / "model.osim"
+    file.write_text(chain(["PinJoint", "PinJoint"], constraints(coupled)))
+    (follower,) = read_robot(file).followers
+    model = opensim.Model(str(file))
+    state = model.initSystem()
+    for at in (-1.3, 0.2, 0.9):
+        for name, value in (("joint0_angle", at), (follower.name, follower.curve(at))):
+            model.getCoordinateSet().get(name).setValue(state, value, False)
+        model.realizePosition(state)
+        assert np.abs(numbers(state.getQErr())).max() <= LIMIT
 
 
 TURNS = {
