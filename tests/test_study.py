@@ -159,7 +159,10 @@ def test_done_trials_stay_and_changed_ones_are_done_again(tmp_path: Path) -> Non
 
 def test_what_all_say_is_made_again_where_the_plan_changes_and_no_trial_is(tmp_path: Path) -> None:
     ask = '\n[[compare]]\nfactor = "condition"\nbetween = ["slow", "fast"]\ncolumns = ["tau/joint1"]\n'
-    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, ask, TRIALS, subjects=3, trials=1), tmp_path / "out"
+    file, out = (
+        write_study(tmp_path, HEAD, QUICK, CHOICES, ask, TRIALS, subjects=3, trials=1),
+        tmp_path / "out",
+    )
     run_study(file, out, Here())
     assert set(pd.read_parquet(out / "tests.parquet").alpha) == {0.05}
     figure = '[[figure]]\nname = "torque"\ncolumns = ["tau/joint1"]\n'

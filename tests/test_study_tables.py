@@ -57,8 +57,10 @@ def tidy(means: Path) -> Any:
 
 
 def test_a_trials_row_sums_up_its_samples(means: Path) -> None:
-    expected = tidy(means).groupby(["trial", "subject", "condition", "day", "column"]).value.agg(
-        ["mean", lambda x: x.std(ddof=0), "min", "max", lambda x: np.sqrt((x**2).mean())]
+    expected = (
+        tidy(means)
+        .groupby(["trial", "subject", "condition", "day", "column"])
+        .value.agg(["mean", lambda x: x.std(ddof=0), "min", "max", lambda x: np.sqrt((x**2).mean())])
     )
     found = pd.read_parquet(means / "summary.parquet").set_index(list(expected.index.names))
     found = found.loc[expected.index]
@@ -97,7 +99,9 @@ def test_means_are_compared_by_subject(means: Path) -> None:
         assert (found.t, found.p) == pytest.approx((expected.statistic, expected.pvalue), rel=1e-9)
         assert (found.first_subjects, found.second_subjects) == (len(first), len(second))
         is_there = expected.pvalue < 0.05
-        assert (found.start, found.end) == ((0, 100) if is_there else pytest.approx((np.nan,) * 2, nan_ok=True))
+        assert (found.start, found.end) == (
+            (0, 100) if is_there else pytest.approx((np.nan,) * 2, nan_ok=True)
+        )
     assert set(tests.loc["tau/joint1", ["first", "second"]]) == {"slow", "fast"}
     assert tests.loc["tau/joint1", "first_subjects"] == 3
 
@@ -113,7 +117,9 @@ def trials_of(points: int) -> list[TrialSummary]:
     for number, level in enumerate(SUBJECTS):
         for at, subject in enumerate(SUBJECTS[level]):
             own = np.random.default_rng(ord(subject)).normal() / 2
-            rough = noise.normal(size=(1, 7)) @ np.array([np.cos(k * np.linspace(0, 3, points)) for k in range(7)])
+            rough = noise.normal(size=(1, 7)) @ np.array(
+                [np.cos(k * np.linspace(0, 3, points)) for k in range(7)]
+            )
             curve = own + 0.2 * (1 + number) * rough[0] - 2.5 * number * bump
             labels = {"subject": subject, "pace": level, "like": "fast" if at % 2 else "slow"}
             statistics = {"tau": np.array([curve.mean(), 0, 0, 0, 0])}
