@@ -1,11 +1,9 @@
-"""What a study does again when something changes: the trials that it is of, what all say together, no others."""
+"""Which trials a study does again when something changes: those that are made of it, and no others."""
 
-import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 import urdf_text
 from linkwise import generate, read_system, write_package
@@ -14,7 +12,7 @@ from linkwise.study.study_file import read_study
 from linkwise.study.study_folder import trial_folders
 from linkwise.study.trial_ledger import done_before
 from motion_logs import write_csv
-from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
+from studies import CHOICES, HEAD, QUICK, Here
 
 CYCLES = '\n[cycles]\ntable = "cycles.csv"\npoints = 21\n'
 ONE = """

@@ -116,7 +116,10 @@ def test_trials_without_cycles_are_dots_with_deviations(driver: Any, tmp_path: P
     names = "return [...document.getElementById('column').options].map((option) => option.textContent)"
     column = driver.execute_script(names).index("tau/joint1/p")
     rows = pd.read_parquet(tmp_path / "out/summary.parquet").set_index("column")
-    dots = "return document.getElementById('bands').data.map((dot) => [dot.name, dot.y[0], dot.error_y.array[0]])"
+    dots = (
+        "return document.getElementById('bands').data"
+        ".map((dot) => [dot.name, dot.y[0], dot.error_y.array[0]])"
+    )
     for at, name, levels in (
         (0, "tau/joint1", ("fast", "slow", "else")),
         (column, "tau/joint1/p", ("else",)),

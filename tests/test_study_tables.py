@@ -53,7 +53,7 @@ def tidy(means: Path) -> Any:
     """Every sample's every column, (rows of trial, factors, column, value)."""
     samples = pd.read_parquet(means / "trials")
     about = ["trial", "subject", "condition", "day"]
-    return samples.astype({name: str for name in about}).melt([*about, "time"], var_name="column")
+    return samples.astype(dict.fromkeys(about, str)).melt([*about, "time"], var_name="column")
 
 
 def test_a_trials_row_sums_up_its_samples(means: Path) -> None:
@@ -155,7 +155,7 @@ def test_curves_are_compared_subject_by_subject(paired: bool, alpha: float) -> N
     field = spm.ttest_paired(first, second) if paired else spm.ttest2(first, second, equal_var=False)
     inferred = field.inference(alpha, two_tailed=True)
     assert found.threshold == pytest.approx(inferred.zstar, rel=1e-9)
-    clusters = [[*np.multiply(c.endpoints, 100 / 30), c.P] for c in inferred.clusters if c.P < alpha]
+    clusters = [[*np.multiply(c.endpoints, 100 / 30), c.P] for c in inferred.clusters if alpha > c.P]
     assert clusters
     np.testing.assert_allclose([[c.start, c.end, c.p] for c in found.clusters], clusters, rtol=1e-9)
 
