@@ -208,6 +208,7 @@ def opened(driver: Any, address: str) -> None:
 def choose(page: Any, name: str, value: object) -> None:
     page.execute_script(
         "const e = document.getElementById(arguments[0]); e.value = arguments[1];"
+        "e.dispatchEvent(new Event('input', {bubbles: true}));"
         "e.dispatchEvent(new Event('change', {bubbles: true}));",
         name,
         str(value),
@@ -294,4 +295,36 @@ def test_bars_of_many_joints_are_the_same_on_the_page(
         assert hover == [f"{joint} {word}" for joint in first]
         caption = driver.find_element("id", "shares-caption").text
         assert caption.endswith("Of all other joints the shares are added up.")
+    assert driver.get_log("browser") == []
+
+
+@pytest.mark.browser
+def test_the_table_of_many_causes_adds_up_the_smaller_ones(
+    driver: Any, crowd: Analysis, tmp_path: Path
+) -> None:
+    (tmp_path / "report.html").write_text(report(crowd), encoding="utf-8")
+    opened(driver, (tmp_path / "report.html").as_uri())
+    every, rows = Columns(crowd.table, CROWD), "return [...document.querySelectorAll('#numbers tbody tr')]"
+    rows += ".map((row) => [row.cells[0].textContent, Number(row.cells[1].dataset.value),"
+    rows += "row.cells[2].textContent, row.cells[3].textContent])"
+    choose(driver, "motion", "apart")
+    choose(driver, "joint", 3)
+    choose(driver, "slider", 123)
+    sizes = every.sizes(BOTH)
+    now = {cause: every.curve(CROWD[3], cause)[:, 123].sum() for cause in sizes}
+    order = largest_first(sizes, 3)
+    moved = [cause for cause in order if cause != "gravity"]
+    named = [cause for cause in order if cause in ("gravity", *moved[:8])]
+    *shown, (rest, x, share, most) = driver.execute_script(rows)
+    assert [name for name, *_ in shown] == named
+    assert [x for _, x, *_ in shown] == pytest.approx([now[cause] for cause in named], rel=1e-12)
+    smaller = moved[8:]
+    assert rest == f"{len(smaller)} others, each smaller"
+    assert x == pytest.approx(sum(now[cause] for cause in smaller), rel=1e-9)
+    assert share == f"{100 * abs(x) / sum(map(abs, now.values())):.1f} %"
+    assert most == f"≤ {float(f'{sizes[smaller[0]][3]:.4g}'):g} each"
+    traces = driver.execute_script("return document.getElementById('curves').data.map((c) => c.name)")
+    assert sorted(traces) == sorted(["gravity", *moved[:6], *["22 others, each smaller"] * 22])
+    driver.execute_script("document.getElementById('every-number').click()")
+    assert [name for name, *_ in driver.execute_script(rows)] == order
     assert driver.get_log("browser") == []
