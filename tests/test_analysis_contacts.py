@@ -113,6 +113,54 @@ def test_a_tie_bears_what_the_ground_gives_to_a_joint_that_follows(folder: Path)
     assert np.abs(by_link - result["force/gear"]).max() < 1e-9 * scale
 
 
+def test_losses_loads_and_measured_forces_of_a_tied_leg_each_balance(folder: Path) -> None:
+    """What a share asks of the base and of the ankle, which follows, ground and gear bear: 4 equations."""
+    text = (folder / "coupled.toml").read_text()
+    for joint, losses in (("knee_angle_r", "damping = 20"), ("ankle_angle_r", "damping = 30")):
+        text = text.replace(f'name = "{joint}"\n', f'name = "{joint}"\n{losses}\n', 1)
+    (folder / "damped.toml").write_text(text)
+    write_package(generate(read_system(folder / "damped.toml"), ["numpy"]), folder / "damped")
+    log = write_csv(folder / "damped.csv", smooth(60, 5) * [1, 0.3, 0.3, 0.3, 0.3, 0.3], JOINTS[:-1])
+    push = Load("push", "shank", (30.0, -40.0, 0.0), (0.0, 0.0, 5.0), (0.1, -0.2, 0.0))
+    plate = Load("plate", "foot", (60.0, 700.0, 0.0), (0.0, 0.0, -8.0), (0.15, 0.02, 0.0))
+    result = analyze(log, folder / "damped", contacts=Contacts((FOOT,), loads=(plate,)), loads=[push])
+    assert result.robot.constrained is not None
+    model: Any = result.robot.constrained.open
+    rows = model.kinematics.jacobian(result.q, "foot", FOOT.point)[:, [2, 3, 4]]  # turn, x, y
+    gear = np.zeros_like(result.q)
+    gear[:, 5], gear[:, 4] = 1.0, 0.5 + 0.4 * result.q[:, 4]
+    bears = np.swapaxes(np.concatenate([rows, gear[:, None]], axis=1), 1, 2)
+    at_push = model.kinematics.jacobian(result.q, "shank", push.point)[:, [2, 3, 4]]
+    asked = {
+        "damping": result.qd * [0.0, 0.0, 0.0, 0.0, 20.0, 30.0],
+        "load": -np.einsum("srn,r->sn", at_push, [5.0, 30.0, -40.0]),
+    }
+    undriven = [0, 1, 2, 5]
+    for share, torque in asked.items():
+        forces = np.linalg.solve(bears[:, undriven], torque[:, undriven, None])
+        left = torque - (bears @ forces)[..., 0]
+        behind = "/push" if share == "load" else ""
+        for row, force in zip(
+            ("sole moment_z", "sole force_x", "sole force_y", "gear"), forces.T[0], strict=True
+        ):
+            found = result[f"force_{share}/{row}{behind}"]
+            assert np.abs(found - force).max() < 1e-9 * np.abs(forces).max(), (share, row)
+        for i in (3, 4):
+            found = result.table.get(f"tau_{share}/{JOINTS[i]}{behind}", 0.0)
+            assert np.abs(found - left[:, i]).max() < 1e-9 * np.abs(torque).max(), (share, i)
+    slip = np.einsum("srn,sn->sr", rows, result.qd)
+    for row, values in zip(("angular_z", "x", "y"), slip.T, strict=True):
+        assert np.abs(result[f"slip/sole {row}"] - values).max() < 1e-12
+    poses = model.kinematics.pose(result.q, "foot")[:, :3, :3]
+    arm = poses @ (np.array(plate.point) - FOOT.point)
+    assert np.abs(result["force_measured/sole force_y"] - 700.0).max() < 1e-9
+    moment = -8.0 + arm[:, 0] * 700.0 - arm[:, 1] * 60.0
+    assert np.abs(result["force_measured/sole moment_z"] - moment).max() < 1e-9
+    loaded = analyze(log, folder / "damped", loads=[push, plate])
+    for joint in JOINTS[:-1]:
+        assert np.abs(result[f"tau_as_loads/{joint}"] - loaded[f"tau/{joint}"]).max() < 1e-9
+
+
 def test_power_of_joints_and_of_slip_is_the_gain_of_energy(folder: Path) -> None:
     result = analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT])
     slip = np.stack([result[f"slip/sole {part}"] for part in ("angular_z", "x", "y")], 1)
