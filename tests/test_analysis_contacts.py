@@ -161,6 +161,48 @@ def test_losses_loads_and_measured_forces_of_a_tied_leg_each_balance(folder: Pat
         assert np.abs(result[f"tau_as_loads/{joint}"] - loaded[f"tau/{joint}"]).max() < 1e-9
 
 
+def test_each_source_moves_a_tied_leg_on_the_ground_as_one_system_of_equations_says(folder: Path) -> None:
+    """[M −Aᵀ; A 0] [q̈_x; λ_x] = [F_x; b_x] with the rows of gear and ground, b_x of these two alone."""
+    log = write_csv(folder / "coupled.csv", smooth(40, 5) * [1, 0.3, 0.3, 0.3, 0.3, 0.3], JOINTS[:-1])
+    result = analyze(log, folder / "coupled", contacts=[FOOT], induced=["joints"])
+    assert result.robot.constrained is not None
+    model: Any = result.robot.constrained.open
+    ground = model.kinematics.jacobian(result.q, "foot", FOOT.point)[:, [2, 3, 4]]
+    gear = np.zeros_like(result.q)
+    gear[:, 5], gear[:, 4] = 1.0, 0.5 + 0.4 * result.q[:, 4]
+    rows = np.concatenate([gear[:, None], ground], axis=1)
+    mass, none = model.mass_matrix(result.q), np.zeros((len(rows), 4, 4))
+    system = np.block([[mass, -np.swapaxes(rows, 1, 2)], [rows, none]])
+    still, rest = np.zeros((len(rows), 4)), np.zeros_like(result.q)
+    turning, slipping = still.copy(), still.copy()
+    turning[:, 0] = -0.4 * result.qd[:, 4] ** 2
+    slipping[:, 1:] = np.einsum("srn,sn->sr", ground, result.qdd)
+    sources = {
+        "acc_gravity": (-model.inverse_dynamics(result.q, rest, rest), still),
+        "acc_constraint": (rest, turning),
+        "acc_contact": (rest, slipping),
+    }
+    for kind, (forces, bend) in sources.items():
+        moved = np.linalg.solve(system, np.concatenate([forces, bend], axis=1)[..., None])[:, :6, 0]
+        for i, joint in enumerate(JOINTS):
+            names = [name for name in result.table if name.startswith(f"{kind}/joints/{joint}/")]
+            found = sum(result[name] for name in names)
+            assert np.abs(found - moved[:, i]).max() < 1e-8 * np.abs(moved).max(), (kind, joint)
+
+
+def test_contacts_bear_alike_unless_all_are_measured(folder: Path) -> None:
+    knee = Contact("shank", "point", name="knee")
+    plate = Load("plate", "foot", (0.0, 600.0, 0.0))
+    columns = {"knee": WhileColumn("stands")}
+    result = analyze(folder / "still.csv", folder / "leg", contacts=Contacts((FOOT, knee), columns, (plate,)))
+    on = result.time > 0.395
+    assert (result["contact/sole"][on], result["contact/sole"][~on]) == (
+        pytest.approx(0.5),
+        pytest.approx(1.0),
+    )
+    assert result["contact/knee"][on] == pytest.approx(0.5)
+
+
 def test_power_of_joints_and_of_slip_is_the_gain_of_energy(folder: Path) -> None:
     result = analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT])
     slip = np.stack([result[f"slip/sole {part}"] for part in ("angular_z", "x", "y")], 1)
