@@ -8,6 +8,7 @@ by finite differences, which know nothing of joints, trees and multipliers.
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +123,14 @@ def test_the_crank_gives_what_its_one_equation_of_motion_says_link_by_link(folde
         np.testing.assert_allclose(result.velocity[:, 0, j, 0], velocity, rtol=0, atol=1e-8)
         np.testing.assert_allclose(result.gravity[:, 0, j], gravity, rtol=0, atol=1e-9)
     assert not result.partial_torque[:, 1:].any(), "joints that follow give nothing"
+
+
+def test_the_gradient_convention_counts_what_changes_the_cranks_inertia_twice(folder: Path) -> None:
+    gradient = replace(ALL, convention="gradient")
+    result = analyze(folder / "crank.csv", folder / "robot", processing=gradient)
+    for j, name in enumerate(MASSES):
+        _, velocity, _ = share_of(name, *motion(result))
+        np.testing.assert_allclose(result.velocity[:, 0, j, 0], 2 * velocity, rtol=0, atol=1e-8)
 
 
 def test_springs_losses_loads_and_payloads_anywhere_are_borne_by_the_crank(folder: Path) -> None:

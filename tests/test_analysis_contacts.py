@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from command_line import run_linkwise
 from linkwise import LinkwiseError, Load, generate, read_system, write_package
-from linkwise.analysis import Contact, Contacts, WhileColumn, analyze
+from linkwise.analysis import Contact, Contacts, Processing, WhileColumn, analyze
 from motion_logs import LEG, smooth, write_csv
 
 JOINTS = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
@@ -64,6 +64,15 @@ def test_a_foot_that_touches_at_a_point_leaves_a_moment_to_the_base(folder: Path
     left = free.torque - np.einsum("srn,sr->sn", rows, wrench)
     assert np.abs(result.torque - left).max() < 1e-9 * np.abs(free.torque).max()
     assert np.abs(result.torque[:, 2]).max() > 1.0
+
+
+def test_the_ground_bears_of_velocities_the_same_share_in_the_gradient_convention(folder: Path) -> None:
+    closing, gradient = (
+        analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT], processing=Processing(convention=how))
+        for how in ("closing", "gradient")
+    )
+    velocity = closing.velocity
+    assert np.abs(gradient.velocity - 2 * velocity).max() < 1e-12 * np.abs(velocity).max()
 
 
 def test_forces_of_links_and_loads_sum_to_what_the_ground_bears(folder: Path) -> None:

@@ -1,5 +1,6 @@
 """Which trials a study does again when something changes: those that are made of it, and no others."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from linkwise import generate, read_system, write_package
 from linkwise.study import run_study
 from linkwise.study.study_file import read_study
 from linkwise.study.study_folder import trial_folders
+from linkwise.study.trial_files import trial_files
 from linkwise.study.trial_ledger import done_before
 from motion_logs import write_csv
 from studies import CHOICES, HEAD, QUICK, Here
@@ -106,3 +108,23 @@ def test_a_trial_is_done_again_for_whatever_it_is_made_of(done: Path, what: str)
 def test_a_trial_is_done_again_by_another_linkwise(done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("linkwise.study.trial_key.fingerprint", lambda: "of another")
     assert still_done(done) == ""
+
+
+def test_a_trial_is_made_of_every_file_that_it_names(done: Path, tmp_path: Path) -> None:
+    """Of OpenSim's loads the file of their numbers, too, and what ties the robot's joints."""
+    loads = '<OpenSimDocument><ExternalLoads><objects><ExternalForce name="f"/></objects>'
+    (tmp_path / "plate.xml").write_text(
+        f"{loads}<datafile>plate.mot</datafile></ExternalLoads></OpenSimDocument>"
+    )
+    for name in ("a.csv", "forces.csv", "arm.urdf", "cycles.csv"):
+        shutil.copy(done / name, tmp_path)
+    (tmp_path / "cycles.csv").write_text("trial,start,end\na,0.1,0.5\n")
+    ties = CHOICES, "\n[robot]\n", 'constraints = "ties.toml"\n', CYCLES
+    trial = ONE.format(name="a", robot="arm.urdf") + 'contact_loads = ["plate.xml"]\n'
+    (tmp_path / "study.toml").write_text("".join((HEAD, QUICK, *ties, trial)))
+    (tmp_path / "ties.toml").touch()
+    plan = read_study(tmp_path / "study.toml")
+    assert sorted(trial_files(plan, plan.trials[0])) == [
+        str(tmp_path / name)
+        for name in ("a.csv", "arm.urdf", "cycles.csv", "forces.csv", "plate.mot", "plate.xml", "ties.toml")
+    ]
