@@ -31,7 +31,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Analysis:
     folder = tmp_path_factory.mktemp("drawn")
     (folder / "arm.urdf").write_text(ARM)
     write_package(generate(read_system(folder / "arm.urdf"), ["numpy"]), folder / "arm")
-    log = write_csv(folder / "=log.csv", smooth(SAMPLES, 3), JOINTS)
+    log = write_csv(folder / "=log.csv", smooth(SAMPLES, 3) + np.array([2.0, 0.0, 0.0, 0.0]), JOINTS)
     push = Load("=push", "d", (3.0, -4.0, 5.0), (0.3, 0.2, -0.1), (0.1, 0.2, 0.3))
     return analyze(log, folder / "arm", loads=[push])
 
@@ -160,6 +160,37 @@ def test_colours_of_the_map_are_shares_of_the_largest_over_the_movement(page: An
     assert [row[0][2] for row in told] == ["N·m", "N", "N·m"]
 
 
+def test_kinds_of_motion_are_headed_where_they_begin(page: Any) -> None:
+    heads = "return document.getElementById('map').layout.annotations.map(({text, x}) => [text, x])"
+    assert page.execute_script(heads) == [["<b>acceleration of</b>", 3.5], ["<b>velocity of</b>", 6.5]]
+    choose(page, "motion", "together")
+    assert page.execute_script(heads) == [["<b>motion of</b>", 3.5]]
+
+
+def test_the_time_line_stands_at_the_instant(page: Any, result: Analysis) -> None:
+    share = page.execute_script(
+        "const area = document.querySelector('#curves .nsewdrag').getBoundingClientRect();"
+        "const line = document.getElementById('curves-cursor').getBoundingClientRect();"
+        "return (line.left + line.width / 2 - area.left) / area.width"
+    )
+    assert share == pytest.approx(AT / (SAMPLES - 1), abs=2e-3)
+    assert page.find_element("id", "now").text == f"{result.time[AT]:.2f} s"
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [
+        ("everything", "Gravity and loads are in."),
+        ("movement", "Left out: gravity, load =push."),
+        ("tau_load", "Left out: gravity, and other causes than those chosen."),
+        ("tau_gravity", "Left out: load =push, and other causes than those chosen."),
+    ],
+)
+def test_captions_say_which_causes_are_left_out(page: Any, order: str, said: str) -> None:
+    choose(page, "order", order)
+    assert page.find_element("id", "shares-caption").text.endswith((said, f"{said} Velocity is hatched."))
+
+
 def test_a_click_on_the_map_picks_joint_and_cause_and_another_lets_go(page: Any) -> None:
     choose(page, "motion", "together")
     click = "document.getElementById('map').emit('plotly_click', {points: [{x: 5, y: 2}]});"
@@ -222,7 +253,7 @@ def test_saved_tables_have_the_numbers_that_are_drawn(page: Any, result: Analysi
     choose(page, "motion", "together")
     order, now, _ = peaks(result)
     head, *rows = saved(page, "save-map-csv")
-    assert head == [f"joint at {result.time[AT]:.2f} s", *order]
+    assert head == [f"joint at {float(result.time[AT])!r} s", *order]
     assert [row[0] for row in rows] == list(JOINTS)
     np.testing.assert_allclose(np.array([row[1:] for row in rows], dtype=float), now, rtol=1e-12, atol=1e-14)
 

@@ -276,6 +276,33 @@ def test_bars_and_table_of_the_page_are_those_of_all_samples(
 
 
 @pytest.mark.browser
+def test_curves_that_are_thinned_out_stand_at_samples_of_their_own(
+    driver: Any, place: Path, columns: Columns
+) -> None:
+    opened(driver, (place / "out" / "report.html").as_uri())
+    table = columns.table
+    moved = np.abs([values for name, values in table.items() if re.match("tau_q(?:dd|d)/", name)]).max(axis=0)
+    now = float(driver.find_element("id", "now").text.split()[0])
+    assert now == pytest.approx(table["time"][moved.argmax()], abs=0.01)
+    loaded = [np.abs(table[f"tau/{joint}"]).mean() for joint in JOINTS]
+    assert driver.find_element("id", "joint").get_attribute("value") == str(int(np.argmax(loaded)))
+    for i, joint in enumerate(JOINTS):
+        choose(driver, "joint", i)
+        shown = driver.execute_script(
+            "return document.getElementById('curves').data"
+            ".map((c) => [c.name, Array.from(c.x), Array.from(c.y)])"
+        )
+        for name, x, y in shown:
+            whole = name == "all causes together"
+            curve = table[f"tau/{joint}"] if whole else columns.curve(joint, name).sum(axis=0)
+            at = np.rint(np.array(x) * 1000).astype(int)
+            assert len(at) < 0.2 * SAMPLES
+            assert (np.diff(at) >= 0).all()
+            np.testing.assert_allclose(y, curve[at], rtol=1e-6, atol=1e-6 * np.abs(curve).max(), err_msg=name)
+            assert (max(y), min(y)) == pytest.approx((curve.max(), curve.min()), rel=1e-6)
+
+
+@pytest.mark.browser
 @pytest.mark.parametrize(("order", "word"), [("everything", "motion"), ("tau_qdd", "acceleration")])
 def test_bars_of_many_joints_are_the_same_on_the_page(
     driver: Any, crowd: Analysis, tmp_path: Path, order: str, word: str
