@@ -230,6 +230,16 @@ def test_a_log_of_all_joints_is_closed_and_says_how_far_off_it_was(folder: Path,
         analyze(tmp_path / "off.csv", folder / "robot", Reading(loop_tolerance=0.001))
 
 
+def test_how_far_a_log_is_off_is_told_of_its_worst_part(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("linkwise.analysis.closed_motion.BLOCK", 100)
+    table = np.loadtxt(folder / "joints.csv", delimiter=",", skiprows=1)
+    table[150:160, 3] += 0.005
+    off = analyze(write_csv(tmp_path / "off.csv", table, ["turn", "bend", "swing"]), folder / "robot")
+    assert off.record()["constraints"]["largest_violation"] == pytest.approx(0.4 * 0.005, rel=0.1)
+
+
 def test_columns_of_joints_that_follow_choose_the_way_in_which_a_loop_closes(
     folder: Path, tmp_path: Path
 ) -> None:
@@ -239,6 +249,8 @@ def test_columns_of_joints_that_follow_choose_the_way_in_which_a_loop_closes(
     whole = np.column_stack([time, turn, coupler - turn, rocker - np.pi / 2])
     other = analyze(write_csv(tmp_path / "down.csv", whole, ["turn", "bend", "swing"]), folder / "robot")
     np.testing.assert_allclose(other.q, whole[:, 1:], rtol=0, atol=1e-9)
+    some = analyze(write_csv(tmp_path / "some.csv", whole[:, [0, 1, 3]], ["turn", "swing"]), folder / "robot")
+    np.testing.assert_allclose(some.q, whole[:, 1:], rtol=0, atol=1e-9)
     upper = analyze(folder / "crank.csv", folder / "robot")
     np.testing.assert_allclose(upper.q[:, 1], angles(turn)[1] - turn, rtol=0, atol=1e-9)
 

@@ -114,7 +114,12 @@ def test_trials_without_cycles_are_dots_with_deviations(driver: Any, tmp_path: P
     run_study(file, tmp_path / "out", Here())
     opened(driver, (tmp_path / "out/study.html").as_uri())
     names = "return [...document.getElementById('column').options].map((option) => option.textContent)"
-    column = driver.execute_script(names).index("tau/joint1/p")
+    every = driver.execute_script(names)
+    column = every.index("tau/joint1/p")
+    unit = "return document.getElementById('bands').layout.yaxis.title.text"
+    for name, expected in (("q/joint1", "rad"), ("tau/joint1", "N·m")):
+        choose(driver, "column", every.index(name))
+        assert driver.execute_script(unit) == expected
     rows = pd.read_parquet(tmp_path / "out/summary.parquet").set_index("column")
     dots = (
         "return document.getElementById('bands').data"
@@ -139,6 +144,9 @@ def test_it_leads_to_each_trial_and_tells_the_broken_one(page: Any) -> None:
     assert rows[0] == "S1-fast-1 S1 fast 1 300 samples, 3 cycles"
     assert rows[-1].startswith("S3-slow-2 S3 slow 2")
     assert "no column for joint" in rows[-1]
+    tests = [row.text for row in page.find_elements("css selector", "#tests tbody tr")]
+    assert tests[0].startswith("tau/joint1 condition: slow – fast 3 ")
+    assert tests[-1].startswith("tau/joint2 day: 2 – 1 3 ")
     link = table.find_element("link text", "S2-fast-1")
     opened(page, link.get_attribute("href"))
     assert page.title == "planar3 · fast_1.csv"
