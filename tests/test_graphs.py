@@ -200,6 +200,12 @@ def test_a_number_that_is_taken_off_is_drawn_with_its_sign(tmp_path: Path) -> No
     robot, _ = edited(tmp_path / "shifted", "qd[0] ** 2 * (q[0] - 0.25)")
     graph = overlay(robot, 0, 0, [robot.graph(0, 0, 0, 2)])
     assert re.search(r"label=<[−+] −?0.25>", dot_text(graph, folded(graph, "none")))[0] == "label=<− 0.25>"
+    robot, _ = edited(tmp_path / "less", "qd[0] ** 2 * (torch.cos(q[0]) - torch.exp(q[0]))")
+    graph = overlay(robot, 0, 0, [robot.graph(0, 0, 0, 2)])
+    drawing = folded(graph, "none")
+    (less,) = (node for node in graph.nodes.values() if node.name == "sub")
+    marked = re.findall(r"^(n\d+ -> n\d+) \[.*arrowhead=tee", dot_text(graph, drawing), re.MULTILINE)
+    assert marked == [f"n{drawing.place[less.operands[1]]} -> n{drawing.place[less.key]}"]
 
 
 def test_an_energy_that_writes_in_place_is_refused(tmp_path: Path) -> None:

@@ -194,9 +194,10 @@ def test_a_figure_has_the_mean_curves_bands_and_differences_of_its_factor(band: 
     trials = trials_of(31)
     tests = [
         test
-        for factor in ("pace", "like")
-        for test in compared(Comparison(factor, ("slow", "fast"), ("tau",), alpha=0.3), trials)[0]
+        for factor, alpha in (("pace", 0.3), ("like", 0.9))
+        for test in compared(Comparison(factor, ("slow", "fast"), ("tau",), alpha=alpha), trials)[0]
     ]
+    assert all(test.clusters for test in tests)
     panel = drawn(PaperFigure(("tau",), "pace", band=band), trials, tests)
     each = dict(zip(("slow", "fast"), sides(trials, False), strict=True))
     lines = {line.get_label(): line for line in panel.get_lines()}
