@@ -197,7 +197,7 @@ def test_an_edited_energy_may_compute_by_any_operation(
 
 
 def test_a_number_that_is_taken_off_is_drawn_with_its_sign(tmp_path: Path) -> None:
-    robot, _ = edited(tmp_path / "shifted", "qd[0] ** 2 * (q[0] - 0.25)")
+    robot, _ = edited(tmp_path / "shifted", "qd[0] ** 2 * (q[0] + -0.25)")
     graph = overlay(robot, 0, 0, [robot.graph(0, 0, 0, 2)])
     assert re.search(r"label=<[−+] −?0.25>", dot_text(graph, folded(graph, "none")))[0] == "label=<− 0.25>"
     robot, _ = edited(tmp_path / "less", "qd[0] ** 2 * (torch.cos(q[0]) - torch.exp(q[0]))")
