@@ -12,6 +12,7 @@ from linkwise.study import run_study
 from linkwise.study.band_figure import band_figures
 from linkwise.study.comparisons import Compared, compared
 from linkwise.study.study_plan import Comparison, PaperFigure
+from linkwise.study.subject_spread import spread, values_of
 from linkwise.study.trial_summary import TrialSummary
 from scipy import stats
 from studies import CHOICES, HEAD, QUICK, Here, write_study
@@ -135,7 +136,7 @@ def sides(trials: Sequence[TrialSummary], paired: bool) -> list[Any]:
         for one in trials
     ]
     table = pd.DataFrame(rows).groupby([0, 1]).mean()
-    first, second = table.loc["slow"], table.loc["fast"]
+    first, second = (table.loc[level] if level in table.index else table[:0] for level in ("slow", "fast"))
     if paired:
         both = sorted(set(first.index) & set(second.index))
         first, second = first.loc[both], second.loc[both]
@@ -177,6 +178,16 @@ def test_too_few_subjects_are_told(paired: bool, told: str) -> None:
     few = [one for one in trials_of(1) if one.labels["pace"] != "slow" or one.labels["subject"] in "AD"]
     made, (reason,) = compared(Comparison("pace", ("slow", "fast"), ("tau",), paired), few)
     assert (made, told in reason, "a test needs 3" in reason) == ([], True, True)
+
+
+def test_whoever_has_more_trials_weighs_more_among_trials_and_not_among_subjects() -> None:
+    slow = [one for one in trials_of(1) if one.labels["pace"] == "slow"]
+    rows = spread(slow, values_of(slow, "tau")).rows
+    trials, subjects = np.array([one.statistics["tau"][0] for one in slow]), sides(slow, False)[0][:, 0]
+    assert (len(trials), len(subjects)) == (6, 5)
+    for head, values in (("trials_", trials), ("", subjects)):
+        found = [rows[f"{head}{name}"][0] for name in ("mean", "std", "min", "max")]
+        assert found == pytest.approx([values.mean(), values.std(ddof=1), values.min(), values.max()])
 
 
 def drawn(figure: PaperFigure, trials: Sequence[TrialSummary], tests: Sequence[Compared]) -> Any:
