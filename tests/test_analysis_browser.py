@@ -219,8 +219,8 @@ def test_curves_are_linked_to_the_slider(page):
     page.execute_script("document.getElementById('map').emit('plotly_click', {points: [{x: 2, y: 1}]})")
     assert page.find_element("id", "joint").get_attribute("value") == "1"
     assert page.find_element("id", "curves-title").text == "On joint2, through all links, by cause"
-    page.execute_script("document.getElementById('curves').emit('plotly_click', {points: [{x: 3.3}]})")
-    assert page.find_element("id", "slider").get_attribute("value") == "165"
+    page.execute_script("document.getElementById('curves').emit('plotly_click', {points: [{x: 3.313}]})")
+    assert page.find_element("id", "slider").get_attribute("value") == "166"
 
 
 def test_keyboard(page):
@@ -229,6 +229,8 @@ def test_keyboard(page):
     body.send_keys("\ue011")  # Home
     body.send_keys("\ue014")  # right
     assert slider.get_attribute("value") == "1"
+    body.send_keys("\ue008\ue014")  # with Shift by ten
+    assert slider.get_attribute("value") == "11"
     body.send_keys("\ue010")  # End
     assert slider.get_attribute("value") == "999"
     pressed = monotonic()

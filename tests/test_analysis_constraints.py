@@ -8,6 +8,7 @@ by finite differences, which know nothing of joints, trees and multipliers.
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +125,14 @@ def test_the_crank_gives_what_its_one_equation_of_motion_says_link_by_link(folde
     assert not result.partial_torque[:, 1:].any(), "joints that follow give nothing"
 
 
+def test_the_gradient_convention_counts_what_changes_the_cranks_inertia_twice(folder: Path) -> None:
+    gradient = replace(ALL, convention="gradient")
+    result = analyze(folder / "crank.csv", folder / "robot", processing=gradient)
+    for j, name in enumerate(MASSES):
+        _, velocity, _ = share_of(name, *motion(result))
+        np.testing.assert_allclose(result.velocity[:, 0, j, 0], 2 * velocity, rtol=0, atol=1e-8)
+
+
 def test_springs_losses_loads_and_payloads_anywhere_are_borne_by_the_crank(folder: Path) -> None:
     pull = Load("pull", "rocker", force=(3.0, -2.0, 0.0), point=(0.1, 0.0, 0.0))
     bag = Payload("coupler", 0.7, (0.4, 0.0, 0.0), "bag")
@@ -221,6 +230,16 @@ def test_a_log_of_all_joints_is_closed_and_says_how_far_off_it_was(folder: Path,
         analyze(tmp_path / "off.csv", folder / "robot", Reading(loop_tolerance=0.001))
 
 
+def test_how_far_a_log_is_off_is_told_of_its_worst_part(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("linkwise.analysis.closed_motion.BLOCK", 100)
+    table = np.loadtxt(folder / "joints.csv", delimiter=",", skiprows=1)
+    table[150:160, 3] += 0.005
+    off = analyze(write_csv(tmp_path / "off.csv", table, ["turn", "bend", "swing"]), folder / "robot")
+    assert off.record()["constraints"]["largest_violation"] == pytest.approx(0.4 * 0.005, rel=0.1)
+
+
 def test_columns_of_joints_that_follow_choose_the_way_in_which_a_loop_closes(
     folder: Path, tmp_path: Path
 ) -> None:
@@ -230,6 +249,8 @@ def test_columns_of_joints_that_follow_choose_the_way_in_which_a_loop_closes(
     whole = np.column_stack([time, turn, coupler - turn, rocker - np.pi / 2])
     other = analyze(write_csv(tmp_path / "down.csv", whole, ["turn", "bend", "swing"]), folder / "robot")
     np.testing.assert_allclose(other.q, whole[:, 1:], rtol=0, atol=1e-9)
+    some = analyze(write_csv(tmp_path / "some.csv", whole[:, [0, 1, 3]], ["turn", "swing"]), folder / "robot")
+    np.testing.assert_allclose(some.q, whole[:, 1:], rtol=0, atol=1e-9)
     upper = analyze(folder / "crank.csv", folder / "robot")
     np.testing.assert_allclose(upper.q[:, 1], angles(turn)[1] - turn, rtol=0, atol=1e-9)
 

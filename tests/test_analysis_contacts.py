@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from command_line import run_linkwise
 from linkwise import LinkwiseError, Load, generate, read_system, write_package
-from linkwise.analysis import Contact, Contacts, WhileColumn, analyze
+from linkwise.analysis import Contact, Contacts, Processing, WhileColumn, analyze
 from motion_logs import LEG, smooth, write_csv
 
 JOINTS = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
@@ -66,6 +66,15 @@ def test_a_foot_that_touches_at_a_point_leaves_a_moment_to_the_base(folder: Path
     assert np.abs(result.torque[:, 2]).max() > 1.0
 
 
+def test_the_ground_bears_of_velocities_the_same_share_in_the_gradient_convention(folder: Path) -> None:
+    closing, gradient = (
+        analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT], processing=Processing(convention=how))
+        for how in ("closing", "gradient")
+    )
+    velocity = closing.velocity
+    assert np.abs(gradient.velocity - 2 * velocity).max() < 1e-12 * np.abs(velocity).max()
+
+
 def test_forces_of_links_and_loads_sum_to_what_the_ground_bears(folder: Path) -> None:
     push = Load("push", "pelvis", (20.0, -30.0, 0.0))
     result = analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT], loads=[push])
@@ -111,6 +120,100 @@ def test_a_tie_bears_what_the_ground_gives_to_a_joint_that_follows(folder: Path)
     assert np.abs(needed[:, [0, 1, 2, 5]]).max() < 1e-9 * scale
     by_link = sum(result[f"force/gear/{link}"] for link in MASSES)
     assert np.abs(by_link - result["force/gear"]).max() < 1e-9 * scale
+
+
+@pytest.mark.parametrize("undriven", [JOINTS[:3], (*JOINTS[:2], "knee_angle_r")], ids=["base", "knee"])
+def test_losses_loads_and_measured_forces_of_a_tied_leg_each_balance(
+    folder: Path, undriven: tuple[str, ...]
+) -> None:
+    """What a share asks of what nothing drives and of the ankle, which follows, ground and gear bear."""
+    text = (folder / "coupled.toml").read_text()
+    for joint, losses in (("knee_angle_r", "damping = 20"), ("ankle_angle_r", "damping = 30")):
+        text = text.replace(f'name = "{joint}"\n', f'name = "{joint}"\n{losses}\n', 1)
+    (folder / "damped.toml").write_text(text)
+    write_package(generate(read_system(folder / "damped.toml"), ["numpy"]), folder / "damped")
+    log = write_csv(folder / "damped.csv", smooth(60, 5) * [1, 0.3, 0.3, 0.3, 0.3, 0.3], JOINTS[:-1])
+    push = Load("push", "shank", (30.0, -40.0, 0.0), (0.0, 0.0, 5.0), (0.1, -0.2, 0.0))
+    plate = Load("plate", "foot", (60.0, 700.0, 0.0), (0.0, 0.0, -8.0), (0.15, 0.02, 0.0))
+    contacts = Contacts((FOOT,), loads=(plate,), unactuated=tuple(undriven))
+    result = analyze(log, folder / "damped", contacts=contacts, loads=[push])
+    assert result.robot.constrained is not None
+    model: Any = result.robot.constrained.open
+    rows = model.kinematics.jacobian(result.q, "foot", FOOT.point)[:, [2, 3, 4]]  # turn, x, y
+    gear = np.zeros_like(result.q)
+    gear[:, 5], gear[:, 4] = 1.0, 0.5 + 0.4 * result.q[:, 4]
+    bears = np.swapaxes(np.concatenate([rows, gear[:, None]], axis=1), 1, 2)
+    at_push = model.kinematics.jacobian(result.q, "shank", push.point)[:, [2, 3, 4]]
+    asked = {
+        "damping": result.qd * [0.0, 0.0, 0.0, 0.0, 20.0, 30.0],
+        "load": -np.einsum("srn,r->sn", at_push, [5.0, 30.0, -40.0]),
+    }
+    solved = [*map(JOINTS.index, undriven), 5]
+    for share, torque in asked.items():
+        forces = np.linalg.solve(bears[:, solved], torque[:, solved, None])
+        left = torque - (bears @ forces)[..., 0]
+        behind = "/push" if share == "load" else ""
+        for row, force in zip(
+            ("sole moment_z", "sole force_x", "sole force_y", "gear"), forces.T[0], strict=True
+        ):
+            found = result[f"force_{share}/{row}{behind}"]
+            assert np.abs(found - force).max() < 1e-9 * np.abs(forces).max(), (share, row)
+        for i in set(range(5)).difference(solved):
+            found = result.table.get(f"tau_{share}/{JOINTS[i]}{behind}", 0.0)
+            assert np.abs(found - left[:, i]).max() < 1e-9 * np.abs(torque).max(), (share, i)
+    slip = np.einsum("srn,sn->sr", rows, result.qd)
+    for row, values in zip(("angular_z", "x", "y"), slip.T, strict=True):
+        assert np.abs(result[f"slip/sole {row}"] - values).max() < 1e-12
+    poses = model.kinematics.pose(result.q, "foot")[:, :3, :3]
+    arm = poses @ (np.array(plate.point) - FOOT.point)
+    assert np.abs(result["force_measured/sole force_y"] - 700.0).max() < 1e-9
+    moment = -8.0 + arm[:, 0] * 700.0 - arm[:, 1] * 60.0
+    assert np.abs(result["force_measured/sole moment_z"] - moment).max() < 1e-9
+    loaded = analyze(log, folder / "damped", loads=[push, plate])
+    for joint in JOINTS[:-1]:
+        assert np.abs(result[f"tau_as_loads/{joint}"] - loaded[f"tau/{joint}"]).max() < 1e-9
+
+
+def test_each_source_moves_a_tied_leg_on_the_ground_as_one_system_of_equations_says(folder: Path) -> None:
+    """[M −Aᵀ; A 0] [q̈_x; λ_x] = [F_x; b_x] with the rows of gear and ground, b_x of these two alone."""
+    log = write_csv(folder / "coupled.csv", smooth(40, 5) * [1, 0.3, 0.3, 0.3, 0.3, 0.3], JOINTS[:-1])
+    result = analyze(log, folder / "coupled", contacts=[FOOT], induced=["joints"])
+    assert result.robot.constrained is not None
+    model: Any = result.robot.constrained.open
+    ground = model.kinematics.jacobian(result.q, "foot", FOOT.point)[:, [2, 3, 4]]
+    gear = np.zeros_like(result.q)
+    gear[:, 5], gear[:, 4] = 1.0, 0.5 + 0.4 * result.q[:, 4]
+    rows = np.concatenate([gear[:, None], ground], axis=1)
+    mass, none = model.mass_matrix(result.q), np.zeros((len(rows), 4, 4))
+    system = np.block([[mass, -np.swapaxes(rows, 1, 2)], [rows, none]])
+    still, rest = np.zeros((len(rows), 4)), np.zeros_like(result.q)
+    turning, slipping = still.copy(), still.copy()
+    turning[:, 0] = -0.4 * result.qd[:, 4] ** 2
+    slipping[:, 1:] = np.einsum("srn,sn->sr", ground, result.qdd)
+    sources = {
+        "acc_gravity": (-model.inverse_dynamics(result.q, rest, rest), still),
+        "acc_constraint": (rest, turning),
+        "acc_contact": (rest, slipping),
+    }
+    for kind, (forces, bend) in sources.items():
+        moved = np.linalg.solve(system, np.concatenate([forces, bend], axis=1)[..., None])[:, :6, 0]
+        for i, joint in enumerate(JOINTS):
+            names = [name for name in result.table if name.startswith(f"{kind}/joints/{joint}/")]
+            found = sum(result[name] for name in names)
+            assert np.abs(found - moved[:, i]).max() < 1e-8 * np.abs(moved).max(), (kind, joint)
+
+
+def test_contacts_bear_alike_unless_all_are_measured(folder: Path) -> None:
+    knee = Contact("shank", "point", name="knee")
+    plate = Load("plate", "foot", (0.0, 600.0, 0.0))
+    columns = {"knee": WhileColumn("stands")}
+    result = analyze(folder / "still.csv", folder / "leg", contacts=Contacts((FOOT, knee), columns, (plate,)))
+    on = result.time > 0.395
+    assert (result["contact/sole"][on], result["contact/sole"][~on]) == (
+        pytest.approx(0.5),
+        pytest.approx(1.0),
+    )
+    assert result["contact/knee"][on] == pytest.approx(0.5)
 
 
 def test_power_of_joints_and_of_slip_is_the_gain_of_energy(folder: Path) -> None:

@@ -160,15 +160,19 @@ def test_tables_record_and_pictures_have_each_load(arm: Path, tmp_path: Path) ->
 
 
 def test_a_low_pass_is_run_over_the_whole_log_of_loads(arm: Path, tmp_path: Path) -> None:
-    table = measured(columns=3)
-    file = write_csv(tmp_path / "plate.csv", table, FORCE)
+    """Over forces and their moments about the world's origin, as a plate has them."""
+    table = measured()
+    file = write_csv(tmp_path / "plate.csv", table, WRENCH)
     result = analyze(arm / "log.csv", arm / "arm", loads=[file], loads_cutoff=30.0)
     assert "loads filtered at 30 Hz" in result.provenance
     sos = butter(2, 30.0, fs=1000.0, output="sos")
-    smooth_force = sosfiltfilt(sos, table[:, 1:], axis=0, padlen=padding_length(sos, len(table)))
-    expected = analyze(
-        arm / "log.csv", arm / "arm", loads=[Load("f", "tool", smooth_force, time=table[:, 0])]
+    time, force, moment, point = np.split(table, [1, 4, 7], axis=1)
+    wrench = np.hstack([force, moment + np.cross(point, force)])
+    smooth_force, about_origin = np.split(
+        sosfiltfilt(sos, wrench, axis=0, padlen=padding_length(sos, len(table))), 2, axis=1
     )
+    same = Load("f", "tool", smooth_force, about_origin, time=time[:, 0], point_in="world")
+    expected = analyze(arm / "log.csv", arm / "arm", loads=[same])
     np.testing.assert_allclose(result.load_torque, expected.load_torque, rtol=0, atol=1e-10)
 
 

@@ -208,6 +208,7 @@ def opened(driver: Any, address: str) -> None:
 def choose(page: Any, name: str, value: object) -> None:
     page.execute_script(
         "const e = document.getElementById(arguments[0]); e.value = arguments[1];"
+        "e.dispatchEvent(new Event('input', {bubbles: true}));"
         "e.dispatchEvent(new Event('change', {bubbles: true}));",
         name,
         str(value),
@@ -275,6 +276,33 @@ def test_bars_and_table_of_the_page_are_those_of_all_samples(
 
 
 @pytest.mark.browser
+def test_curves_that_are_thinned_out_stand_at_samples_of_their_own(
+    driver: Any, place: Path, columns: Columns
+) -> None:
+    opened(driver, (place / "out" / "report.html").as_uri())
+    table = columns.table
+    moved = np.abs([values for name, values in table.items() if re.match("tau_q(?:dd|d)/", name)]).max(axis=0)
+    now = float(driver.find_element("id", "now").text.split()[0])
+    assert now == pytest.approx(table["time"][moved.argmax()], abs=0.01)
+    loaded = [np.abs(table[f"tau/{joint}"]).mean() for joint in JOINTS]
+    assert driver.find_element("id", "joint").get_attribute("value") == str(int(np.argmax(loaded)))
+    for i, joint in enumerate(JOINTS):
+        choose(driver, "joint", i)
+        shown = driver.execute_script(
+            "return document.getElementById('curves').data"
+            ".map((c) => [c.name, Array.from(c.x), Array.from(c.y)])"
+        )
+        for name, x, y in shown:
+            whole = name == "all causes together"
+            curve = table[f"tau/{joint}"] if whole else columns.curve(joint, name).sum(axis=0)
+            at = np.rint(np.array(x) * 1000).astype(int)
+            assert len(at) < 0.2 * SAMPLES
+            assert (np.diff(at) >= 0).all()
+            np.testing.assert_allclose(y, curve[at], rtol=1e-6, atol=1e-6 * np.abs(curve).max(), err_msg=name)
+            assert (max(y), min(y)) == pytest.approx((curve.max(), curve.min()), rel=1e-6)
+
+
+@pytest.mark.browser
 @pytest.mark.parametrize(("order", "word"), [("everything", "motion"), ("tau_qdd", "acceleration")])
 def test_bars_of_many_joints_are_the_same_on_the_page(
     driver: Any, crowd: Analysis, tmp_path: Path, order: str, word: str
@@ -294,4 +322,36 @@ def test_bars_of_many_joints_are_the_same_on_the_page(
         assert hover == [f"{joint} {word}" for joint in first]
         caption = driver.find_element("id", "shares-caption").text
         assert caption.endswith("Of all other joints the shares are added up.")
+    assert driver.get_log("browser") == []
+
+
+@pytest.mark.browser
+def test_the_table_of_many_causes_adds_up_the_smaller_ones(
+    driver: Any, crowd: Analysis, tmp_path: Path
+) -> None:
+    (tmp_path / "report.html").write_text(report(crowd), encoding="utf-8")
+    opened(driver, (tmp_path / "report.html").as_uri())
+    every, rows = Columns(crowd.table, CROWD), "return [...document.querySelectorAll('#numbers tbody tr')]"
+    rows += ".map((row) => [row.cells[0].textContent, Number(row.cells[1].dataset.value),"
+    rows += "row.cells[2].textContent, row.cells[3].textContent])"
+    choose(driver, "motion", "apart")
+    choose(driver, "joint", 3)
+    choose(driver, "slider", 123)
+    sizes = every.sizes(BOTH)
+    now = {cause: every.curve(CROWD[3], cause)[:, 123].sum() for cause in sizes}
+    order = largest_first(sizes, 3)
+    moved = [cause for cause in order if cause != "gravity"]
+    named = [cause for cause in order if cause in ("gravity", *moved[:8])]
+    *shown, (rest, x, share, most) = driver.execute_script(rows)
+    assert [name for name, *_ in shown] == named
+    assert [x for _, x, *_ in shown] == pytest.approx([now[cause] for cause in named], rel=1e-12)
+    smaller = moved[8:]
+    assert rest == f"{len(smaller)} others, each smaller"
+    assert x == pytest.approx(sum(now[cause] for cause in smaller), rel=1e-9)
+    assert share == f"{100 * abs(x) / sum(map(abs, now.values())):.1f} %"
+    assert most == f"≤ {float(f'{sizes[smaller[0]][3]:.4g}'):g} each"
+    traces = driver.execute_script("return document.getElementById('curves').data.map((c) => c.name)")
+    assert sorted(traces) == sorted(["gravity", *moved[:6], *["22 others, each smaller"] * 22])
+    driver.execute_script("document.getElementById('every-number').click()")
+    assert [name for name, *_ in driver.execute_script(rows)] == order
     assert driver.get_log("browser") == []

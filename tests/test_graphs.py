@@ -196,6 +196,18 @@ def test_an_edited_energy_may_compute_by_any_operation(
         assert robot.graph(0, 0, 0, 2).evaluate(q[0], qd[0], qdd[0]).shape == ()
 
 
+def test_a_number_that_is_taken_off_is_drawn_with_its_sign(tmp_path: Path) -> None:
+    robot, _ = edited(tmp_path / "shifted", "qd[0] ** 2 * (q[0] + -0.25)")
+    graph = overlay(robot, 0, 0, [robot.graph(0, 0, 0, 2)])
+    assert re.search(r"label=<[−+] −?0.25>", dot_text(graph, folded(graph, "none")))[0] == "label=<− 0.25>"
+    robot, _ = edited(tmp_path / "less", "qd[0] ** 2 * (torch.cos(q[0]) - torch.exp(q[0]))")
+    graph = overlay(robot, 0, 0, [robot.graph(0, 0, 0, 2)])
+    drawing = folded(graph, "none")
+    (less,) = (node for node in graph.nodes.values() if node.name == "sub")
+    marked = re.findall(r"^(n\d+ -> n\d+) \[.*arrowhead=tee", dot_text(graph, drawing), re.MULTILINE)
+    assert marked == [f"n{drawing.place[less.operands[1]]} -> n{drawing.place[less.key]}"]
+
+
 def test_an_energy_that_writes_in_place_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="writes into a tensor, which a graph cannot show"):
         edited(tmp_path / "in_place", "(qd[0] * 1.5).square_()")[0].graph(0, 0)
@@ -383,6 +395,9 @@ def test_the_command_counts_and_writes(
     rows = [line.split()[:4] for line in told.splitlines()]
     assert ["c2_1,2,2", "q̈_2", str(part), str(part)] in rows
     assert ["τ_1,2", "unsplit", str(whole)] in rows
+    through = {node.key for node in robot.graph(0, 2).operations}
+    there = sum(node.key in through for node in robot.graph(0, 1, 1, 2).operations)
+    assert f"{there} of these operations are in the torque through link3 too" in told
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["tau_1_2_qdd_2.dot"]
 
 

@@ -119,6 +119,28 @@ def test_a_minute_of_panda_is_identified_to_the_noise_of_its_torques(
     assert (np.linalg.eigvalsh(pseudo_inertia(found.physical.pi)) > 0).all()
 
 
+def test_noise_and_errors_are_those_of_least_squares(tmp_path: Path) -> None:
+    """One joint, 26 samples and five unknowns; differences are exact, as the motion is of degree four."""
+    write_package(generate(read_system("planar1"), ["numpy"]), tmp_path / "arm")
+    arm, t = load_robot(tmp_path / "arm"), np.arange(26) / 10
+    motion = np.polynomial.Polynomial([0.2, 2.0, -4.0, 2.4, -0.42])
+    q, qd, qdd = (motion.deriv(m)(t) for m in range(3))
+    torque = arm.model.inverse_dynamics(*(a[:, None] for a in (q, qd, qdd)))[:, 0] + 0.3 * qd
+    torque += 0.05 * np.random.default_rng(8).standard_normal(len(t))
+    log = write_csv(tmp_path / "log.csv", np.column_stack([t, q, torque]), ("joint1", "tau/joint1"))
+    found = identify(log, arm, fitting=Fitting(unseen=0.0))
+    assert found.base.texts() == ["mcx(link1)", "mcy(link1)", "Izz(link1)"]
+    rows = np.column_stack([9.80665 * np.cos(q), -9.80665 * np.sin(q), qdd, qd, np.sign(qd)])
+    x, (left,), rank, _ = np.linalg.lstsq(rows, torque, rcond=None)
+    sigma = np.sqrt(left / (len(t) - rank))
+    errors = sigma * np.sqrt(np.linalg.inv(rows.T @ rows).diagonal())
+    assert [*found.fit.beta, *found.fit.friction[0]] == pytest.approx(x, rel=1e-6, abs=1e-9)
+    assert found.fit.noise == pytest.approx([sigma], rel=1e-6)
+    assert [*found.fit.beta_errors, *found.fit.friction_errors[0]] == pytest.approx(errors, rel=1e-6)
+    seen = found.errors(found.seen)["fit"]
+    assert seen == pytest.approx([np.sqrt(left / len(t))], rel=1e-6)
+
+
 def test_base_parameters_of_a_planar_arm_are_the_textbooks(planar3: LoadedRobot) -> None:
     base = base_parameters(planar3.model)
     assert base.texts() == [
@@ -439,7 +461,10 @@ def test_noise_of_positions_is_told_from_a_poor_motion(planar3: LoadedRobot, tmp
         r"the 1\d rad/s\^2 of acceleration \(root mean squares\); pass --cutoff, in Hz, .*",
         warning,
     )
-    assert identify(log, planar3, processing=Processing(lowpass=Lowpass(5.0))).warnings == ()
+    smooth = identify(log, planar3, processing=Processing(lowpass=Lowpass(5.0)))
+    assert smooth.warnings == ()
+    # Of 4,000 samples, 120 at either end are not the filter's alone; of the rest a fifth is not seen.
+    assert (smooth.seen.rows, smooth.unseen.rows) == (3008, 752)
     (warning,) = identify(log, planar3, processing=Processing(lowpass=Lowpass(80.0))).warnings
     assert "lower --cutoff 80 towards the motion's own frequencies" in warning
 
@@ -536,7 +561,11 @@ def test_springs_and_armatures_of_the_file_are_known_and_kept(tmp_path: Path) ->
     log = write_csv(tmp_path / "log.csv", np.column_stack([t, q, torque]), ("ab", "bc", "tau/ab", "tau/bc"))
     found = identify(log, arm)
     assert found.fit.friction == pytest.approx(np.array([[0.5, 0.2], [0.0, 0.0]]), abs=1e-3)
+    # An armature that were not known would be an inertia of the link, and be found as one.
+    assert found.fit.beta == pytest.approx(found.base.combinations @ found.own.reshape(-1), abs=1e-3)
     assert (found.errors(found.unseen)["bodies"] < 1e-2).all()
+    alone = identify(log, arm, Reading(ignore_extra=True), fitting=Fitting(unmeasured=("ab",)))
+    assert (alone.errors(alone.unseen)["bodies"] < 1e-2).all()
     manifest = Manifest.read(tmp_path / "arm")
     (tmp_path / "again.urdf").write_bytes(identified_robot(found, manifest, None)[0]["test.urdf"])
     kept = {axis.joint: axis.own for axis in read_robot(tmp_path / "again.urdf").passive}

@@ -5,12 +5,14 @@ import os
 import shutil
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from command_line import run_linkwise
-from linkwise import analyze, kept_package
+from linkwise import Options, analyze, kept_package
+from linkwise.analysis import Payload, Processing, Reading
+from linkwise.analysis.loads import Load
+from linkwise.analysis.settings import Lowpass
 from linkwise.study import run_study
 from linkwise.study.comparisons import compared
 from linkwise.study.study_plan import Comparison
@@ -36,7 +38,7 @@ def arms(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_trial_is_what_its_analysis_is_over_its_cycles(arms: Path) -> None:
     table = pd.read_parquet(arms / "out/trials/S2-fast-1/samples.parquet")
-    whole = analyze(arms / "data/S2/fast_1.csv", kept_package("planar3"), _reading())
+    whole = analyze(arms / "data/S2/fast_1.csv", kept_package("planar3"), Reading(ignore_extra=True))
     stands = np.loadtxt(arms / "data/S2/fast_1.csv", delimiter=",", skiprows=1)[:, 4]
     starts = whole.time[1:][np.diff(stands) > 0]
     assert table.groupby("cycle").size().tolist() == [101] * (len(starts) - 1)
@@ -45,12 +47,6 @@ def test_a_trial_is_what_its_analysis_is_over_its_cycles(arms: Path) -> None:
     at = np.linspace(starts[1], starts[2], 101)
     expected = CubicSpline(whole.time, whole["tau/joint1"])(at)
     np.testing.assert_allclose(table[table.cycle == 1]["tau/joint1"], expected, rtol=1e-6, atol=1e-9)
-
-
-def _reading() -> Any:
-    from linkwise import Reading
-
-    return Reading(ignore_extra=True)
 
 
 def test_tables_are_read_in_one_line(arms: Path) -> None:
@@ -81,6 +77,11 @@ def test_curves_of_groups_are_means_of_subjects_each_the_mean_of_its_trials(arms
     found = curves[curves.column == "tau/joint1"].set_index(["condition", "percent"]).sort_index()
     for statistic in ("mean", "std", "min", "max"):
         np.testing.assert_allclose(found[statistic], expected[statistic].sort_index(), rtol=1e-9, atol=1e-12)
+    whosever = of_trials.groupby(["condition", "percent"], observed=True).agg(["mean", "std", "min", "max"])
+    for statistic in ("mean", "std", "min", "max"):
+        every = whosever[statistic].sort_index()
+        np.testing.assert_allclose(found[f"trials_{statistic}"], every, rtol=1e-9, atol=1e-12)
+    assert set(found.unit) == {"N·m"}
     assert set(found.subjects) == {4}
     assert set(found.trials) == {8}
 
@@ -93,6 +94,9 @@ def test_levels_are_compared_over_whole_curves(arms: Path) -> None:
     expected = field.inference(0.05, two_tailed=True)
     tests = pd.read_parquet(arms / "out/tests.parquet")
     assert tests.threshold.iloc[0] == pytest.approx(expected.zstar, rel=1e-6)
+    assert tests.t.to_list() == pytest.approx([field.z[np.abs(field.z).argmax()]] * len(tests), rel=1e-6)
+    parts = np.array([cluster.endpoints for cluster in expected.clusters])
+    np.testing.assert_allclose(tests[["start", "end"]], parts, rtol=1e-4)
     np.testing.assert_allclose(tests.p, [cluster.P for cluster in expected.clusters], rtol=1e-4)
 
 
@@ -153,6 +157,48 @@ def test_done_trials_stay_and_changed_ones_are_done_again(tmp_path: Path) -> Non
     assert sorted(other.given) == NAMES[:4]
 
 
+def test_what_all_say_is_made_again_where_the_plan_changes_and_no_trial_is(tmp_path: Path) -> None:
+    ask = '\n[[compare]]\nfactor = "condition"\nbetween = ["slow", "fast"]\ncolumns = ["tau/joint1"]\n'
+    file, out = (
+        write_study(tmp_path, HEAD, QUICK, CHOICES, ask, TRIALS, subjects=3, trials=1),
+        tmp_path / "out",
+    )
+    run_study(file, out, Here())
+    assert set(pd.read_parquet(out / "tests.parquet").alpha) == {0.05}
+    figure = '[[figure]]\nname = "torque"\ncolumns = ["tau/joint1"]\n'
+    file.write_text("".join((HEAD, QUICK, CHOICES, ask, "alpha = 0.2\n", figure, TRIALS)))
+    engine = Here()
+    assert run_study(file, out, engine).fresh == 0
+    assert engine.given == []
+    assert set(pd.read_parquet(out / "tests.parquet").alpha) == {0.2}
+    (out / "torque.svg").unlink()
+    (out / "summary.parquet").unlink()
+    run_study(file, out, Here())
+    assert len(set(pd.read_parquet(out / "summary.parquet").trial)) == 6
+    assert (out / "torque.svg").is_file()
+
+
+def test_a_trial_has_all_that_is_chosen_of_its_analysis_and_robot(tmp_path: Path) -> None:
+    chosen = 'cutoff = 6\npayload = ["link3=2,0.1,0,0"]\nload = ["link2=0,9,0"]\n'
+    robot = "[robot]\nlock = {joint2 = 0.5}\n"
+    own = TRIALS.replace("{condition}_{trial}", "slow_1").replace("-{condition}-{trial}", "")
+    own += 'condition = "slow"\ncutoff = 9\nderivative = "savitzky-golay"\n'
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, chosen, robot, own, subjects=1, trials=1)
+    assert run_study(file, tmp_path / "out", Here()).done == ("S1",)
+    whole = analyze(
+        tmp_path / "data/S1/slow_1.csv",
+        kept_package("planar3", options=Options(lock={"joint2": 0.5})),
+        Reading(ignore_extra=True),
+        Processing("savitzky-golay", lowpass=Lowpass(9)),
+        payloads=[Payload("link3", 2.0, (0.1, 0, 0))],
+        loads=[Load("link2", "link2", (0, 9, 0))],
+    )
+    table = pd.read_parquet(tmp_path / "out/trials/S1/samples.parquet")
+    assert list(table.filter(like="tau/")) == ["tau/joint1", "tau/joint3"]
+    for name in ("tau/joint1", "tau/joint3"):
+        np.testing.assert_array_equal(table[name], whole[name])
+
+
 def test_a_broken_trial_is_told_and_stops_no_other(tmp_path: Path) -> None:
     file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1)
     done = run_linkwise("study", file, "--out", "out", folder=tmp_path)
@@ -168,6 +214,10 @@ def test_a_broken_trial_is_told_and_stops_no_other(tmp_path: Path) -> None:
     assert sorted(set(pd.read_parquet(tmp_path / "out/summary.parquet").trial)) == [
         name for name in NAMES[:4] if name != "S1-fast-2"
     ]
+    (tmp_path / "data/S1/fast_2.csv").write_text("time,joint1,joint2,joint3\n0,1,2,x\n")
+    run_study(file, tmp_path / "out", Here())
+    told = json.loads((tmp_path / "out/study.json").read_text())["broken"]["S1-fast-2"]
+    assert "no column for joint" not in told, "it is broken in another way now"
 
 
 def test_every_trial_is_read_whatever_it_is_called(tmp_path: Path) -> None:
@@ -178,6 +228,10 @@ def test_every_trial_is_read_whatever_it_is_called(tmp_path: Path) -> None:
     assert run_study(file, tmp_path / "out", Here()).done == tuple(names)
     assert set(pd.read_parquet(tmp_path / "out/trials").trial) == set(names)
     assert len(list((tmp_path / "out/trials").iterdir())) == len(names)
+    file.write_text(file.read_text().replace('"B"', '"B-2"'))
+    renamed = Here()
+    run_study(file, tmp_path / "out", renamed)
+    assert renamed.given == ["B-2"], "the folder of B has that name"
 
 
 def test_damaged_trials_are_done_again_and_what_is_not_a_trial_stays(tmp_path: Path) -> None:

@@ -61,7 +61,8 @@ def weighted_fit(equations: JointEquations, base: BaseParameters, bearings: Bear
     for _ in range(ROUNDS):
         triangle = stacked(equations, noise, rubs)
         beta, friction = _solved(triangle, base, rubs)
-        noise = _noise(equations, beta, friction, max(equations.rows - len(triangle) / n, 1.0))
+        unknowns = len(triangle) - 1
+        noise = _noise(equations, beta, friction, max(equations.rows - unknowns / n, 1.0))
     triangle = stacked(equations, noise, rubs)
     beta, friction = _solved(triangle, base, rubs)
     errors = np.linalg.norm(np.linalg.inv(triangle[:-1, :-1]), axis=1)

@@ -1,0 +1,171 @@
+"""Flags of commands: each is what its name says, and none is another."""
+
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from linkwise import Fitting, Options
+from linkwise.analysis import Lowpass, Processing, Reading
+from linkwise.analysis.analysis_choices import AnalysisChoices
+from linkwise.analysis.job import Wanted
+from linkwise.cli.app import app
+from typer.testing import CliRunner
+
+READING: dict[str, Any] = {
+    "units": "deg",
+    "time": "t",
+    "topic": "/arm",
+    "qpos": None,
+    "map": ("a=elbow", "b=wrist"),
+    "ignore_extra": True,
+    "resample": 125.0,
+    "loop_tolerance": 0.25,
+    "derivative": "savitzky-golay",
+    "window": 9,
+    "degree": 3,
+    "cutoff": 7.0,
+    "filter_order": 4,
+    "padding": "even",
+}
+ANALYSIS: dict[str, Any] = {
+    **READING,
+    "qpos": "mujoco",
+    "edges": "trim",
+    "convention": "gradient",
+    "phase": ("stance=push",),
+    "power_terms": True,
+    "payload": ("hand=2",),
+    "load": ("hand=1,2,3",),
+    "loads": ("plate.csv",),
+    "loads_cutoff": 31.0,
+    "contact": ("foot=held",),
+    "contact_while": ("foot=on",),
+    "contact_loads": ("grf.mot",),
+    "contact_threshold": 42.0,
+    "unactuated": ("base_x",),
+    "induced": ("joints",),
+}
+ROBOT = {
+    "lock": ("elbow=0.5",),
+    "base": "floating",
+    "root": "torso",
+    "tip": "hand",
+    "allow_unphysical": True,
+    "free_mimic": True,
+    "constraints": "ties.toml",
+    "independent": ("hip,knee",),
+}
+OPTIONS = Options(
+    lock={"elbow": 0.5},
+    base="floating",
+    root="torso",
+    tip="hand",
+    allow_unphysical=True,
+    free_mimic=True,
+    constraints="ties.toml",
+    independent=("hip,knee",),
+)
+SMOOTHED = Lowpass(7.0, 4, "even")
+READ = Reading("deg", "t", (("a", "elbow"), ("b", "wrist")), True, 125.0, 0.25, "/arm")
+
+
+class CalledWith(Exception):
+    """Ends a command where it would begin its work."""
+
+
+@pytest.fixture
+def called(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    """What a command calls a function of its module with, by the function's name."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(command: str, function: str, chosen: dict[str, Any]) -> tuple[Any, ...]:
+        def stop(*given: Any) -> None:
+            raise CalledWith(*given)
+
+        monkeypatch.setattr(f"linkwise.cli.{command}.{function}", stop)
+        words = [command, "walk.csv", "--robot", "arm.urdf", "--out", "out"]
+        for name, values in chosen.items():
+            if values is None:
+                continue
+            flag = f"--{name.replace('_', '-')}"
+            words += [flag] if values is True else [flag[:2] + "no-" + flag[2:]] * (values is False)
+            if not isinstance(values, bool):
+                several = values if isinstance(values, tuple) else (values,)
+                words += [word for value in several for word in (flag, str(value))]
+        ended = CliRunner().invoke(app, words).exception
+        assert isinstance(ended, CalledWith), ended
+        return ended.args
+
+    return call
+
+
+def test_every_flag_of_analyze_is_the_choice_of_its_name(called: Any) -> None:
+    assert list(ANALYSIS) == [field.name for field in fields(AnalysisChoices)]
+    usual = asdict(AnalysisChoices())
+    assert all(usual[name] != value for name, value in ANALYSIS.items())
+    found = AnalysisChoices(*called("analyze", "AnalysisChoices", ANALYSIS))
+    assert asdict(found) == ANALYSIS
+
+
+def test_choices_are_read_processed_and_written_as_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen = AnalysisChoices(**ANALYSIS | {"qpos": None})
+    assert chosen.reading == READ
+    assert AnalysisChoices(qpos="mujoco").reading == Reading(qpos="mujoco")
+    assert chosen.processing == Processing("savitzky-golay", 9, 3, SMOOTHED, "trim", "gradient")
+    wanted = chosen.wanted("csv", ("shares",), False)
+    assert (wanted.table, wanted.figures, wanted.page) == ("csv", ("shares",), False)
+    assert (wanted.power_terms, wanted.induced) == (True, ("joints",))
+    assert [phase.name for phase in wanted.phases] == ["stance"]
+    monkeypatch.setattr("linkwise.analysis.analysis_choices.chosen_contacts", lambda *given: given)
+    contacts = ("foot=held",), ("foot=on",), [Path("grf.mot")], 42.0, 31.0, ("base_x",), "the robot"
+    assert chosen.contacts("the robot") == contacts  # type: ignore[arg-type, comparison-overlap]
+    both = AnalysisChoices(loads=("plate.csv",), contact_loads=("grf.mot",), loads_cutoff=31.0)
+    for files, cutoff in (
+        (both, 31.0),
+        (replace(both, loads=()), None),
+        (replace(both, contact_loads=()), 31.0),
+    ):
+        assert files.borne("the robot").cutoff == cutoff  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "wanted"),
+    [
+        ({}, Wanted()),
+        (
+            {"format": "csv", "figure": ("shares", "power"), "page": False, "power_terms": True},
+            Wanted("csv", ("shares", "power"), False, True),
+        ),
+    ],
+    ids=["usual", "all"],
+)
+def test_analyze_writes_what_is_asked_for(
+    called: Any, monkeypatch: pytest.MonkeyPatch, chosen: dict[str, Any], wanted: Wanted
+) -> None:
+    monkeypatch.setattr("linkwise.cli.analyze.opened_robot", lambda *given: "the robot")
+    out, log, robot, *how = called("analyze", "analyze_to", chosen)
+    assert (out, log, robot) == (Path("out"), Path("walk.csv"), "the robot")
+    assert how[:3] == [Reading(), Processing(), wanted]
+
+
+def test_every_flag_of_a_robot_is_the_option_of_its_name(called: Any) -> None:
+    robot, backend, options, _ = called("analyze", "opened_robot", {**ROBOT, "backend": "numpy"})
+    assert (str(robot), backend, options) == ("arm.urdf", "numpy", OPTIONS)
+
+
+def test_every_flag_of_identify_is_what_its_name_says(called: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("linkwise.cli.identify.opened_robot", lambda *given: "the robot")
+    monkeypatch.setattr("linkwise.cli.identify.own_file", lambda robot: None)
+    own = {
+        "torque": ("c=elbow",),
+        "unmeasured": ("wrist",),
+        "torque_factor": 0.001,
+        "friction": False,
+        "unseen": 0.3,
+    }
+    log, robot, *how, _ = called("identify", "identified", READING | own)
+    assert (log, robot) == (Path("walk.csv"), "the robot")
+    fitting = Fitting((("c", "elbow"),), 0.001, False, 0.3, ("wrist",))
+    assert how == [READ, Processing("savitzky-golay", 9, 3, SMOOTHED, "trim"), fitting]
+    assert called("identify", "identified", {"qpos": "mujoco"})[2] == Reading(qpos="mujoco")
