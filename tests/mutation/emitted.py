@@ -19,7 +19,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from linkwise import Options, check_package, generate, read_system, write_package
-from mutants import Mutant, Rules, mutants
+from mutation.mutants import Mutant, Rules, mutants
 from urdf_text import chain, joint, link, mimic, robot
 
 DATA = Path(__file__).parents[1] / "data"
