@@ -321,6 +321,18 @@ def test_a_value_added_to_itself_is_drawn_with_two_arrows(package_of: Packages) 
     assert len(arrows) == sum(count for _, _, count in drawing.edges()) > len(set(arrows))
 
 
+def test_what_is_subtracted_or_divided_by_and_nothing_else_ends_in_a_bar(tmp_path: Path) -> None:
+    robot, _ = edited(tmp_path / "bars", "qd[0] ** 2 * (q[0].sin() - q[0].cos()) / (2.0 + q[0])")
+    graph = overlay(robot, 0, 0, robot.graph_parts(0, 0))
+    drawing = folded(graph, "none")
+    bars = re.findall(r"^n(\d+) -> n(\d+) \[arrowhead=tee\];", dot_text(graph, drawing), re.MULTILINE)
+    two = [node for node in graph.nodes.values() if len(getattr(node, "operands", ())) == 2]
+    taken_away = [node for node in two if node.name in ("sub", "div")]
+    assert {node.name for node in taken_away} == {"sub", "div"} < {node.name for node in two}
+    places = {(drawing.place[node.operands[1]], drawing.place[node.key]) for node in taken_away}
+    assert {(int(a), int(b)) for a, b in bars} == places
+
+
 @needs_graphviz
 def test_a_picture_says_that_it_is_being_drawn(package_of: Packages) -> None:
     robot, told = package_of("planar3").load("autograd"), list[tuple[str, int, int]]()

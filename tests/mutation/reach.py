@@ -7,7 +7,7 @@ reach counts for the test that runs them, what fixtures of many tests reach for 
 import ast
 import hashlib
 import json
-import time
+import os
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -36,8 +36,8 @@ patch = _exit, fork
 class Reached:
     """What one file of tests reaches.
 
-    seconds: of each of its tests; functions: of a source, by name, "" for what runs at its import: tests,
-    or "" where every test of the file may depend on it
+    seconds: of the processor, of each of its tests; functions: of a source, by name, "" for what runs at
+    its import: tests, or "" where every test of the file may depend on it
     """
 
     digest: str
@@ -124,6 +124,11 @@ def name_at(text: str, line: int) -> str:
     return inside[-1] if inside else ""
 
 
+def _spent() -> float:
+    """Seconds of processor time of this process and the programs that it waited for: no other work counts."""
+    return sum(os.times()[:4])
+
+
 class Watch:
     """Tells coverage which test runs, and how long each takes."""
 
@@ -151,10 +156,10 @@ class Watch:
         class Hooks:
             @pytest.hookimpl(wrapper=True)
             def pytest_runtest_protocol(self, item: Any) -> Any:
-                start = time.monotonic()
+                start = _spent()
                 with watch._as(test_of(item.nodeid)):
                     result = yield
-                watch.seconds[test_of(item.nodeid)] += time.monotonic() - start
+                watch.seconds[test_of(item.nodeid)] += _spent() - start
                 return result
 
             @pytest.hookimpl(wrapper=True)
@@ -186,8 +191,6 @@ def _reached(name: str, tree: Tree) -> Reached:
     )
 
     def work(pytest_main: Callable[..., int]) -> int:
-        import os
-
         import coverage
 
         os.environ["COVERAGE_PROCESS_START"] = str(settings)
