@@ -70,7 +70,7 @@ def test_what_a_room_or_a_reason_names_is_there() -> None:
 
 
 def test_every_explained_mutant_is_one_of_the_text_as_it_is() -> None:
-    keys = list(explained())
+    keys = [key for key in explained() if key.startswith(("generator/", "templates/"))]
     paths = {key.partition(": ")[0] for key in keys}
     there = {
         mutant.key
