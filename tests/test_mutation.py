@@ -70,7 +70,7 @@ def test_what_a_room_or_a_reason_names_is_there() -> None:
 
 
 def test_every_explained_mutant_is_one_of_the_text_as_it_is() -> None:
-    keys = [key for key in explained() if key.startswith(("generator/", "templates/"))]
+    keys = list(explained())
     paths = {key.partition(": ")[0] for key in keys}
     there = {
         mutant.key
@@ -182,7 +182,7 @@ def test_a_test_that_fails_by_itself_kills_nothing_and_is_told(
 
 
 def test_tests_that_end_badly_without_a_mutant_stop_the_sweep(decider: Decider) -> None:
-    with pytest.raises(RuntimeError, match="a end with 4 without a mutant, too"):
+    with pytest.raises(SystemExit, match="a end with 4 without a mutant, too"):
         decider.decide("graphs", some_mutants()[0], Scripted([Ended(4)], [Ended(4)]))  # type: ignore[arg-type]
 
 

@@ -64,7 +64,7 @@ class Decider:
                 if self._trusted(ended, tests, seconds, left, tree):
                     return ("too slow" if ended.too_slow else "killed"), ended.by or tests[0]
                 if not ended.by:
-                    raise RuntimeError(f"{' '.join(tests)} end with {ended.code} without a mutant, too")
+                    raise SystemExit(f"{' '.join(tests)} end with {ended.code} without a mutant, too")
         return "survived", f"{total:.0f} s of tests" if total else "nothing reaches it"
 
     def _trusted(self, ended: Ended, tests: list[str], seconds: float, left: list[str], tree: Tree) -> bool:

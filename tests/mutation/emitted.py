@@ -21,7 +21,6 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from linkwise import Options, check_package, generate, read_system, write_package
 from linkwise.emit.formulas import too_many_to_read
 from mutation.mutants import Mutant, Rules, mutants
-from mutation.verdicts import explained
 from urdf_text import chain, joint, link, mimic, robot
 
 DATA = Path(__file__).parents[1] / "data"
@@ -73,7 +72,13 @@ def formula_mutants(directory: Path) -> list[Mutant]:
         for path in sorted(directory.glob(pattern)):
             if path.name not in SHARED:
                 found += mutants(path.relative_to(directory).as_posix(), path.read_text(), RULES)
-    return [mutant for mutant in found if not _prose(mutant)]
+    planar = directory.name.startswith("planar")
+    return [one for one in found if not _prose(one) and not (planar and _out_of_plane(one))]
+
+
+def _out_of_plane(mutant: Mutant) -> bool:
+    """Whether part of a planar arm leaves its plane by a millionth: no torque, or one of second order."""
+    return mutant.path.startswith("energies/") and mutant.old == "0.0"
 
 
 def _prose(mutant: Mutant) -> bool:
@@ -162,9 +167,7 @@ def main() -> None:
         for name in options.only:
             directory = package(name, Path(folder))
             assert not caught(directory, None), name
-            reasons = explained()
-            found = [one for one in formula_mutants(directory) if f"{name}/{one.key}" not in reasons]
-            for mutant in sample(found, options.each, options.seed):
+            for mutant in sample(formula_mutants(directory), options.each, options.seed):
                 killed = caught(directory, mutant)
                 counts[name, killed] += 1
                 record.append({"package": name, "mutant": mutant.key, "caught": killed})

@@ -64,6 +64,10 @@ def side_by_side(
     pool = ThreadPoolExecutor(len(trees))
     try:
         yield from (item for item in pool.map(one, items) if item is not None)
+    except BaseException:
+        for tree in trees:
+            tree.stop()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
 

@@ -31,6 +31,8 @@ HEAVY = (
 )
 """Loaded once, before the first fork; nothing of linkwise is."""
 PLAIN = ("-q", "-p", "no:cacheprovider", "--no-header", "--tb=short", "--assert=plain", "--disable-warnings")
+MEMORY = 12 * 2**30
+"""Bytes that a process may fill: a loop without an end fills them all."""
 _IGNORED = shutil.ignore_patterns("__pycache__", "mutation", "test_mutation.py")
 
 
@@ -63,6 +65,8 @@ class Tree:
     def __init__(self, folder: Path) -> None:
         """Copy, and compile so that a changed source is never taken for its bytecode."""
         self.folder = folder
+        self.child = 0
+        self.stopped = False
         shutil.copytree(ROOT / "generator/linkwise", folder / "linkwise", ignore=_IGNORED)
         shutil.copytree(
             ROOT / "templates", folder / "linkwise/templates", ignore=_IGNORED, dirs_exist_ok=True
@@ -112,18 +116,26 @@ class Tree:
 
         It ends after `cpu` seconds of processor time, or ten times as many on the clock.
         """
-        child = os.fork()
-        if child == 0:
+        if self.stopped:
+            raise SystemExit("stopped")
+        self.child = os.fork()
+        if self.child == 0:
             _child(self.folder, work, cpu)
-        try:
-            _, status = os.waitpid(child, 0)
-        except BaseException:
-            os.killpg(child, signal.SIGKILL)
-            os.waitpid(child, 0)
-            raise
-        with suppress(ProcessLookupError):
-            os.killpg(child, signal.SIGKILL)  # what a test left running
+        _, status = os.waitpid(self.child, 0)
+        self._end()  # what a test left running
+        if self.stopped:
+            raise SystemExit("stopped")
         return os.waitstatus_to_exitcode(status)
+
+    def stop(self) -> None:
+        """End what runs, and begin nothing any more."""
+        self.stopped = True
+        self._end()
+
+    def _end(self) -> None:
+        if self.child:
+            with suppress(ProcessLookupError):
+                os.killpg(self.child, signal.SIGKILL)
 
 
 class First:
@@ -158,6 +170,7 @@ def _child(folder: Path, work: Callable[[Callable[..., int]], int], cpu: float) 
     os.dup2(out, 1)
     os.dup2(out, 2)
     resource.setrlimit(resource.RLIMIT_CPU, (int(cpu) + 1, int(cpu) + 6))
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     signal.alarm(int(10 * cpu) + 1)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)  # ignored in the background: programs under test inherit that
