@@ -194,8 +194,8 @@ def some_mutants() -> list[Mutant]:
 def test_a_verdict_stays_for_the_same_texts_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     one, other, third = some_mutants()[:3]
     record = Record(tmp_path / "verdicts.json")
-    record.add("single files", one, "killed", BY)
-    record.add("single files", other, "survived", "3 s of tests")
+    record.add("single-files", one, "killed", BY)
+    record.add("single-files", other, "survived", "3 s of tests")
     again = Record(tmp_path / "verdicts.json")
     assert [m and m.verdict for m in map(again.decided, (one, other, third))] == ["killed", "survived", None]
     again.all_tests = "one more test"
@@ -239,7 +239,7 @@ def test_a_sweep_maps_decides_and_goes_on(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "tests/mutation", tmp_path / "tests/mutation")
 
     def swept(*arguments: str) -> str:
-        command = [sys.executable, "-c", SWEEP, "--jobs=1", "--only", "single files", "runtime", *arguments]
+        command = [sys.executable, "-c", SWEEP, "--jobs=1", "--only", "single-files", "runtime", *arguments]
         environment = {"PYTHONPATH": str(tmp_path / "tests"), "PATH": "/usr/bin:/bin"}
         done = subprocess.run(
             command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
@@ -258,5 +258,5 @@ def test_a_sweep_maps_decides_and_goes_on(tmp_path: Path) -> None:
     assert by["return a + 1"] == ("killed", "tests/test_one.py::test_program")
     assert by["return a - 2"] == ("killed", "tests/test_one.py::test_copy")
     assert by["return a * 3"][0] == "survived"
-    assert "| single files | 2 | 1 | 0 | 50.0 % |" in said
+    assert "| single-files | 2 | 1 | 0 | 50.0 % |" in said
     assert "0 of 0 mutants decided" in swept()

@@ -61,7 +61,7 @@ ROOMS: dict[str, Room] = {
     "symbolic": _folder("symbolic"),
     "robot": _folder("robot", "tests/test_robots_builtin.py", "tests/numeric/test_against_pinocchio.py"),
     "output": _folder("output"),
-    "single files": Room(
+    "single-files": Room(
         tuple(
             f"{HOUSE}{name}.py"
             for name in (
