@@ -209,7 +209,7 @@ def test_a_verdict_stays_for_the_same_texts_alone(tmp_path: Path, monkeypatch: p
             assert not again.decided(one)
 
 
-def test_quick_tests_that_reach_a_function_come_first_and_the_rest_of_their_files_last(
+def test_quick_tests_that_are_about_a_function_come_first_and_the_rest_of_their_files_last(
     tmp_path: Path,
 ) -> None:
     path = "generator/linkwise/extras.py"
@@ -222,12 +222,19 @@ def test_quick_tests_that_reach_a_function_come_first_and_the_rest_of_their_file
             "", {"a::slow": 9.0, "a::quick": 1.0, "a::far": 0.1}, {path: {function: ["a::slow", "a::quick"]}}
         ),
         "tests/b.py": Reached("", {"b::x": 3.0, "b::y": 2.0}, {path: {function: [""]}}),
+        "tests/d.py": Reached(
+            "",
+            {"d::of_all": 2.0},
+            {path: {function: ["d::of_all"]}, "elsewhere/b.py": {f"f{k}": [""] for k in range(9)}},
+        ),
         "tests/c.py": Reached("", {"c::z": 0.1}, {path: {"": [""]}}),
     }
-    assert [name for name, _ in reach.tests(path, line)] == ["b::y", "b::x", "a::quick", "a::slow", "a::far"]
+    assert [name for name, _ in reach.tests(path, line)] == [
+        *("b::y", "b::x", "a::quick", "a::slow", "d::of_all", "a::far"),
+    ]
     at_import = [name for name, _ in reach.tests(path, 1)]
-    assert at_import[:2] == ["a::quick", "a::slow"]
-    assert set(at_import) == {"a::quick", "a::slow", "a::far", "b::x", "b::y", "c::z"}
+    assert {"a::quick", "a::slow", "d::of_all"} == {*at_import[:-4]}
+    assert {"a::far", "b::x", "b::y", "c::z"} == {*at_import[-4:]}
 
 
 def test_a_sweep_maps_decides_and_goes_on(tmp_path: Path) -> None:

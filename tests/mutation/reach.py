@@ -44,6 +44,12 @@ class Reached:
     seconds: dict[str, float]
     functions: dict[str, dict[str, list[str]]]
 
+    def share(self, folder: str) -> float:
+        """Of all functions that are reached, the part that is in a folder."""
+        counts = {path: sum(bool(name) for name in found) for path, found in self.functions.items()}
+        inside = sum(count for path, count in counts.items() if path.rpartition("/")[0] == folder)
+        return max(inside, 1) / max(sum(counts.values()), 1)
+
 
 def digest(path: Path) -> str:
     """Short hash of a file's bytes."""
@@ -72,32 +78,32 @@ class Map:
         kept.write_text(json.dumps(vars(reached)))
 
     def tests(self, path: str, line: int) -> list[tuple[str, float]]:
-        """Tests that reach the function of a line, with their seconds: files in turn, quick ones first.
+        """Tests that reach the function of a line, with their seconds, those first that tell most in a second.
 
-        After these come the other tests of these files, which may use what the first ones kept.
+        Files are in turn by their seconds for each share of them that is about the path's folder; quick tests are
+        first in each. After these come other tests of these files, which may use what the first ones kept.
         """
         function = name_at((ROOT / path).read_text(encoding="utf-8"), line)
-        near: list[list[tuple[str, float]]] = []
-        far: list[list[tuple[str, float]]] = []
+        is_known = any(function in reached.functions.get(path, {}) for reached in self.files.values())
+        near: list[tuple[float, list[tuple[str, float]]]] = []
+        far: list[tuple[float, list[tuple[str, float]]]] = []
         for reached in self.files.values():
             here = reached.functions.get(path, {})
-            new = function not in here and not any(
-                function in r.functions.get(path, {}) for r in self.files.values()
-            )
-            names = set(here.get(function, ()))
-            if (not function or new) and here:
-                names = {name for found in here.values() for name in found if name} | {""}
-            if not names:
+            if function and is_known:
+                names = set(here.get(function, ()))
+            else:  # what runs at import may matter to all that use the module
+                names = {name for found in here.values() for name in found if name}
+            if not (names or (here and not function)):
                 continue
-            whole = "" in names and function in here and function != ""
             ranked = sorted(reached.seconds.items(), key=lambda item: item[1])
-            near.append([item for item in ranked if whole or item[0] in names])
-            far.append([item for item in ranked if not whole and item[0] not in names])
-
-        def cost(group: list[tuple[str, float]]) -> float:
-            return sum(seconds for _, seconds in group)
-
-        return [item for groups in (near, far) for group in sorted(groups, key=cost) for item in group]
+            close = [item for item in ranked if item[0] in names or "" in names]
+            share = reached.share(path.rpartition("/")[0])
+            near.append((sum(seconds for _, seconds in close) / share, close))
+            far.append(
+                (sum(reached.seconds.values()) / share, [item for item in ranked if item not in close])
+            )
+        groups = [group for part in (near, far) for _, group in sorted(part, key=lambda item: item[0])]
+        return [item for group in groups for item in group]
 
 
 @cache
