@@ -78,10 +78,10 @@ class Map:
         kept.write_text(json.dumps(vars(reached)))
 
     def tests(self, path: str, line: int) -> list[tuple[str, float]]:
-        """Tests that reach the function of a line, with their seconds, those first that tell most in a second.
+        """Tests that reach the function of a line, with their seconds; first what tells most in a second.
 
-        Files are in turn by their seconds for each share of them that is about the path's folder; quick tests are
-        first in each. After these come other tests of these files, which may use what the first ones kept.
+        Files are in turn by their seconds for each share of them that is about the path's folder, in each the
+        quick tests first. After these come the other tests of these files, which may use what those kept.
         """
         function = name_at((ROOT / path).read_text(encoding="utf-8"), line)
         is_known = any(function in reached.functions.get(path, {}) for reached in self.files.values())
