@@ -16,13 +16,14 @@ from mutation.mutants import Mutant, mutants
 from mutation.reach import Map, Reached, digest, name_at
 from mutation.rooms import LEFT_OUT, NOT_COUNTED, ROOMS, drawn, rooms_of, sources
 from mutation.tree import ROOT, Ended
-from mutation.verdicts import Record, explained
+from mutation.verdicts import END, HEAD, MARK, Record, explained
 
 HOUSE = {
     "generator/linkwise/__init__.py": "",
     "generator/linkwise/errors.py": "def kept(a):\n    return a + 1\n\n\ndef lost(a):\n    return a * 3\n",
     "generator/linkwise/runtime/units.py": "def copied(a):\n    return a - 2\n",
     "templates/a.txt.j2": "",
+    "docs/trust.md": f"before\n{MARK}an older table\n{END}after\n",
     "tests/test_one.py": """
 import importlib.util, pathlib, shutil, subprocess, sys
 import linkwise
@@ -245,16 +246,17 @@ def test_a_sweep_maps_decides_and_goes_on(tmp_path: Path) -> None:
         (tmp_path / name).write_text("")
     shutil.copytree(ROOT / "tests/mutation", tmp_path / "tests/mutation")
 
-    def swept(*arguments: str) -> str:
+    def swept(*arguments: str, status: int = 1) -> str:
         command = [sys.executable, "-c", SWEEP, "--jobs=1", "--only", "single-files", "runtime", *arguments]
         environment = {"PYTHONPATH": str(tmp_path / "tests"), "PATH": "/usr/bin:/bin"}
         done = subprocess.run(
             command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
         )
-        assert done.returncode == 1, done.stderr
-        return done.stdout
+        assert done.returncode == status, done.stderr
+        return done.stdout + done.stderr
 
     assert "mapped" not in swept("--minutes=0")
+    assert swept("--write").endswith("3 mutants are not decided yet: run `make mutate` before --write\n")
     said = swept()
     assert "mapped: tests/test_one.py" in said
     assert "no verdict by tests/test_one.py::test_fails_now_and_then: failed, and passed" in said
@@ -267,3 +269,8 @@ def test_a_sweep_maps_decides_and_goes_on(tmp_path: Path) -> None:
     assert by["return a * 3"][0] == "survived"
     assert "| single-files | 2 | 1 | 0 | 50.0 % |" in said
     assert "0 of 0 mutants decided" in swept()
+    assert swept("--write", status=0) == ""
+    page = (tmp_path / "docs/trust.md").read_text()
+    assert page.startswith(f"before\n{MARK}{HEAD}| cli | 0 | – | 0 | – |\n")
+    assert "| single-files | 2 | 1 | 0 | 50.0 % |\n" in page
+    assert page.endswith(f"{END}after\n")
