@@ -121,7 +121,10 @@ def main() -> None:
             sys.exit(f"{waiting} mutants are not decided yet: run `make mutate` before --write")
         PAGE.write_text(written(PAGE.read_text(encoding="utf-8"), found), encoding="utf-8")
         return
-    whole = swept(options)
+    try:
+        whole = swept(options)
+    except KeyboardInterrupt:
+        sys.exit("interrupted; the next run goes on from here")
     found = scores(Record(options.out / "verdicts.json"), options.only)
     report = "\n".join([table(found), *(f"- {key}" for score in found for key in score.survivors)]) + "\n"
     (options.out / "mutants.md").write_text(report, encoding="utf-8")
