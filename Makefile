@@ -54,10 +54,11 @@ test: $(READY)
 ship: $(READY)
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m ship
 
-# What could be wrong without a test, or without `linkwise check`, noticing: an hour. ONLY="dynamics emit" takes rooms.
+# What could be wrong without a test, or without `linkwise check`, noticing: hours. Without the latter, MINUTES=30 ends
+# earlier, and the next run goes on from there; ONLY="dynamics runtime/rule" takes rooms.
 mutate: $(READY)
-	$(BIN)/python tests/mutation/emitted.py --out out/mutate
-	$(BIN)/python tests/mutation/run.py --out out/mutate $(if $(ONLY),--only $(ONLY))
+	$(if $(MINUTES)$(ONLY),,$(BIN)/python tests/mutation/emitted.py --out out/mutate)
+	$(BIN)/python tests/mutation/run.py --out out/mutate $(if $(MINUTES),--minutes $(MINUTES)) $(if $(ONLY),--only $(ONLY))
 
 lint: $(READY)
 	$(BIN)/ruff format --check .

@@ -201,6 +201,14 @@ def test_nothing_is_written_into_a_package(call, command, log, tmp_path):
     assert sorted(package.rglob("*")) == before
 
 
+def test_motions_are_told_with_their_samples(call, tmp_path):
+    told = call("motion", "--out", tmp_path).stdout.splitlines()
+    assert told == [
+        f"{tmp_path}/recorded.csv: 801 samples at 100 Hz",
+        f"{tmp_path}/simulated.csv: 601 samples at 100 Hz",
+    ]
+
+
 def test_motions_are_written_and_analysed(call, tmp_path):
     written = json.loads(call("motion", "--out", tmp_path, "--json").stdout)
     assert [entry["samples"] for entry in written] == [801, 601]

@@ -19,7 +19,8 @@ from linkwise import Options, generate, read_system, write_package
 from linkwise.cli.app import main
 from linkwise.errors import LinkwiseError
 from linkwise.graphs import FOLDS, dot_text, folded, graph_files, graph_json, overlay
-from linkwise.graphs.folding import LEGIBLE
+from linkwise.graphs.folding import LEGIBLE, Drawing
+from linkwise.graphs.overlay import Overlay
 from linkwise.package.load import import_package
 from linkwise.progress import silent
 from linkwise.report import count_polynomial, reduction_json, reduction_markdown, study
@@ -303,6 +304,7 @@ def test_json_and_graphml_hold_the_whole_graph(package_of: Packages) -> None:
     assert json.loads(read.graph["parts"]) == parts
     assert sum(values[part["output"]] for part in parts) == pytest.approx(float(torque), abs=1e-13)
     linked = networkx.node_link_graph(data, edges="edges")
+    assert linked.is_directed()
     assert set(read.nodes) == set(linked.nodes)
     assert sorted(read.edges(data="position")) == sorted(linked.edges(data="position"))
 
@@ -331,6 +333,38 @@ def test_a_value_added_to_itself_is_drawn_with_two_arrows(package_of: Packages) 
     drawing = folded(graph, "none")
     arrows = re.findall(r"^(n\d+ -> n\d+)", dot_text(graph, drawing), re.MULTILINE)
     assert len(arrows) == sum(count for _, _, count in drawing.edges()) > len(set(arrows))
+
+
+def test_the_legend_counts_what_parts_share_and_labels_say_which_coefficient(package_of: Packages) -> None:
+    robot = package_of("planar3").load("autograd")
+    graph = overlay(robot, 0, 1, robot.graph_parts(0, 1))
+    users = [graph.users[key] for key, node in graph.nodes.items() if hasattr(node, "operands")]
+    shared = sum(len(parts) > 1 for parts in users)
+    assert 0 < shared < len(users)
+    text = dot_text(graph, folded(graph))
+    assert f"needed by several parts: {shared} of {len(users)} operations" in text
+    assert "<B>c2₁₂₁ q\u0308₁</B>" in text
+    assert "<B>c1₁₂₂ q\u0307₂</B>" in text
+    assert "<B>τ₁₂</B>" in text
+
+
+@pytest.mark.parametrize(("joint", "link", "shown"), [(0, 1, "τ₁₂"), (0, 9, "τ₁,₁₀"), (10, 11, "τ₁₁,₁₂")])
+def test_indices_of_two_digits_stand_apart(joint: int, link: int, shown: str) -> None:
+    joints = tuple(f"joint{k}" for k in range(1, 13))
+    empty = Overlay("arm", joints, joint, (f"link{link + 1}",), link, "gravity", (), {}, {})
+    assert f"<B>{shown} of arm: torque on joint {joint + 1}, " in dot_text(empty, Drawing((), {}))
+
+
+def test_what_is_subtracted_or_divided_by_and_nothing_else_ends_in_a_bar(tmp_path: Path) -> None:
+    robot, _ = edited(tmp_path / "bars", "qd[0] ** 2 * (q[0].sin() - q[0].cos()) / (2.0 + q[0])")
+    graph = overlay(robot, 0, 0, robot.graph_parts(0, 0))
+    drawing = folded(graph, "none")
+    bars = re.findall(r"^n(\d+) -> n(\d+) \[arrowhead=tee\];", dot_text(graph, drawing), re.MULTILINE)
+    two = [node for node in graph.nodes.values() if len(getattr(node, "operands", ())) == 2]
+    taken_away = [node for node in two if node.name in ("sub", "div")]
+    assert {node.name for node in taken_away} == {"sub", "div"} < {node.name for node in two}
+    places = {(drawing.place[node.operands[1]], drawing.place[node.key]) for node in taken_away}
+    assert {(int(a), int(b)) for a, b in bars} == places
 
 
 @needs_graphviz

@@ -57,9 +57,19 @@ def test_a_users_mistake_is_one_line_and_leaves_no_file(
     assert not (tmp_path / "out").exists()
 
 
-def test_an_unwritable_directory_is_refused_before_the_work(report: Report, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "work"),
+    [(("reduction",), "report_reduction.study"), (("terms", "planar2"), "report_terms.terms_report")],
+)
+def test_an_unwritable_directory_is_refused_before_the_work(
+    arguments: tuple[str, ...], work: str, report: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def begun(*_: object) -> None:
+        raise AssertionError("the work has begun")
+
+    monkeypatch.setattr(f"linkwise.cli.{work}", begun)
     (tmp_path / "file").write_text("")
-    run = report("reduction", "--out", str(tmp_path / "file" / "out"))
+    run = report(*arguments, "--out", str(tmp_path / "file" / "out"))
     assert run.returncode == 2
     assert run.stderr.count("\n") == 1
     assert "nothing was written" in run.stderr

@@ -54,8 +54,8 @@ WAYS = {
     "a column": ('start = "stands>0.5"', [(0.5, 1.5), (1.5, 2.5)]),
     "as long as it lasts": ('during = "stands"', [(0.5, 0.79), (1.5, 1.79), (2.5, 2.79)]),
     "a load": ('start = "push>20"', [(0.25, 1.25), (1.25, 2.25)]),
-    "a table": ('table = "cycles.csv"', [(0.305, 0.9), (1.0, 2.0)]),
-    "a length": ('table = "cycles.csv"\nshortest = 0.7', [(1.0, 2.0)]),
+    "a table": ('table = "cycles.csv"', [(0.305, 0.9), (1.0, 2.0), (2.0, 2.99)]),
+    "a length": ('table = "cycles.csv"\nshortest = 0.7', [(1.0, 2.0), (2.0, 2.99)]),
 }
 
 
@@ -68,7 +68,7 @@ def test_cycles_begin_by_a_column_a_load_or_a_table(way: str, tmp_path: Path) ->
     write_csv(tmp_path / "a.csv", np.column_stack([time, q, stands]), (*JOINTS, "stands"))
     forces = np.column_stack([time, 50.0 * pushed, 0 * time, 0 * time])
     write_csv(tmp_path / "forces.csv", forces, [f"push:link3/force_{axis}" for axis in "xyz"])
-    (tmp_path / "cycles.csv").write_text("trial,start,end\nb,0,1\na,1,2\na,0.305,0.9\n")
+    (tmp_path / "cycles.csv").write_text("trial,start,end\nb,0,1\na,1,2\na,0.305,0.9\na,2,2.99\n")
     entry = 'log = "a.csv"\nrobot = "planar3"\nloads = ["forces.csv"]\n'
     file = tmp_path / "study.toml"
     trials = "".join(f'[[trial]]\nname = "{name}"\n{entry}' for name in "ab")

@@ -86,6 +86,14 @@ def test_what_cannot_be_is_told_in_a_line_before_any_work(case: str, tmp_path: P
     assert (engine.given, (tmp_path / "out").exists()) == ([], False)
 
 
+def test_a_folder_that_cannot_be_is_refused_before_any_work(tmp_path: Path) -> None:
+    file, engine = write_study(tmp_path, HEAD, TRIALS, subjects=1, trials=1), Here()
+    (tmp_path / "file").touch()
+    with pytest.raises(LinkwiseError, match="nothing was written"):
+        run_study(file, tmp_path / "file/out", engine)
+    assert engine.given == []
+
+
 def test_a_folder_of_something_else_stays(tmp_path: Path) -> None:
     file = write_study(tmp_path, HEAD, TRIALS, subjects=1, trials=1)
     (tmp_path / "out").mkdir()

@@ -3,6 +3,10 @@
 import re
 from pathlib import Path
 
+import pytest
+from mutation.rooms import ROOMS
+from mutation.verdicts import END, HEAD, MARK
+
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs/trust.md").read_text(encoding="utf-8")
 
@@ -21,9 +25,21 @@ def test_every_make_target_named_is_there() -> None:
 
 
 def test_every_promise_says_what_holds_it() -> None:
-    rows = [line for line in PAGE.splitlines() if line.startswith("|")]
+    rows = [line for line in PAGE.partition(MARK)[0].splitlines() if line.startswith("|")]
+    rows += [line for line in PAGE.partition(END)[2].splitlines() if line.startswith("|")]
     promises = [row for row in rows if not re.match(r"\| (promise|figure) |\|--", row)]
     assert not [row for row in promises if "tests/" not in row and "`make " not in row]
+
+
+def test_each_room_is_in_the_table_of_slips_and_95_of_100_are_caught() -> None:
+    table = PAGE.partition(MARK)[2].partition(END)[0].removeprefix(HEAD)
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
+    assert [row[0] for row in rows] == list(ROOMS)
+    for room, mutants, caught, equivalent, score in rows:
+        if score != "–":
+            share = 100 * int(caught) / (int(mutants) - int(equivalent))
+            assert float(score.removesuffix(" %")) == pytest.approx(share, abs=0.051), room
+            assert share >= 95, room
 
 
 def test_the_readme_points_there() -> None:

@@ -8,10 +8,11 @@ import hashlib
 import json
 import os
 import random
+import resource
 import shutil
+import signal
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +20,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from linkwise import Options, check_package, generate, read_system, write_package
-from mutants import Mutant, Rules, mutants
+from linkwise.emit.formulas import too_many_to_read
+from mutation.mutants import Mutant, Rules, mutants
 from urdf_text import chain, joint, link, mimic, robot
 
 DATA = Path(__file__).parents[1] / "data"
@@ -59,7 +61,8 @@ def package(name: str, folder: Path) -> Path:
         spec = folder / "every_joint.urdf"
         spec.write_text(EVERY_JOINT)
     system = read_system(spec, Options(**options))
-    write_package(generate(system, BACKENDS, name), folder / name)
+    backends = [one for one in BACKENDS if one != "formulas" or not too_many_to_read(system)]
+    write_package(generate(system, backends, name), folder / name)
     return folder / name
 
 
@@ -70,7 +73,13 @@ def formula_mutants(directory: Path) -> list[Mutant]:
         for path in sorted(directory.glob(pattern)):
             if path.name not in SHARED:
                 found += mutants(path.relative_to(directory).as_posix(), path.read_text(), RULES)
-    return [mutant for mutant in found if not _prose(mutant)]
+    planar = directory.name.startswith("planar")
+    return [one for one in found if not _prose(one) and not (planar and _out_of_plane(one))]
+
+
+def _out_of_plane(mutant: Mutant) -> bool:
+    """Whether part of a planar arm leaves its plane by a millionth: no torque, or one of second order."""
+    return mutant.path.startswith("energies/") and mutant.old == "0.0"
 
 
 def _prose(mutant: Mutant) -> bool:
@@ -86,10 +95,11 @@ def _prose(mutant: Mutant) -> bool:
     return text.startswith(("import", "from", "LINK =", "raise"))
 
 
-def caught(directory: Path, mutant: Mutant | None, timeout: float = 120.0) -> bool:
+def caught(directory: Path, mutant: Mutant | None, seconds: int = 120) -> bool:
     """Whether `check` refuses the package with this change, in a process of its own.
 
-    The parent may compute nothing with torch: what it has forked could not.
+    What takes more `seconds` of the processor, or ten times as long, is caught too. The parent may compute
+    nothing with torch: what it has forked could not.
     """
     with tempfile.TemporaryDirectory() as folder:
         changed = Path(folder) / directory.name
@@ -98,6 +108,8 @@ def caught(directory: Path, mutant: Mutant | None, timeout: float = 120.0) -> bo
             damage(changed, mutant)
         child = os.fork()
         if child == 0:
+            resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+            signal.alarm(10 * seconds)
             with open(os.devnull, "w") as silence:
                 os.dup2(silence.fileno(), 1)
                 os.dup2(silence.fileno(), 2)
@@ -106,7 +118,7 @@ def caught(directory: Path, mutant: Mutant | None, timeout: float = 120.0) -> bo
             except BaseException:
                 passed = False
             os._exit(0 if passed else 1)
-        return _status(child, timeout) != 0
+        return os.waitpid(child, 0)[1] != 0
 
 
 def damage(directory: Path, mutant: Mutant) -> None:
@@ -116,19 +128,6 @@ def damage(directory: Path, mutant: Mutant) -> None:
     data = json.loads(manifest.read_text())
     data["files"][mutant.path] = hashlib.sha256(file.read_bytes()).hexdigest()
     manifest.write_text(json.dumps(data))
-
-
-def _status(child: int, timeout: float) -> int:
-    """Exit status of a process; one that takes too long is ended, which is a catch too."""
-    end = time.monotonic() + timeout
-    while time.monotonic() < end:
-        ended, status = os.waitpid(child, os.WNOHANG)
-        if ended:
-            return status
-        time.sleep(0.01)
-    os.kill(child, 9)
-    os.waitpid(child, 0)
-    return -1
 
 
 def sample(found: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
@@ -158,7 +157,8 @@ def main() -> None:
         os.environ["LINKWISE_CACHE"] = folder
         for name in options.only:
             directory = package(name, Path(folder))
-            assert not caught(directory, None), name
+            if caught(directory, None):
+                sys.exit(f"{name}: `linkwise check` refuses the package as it was generated")
             for mutant in sample(formula_mutants(directory), options.each, options.seed):
                 killed = caught(directory, mutant)
                 counts[name, killed] += 1

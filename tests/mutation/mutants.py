@@ -13,12 +13,26 @@ from itertools import pairwise
 SWAPS = {
     **{"+": "-", "-": "+", "*": "/", "/": "*", "//": "/", "%": "*", "**": "*", "+=": "-=", "-=": "+="},
     **{"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "&&": "||", "||": "&&"},
-    **{"and": "or", "or": "and", "is": "is not", "in": "not in", "|": "&", "&": "|", "++": "--"},
+    **{"===": "!==", "!==": "===", "|": "&", "&": "|", "++": "--"},
 }
 """Operators with a space on either side; ++ without."""
+OF_PYTHON = {"and": "or", "or": "and", "is": "is not", "in": "not in"}
+OF_CMAKE = {
+    **{"AND": "OR", "OR": "AND", "TRUE": "FALSE", "FALSE": "TRUE", "PUSH": "POP", "POP": "PUSH"},
+    **{"EQUAL": "LESS", "STREQUAL": "STRLESS", "PRIVATE": "INTERFACE", "PUBLIC": "PRIVATE"},
+}
 
 WORDS = {
-    **{"True": "False", "False": "True", "min": "max", "max": "min", "any": "all", "all": "any"},
+    **{
+        "True": "False",
+        "False": "True",
+        "true": "false",
+        "false": "true",
+        "min": "max",
+        "max": "min",
+        "any": "all",
+        "all": "any",
+    },
     **{
         "sin": "cos",
         "cos": "sin",
@@ -29,16 +43,23 @@ WORDS = {
     },
     **{"sorted": "list", "first": "last", "last": "first", "upper": "lower", "lower": "upper"},
 }
-TOKEN = re.compile(
-    r"""(?P<comment>\#[^\n]*|//[^\n]*|/\*.*?\*/)
-    |(?P<string>[rbfu]{0,2}(?:\"\"\".*?\"\"\"|'''.*?'''|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'))
-    |(?P<jinja>\{[%{\#].*?[%}\#]\})
+TOKEN = r"""(?P<comment>{comment})
+    |(?P<string>[rbfu]{{0,2}}(?:\"\"\".*?\"\"\"|'''.*?'''|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'))
+    |(?P<jinja>\{{[%{{\#].*?[%}}\#]\}})
     |(?P<number>\b\d+(?:\.\d+)?(?:[eE][-+]?\d+)?\b)
     |(?P<word>\\?[A-Za-z_]\w*)
-    |(?P<operator>\*\*|//|<=|>=|==|!=|&&|\|\||\+\+|\+=|-=|->|[-+*/%<>|&=:,(\[{])
-    |(?P<other>\S)""",
-    re.DOTALL | re.VERBOSE,
+    |(?P<operator>\*\*|//|===|!==|<=|>=|=>|==|!=|&&|\|\||\+\+|\+=|-=|->|[-+*/%<>|&=:,(\[{{])
+    |(?P<other>\S)"""
+COMMENTS = {
+    **dict.fromkeys(("py", "txt", "toml", "cmake"), r"\#[^\n]*"),
+    **dict.fromkeys(("c", "h", "js", "html"), r"//[^\n]*|/\*.*?\*/"),
+}
+"""By the ending of the text that is meant; other texts have none."""
+CALL = re.compile(r"^[ \t]*([A-Za-z_][\w.]*\(.*\);)[ \t]*$", re.MULTILINE)
+COMMAND = re.compile(
+    r"^[ \t]*((?!if|else|endif|foreach|endforeach|function|endfunction)[a-z_]+\(.*\))[ \t]*$", re.MULTILINE
 )
+SCRIPT = re.compile(r"(?<=<script>).*?(?=</script>)", re.DOTALL)
 C_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*|^[ \t]*\#(?:[^\n]*\\\n)*[^\n]*", re.DOTALL | re.MULTILINE)
 
 
@@ -103,13 +124,17 @@ def mutants(path: str, text: str, rules: Rules = Rules()) -> Iterator[Mutant]:
         shown = text[starts[line] : end if end >= 0 else len(text)].strip()
         if shown.startswith("@dataclass") or text[max(start - 7, 0) : start] == "strict=":
             continue  # promises that no result depends on
+        if old == "|" and text[start:].startswith("| None"):
+            continue  # a type: whatever imports it would fail
         place = seen[shown, old, new] = seen.get((shown, old, new), 0) + 1
         yield Mutant(path, start, old, new, line + 1, shown, place)
 
 
 def _changes(path: str, text: str, rules: Rules) -> Iterator[tuple[int, str, str]]:
-    python = path.endswith((".py", ".txt"))
-    tokens = [m for m in TOKEN.finditer(text) if python or m.lastgroup != "comment" or m[0][0] != "#"]
+    kind_of_text = path.removesuffix(".j2").rpartition(".")[2]
+    comment = COMMENTS.get(kind_of_text, "(?!)")
+    tokens = re.finditer(TOKEN.format(comment=comment), text, re.DOTALL | re.VERBOSE)
+    words = SWAPS | {"py": OF_PYTHON, "txt": OF_PYTHON, "cmake": OF_CMAKE}.get(kind_of_text, {})
     before: re.Match[str] | None = None
     for token, after in pairwise([*tokens, None]):
         assert token is not None
@@ -122,9 +147,9 @@ def _changes(path: str, text: str, rules: Rules) -> Iterator[tuple[int, str, str
             if old.lstrip("\\") in WORDS and (old not in ("first", "last", "upper", "lower")):
                 word = old.lstrip("\\")
                 yield start, old, old.replace(word, WORDS[word])
-            elif old in SWAPS:
-                yield start, old, SWAPS[old]
-            elif old == "not" and after is not None:
+            elif old in words:
+                yield start, old, words[old]
+            elif old in ("not", "NOT") and after is not None:
                 yield start, text[start : after.start()], ""
             elif rules.names:
                 yield from ((start, old, new) for new in _renamed(old))
@@ -137,6 +162,14 @@ def _changes(path: str, text: str, rules: Rules) -> Iterator[tuple[int, str, str
         before = token
     if path.endswith(".py"):
         yield from _statements(text)
+    for lines in {"js": [CALL], "c": [CALL], "h": [CALL], "cmake": [COMMAND]}.get(kind_of_text, []):
+        for found in lines.finditer(text):
+            if _balanced(found[1]):
+                yield found.start(1), found[1], ""
+
+
+def _balanced(text: str) -> bool:
+    return text.count("(") == text.count(")") and text.count("{") == text.count("}")
 
 
 def _number(old: str, rules: Rules) -> str:
@@ -195,6 +228,15 @@ def _statements(text: str) -> Iterator[tuple[int, str, str]]:
 
 def _hidden(path: str, text: str) -> list[tuple[int, int]]:
     """Where nothing is changed: strings and annotations of Python, comments and preprocessor lines of C."""
+    if path.endswith(".html.j2"):
+        # Outside of scripts, only what is filled in.
+        scripts = [m.span() for m in SCRIPT.finditer(text)]
+        filled = [m.span() for m in re.finditer(r"\{[{%].*?[%}]\}", text)]
+        kept = sorted([*scripts, *filled])
+        ends = [0, *(end for _, end in kept)]
+        return [
+            (a, b) for a, b in zip(ends, [*(start for start, _ in kept), len(text)], strict=True) if a < b
+        ]
     if re.search(r"\.(c|h)(\.j2)?$", path):
         found = [m.span() for m in C_COMMENT.finditer(text)]
         return [] if path.endswith(".h.j2") else found

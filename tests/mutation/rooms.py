@@ -1,191 +1,204 @@
-"""Which files are changed, and which tests must notice: the room's and its users', cheap ones first.
+"""Which room each source file belongs to, which of its lines are changed, and which tests count.
 
-Comparisons with checked-in bytes are in no list: they tell that a text changed, not that it became wrong.
+A room of the house is a room here, with those of the runtime and the templates apart. The tests of a Python
+file are those that reach the changed function; for what Python does not run, a room names its tests, cheap
+ones first.
 """
 
+import hashlib
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
-from fnmatch import fnmatch
+from functools import cache
 
-CHECK = "tests/test_check.py"
-UNTYPED = "not typed_strictly"
-"""mypy, which takes longer than all other tests, tells no wrong number."""
-ONE_COMPILER = f"(not compile or gcc) and not its_parts and {UNTYPED}"
-"""What three more compilers warn of, gcc has."""
+from mutation.mutants import Mutant, mutants
+from mutation.tree import ROOT
+
+HOUSE = "generator/linkwise/"
+LINES = 100
+"""Of so many lines, one is changed at least."""
+LEAST = 20
+"""Mutants of a room, however small: with fewer, one survivor would be more than 5 %."""
 
 
 @dataclass(frozen=True)
 class Room:
-    """Files by pattern, below the project's root; tests as pytest names them, `only` as its -k chooses."""
+    """Files and folders below the project's root; tests, of what no coverage of Python tells."""
 
-    files: tuple[str, ...]
-    tests: tuple[str, ...]
-    leave: tuple[str, ...] = ()
-    only: str = ""
-
-    def holds(self, path: str) -> bool:
-        """Whether a file is one of this room's."""
-        return any(fnmatch(path, p) for p in self.files) and not any(fnmatch(path, p) for p in self.leave)
+    places: tuple[str, ...]
+    tests: tuple[str, ...] = ()
 
 
-def _house(room: str) -> tuple[str, ...]:
-    return (f"generator/linkwise/{room}/*.py", f"generator/linkwise/{room}.py")
+def _folder(name: str, *tests: str) -> Room:
+    return Room((f"{HOUSE}{name}/",), tests)
 
 
-def _cli(*tests: str) -> tuple[str, ...]:
-    """Of the commands' tests, each of which begins a new Python, those of a room."""
-    return tuple(f"tests/test_cli.py::test_{test}" for test in tests)
-
-
+C = (
+    "tests/test_control_c.py",
+    "tests/test_emitted_c.py",
+    "tests/test_loops.py",
+    "tests/test_native.py",
+    "tests/test_impedance_c.py",
+    "tests/test_passive_torque.py",
+    "tests/test_check.py",
+    "tests/numeric/test_regressors.py",
+)
 ROOMS: dict[str, Room] = {
-    "expression": Room(
-        _house("expression"),
-        ("tests/test_expression.py", "tests/test_dynamics.py", "tests/test_user_energies.py"),
-    ),
-    "dynamics": Room(
-        _house("dynamics"),
-        (
-            "tests/test_dynamics.py",
-            "tests/test_robots_builtin.py",
-            "tests/test_user_energies.py",
-        ),
-    ),
-    "symbolic": Room(
-        _house("symbolic"),
-        (
-            "tests/test_dynamics.py",
-            "tests/test_user_energies.py",
-            "tests/numeric/test_against_sympy.py",
-            "tests/test_report_terms.py",
-            f"{CHECK}::test_c_that_does_not_compile_fails_with_the_compilers_words",  # formulas
-        ),
-    ),
-    "emit": Room(
-        (*_house("emit"), "generator/linkwise/emit/c/*.py"),
-        (
-            "tests/test_templates.py",
-            CHECK,
-            "tests/test_parameters.py",
-            "tests/test_runtime.py",
-            "tests/test_package_import.py",
-            "tests/test_names.py",
-            "tests/test_escape.py",
-            "tests/test_emitted_c.py",
-        ),
-        only=ONE_COMPILER,
-    ),
-    "templates": Room(
-        tuple(f"templates/{kind}/*.j2" for kind in ("c", "closed_forms", "energies", "formulas", "package")),
-        (
-            "tests/test_templates.py",
-            CHECK,
-            "tests/test_package_import.py",
-            "tests/test_package_calls.py",
-            "tests/test_parameters.py",
-            "tests/test_emitted_c.py",
-        ),
-        only=ONE_COMPILER,
-    ),
-    "check": Room(_house("check"), ("tests/test_check_sources.py", CHECK)),
-    "package": Room(
-        _house("package"),
-        (
-            "tests/test_manifest.py",
-            CHECK,
-            "tests/test_package_import.py",
-        ),
-    ),
-    "runtime": Room(
-        _house("runtime"),
-        (
-            "tests/test_package_arguments.py",
-            "tests/test_package_calls.py",
-            "tests/test_parameters.py",
-            "tests/test_runtime.py",
-            "tests/test_user_energies.py",
-            "tests/test_labelled.py",
-            CHECK,
-            "tests/numeric/test_regressors.py",
-        ),
-        leave=("*/runtime/native/*.py",),
-        only=UNTYPED,
-    ),
-    "native": Room(
-        ("generator/linkwise/runtime/native/*.py",),
-        (
-            "tests/test_native.py",
-            "tests/test_native_cache.py",
-            "tests/test_other_systems.py",
-            "tests/test_package_calls.py",
-            "tests/test_runtime.py",
-        ),
-        only=UNTYPED,
-    ),
-    "c headers": Room(
-        ("generator/linkwise/runtime/c/*.h",),
-        ("tests/test_emitted_c.py", "tests/test_control_c.py", CHECK),
-        only=ONE_COMPILER,
-    ),
-    "output": Room(
-        (
-            *_house("output"),
-            *(f"generator/linkwise/{name}.py" for name in ("escape", "errors", "input_file")),
-        ),
-        (
-            "tests/test_escape.py",
-            "tests/test_output.py",
-            "tests/test_cli_endings.py",
-            *_cli("what_blocks_the_target_is_named"),
-        ),
-    ),
+    "cli": _folder("cli"),
+    "study": _folder("study"),
     "report": Room(
-        (*_house("report"), "templates/report/*.j2"),
-        (
-            "tests/test_report_pages.py",
-            "tests/test_report_terms.py",
-            "tests/test_report_reduction.py",
-            "tests/test_report_commands.py",
-        ),
-        leave=("*/plots.py", "*/seconds.py", "*/seconds_page.py"),
-        only="not same_bytes and not users_mistake and not unwritable",  # whole commands are slow
+        (f"{HOUSE}report/", "templates/report/"),
+        ("tests/test_report_pages.py", "tests/test_report_reduction.py", "tests/test_report_commands.py"),
     ),
-    "analysis": Room(
-        _house("analysis"),
+    "identification": _folder("identification"),
+    "analysis": _folder("analysis"),
+    "graphs": _folder("graphs"),
+    "check": _folder("check"),
+    "emit": _folder("emit"),
+    "package": _folder("package"),
+    "dynamics": _folder("dynamics"),
+    "expression": _folder("expression"),
+    "symbolic": _folder("symbolic"),
+    "robot": _folder("robot", "tests/test_robots_builtin.py", "tests/numeric/test_against_pinocchio.py"),
+    "output": _folder("output"),
+    "single-files": Room(
+        tuple(
+            f"{HOUSE}{name}.py"
+            for name in (
+                *("__init__", "__main__", "package_cache", "pipeline", "plotstyle", "extras"),
+                *("progress", "input_file", "makers", "errors", "escape", "version"),
+            )
+        )
+    ),
+    "runtime": _folder("runtime"),
+    "runtime/native": _folder("runtime/native", "tests/test_native_module.py", "tests/test_native.py"),
+    **{
+        f"runtime/{name}": _folder(f"runtime/{name}")
+        for name in (
+            *("lagrangians", "recorded", "arrays", "control", "simulation", "induced"),
+            *("constraints", "kinematics", "sums", "rule"),
+        )
+    },
+    "runtime/c": _folder("runtime/c", *C),
+    "cmake": _folder("cmake", "tests/test_cmake.py"),
+    "templates": Room(
         (
-            "tests/test_analysis_derivatives.py",
-            "tests/test_analysis_ends.py",
-            "tests/test_analysis_samples.py",
-            "tests/test_analysis_run.py",
-            "tests/test_analysis_formats.py",
-            "tests/test_analysis_logs.py",
-            "tests/test_analysis_files.py",
-            "tests/test_analysis_pictures.py",
+            "templates/__init__.py",
+            *(f"templates/{kind}/" for kind in ["c", "closed_forms", "energies", "formulas", "package"]),
+        ),
+        ("tests/test_templates.py", "tests/test_package_import.py", "tests/test_package_calls.py", *C),
+    ),
+    "pages": Room(
+        ("templates/analysis/", "templates/study/"),
+        (
+            "tests/test_study_page.py",
             "tests/test_analysis_page.py",
-            "tests/test_analysis_named.py",
-        ),
-    ),
-    "identification": Room(
-        _house("identification"), ("tests/test_identify.py", "tests/numeric/test_base_parameters.py")
-    ),
-    "robot": Room(
-        (*_house("robot"), "generator/linkwise/robot/readers/*.py"),
-        (
-            "tests/test_robots_transforms.py",
-            "tests/test_robots_names.py",
-            "tests/test_robots_builtin.py",
-            "tests/test_robots_bad.py",
-            "tests/test_robots_joints.py",
-            "tests/test_robots_mjcf.py",
-            "tests/test_robots_mjcf_options.py",
-            "tests/test_parameters.py",
-            "tests/numeric/test_parameters_of_file.py",
-            *_cli(
-                "inspect_prints_a_table",
-                "inspect_names_what_was_merged_locked_and_ignored",
-                "inspect_lists_what_each_joint_leaves_out_on_request",
-                "inspect_shows_a_robot_that_generate_refuses_for_a_body_that_cannot_be",
-                "generate_warns_of_what_the_torques_leave_out",
-                "generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be",
-            ),
+            "tests/test_analysis_shares.py",
+            "tests/test_analysis_browser.py",
         ),
     ),
 }
+LEFT_OUT = {
+    f"{HOUSE}py.typed": "empty",
+    "templates/analysis/report.css.j2": "how a page looks; that all of it can be read, tests of pages hold",
+}
+NOT_COUNTED = {
+    "tests/test_generated.py": "that a text changed, not that it became wrong",
+    "tests/test_mutation.py": "of this sweep itself",
+    **dict.fromkeys(
+        ("tests/test_rooms.py", "tests/test_docs.py", "tests/test_pages.py", "tests/test_licences.py"),
+        "reads texts of the checkout, which are not changed",
+    ),
+    **dict.fromkeys(
+        (
+            "tests/test_trust.py",
+            "tests/test_stated_figures.py",
+            "tests/test_skipped.py",
+            "tests/test_packaging.py",
+        ),
+        "reads texts of the checkout, which are not changed",
+    ),
+    "tests/test_runtime.py::test_a_package_and_its_user_are_typed_strictly": "mypy, in minutes",
+}
+"""Files of tests, or tests, whose failure is no catch, with the reason."""
+
+
+def sources() -> list[str]:
+    """Every source file, below the project's root."""
+    paths = [
+        path for top in (HOUSE, "templates/") for path in sorted((ROOT / top).rglob("*")) if path.is_file()
+    ]
+    names = [path.relative_to(ROOT).as_posix() for path in paths]
+    return [n for n in names if "__pycache__" not in n and not n.startswith(f"{HOUSE}templates/")]
+
+
+def rooms_of(path: str) -> list[str]:
+    """Names of the rooms that a file is in: of nested folders, the innermost alone."""
+    lengths = {
+        name: max(
+            (
+                len(place)
+                for place in room.places
+                if path == place or (path.startswith(place) and place[-1] == "/")
+            ),
+            default=0,
+        )
+        for name, room in ROOMS.items()
+    }
+    deepest = max(lengths.values())
+    return [name for name, length in lengths.items() if length == deepest > 0]
+
+
+def files_of(room: str) -> list[str]:
+    """The files of a room that are changed."""
+    return [path for path in sources() if path not in LEFT_OUT and room in rooms_of(path)]
+
+
+def test_files() -> list[str]:
+    """Files whose tests count, in order of their names."""
+    paths = sorted((ROOT / "tests").rglob("test_*.py"))
+    return [n for n in (path.relative_to(ROOT).as_posix() for path in paths) if n not in NOT_COUNTED]
+
+
+@cache
+def text_of(path: str) -> str:
+    """Text of a file of the project."""
+    return (ROOT / path).read_text(encoding="utf-8")
+
+
+def lines_of(room: str) -> int:
+    """How many lines a room has."""
+    return sum(text_of(path).count("\n") for path in files_of(room))
+
+
+def drawn(room: str) -> list[Mutant]:
+    """Mutants of a room, one of a line: each line that can be changed has the same chance.
+
+    The chance is a hash of the line's text, so that a line stays drawn when others change.
+    """
+    candidates = [item for path in files_of(room) for item in _by_chance(path)]
+    wanted = max(LEAST, -(-lines_of(room) // LINES))
+    found: list[Mutant] = []
+    for _, group in sorted(candidates, key=lambda item: item[0]):
+        possible = (mutant for mutant in group if mutant.parses(text_of(mutant.path)))
+        if mutant := next(possible, None):
+            found.append(mutant)
+        if len(found) == wanted:
+            break
+    return found
+
+
+def _by_chance(path: str) -> Iterator[tuple[str, list[Mutant]]]:
+    """For each line, its chance and its mutants, both by a hash."""
+    by_line: dict[int, list[Mutant]] = {}
+    for mutant in mutants(path, text_of(path)):
+        by_line.setdefault(mutant.line, []).append(mutant)
+    seen = Counter[str]()
+    for group in by_line.values():
+        line = group[0].text
+        seen[line] += 1
+        yield _chance(f"{path}: {line} {seen[line]}"), sorted(group, key=lambda mutant: _chance(mutant.key))
+
+
+def _chance(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,92 @@
+"""The verdict on one mutant: tests that may notice it, quick ones first, until one fails.
+
+A test that fails without the mutant too, or passes when it runs again, decides nothing: it is told and
+left out.
+"""
+
+from collections.abc import Iterator
+from threading import Lock
+
+from mutation.mutants import Mutant
+from mutation.reach import Map, digest
+from mutation.rooms import NOT_COUNTED, ROOMS
+from mutation.tree import ROOT, Ended, Tree
+from mutation.verdicts import Record
+
+STAGES = (10.0, 40.0, 160.0)
+"""Seconds of tests, as the map has measured them, of the processes that a mutant is put to in turn."""
+UNKNOWN = 300.0
+"""Seconds for a file that a room names, which no map has measured."""
+
+
+class Decider:
+    """Decides mutants."""
+
+    def __init__(self, reach: Map, record: Record) -> None:
+        """Take the map of what tests reach and the record of what is known."""
+        self.reach = reach
+        self.record = record
+        self.unsteady: dict[str, str] = {}
+        self._lock = Lock()
+
+    def stages(self, room: str, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
+        """Tests of each process, and their seconds: what reaches the change, else what the room names."""
+        near = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else []
+        if not near:
+            for name in ROOMS[room].tests:
+                known = self.reach.files.get(name)
+                yield [name], sum(known.seconds.values()) if known else UNKNOWN
+            return
+        ranked = iter(near)
+        for limit in STAGES:
+            tests: list[str] = []
+            total = 0.0
+            for name, seconds in ranked:
+                if not any(name.startswith(left) for left in NOT_COUNTED):
+                    tests.append(name)
+                    total += seconds
+                if total >= limit:
+                    break
+            if tests:
+                yield tests, total
+
+    def decide(self, room: str, mutant: Mutant, tree: Tree) -> tuple[str, str]:
+        """Killed, too slow or survived; and by which test, or after how many seconds of tests."""
+        total = 0.0
+        for tests, seconds in self.stages(room, mutant):
+            total += seconds
+            while True:
+                left = [*(name for name in NOT_COUNTED if "::" in name), *self.unsteady]
+                with tree.changed(mutant):
+                    ended = tree.tested(tests, 60 + 4 * seconds, left)
+                if ended.passed:
+                    break
+                if self._trusted(ended, tests, seconds, left, tree):
+                    return ("too slow" if ended.too_slow else "killed"), ended.by or tests[0]
+                if not ended.by:
+                    raise SystemExit(f"{' '.join(tests)} end with {ended.code} without a mutant, too")
+        return "survived", f"{total:.0f} s of tests" if total else "nothing reaches it"
+
+    def _trusted(self, ended: Ended, tests: list[str], seconds: float, left: list[str], tree: Tree) -> bool:
+        """Whether what failed fails because of the mutant; if not, it is told and does not count any more."""
+        if ended.by and not ended.again:
+            self._leave(ended.by, "failed, and passed when it was run again")
+            return False
+        file = ROOT / ended.by.partition("::")[0]
+        known = digest(file) if ended.by and file.is_file() else ""
+        if ended.by and self.record.sound.get(ended.by) == known:
+            return True
+        without = tree.tested([ended.by] if ended.by else tests, 60 + 4 * seconds, left)
+        if not without.passed:
+            if ended.by:
+                self._leave(ended.by, "fails without a mutant")
+            return False
+        if ended.by:
+            with self._lock:
+                self.record.sound[ended.by] = known
+        return True
+
+    def _leave(self, name: str, why: str) -> None:
+        with self._lock:
+            self.unsteady[name] = why
+        print(f"no verdict by {name}: {why}", flush=True)

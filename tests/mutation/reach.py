@@ -1,0 +1,250 @@
+"""Which tests reach a function: each file of tests runs under coverage.py, anew when its text changes.
+
+Kept by the function's name, not by line, so that it stays true while lines move. What programs of the tests
+reach counts for the test that runs them, what fixtures of many tests reach for every test of their file.
+"""
+
+import ast
+import hashlib
+import json
+import os
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from mutation.tree import ROOT, Tree
+
+HOUSE = "generator/linkwise"
+SLOW = 1800
+"""Seconds of processor time for one file of tests."""
+SETTINGS = """[run]
+data_file = {folder}/reached
+parallel = true
+context = ${{PYTEST_CURRENT_TEST-}}
+include = {folder}/linkwise/*, */runtime/*
+disable_warnings = couldnt-parse, no-data-collected, module-not-measured, already-imported, dynamic-conflict
+patch = _exit, fork
+"""
+"""Of programs that tests start; runtime is also copied into packages, which are anywhere."""
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What one file of tests reaches.
+
+    seconds: of the processor, of each of its tests; functions: of a source, by name, "" for what runs at
+    its import: tests, or "" where every test of the file may depend on it
+    """
+
+    digest: str
+    seconds: dict[str, float]
+    functions: dict[str, dict[str, list[str]]]
+
+    def share(self, folder: str) -> float:
+        """Of all functions that are reached, the part that is in a folder."""
+        counts = {path: sum(bool(name) for name in found) for path, found in self.functions.items()}
+        inside = sum(count for path, count in counts.items() if path.rpartition("/")[0] == folder)
+        return max(inside, 1) / max(sum(counts.values()), 1)
+
+
+def digest(path: Path) -> str:
+    """Short hash of a file's bytes."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+class Map:
+    """What each file of tests reaches, kept in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        """Take what is there; files that changed since are not in it."""
+        self.folder = folder
+        self.files: dict[str, Reached] = {}
+        folder.mkdir(parents=True, exist_ok=True)
+        for file in sorted(folder.glob("*.json")):
+            name = file.stem.replace("+", "/") + ".py"
+            reached = Reached(**json.loads(file.read_text()))
+            if (ROOT / name).is_file() and digest(ROOT / name) == reached.digest:
+                self.files[name] = reached
+
+    def add(self, name: str, tree: Tree) -> None:
+        """Run one file of tests, and keep what it reaches."""
+        reached = _reached(name, tree)
+        self.files[name] = reached
+        kept = self.folder / (name.removesuffix(".py").replace("/", "+") + ".json")
+        kept.write_text(json.dumps(vars(reached)))
+
+    def tests(self, path: str, line: int) -> list[tuple[str, float]]:
+        """Tests that reach the function of a line, with their seconds; first what tells most in a second.
+
+        Files are in turn by their seconds for each share of them that is about the path's folder, in each the
+        quick tests first. After these come the other tests of these files, which may use what those kept.
+        """
+        function = name_at((ROOT / path).read_text(encoding="utf-8"), line)
+        is_known = any(function in reached.functions.get(path, {}) for reached in self.files.values())
+        near: list[tuple[float, list[tuple[str, float]]]] = []
+        far: list[tuple[float, list[tuple[str, float]]]] = []
+        for reached in self.files.values():
+            here = reached.functions.get(path, {})
+            if function and is_known:
+                names = set(here.get(function, ()))
+            else:  # what runs at import may matter to all that use the module
+                names = {name for found in here.values() for name in found if name}
+            if not (names or (here and not function)):
+                continue
+            ranked = sorted(reached.seconds.items(), key=lambda item: item[1])
+            close = [item for item in ranked if item[0] in names or "" in names]
+            share = reached.share(path.rpartition("/")[0])
+            near.append((sum(seconds for _, seconds in close) / share, close))
+            far.append(
+                (sum(reached.seconds.values()) / share, [item for item in ranked if item not in close])
+            )
+        groups = [group for part in (near, far) for _, group in sorted(part, key=lambda item: item[0])]
+        return [item for group in groups for item in group]
+
+
+@cache
+def _functions(text: str) -> list[tuple[int, int, str]]:
+    """First and last line of the body of each function, outer ones first, and its name."""
+    found: list[tuple[int, int, str]] = []
+
+    def visit(node: ast.AST, above: str) -> None:
+        for child in ast.iter_child_nodes(node):
+            name = above
+            if isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+                name = f"{above}.{child.name}".removeprefix(".")
+                if not isinstance(child, ast.ClassDef):
+                    found.append((child.body[0].lineno, child.end_lineno or 0, name))
+            visit(child, name)
+
+    visit(ast.parse(text), "")
+    return found
+
+
+def name_at(text: str, line: int) -> str:
+    """Name of the innermost function whose body has this line; "" for what runs at import."""
+    inside = [name for first, last, name in _functions(text) if first <= line <= last]
+    return inside[-1] if inside else ""
+
+
+def _spent() -> float:
+    """Seconds of processor time of this process and the programs that it waited for: no other work counts."""
+    return sum(os.times()[:4])
+
+
+class Watch:
+    """Tells coverage which test runs, and how long each takes."""
+
+    def __init__(self, switch: Callable[[str], None]) -> None:
+        self.switch = switch
+        self.now = ""
+        self.seconds: dict[str, float] = defaultdict(float)
+
+    @contextmanager
+    def _as(self, name: str) -> Iterator[None]:
+        before, self.now = self.now, name
+        self.switch(name)
+        try:
+            yield
+        finally:
+            self.now = before
+            self.switch(before)
+
+    def pytest_configure(self, config: Any) -> None:
+        """Wrap what pytest calls; written so that this module does not need pytest."""
+        import pytest
+
+        watch = self
+
+        class Hooks:
+            @pytest.hookimpl(wrapper=True)
+            def pytest_runtest_protocol(self, item: Any) -> Any:
+                start = _spent()
+                with watch._as(test_of(item.nodeid)):
+                    result = yield
+                watch.seconds[test_of(item.nodeid)] += _spent() - start
+                return result
+
+            @pytest.hookimpl(wrapper=True)
+            def pytest_fixture_setup(self, fixturedef: Any) -> Any:
+                if fixturedef.scope == "function":
+                    return (yield)
+                with watch._as(""):
+                    return (yield)
+
+        config.pluginmanager.register(Hooks())
+
+
+def test_of(name: str) -> str:
+    """Name of a test without its parameters and its phase."""
+    return name.partition("[")[0].partition(" (")[0]
+
+
+test_of.__test__ = False  # type: ignore[attr-defined]
+
+
+def _reached(name: str, tree: Tree) -> Reached:
+    folder = tree.folder / "coverage"
+    folder.mkdir(exist_ok=True)
+    for old in folder.iterdir():
+        old.unlink()
+    settings, seconds = folder / "coveragerc", folder / "seconds.json"
+    settings.write_text(
+        SETTINGS.format(folder=folder).replace(f"{folder}/linkwise", f"{tree.folder}/linkwise")
+    )
+
+    def work(pytest_main: Callable[..., int]) -> int:
+        import coverage
+
+        os.environ["COVERAGE_PROCESS_START"] = str(settings)
+        cover = coverage.Coverage(config_file=str(settings))
+        cover.start()
+        watch = Watch(cover.switch_context)
+        code = pytest_main(["-m", "not ship", name], [watch])
+        cover.stop()
+        cover.save()
+        seconds.write_text(json.dumps(watch.seconds))
+        return code
+
+    code = tree.forked(work, SLOW)
+    if not seconds.is_file():
+        print(f"{name}: ended with {code} under coverage, and is not in the map", flush=True)
+        return Reached(digest(ROOT / name), {}, {})
+    return Reached(digest(ROOT / name), json.loads(seconds.read_text()), _collected(folder, tree))
+
+
+def _collected(folder: Path, tree: Tree) -> dict[str, dict[str, list[str]]]:
+    """Functions that were reached, of all processes' data."""
+    import coverage
+
+    found: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for file in folder.glob("reached*"):
+        data = coverage.CoverageData(str(file))
+        try:
+            data.read()
+        except coverage.CoverageException:
+            continue  # of a process that was killed while it wrote
+        for measured in data.measured_files():
+            path = _source(measured, tree)
+            if path is None:
+                continue
+            text = (ROOT / path).read_text(encoding="utf-8")
+            for line, contexts in data.contexts_by_lineno(measured).items():
+                tests = {test_of(part) for part in contexts}
+                found[path][name_at(text, line)] |= {test if "::" in test else "" for test in tests}
+    return {path: {name: sorted(tests) for name, tests in inner.items()} for path, inner in found.items()}
+
+
+def _source(measured: str, tree: Tree) -> str | None:
+    """The project's file that this one is, or is a copy of."""
+    own = str(tree.folder / "linkwise") + "/"
+    inner = (
+        measured.removeprefix(own)
+        if measured.startswith(own)
+        else "runtime/" + measured.rpartition("/runtime/")[2]
+    )
+    path = f"{HOUSE}/{inner}"
+    return path if (ROOT / path).is_file() and path.endswith(".py") else None

@@ -1,0 +1,127 @@
+"""What was decided, kept on disk, so that a sweep goes on where it stopped and runs nothing twice."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from mutation.mutants import Mutant
+from mutation.reach import digest
+from mutation.rooms import ROOMS, drawn, test_files
+from mutation.tree import ROOT
+
+CAUGHT = ("killed", "too slow")
+EQUIVALENTS = Path(__file__).with_name("equivalents.json")
+MARK = "<!-- from here on by tests/mutation/run.py --write -->\n"
+END = "<!-- to here -->\n"
+HEAD = "| room | mutants | caught | equivalent | score |\n|---|---:|---:|---:|---:|\n"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a mutant.
+
+    verdict: killed, too slow or survived; by: the test that failed, else how much was run;
+    source: digest of the file that is changed; tests: of the file of the test that failed, else of all
+    """
+
+    room: str
+    verdict: str
+    by: str
+    source: str
+    tests: str
+
+
+class Record:
+    """Verdicts by mutant, and the tests that pass without one."""
+
+    def __init__(self, file: Path) -> None:
+        """Take what is there."""
+        self.file = file
+        kept = json.loads(file.read_text()) if file.is_file() else {"verdicts": {}, "sound": {}}
+        self.verdicts = {key: Verdict(**entry) for key, entry in kept["verdicts"].items()}
+        self.sound: dict[str, str] = kept["sound"]
+        self.all_tests = hashlib.sha256(
+            "".join(f"{name} {digest(ROOT / name)}\n" for name in test_files()).encode()
+        ).hexdigest()[:16]
+
+    def tests(self, verdict: str, by: str) -> str:
+        """Digest of the tests that a verdict rests on."""
+        file = ROOT / by.partition("::")[0]
+        return digest(file) if verdict in CAUGHT and by and file.is_file() else self.all_tests
+
+    def decided(self, mutant: Mutant) -> Verdict | None:
+        """Verdict on a mutant for the texts as they are."""
+        kept = self.verdicts.get(mutant.key)
+        if kept is None or kept.source != digest(ROOT / mutant.path):
+            return None
+        return kept if kept.tests == self.tests(kept.verdict, kept.by) else None
+
+    def add(self, room: str, mutant: Mutant, verdict: str, by: str) -> None:
+        """Keep a verdict."""
+        tests = self.tests(verdict, by)
+        self.verdicts[mutant.key] = Verdict(room, verdict, by, digest(ROOT / mutant.path), tests)
+        self.save()
+
+    def save(self) -> None:
+        """Write the record, whole or not at all."""
+        data = {"verdicts": {k: asdict(v) for k, v in self.verdicts.items()}, "sound": self.sound}
+        beside = self.file.with_suffix(".new")
+        beside.write_text(json.dumps(data, indent=1))
+        beside.replace(self.file)
+
+
+@dataclass(frozen=True)
+class Score:
+    """How a room stands."""
+
+    room: str
+    mutants: int
+    caught: int
+    equivalent: int
+    survivors: tuple[str, ...]
+
+    @property
+    def open(self) -> int:
+        """Mutants that are not decided yet."""
+        return self.mutants - self.equivalent - self.caught - len(self.survivors)
+
+    @property
+    def row(self) -> str:
+        """The room's line of the table; its score is of what is decided."""
+        decided = self.caught + len(self.survivors)
+        caught, score = (self.caught, f"{100 * self.caught / decided:.1f} %") if decided else ("–", "–")
+        return f"| {self.room} | {self.mutants} | {caught} | {self.equivalent} | {score} |\n"
+
+
+def explained() -> Mapping[str, str]:
+    """Mutants that change nothing that is promised, with the reason."""
+    found: dict[str, str] = json.loads(EQUIVALENTS.read_text(encoding="utf-8"))
+    return found
+
+
+def scores(record: Record, rooms: Sequence[str] = tuple(ROOMS)) -> list[Score]:
+    """How each room stands, for the texts as they are."""
+    reasons = explained()
+    found = []
+    for room in rooms:
+        mutants = drawn(room)
+        rest = [mutant for mutant in mutants if mutant.key not in reasons]
+        verdicts = [(mutant.key, record.decided(mutant)) for mutant in rest]
+        caught = sum(verdict is not None and verdict.verdict in CAUGHT for _, verdict in verdicts)
+        survivors = tuple(k for k, v in verdicts if v is not None and v.verdict == "survived")
+        found.append(Score(room, len(mutants), caught, len(mutants) - len(rest), survivors))
+    return found
+
+
+def table(found: Sequence[Score]) -> str:
+    """The scores as docs/trust.md has them."""
+    return HEAD + "".join(score.row for score in found)
+
+
+def written(page: str, found: Sequence[Score]) -> str:
+    """The page with the table in its place."""
+    before, _, rest = page.partition(MARK)
+    _, _, after = rest.partition(END)
+    return before + MARK + table(found) + END + after

@@ -1,0 +1,103 @@
+"""A study's figures for papers: whose curves, which band, and the tests that are about them."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from linkwise.study.band_figure import band_figures
+from linkwise.study.comparisons import Cluster, Compared
+from linkwise.study.running_moments import STATISTICS
+from linkwise.study.study_plan import Comparison, PaperFigure
+from linkwise.study.subject_spread import Spread
+from linkwise.study.trial_summary import TrialSummary
+
+LEVELS = {"slow": [[1.0, 2.0, 3.0], [3.0, 4.0, 8.0]], "fast": [[5.0, 5.0, 5.0], [6.0, 9.0, 5.0]]}
+"""Curves of two subjects by condition."""
+
+
+def trials(points: int = 3) -> list[TrialSummary]:
+    """Each subject's trial in each condition; of one point, without cycles."""
+    found = []
+    for level, curves in LEVELS.items():
+        for subject, curve in enumerate(curves):
+            labels = {"subject": f"S{subject}", "condition": level, "day": f"{subject}"}
+            of_mean = {"tau/hip": np.full(len(STATISTICS), np.mean(curve))}
+            of_cycle = {"tau/hip": np.array(curve)} if points > 1 else {}
+            found.append(
+                TrialSummary(f"{level}-{subject}", labels, {"tau/hip": "N m"}, of_mean, of_cycle, points > 1)
+            )
+    return found
+
+
+def about(factor: str, column: str, start: float) -> Compared:
+    """A test that found ten per cent of the cycle."""
+    asked = Comparison(factor, ("slow", "fast"), (column,))
+    sides = (Spread((), np.empty((0, 3)), np.empty((0, 3))),) * 2
+    parts = (Cluster(start, start + 10, 0.01),)
+    return Compared(asked, column, "N m", sides, np.zeros(3), 2.0, float("nan"), parts)
+
+
+@pytest.fixture
+def drawn_of(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The axis of a figure of one panel, and the names of its files."""
+
+    def drawn(figure: PaperFigure, of: Sequence[TrialSummary], tests: Sequence[Compared] = ()) -> Any:
+        kept: list[Any] = []
+        monkeypatch.setattr("linkwise.study.band_figure.saved", lambda one, kind: kept.append(one) or b"")
+        names = [name for name, _ in band_figures([figure], of, tests)]
+        return kept[0].axes[0], names
+
+    return drawn
+
+
+def band_of(axis: Any, number: int) -> np.ndarray:
+    """Lower and upper edge of a band, by its corners."""
+    corners = axis.collections[number].get_paths()[0].vertices
+    return np.array(
+        [[corners[corners[:, 0] == x, 1].min(), corners[corners[:, 0] == x, 1].max()] for x in (0, 50, 100)]
+    ).T
+
+
+@pytest.mark.parametrize(
+    ("band", "of_slow"),
+    [
+        ("deviation", np.array([[2, 3, 5.5]]) + np.outer([-1, 1], np.sqrt([2, 2, 12.5]))),
+        ("range", np.array([[1, 2, 3], [3, 4, 8]])),
+        ("none", None),
+    ],
+)
+def test_each_level_has_its_subjects_mean_and_band(drawn_of: Any, band: Any, of_slow: Any) -> None:
+    axis, names = drawn_of(PaperFigure(("tau/hip",), "condition", band=band), trials())
+    assert names == ["tau%2Fhip.svg", "tau%2Fhip.pdf"]
+    assert [line.get_label() for line in axis.lines] == ["slow", "fast"]
+    for line, curves in zip(axis.lines, LEVELS.values(), strict=True):
+        np.testing.assert_allclose(line.get_xdata(), [0, 50, 100])
+        np.testing.assert_allclose(line.get_ydata(), np.mean(curves, axis=0))
+    if of_slow is None:
+        assert not axis.collections
+    else:
+        np.testing.assert_allclose(band_of(axis, 0), of_slow)
+    assert axis.get_ylabel() == "N m"
+
+
+def test_bars_are_the_tests_of_its_own_factor_and_column(drawn_of: Any) -> None:
+    tests = [
+        about("day", "tau/hip", 10),
+        about("condition", "tau/knee", 30),
+        about("condition", "tau/hip", 60),
+    ]
+    axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition"), trials(), tests)
+    assert [(bar.get_x(), bar.get_width()) for bar in axis.patches] == [(60, 10)]
+
+
+def test_means_without_cycles_are_dots_with_their_deviation(drawn_of: Any) -> None:
+    axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition"), trials(points=1))
+    dots = [line for line in axis.lines if line.get_label() in LEVELS]
+    assert [tick.get_text() for tick in axis.get_xticklabels()] == list(LEVELS)
+    for at, (line, curves) in enumerate(zip(dots, LEVELS.values(), strict=True)):
+        means = np.mean(curves, axis=1)
+        np.testing.assert_allclose(line.get_ydata(), means)
+        np.testing.assert_array_equal(line.get_xdata(), at)
+        (bar,) = axis.containers[at].lines[2][0].get_segments()
+        np.testing.assert_allclose(bar[:, 1], means.mean() + np.array([-1, 1]) * means.std(ddof=1))

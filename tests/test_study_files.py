@@ -1,0 +1,29 @@
+"""A trial is done again when any file that it is made of changes: of a log that is a folder, each in it."""
+
+from pathlib import Path
+
+import pytest
+from linkwise.analysis.analysis_choices import AnalysisChoices
+from linkwise.study.study_plan import StudyPlan, Trial
+from linkwise.study.trial_key import trial_key
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    """A log of two files, one deeper."""
+    (tmp_path / "bag/part").mkdir(parents=True)
+    (tmp_path / "bag/metadata.yaml").write_text("one")
+    (tmp_path / "bag/part/0.db3").write_text("two")
+    return tmp_path / "bag"
+
+
+def test_each_file_of_a_folder_counts(bag: Path) -> None:
+    plan = StudyPlan("arms", bag.parent / "study.toml", ("subject",), ())
+    trial = Trial("a", (("subject", "S1"),), str(bag), "planar3", AnalysisChoices())
+    key, files = trial_key(plan, trial, {})
+    assert list(files) == [str(bag / "metadata.yaml"), str(bag / "part/0.db3")]
+    assert trial_key(plan, trial, files).key == key
+    (bag / "part/0.db3").write_text("three")
+    changed = trial_key(plan, trial, files).key
+    (bag / "part/1.db3").write_text("")
+    assert len({key, changed, trial_key(plan, trial, files).key}) == 3
