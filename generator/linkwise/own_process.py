@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from linkwise.runtime.native.native_system import system_here
 
@@ -41,8 +41,13 @@ def in_own_process(work: Callable[[], T], limits: ProcessLimits | None = None) -
     What `work` raises comes back too, a MemoryError where it wants more than the limits have. Where a fork
     cannot compute, it is done in this process, without limits.
     """
+    return begun(work, limits)()
+
+
+def begun(work: Callable[[], T], limits: ProcessLimits | None = None) -> Callable[[], T]:
+    """The same, of which the answer is waited for later: by calling what this returns, once."""
     if not system_here().forks:
-        return work()
+        return work
     reader, writer = os.pipe()
     with warnings.catch_warnings():  # `work` computes with NumPy or MuJoCo alone, which fork beside threads
         warnings.simplefilter("ignore", DeprecationWarning)
@@ -50,6 +55,10 @@ def in_own_process(work: Callable[[], T], limits: ProcessLimits | None = None) -
     if not child:
         _answer(work, writer, limits)
     os.close(writer)
+    return lambda: _waited(child, reader, limits)
+
+
+def _waited(child: int, reader: int, limits: ProcessLimits | None) -> Any:
     try:
         with os.fdopen(reader, "rb") as pipe:
             answer = pipe.read()
@@ -67,7 +76,7 @@ def in_own_process(work: Callable[[], T], limits: ProcessLimits | None = None) -
     succeeded, result = pickle.loads(answer)
     if not succeeded:
         raise result
-    return result  # type: ignore[no-any-return]
+    return result
 
 
 def _answer(work: Callable[[], T], writer: int, limits: ProcessLimits | None) -> None:

@@ -65,8 +65,11 @@ def body_reference(recursion: NewtonEuler, magnitudes: Magnitudes, states: State
 
 
 def by_unit(torque: Callable[..., Array], states: States) -> Array:
-    """What each unit vector e (n,) gives with q, qd and qdd, side by side on a last axis: all in one call."""
+    """What each unit vector e (n,) gives with q, qd and qdd, (samples, i, j, ...), on an axis behind j.
+
+    All of them are in one call.
+    """
     samples, n = states.q.shape
     motion = (np.repeat(x, n, axis=0) for x in states.motion)
     found = torque(*motion, np.tile(np.eye(n), (samples, 1)))
-    return np.ascontiguousarray(np.moveaxis(found.reshape(samples, n, *found.shape[1:]), 1, -1))
+    return np.ascontiguousarray(np.moveaxis(found.reshape(samples, n, *found.shape[1:]), 1, 3))

@@ -48,6 +48,8 @@ REGRESSORS = {
 AT_REST = ("coefficients", "coefficient_regressors")
 """Functions that take no qdd."""
 
+MOST = 16
+"""Samples that functions of a large robot are called for at once: one block, and rows that fill none."""
 MANY = 192
 """Bytes for each result of a sample that still count as few: 24 samples in double, 48 in float."""
 
@@ -119,7 +121,11 @@ class CFunctions:
         width = 1
         if function.short.endswith("_blocks"):
             width = self.compiled.constants["BLOCKF" if function.real == "float" else "BLOCK"]
+        results = sum(len(self.rows.of(what)) for what in function.outputs)
+        most = max(MOST, NUMBERS // max(results, 1))
         for count in BLOCKS if width > 1 else ROWS:
+            if count * width > most:
+                continue
             at = np.arange(count * width) * 3 % max(len(reference.states.q), 1)
             for shift in (0, 1):
                 yield from self._rows(function, reference, at, width, shift)

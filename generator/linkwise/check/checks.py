@@ -16,7 +16,7 @@ from linkwise.check.body_reference import body_reference
 from linkwise.check.c_functions import CFunctions, References, compile_c
 from linkwise.check.compare import Result, skipped
 from linkwise.check.compiled_c import CompiledPackage
-from linkwise.check.contact_checks import Contacts
+from linkwise.check.contact_checks import ContactReference
 from linkwise.check.derivations import derivations
 from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.formula_texts import check_formulas
@@ -35,17 +35,18 @@ from linkwise.check.recorded_parts import recorded_parts
 from linkwise.check.reference import Reference
 from linkwise.check.regressor_reference import regressor_calls, regressor_reference
 from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion, simulation_calls
-from linkwise.check.states import AT_REST, States, affordable, random_states
+from linkwise.check.states import States, affordable, random_states
 from linkwise.check.sum_checks import sums_against_reference
 from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.torque_reference import states_of_torques, torque_reference
-from linkwise.own_process import Ended, in_own_process
+from linkwise.own_process import Ended, begun, in_own_process
 from linkwise.package.entries import PassiveEntry, RigidTree
 from linkwise.package.load import Array, Model, Package, load_package, staying
 from linkwise.package.manifest import Manifest
 
 OPTIONAL = ("torch",)
 """Libraries that a package's back ends may need beside NumPy."""
+COMPOSED = "of a robot as large as this, held of torch, which composes it of the same answers"
 LEAST = 10
 """States below which nothing is proved of energies that are not defined everywhere."""
 
@@ -147,17 +148,19 @@ def _numbers(package: Package, loaded: Mapping[Way, Model], samples: int) -> Ite
     if f"c/{manifest.name}.h" in manifest.files:
         compiled, result = compile_c(manifest, package.directory, rows)
         yield result
-    few = affordable(samples, len(manifest.joints), len(manifest.links))
+    few, rest = affordable(samples, len(manifest.joints), len(manifest.links))
     if few < samples:
-        told = f"{few} random ones instead of {samples}, and {AT_REST} at rest: that is what memory is for"
+        told = f"{few} random ones instead of {samples}, and {rest} at rest: for more it would take gigabytes"
         yield Result("states", True, None, told)
     values = dict(manifest.parameters)
-    yield from _Subject(package, "", values, loaded, rows, compiled, few).results()
+    yield from _Subject(package, "", values, loaded, rows, compiled, (few, rest)).results()
     if values:
         # Every parameter changed a little: equal ones tell no longer one from another, and none is zero.
         values = changed_values(manifest.parameters, manifest.tree)
         loaded = {way: package.load(way.backend, values, way.kernel) for way in loaded}
-        yield from _Subject(package, ", other parameters", values, loaded, rows, compiled, few).results()
+        yield from _Subject(
+            package, ", other parameters", values, loaded, rows, compiled, (few, rest)
+        ).results()
 
 
 @dataclass(frozen=True)
@@ -173,7 +176,8 @@ class _Subject:
     loaded: Mapping[Way, Model]
     rows: IndexRows
     compiled: CompiledPackage | None
-    samples: int
+    count: tuple[int, int]
+    """Of random states, and of those at rest."""
 
     def results(self) -> Iterator[Result]:
         """The bodies, the texts, the C, and every back end."""
@@ -184,7 +188,7 @@ class _Subject:
             yield from check_bodies(manifest.tree, bodies, self.parameters, unphysical, label)
         reference, tried = self._found
         if manifest.energies is not None:
-            yield from _told(f"energies{label}", reference, tried, self.samples)
+            yield from _told(f"energies{label}", reference, tried, self.count[0])
         if reference is None and tried:
             return
         yield from check_formulas(self.package, self.rows, self.parameters, label, reference)
@@ -195,22 +199,35 @@ class _Subject:
             told = "loops close near none of the states, or only next to singular positions"
             yield skipped(f"constraints{label}", told)
         functions, wrong = self.functions, False
-        for result in _c_results(functions, f"c{label}", self) if functions else ():
-            wrong |= result.failed
-            yield result
-        for way, model in self.loaded.items():
+        # A wrong function of C may write anywhere: in a process of its own, beside the back ends but native.
+        calls = begun(_c_calls(functions, f"c{label}", self)) if functions else list
+        for way, model in sorted(self.loaded.items(), key=lambda item: item[0].backend == "native"):
             name = f"{way.label}{label}"
+            if way.backend == "native":
+                results, calls = _c_results(calls, f"c{label}"), list
+                wrong = any(result.failed for result in results)
+                yield from results
             if way.backend == "native" and wrong:
                 # What writes beyond its arrays takes the interpreter with it.
                 yield skipped(f"{name}: not called", "its C is wrong, see above")
                 continue
             for check in CHECKS:
-                if check.concerns(self, way):
+                if not check.concerns(self, way):
+                    continue
+                if check.composed and way.backend == "autograd" and self.composed_elsewhere:
+                    yield skipped(f"{name}: {check.title}", COMPOSED)
+                else:
                     yield from _guarded(f"{name}: {check.title}", check.run(self, name, model))
+        yield from _c_results(calls, f"c{label}")
         if self.tree is not None:
             how = "from energies" if manifest.request.get("derivation") == "energy" else "by the rigid rule"
             ways = {way.label: model for way, model in self.loaded.items()}
             yield from derivations(ways, self.rows, reference, how, label)
+
+    @property
+    def composed_elsewhere(self) -> bool:
+        """Whether what autograd takes long for, of a large robot, is held of torch, which is alike in it."""
+        return self.reference.is_large and any(way.backend == "torch" for way in self.loaded)
 
     @property
     def manifest(self) -> Manifest:
@@ -272,9 +289,9 @@ class _Subject:
         return None if self.loops is None else self.loops.states
 
     @cached_property
-    def contacts(self) -> Contacts:
+    def contacts(self) -> ContactReference:
         """What contacts are held against."""
-        return Contacts(self.manifest, _made(self.tree), _made(self.closed))
+        return ContactReference(self.manifest, _made(self.tree), _made(self.closed))
 
     @cached_property
     def simulated(self) -> SimulatedMotion:
@@ -286,7 +303,8 @@ class _Subject:
         """What numbers are held against, None if nothing can compute or at no state; how many were tried."""
         manifest = self.manifest
         if self.tree is not None:
-            states = random_states(manifest.joints, self.samples)
+            samples, rest = self.count
+            states = random_states(manifest.joints, samples, rest=rest)
             recursion, magnitudes = NewtonEuler(manifest, self.tree), Magnitudes(manifest, self.tree)
             return body_reference(recursion, magnitudes, states), len(states.q)
         if manifest.energies is not None and find_spec("torch"):
@@ -295,7 +313,7 @@ class _Subject:
                 [TextLagrangian(energy, self.parameters, noise) for energy in manifest.energies]
                 for noise in noises
             )
-            found = states_of_energies(exact, manifest.joints, self.samples)
+            found = states_of_energies(exact, manifest.joints, self.count[0])
             defined = len(found.states.q) > 0
             return energy_reference(exact, noisy, found.states) if defined else None, found.tried
         return self._own_reference()
@@ -304,7 +322,7 @@ class _Subject:
         """The torques of one of the package's back ends, else those of its C."""
 
         def of(name: str, torque: Callable[[Array, Array, Array], Array]) -> tuple[Reference | None, int]:
-            found = states_of_torques(torque, self.manifest.joints, self.samples)
+            found = states_of_torques(torque, self.manifest.joints, self.count[0])
             reference = torque_reference(name, torque, found.states) if len(found.states.q) else None
             return reference, found.tried
 
@@ -325,11 +343,14 @@ class Check:
     run: its results, from the subject, the back end's label and its model
     by_rule: whether it concerns the vectorised rule too; what is composed of answers that both kernels were
     held against does not
+    composed: whether its calls are put together from coefficients and torques alike for every back end
+    of: of which subjects and back ends it is
     """
 
     title: str
     run: Callable[[_Subject, str, Model], Iterator[Result]]
     by_rule: bool = False
+    composed: bool = True
     of: Callable[[_Subject, Way], bool] = lambda subject, way: True
 
     def concerns(self, subject: _Subject, way: Way) -> bool:
@@ -355,10 +376,12 @@ CHECKS = (
         "coefficients and torques",
         lambda s, name, model: against_reference(Named(name, model, s.rows, s.reference), s.manifest),
         by_rule=True,
+        composed=False,
     ),
     Check(
         "recorded graphs",
         lambda s, name, model: iter([recorded_parts(Named(name, model, s.rows, s.reference))]),
+        composed=False,
         of=lambda s, way: way.backend == "autograd",
     ),
     Check(
@@ -441,11 +464,16 @@ def _told(name: str, reference: Reference | None, tried: int, samples: int) -> I
         yield Result(f"{name}: are defined", True, None, detail)
 
 
-def _c_results(functions: CFunctions, name: str, subject: _Subject) -> list[Result]:
-    """What each function of the C gives; a wrong one may write anywhere."""
+def _c_calls(functions: CFunctions, name: str, subject: _Subject) -> Callable[[], list[Result]]:
+    """What each function of the C gives, when called."""
     references = References(subject.reference, subject.regressors, subject.frames)
+    return lambda: list(functions.check(name, references))
+
+
+def _c_results(calls: Callable[[], list[Result]], name: str) -> list[Result]:
+    """The same, where nothing ends its process."""
     try:
-        return in_own_process(lambda: list(functions.check(name, references)))
+        return calls()
     except Ended as ended:
         return [Result(f"{name}: runs to its end", False, None, str(ended))]
 

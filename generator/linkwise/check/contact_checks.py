@@ -25,7 +25,7 @@ STATES = 2
 TRIED = 6
 
 
-class Contacts:
+class ContactReference:
     """Contacts of each kind on the frame that most joints move, at states in which ties close."""
 
     def __init__(self, manifest: Manifest, tree: RigidTree, states: States) -> None:

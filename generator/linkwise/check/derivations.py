@@ -47,9 +47,10 @@ def derivations(
 
 def _answers(model: Model, rows: IndexRows, reference: Reference) -> dict[str, tuple[Array, Array]]:
     """Packed values and slopes by position, each beside its scale."""
-    motion = reference.states.motion
+    few = slice(-2, None) if reference.is_large else slice(None)
+    motion = reference.states.at(few).motion
     found = {
-        what: (value, reference.scales[what][(slice(None), *rows.of(what).T)])
+        what: (value, reference.scales[what][few][(slice(None), *rows.of(what).T)])
         for what, value in rows.fields(model.packed(*motion)).items()
     }
-    return found | {"c0": (model.position_gradient(*motion), reference.scales["c0"])}
+    return found | {"c0": (model.position_gradient(*motion), reference.scales["c0"][few])}

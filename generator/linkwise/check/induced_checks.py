@@ -30,13 +30,17 @@ class _Sources:
     forces: dict[str, Quantity]
 
     def accelerations(self) -> dict[str, Quantity]:
-        """M^-1 F; rounding of F and of M qdd moves qdd by |M^-1| times as much."""
+        """M^-1 F; rounding of F and of M qdd moves qdd by |M^-1| times as much.
+
+        A force that is zero but for rounding moves the joints by that, of which M qdd rounds again.
+        """
         mass, noise = self.mass
         inverse = np.linalg.inv(mass)
         found = {}
         for source, (force, size) in self.forces.items():
             columns = inverse @ flat(force)
-            scale = np.abs(inverse) @ (flat(size) + noise @ np.abs(columns))
+            rounded = np.abs(columns) + FLOAT32["epsilon"] * (np.abs(inverse) @ flat(size))
+            scale = np.abs(inverse) @ (flat(size) + noise @ rounded)
             found[source] = columns.reshape(force.shape), scale.reshape(force.shape)
         return found
 

@@ -5,13 +5,13 @@ so that nothing cancels. Closed forms in a common frame add such numbers too, an
 A torque that is 0 by geometry has no size of its own; of its operands rounding leaves some 1e-16.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from linkwise.check.curve_reference import displacement_bound
-from linkwise.check.newton_euler import Points
+from linkwise.check.newton_euler import Points, path_of
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
@@ -42,22 +42,32 @@ class Magnitudes:
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
         """Bounds of |τ_ij|, shape (samples, n, N)."""
+        own = [[self.bodies[at]] for at in self.links]
+        return self.torques_of(own, q, qd, qdd, gravity)[..., 0]
+
+    def torques_of(
+        self, carried: Sequence[Sequence[BodyEntry]], q: Array, qd: Array, qdd: Array, gravity: bool = True
+    ) -> Array:
+        """The same (samples, n, N, X) where each link has the masses of X bodies in turn."""
         frames = self._frames(q, qd, qdd, self.gravity if gravity else 0.0)
-        tau = np.zeros((len(q), self.n, len(self.links)))
+        reaches = np.stack([frame.reach for frame in frames], 1)
+        slopes = np.stack([displacement_bound(body, q, 1) for body in self.bodies], 1)
+        tau = np.zeros((len(q), self.n, len(self.links), len(carried[0])))
         for j, at in enumerate(self.links):
-            body, frame, reach = self.bodies[at], frames[at], self._com(frames, at)
-            turning = frame.alpha + frame.omega**2
-            force = abs(body.mass) * (frame.a + frame.omega * frame.v + turning * reach)
-            # v × p is 0, but who differentiates ½ m v² sums it all the same.
-            moment = reach * force + abs(body.mass) * (frame.v + frame.omega * reach) ** 2
-            moment = moment + float(np.linalg.norm(body.inertia)) * turning
-            back: int | None = at
-            while back is not None:
-                upper = self.bodies[back]
-                about = moment + frames[back].reach * force
-                turned = about if upper.kind == "revolute" else force
-                tau[:, upper.coordinate, j] += displacement_bound(upper, q, 1) * turned
-                back = upper.parent
+            path, frame = path_of(self.bodies, at), frames[at]
+            turns = np.array([self.bodies[b].kind == "revolute" for b in path])
+            coordinates = [self.bodies[b].coordinate for b in path]
+            for x, body in enumerate(carried[j]):
+                reach = frame.reach + _length(body.com)
+                turning = frame.alpha + frame.omega**2
+                force = abs(body.mass) * (frame.a + frame.omega * frame.v + turning * reach)
+                # v × p is 0, but who differentiates ½ m v² sums it all the same.
+                moment = reach * force + abs(body.mass) * (frame.v + frame.omega * reach) ** 2
+                moment = moment + float(np.linalg.norm(body.inertia)) * turning
+                about = moment[:, None] + reaches[:, path] * force[:, None]
+                work = slopes[:, path] * np.where(turns, about, force[:, None])
+                for k, column in zip(coordinates, work.T, strict=True):
+                    tau[:, k, j, x] += column
         return tau
 
     def lagrangian(self, q: Array, qd: Array) -> Array:

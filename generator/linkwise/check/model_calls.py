@@ -8,13 +8,14 @@ import numpy as np
 from linkwise.check.compare import Entries, Result, compare, dense, skipped
 from linkwise.check.packed_layout import IndexRows, Rows, packed
 from linkwise.check.reference import Reference
-from linkwise.check.states import NUMBERS, States
+from linkwise.check.states import States
 from linkwise.extras import extra
 from linkwise.package.load import Array, Model
 from linkwise.package.manifest import Manifest
 
 FLOAT32 = {"tolerance": 1e-5, "epsilon": 2.0**-23}
 """How exact single precision is asked to be."""
+FEW_LINKS = 8
 TOO_LARGE = "the numbers are too large for it at every state"
 
 
@@ -103,10 +104,7 @@ def _batches(checked: Named) -> Iterator[Entries]:
     states, count = reference.states, len(reference.states.q)
     if not count:
         return
-    most = max(6, NUMBERS // reference.values["c0"][0].size)
-    for shape in ((), (1,), (7,), (9,), (17,), (2, 3), (0,)):
-        if np.prod(shape) > most:
-            continue
+    for shape in ((), (2, 3)) if reference.is_large else ((), (1,), (7,), (9,), (17,), (2, 3), (0,)):
         at = np.arange(int(np.prod(shape))).reshape(shape) * 5 % count
         yield from _few(checked, states.at(at), at)
     same = np.zeros(5, dtype=int)
@@ -136,7 +134,7 @@ def _single(checked: Named) -> Iterator[Entries]:
     """The same in float32, in a large batch and in one that fills no block."""
     _, model, rows, reference = checked
     fitting = np.flatnonzero(reference.fits_single())
-    for at in (fitting, fitting[:7], fitting[:1]):
+    for at in (fitting,) if reference.is_large else (fitting, fitting[:7], fitting[:1]):
         motion: list[Any] = [x[at].astype(np.float32) for x in reference.states.motion]
         for what, value in rows.fields(model.packed(*motion)).items():
             yield packed(what, value, rows.of(what), reference, at)
@@ -157,14 +155,16 @@ def _energies(checked: Named) -> Iterator[Result]:
 
 
 def _links(checked: Named) -> Iterator[Entries]:
-    """What each module gives of its own link."""
-    torch = extra("torch")
-    states, modules = checked.reference.states, list(checked.model.backend.modules)
-    motion = [torch.from_numpy(x) for x in states.motion]
+    """What each module gives of its own link; of a large robot the first ones, which fewer joints carry."""
+    torch, reference = extra("torch"), checked.reference
+    modules = list(checked.model.backend.modules)[: FEW_LINKS if reference.is_large else None]
+    motion = [torch.from_numpy(x) for x in reference.states.motion]
     parts = [module.coefficients(*motion[:2]) for module in modules]
     values = dict(zip(("c2", "c1", "g"), zip(*parts, strict=True), strict=True))
     for what, rows in (values | {"tau": [module.torque(*motion) for module in modules]}).items():
-        yield dense(what, np.stack([row.detach().numpy() for row in rows], 2), checked.reference)
+        found = np.stack([row.detach().numpy() for row in rows], 2)
+        value, scale = (source[what][:, :, : len(modules)] for source in (reference.values, reference.scales))
+        yield Entries(what, found, value, scale)
 
 
 def _lagrangians(model: Model, states: States) -> Array:

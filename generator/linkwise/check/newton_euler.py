@@ -7,6 +7,7 @@ the last digit (Squire and Trapp, SIAM Review 40(1), 1998).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,29 +31,11 @@ class _FrameMotion:
     a: Array
 
 
-@dataclass(frozen=True)
-class _BodyMotion:
-    """A body's frame, its joint's axis, and where its centre of mass is beside the frame's origin."""
+class _BodyMotion(NamedTuple):
+    """A body's frame, and its joint's axis."""
 
     frame: _FrameMotion
     axis: Array
-    lever: Array
-
-    @property
-    def com(self) -> Array:
-        """Centre of mass."""
-        return self.frame.origin + self.lever
-
-    @property
-    def v_com(self) -> Array:
-        """Its velocity."""
-        return self.frame.v + _cross(self.frame.omega, self.lever)
-
-    @property
-    def a_com(self) -> Array:
-        """Its acceleration, less gravity."""
-        turning = _cross(self.frame.omega, _cross(self.frame.omega, self.lever))
-        return self.frame.a + _cross(self.frame.alpha, self.lever) + turning
 
 
 class NewtonEuler:
@@ -67,22 +50,33 @@ class NewtonEuler:
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
         """τ_ij, shape (samples, n, N), for inputs of shape (samples, n)."""
+        own = [[self.bodies[at]] for at in self.links]
+        return self.torques_of(own, q, qd, qdd, gravity)[..., 0]
+
+    def torques_of(
+        self, carried: Sequence[Sequence[BodyEntry]], q: Array, qd: Array, qdd: Array, gravity: bool = True
+    ) -> Array:
+        """τ_ij (samples, n, N, X) where each link has the masses of X bodies in turn, not its own."""
         motions = self._motions(q, qd, qdd, self.gravity if gravity else 0.0 * self.gravity)
-        tau = np.zeros((len(q), self.n, len(self.links)), np.result_type(q, qd, qdd))
+        axes, origins = (
+            np.stack(parts, 1)
+            for parts in zip(*((motion.axis, motion.frame.origin) for motion in motions), strict=True)
+        )
+        slopes = np.stack([displacement(body, q, 1)[:, 0] for body in self.bodies], 1)
+        shape = len(q), self.n, len(self.links), len(carried[0])
+        tau = np.zeros(shape, np.result_type(q, qd, qdd))
         for j, at in enumerate(self.links):
-            body, motion = self.bodies[at], motions[at]
-            omega, inertia = motion.frame.omega, _inertia(body, motion)
-            force = body.mass * motion.a_com
-            spin = _cross(omega, _applied(inertia, omega))
-            moment = _applied(inertia, motion.frame.alpha) + spin
-            back: int | None = at
-            com = motion.com
-            while back is not None:
-                upper, joint = self.bodies[back], motions[back]
-                lever = com - joint.frame.origin
-                about = moment + _cross(lever, force) if upper.kind == "revolute" else force
-                tau[:, upper.coordinate, j] += displacement(upper, q, 1)[:, 0] * _dot(joint.axis, about)
-                back = upper.parent
+            path = path_of(self.bodies, at)
+            turning = np.array([self.bodies[b].kind == "revolute" for b in path])
+            coordinates = [self.bodies[b].coordinate for b in path]
+            for x, body in enumerate(carried[j]):
+                force, moment, com = _wrench(body, motions[at].frame)
+                # On a joint that turns, the moment about its origin; on one that slides, the force.
+                about = moment[:, None] + _cross(com[:, None] - origins[:, path], force[:, None])
+                share = np.where(turning[:, None], about, force[:, None])
+                work = slopes[:, path] * (axes[:, path] * share).sum(-1)
+                for k, column in zip(coordinates, np.moveaxis(work, 1, 0), strict=True):
+                    tau[:, k, j, x] += column
         return tau
 
     def energies(self, q: Array, qd: Array) -> tuple[Array, Array]:
@@ -90,11 +84,12 @@ class NewtonEuler:
         motions = self._motions(q, qd, 0.0 * qd, self.gravity)
         kinetic, potential = [], []
         for at in self.links:
-            body, motion = self.bodies[at], motions[at]
-            spin = _applied(_inertia(body, motion), motion.frame.omega)
-            v_com = motion.v_com
-            kinetic.append(0.5 * (body.mass * _dot(v_com, v_com) + _dot(motion.frame.omega, spin)))
-            potential.append(-body.mass * motion.com @ self.gravity)
+            body, frame = self.bodies[at], motions[at].frame
+            lever = frame.rotation @ np.array(body.com)
+            v_com = frame.v + _cross(frame.omega, lever)
+            spin = _applied(_inertia(body, frame), frame.omega)
+            kinetic.append(0.5 * (body.mass * _dot(v_com, v_com) + _dot(frame.omega, spin)))
+            potential.append(-body.mass * (frame.origin + lever) @ self.gravity)
         return np.stack(kinetic, -1), np.stack(potential, -1)
 
     def poses(self, frames: Sequence[FrameEntry], q: Array) -> Array:
@@ -162,21 +157,37 @@ def _moved(body: BodyEntry, up: _FrameMotion, turn: Array, rate: Array, change: 
         alpha = alpha + change * axis + _cross(omega, rate * axis)
         omega = omega + rate * axis
         rotation = rotation @ _about_z(turn[:, 0])
-    origin, lever = up.origin + arm, rotation @ np.array(body.com)
-    frame = _FrameMotion(rotation, origin, v, omega, alpha, a)
-    return _BodyMotion(frame, axis, lever)
+    return _BodyMotion(_FrameMotion(rotation, up.origin + arm, v, omega, alpha, a), axis)
 
 
-def _inertia(body: BodyEntry, motion: _BodyMotion) -> Array:
+def path_of(bodies: Sequence[BodyEntry], at: int) -> list[int]:
+    """A body, what carries it, and so on to the ground."""
+    back, path = bodies[at].parent, [at]
+    while back is not None:
+        path.append(back)
+        back = bodies[back].parent
+    return path
+
+
+def _wrench(body: BodyEntry, frame: _FrameMotion) -> tuple[Array, Array, Array]:
+    """Force at the centre of mass, moment about it, and where it is."""
+    lever, inertia, omega = frame.rotation @ np.array(body.com), _inertia(body, frame), frame.omega
+    turning = _cross(frame.alpha, lever) + _cross(omega, _cross(omega, lever))
+    spin = _cross(omega, _applied(inertia, omega))
+    return body.mass * (frame.a + turning), _applied(inertia, frame.alpha) + spin, frame.origin + lever
+
+
+def _inertia(body: BodyEntry, frame: _FrameMotion) -> Array:
     """Inertia about the centre of mass, in the world's axes."""
-    turn = motion.frame.rotation
+    turn = frame.rotation
     inertia: Array = turn @ np.array(body.inertia) @ turn.transpose(0, 2, 1)
     return inertia
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Vector product of each pair, as np.cross gives it in ten times the time."""
-    return np.stack([a[:, i] * b[:, j] - a[:, j] * b[:, i] for i, j in ((1, 2), (2, 0), (0, 1))], -1)
+    """Vector product of each pair (..., 3), as np.cross gives it in ten times the time."""
+    (a0, a1, a2), (b0, b1, b2) = (np.moveaxis(x, -1, 0) for x in (a, b))
+    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], -1)
 
 
 def _dot(a: Array, b: Array) -> Array:

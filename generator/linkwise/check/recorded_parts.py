@@ -13,6 +13,8 @@ STATES = 10
 """States at most."""
 PAIRS = 6
 """Torques tau_ij at most: each is recorded anew."""
+CARRIERS = 16
+"""Joints that carry the links of these, at most."""
 OPERATIONS = 2500
 """Run in all, at most: where there are more, every tau_ij has its share, by parts picked at random."""
 
@@ -32,7 +34,10 @@ def _parts(checked: Named) -> Iterator[Entries]:
     few = reference.states.at(slice(STATES))
     generator, run = np.random.default_rng(0), 0
     asked = [(None, 0), *((k, m) for k in range(len(joints)) for m in (1, 2))]
-    pairs = generator.permutation(checked.rows.tau)[:PAIRS].tolist()
+    # To record a torque takes the longer, the more joints carry the link.
+    carriers = np.bincount(checked.rows.tau[:, 1])
+    near = checked.rows.tau[carriers[checked.rows.tau[:, 1]] <= max(CARRIERS, carriers.min())]
+    pairs = generator.permutation(near)[:PAIRS].tolist()
     for i, j in pairs:
         graphs = {(part.coordinate, part.order): part for part in checked.model.backend.graph_parts(i, j)}
         own = 0

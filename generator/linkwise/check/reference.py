@@ -12,12 +12,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwise.check.states import States
+from linkwise.check.states import NUMBERS, States
 from linkwise.package.load import Array
 
 TOLERANCE = 1e-9
 """Largest error that passes, relative to the value itself; float64 leaves some 1e-13."""
 
+LEAST = 40
+"""Samples' coefficients that a check computes at a time, of robots that are not large."""
 STIFF = 10.0
 """How much larger operands of derivatives may be than the largest part of a link's torques."""
 SINGLE = 1e18
@@ -48,6 +50,14 @@ class Reference:
             return None
         (kinetic, size), (potential, other) = self.energies.values()
         return kinetic - potential, size + other
+
+    @property
+    def is_large(self) -> bool:
+        """Whether a sample's coefficients are so many that batches of every shape would take minutes.
+
+        How batches are cut and joined is code that all robots share.
+        """
+        return bool(self.values["c0"][0].size * LEAST > NUMBERS)
 
     @cached_property
     def regularity(self) -> Array:

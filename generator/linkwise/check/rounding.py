@@ -17,6 +17,8 @@ from linkwise.package.load import Array
 NOISE = 1e-11
 """Relative; far above rounding, and small enough for matrices that lose ten digits."""
 DRAWS = 2
+JOINTS = 10
+"""From so many on their number counts."""
 
 
 def measured(
@@ -35,6 +37,8 @@ def measured(
         for what, value in values.items():
             moved = np.abs(changed[what] - value).reshape(len(value), -1).max(-1, initial=0.0)
             scales[what] = np.maximum(scales[what], moved / NOISE)
+    # Who eliminates one joint after the other gathers roundings as there are joints.
+    losing = losing * max(1.0, len(tree.bodies) / JOINTS)
     scales = {what: scale * losing for what, scale in scales.items()}
     return values, {
         what: np.broadcast_to(scale.reshape(-1, *[1] * (values[what].ndim - 1)), values[what].shape)

@@ -44,13 +44,16 @@ class Found:
     tried: int
 
 
-def affordable(samples: int, n: int, links: int) -> int:
-    """How many of `samples` random states the memory of a check allows, 2 at least."""
-    return min(samples, max(2, NUMBERS // (n * n * links) - AT_REST))
+def affordable(samples: int, n: int, links: int) -> tuple[int, int]:
+    """How many of `samples` random states the memory of a check allows, 2 at least, and of those at rest."""
+    few = min(samples, max(2, NUMBERS // (n * n * links) - AT_REST))
+    return few, AT_REST if few > 2 or samples <= 2 else 2
 
 
-def random_states(joints: Sequence[JointEntry], samples: int, seed: int = 0) -> States:
+def random_states(joints: Sequence[JointEntry], samples: int, seed: int = 0, rest: int = AT_REST) -> States:
     """Random states, no rate near 0, and states at rest; float32 holds them.
+
+    rest: how many of those at rest, the last ones
 
     Every other position is within the limits of the joints, the others are in all four quadrants, for
     formulas do not know of limits. A slide without limits moves within half a metre.
@@ -60,7 +63,9 @@ def random_states(joints: Sequence[JointEntry], samples: int, seed: int = 0) -> 
     q = generator.uniform(0.0, 1.0, (samples, len(joints)))
     wide = np.array([np.pi if joint.unit == "rad" else 0.5 for joint in joints])
     q = np.where(np.arange(samples)[:, None] % 2 == 0, lower + q * (upper - lower), (2 * q - 1) * wide)
-    return _states(q, samples, generator)
+    return _states(q, samples, generator).at(
+        [*range(samples), *range(samples + AT_REST - rest, samples + AT_REST)]
+    )
 
 
 def _range(joint: JointEntry) -> tuple[float, float]:

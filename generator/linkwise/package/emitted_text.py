@@ -66,7 +66,18 @@ ARITHMETIC = Grammar(
     whole={"torch": "torch", "numpy": "np"},
     builtins=frozenset(("tuple", "type", "int", "float", "str", "dict")),
     attributes=frozenset(
-        ["before", "twist", "height", "body", "kinetic", "potential", "constants", "turn", "Lagrangian"]
+        [
+            "before",
+            "twist",
+            "height",
+            "body",
+            "kinetic",
+            "potential",
+            "constants",
+            "turn",
+            "slide",
+            "Lagrangian",
+        ]
     ),
     nodes=(*PLAIN, ast.ClassDef, ast.Lambda, ast.Slice),
 )

@@ -108,7 +108,10 @@ class Summed:
         if self._structure.linear:
             rest = self._rest(q)
             values = values - self._compute("packed", (q, rest, rest))[1][:, None, :]
-        return namespace(q).moveaxis(made(values), 1, -1)
+        symbols = made(values)
+        for axis in range(1, symbols.ndim - 1):  # vmap knows no moveaxis
+            symbols = namespace(q).swapaxes(symbols, axis, axis + 1)
+        return symbols
 
     def _rest(self, q: Any) -> Any:
         return self._backend.zeros(q, self._structure.n)
