@@ -73,9 +73,9 @@ report: $(READY)
 opensim: $(READY)
 	$(BIN)/python tests/opensim_folder.py $(MODELS)
 
-# Every real robot at hand, beside Pinocchio: minutes.
+# Every real robot at hand, beside Pinocchio, and whether `linkwise check` calls each right: half an hour.
 corpus: $(READY)
-	$(BIN)/python tests/corpus.py --out out/corpus
+	$(BIN)/python tests/corpus.py --check --out out/corpus
 	$(BIN)/python tests/corpus.py --kernel loops --out out/corpus-loops
 
 # Every call of docs/exports.md compiled, exported and under onnxruntime: some ten minutes.

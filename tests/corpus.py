@@ -1,6 +1,8 @@
 """Every URDF of the package example-robot-data through the generator, beside Pinocchio: `make corpus`.
 
-With `--kernel loops` through C in loops, whose seconds to compile and to answer first count too.
+With `--kernel loops` through C in loops, whose seconds to compile and to answer first count too. With
+`--check` every robot's package, with all its back ends, is also given to `linkwise check`: none of them is
+wrong, so that a FAIL is a false alarm, which fails this.
 
 Writes corpus.json, corpus.md and a plot: for each file its joints, links, what was merged or mimicked,
 generation seconds, peak memory, operations, outputs, and the errors for the sums and for each link's own
@@ -92,10 +94,35 @@ def relative(mine: Any, reference: Any) -> float:
     return float(np.abs(mine - reference).max() / max(np.abs(reference).max(), 1e-300))
 
 
-def run(path: Path, options: dict[str, Any], samples: int, kernel: str) -> dict[str, Any]:
+def checked(path: Path, options: dict[str, Any]) -> dict[str, Any]:
+    """What `linkwise check` says of a robot's package, in which seconds and MB."""
+    flags = [
+        flag
+        for key, value in options.items()
+        for flag in (f"--{key.replace('_', '-')}", *(() if value is True else (value,)))
+    ]
+    call = [sys.executable, "-m", "linkwise"]
+    with tempfile.TemporaryDirectory() as folder:
+        made = [*call, "generate", str(path), "--out", folder, "--name", "robot", *flags]
+        subprocess.run(made, check=True, capture_output=True)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+        start = time.perf_counter()
+        done = subprocess.run(
+            [*call, "check", f"{folder}/robot", "--json"], capture_output=True, text=True, check=False
+        )
+        seconds = time.perf_counter() - start
+    # Of whichever of the two took more.
+    megabytes = max(before, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 1024
+    results = json.loads(done.stdout)
+    alarms = [f"{result['name']}: {result['detail']}" for result in results if result["mark"] == "FAIL"]
+    left = [result["name"] for result in results if result["mark"] == "skip"]
+    return {"alarms": alarms, "left": left, "check_seconds": seconds, "check_megabytes": megabytes}
+
+
+def run(path: Path, options: dict[str, Any], samples: int, kernel: str, check: bool) -> dict[str, Any]:
     """Study one robot in a fresh process."""
     chosen = ["--one", str(path), "--options", json.dumps(options), "--samples", str(samples)]
-    chosen += ["--kernel", kernel]
+    chosen += ["--kernel", kernel, *(["--check"] if check else [])]
     done = subprocess.run([sys.executable, __file__, *chosen], capture_output=True, text=True, check=False)
     if done.returncode:
         file = str(path.relative_to(ROBOTS))
@@ -103,16 +130,16 @@ def run(path: Path, options: dict[str, Any], samples: int, kernel: str) -> dict[
     return json.loads(done.stdout)  # type: ignore[no-any-return]
 
 
-def ways(path: Path, samples: int, kernel: str) -> list[dict[str, Any]]:
+def ways(path: Path, samples: int, kernel: str, check: bool) -> list[dict[str, Any]]:
     """Rows of one file: as it is, with the options that its refusals name, and those of ALSO."""
-    rows = [run(path, {}, samples, kernel)]
+    rows = [run(path, {}, samples, kernel, check)]
     while "refused" in rows[-1]:
         last = rows[-1]
         past = [way for flag, way in WAYS_PAST.items() if flag in last["refused"]]
         if not past or past[0].items() <= last["options"].items():
             break
-        rows.append(run(path, last["options"] | past[0], samples, kernel))
-    return rows + [run(path, options, samples, kernel) for options in ALSO.get(path.name, ())]
+        rows.append(run(path, last["options"] | past[0], samples, kernel, check))
+    return rows + [run(path, options, samples, kernel, check) for options in ALSO.get(path.name, ())]
 
 
 def main() -> None:
@@ -122,15 +149,16 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=100)
     parser.add_argument("--only", default="", help="part of a file's name")
     parser.add_argument("--kernel", choices=("straight", "loops"), default="straight")
+    parser.add_argument("--check", action="store_true", help="run `linkwise check` on every package")
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--options", default="{}", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
-        print(
-            json.dumps(
-                study(arguments.one, json.loads(arguments.options), arguments.samples, arguments.kernel)
-            )
-        )
+        options = json.loads(arguments.options)
+        row = study(arguments.one, options, arguments.samples, arguments.kernel)
+        if arguments.check and "refused" not in row:
+            row |= checked(arguments.one, options)
+        print(json.dumps(row))
         return
     from corpus_report import COUNTS, HEAD, line, sorted_out, write
 
@@ -138,9 +166,11 @@ def main() -> None:
     print(HEAD)
     for path in sorted(ROBOTS.rglob("*.urdf"), key=lambda p: (p.name, p)):
         if arguments.only in path.name:
-            rows += (new := ways(path, arguments.samples, arguments.kernel))
+            rows += (new := ways(path, arguments.samples, arguments.kernel, arguments.check))
             print("\n".join(map(line, new)), flush=True)
     print(write(rows, arguments.out))
+    if any(row.get("alarms") for row in rows):
+        sys.exit("linkwise check fails packages that are right, see above")
     counts = {key: len(files) for key, files in sorted_out(rows).items()}
     if not arguments.only and counts != COUNTS:
         sys.exit(f"docs/robots.md says {COUNTS}, here it is {counts}")

@@ -34,6 +34,7 @@ def line(row: dict[str, Any]) -> str:
         f"| {name} | {row['joints']} | {row['links']} | {row['merged']} | {row['mimic']} | "
         f"{row['massless']} | {row['seconds']:.1f} | {row['megabytes']:.0f} | {row['operations']} | "
         f"{row['outputs']} | {row['error_sum']:.0e} | {row['error_link']:.0e} |"
+        + "".join(f"\nFALSE ALARM of {name}: {alarm}" for alarm in row.get("alarms", ()))
     )
 
 
@@ -62,7 +63,21 @@ def summary(rows: list[dict[str, Any]]) -> str:
         f"refusal names, {len(never)} never{f' ({chr(44).join(never)})' if never else ''}. "
         f"Largest errors: {worst[0]:.0e} of the sums, {worst[1]:.0e} of a link's own torque. "
         f"Slowest: {Path(slowest['file']).stem}, {slowest['seconds']:.1f} s; most memory: "
-        f"{Path(largest['file']).stem}, {largest['megabytes']:.0f} MB. {growth(made)}"
+        f"{Path(largest['file']).stem}, {largest['megabytes']:.0f} MB. {growth(made)}{_checks(made)}"
+    )
+
+
+def _checks(made: list[dict[str, Any]]) -> str:
+    """What `linkwise check` said of the packages, if it was asked."""
+    rows = [row for row in made if "alarms" in row]
+    if not rows:
+        return ""
+    alarms, left = (sum(len(row[key]) for row in rows) for key in ("alarms", "left"))
+    slowest, largest = (max(rows, key=lambda row: row[key]) for key in ("check_seconds", "check_megabytes"))
+    return (
+        f" `linkwise check` of {len(rows)} packages: {alarms} false alarms, {left} checks that could not be "
+        f"made; at most {slowest['check_seconds']:.0f} s ({Path(slowest['file']).stem}) and "
+        f"{largest['check_megabytes']:.0f} MB ({Path(largest['file']).stem})."
     )
 
 

@@ -227,6 +227,7 @@ def unread(monkeypatch: pytest.MonkeyPatch) -> None:
     held = Result("texts", True, None, "")
     monkeypatch.setattr("linkwise.check.checks.check_texts", lambda directory, manifest: held)
     monkeypatch.setattr("linkwise.package.importer.foreign_text", lambda *text: None)
+    monkeypatch.setattr("linkwise.package.load.foreign", lambda *listed: [])
 
 
 @pytest.mark.usefixtures("unread")

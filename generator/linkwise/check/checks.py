@@ -3,45 +3,24 @@
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from linkwise.check.as_generated import check_files, check_made, check_manifest, check_texts
-from linkwise.check.body_reference import body_reference
+from linkwise.check.back_end_checks import CHECKS
 from linkwise.check.c_functions import CFunctions, References, compile_c
 from linkwise.check.compare import Result, skipped
-from linkwise.check.compiled_c import CompiledPackage
-from linkwise.check.contact_checks import ContactReference
 from linkwise.check.derivations import derivations
-from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.formula_texts import check_formulas
-from linkwise.check.frame_reference import FrameReference, frame_calls, frame_reference
-from linkwise.check.impedance_checks import impedance_calls
-from linkwise.check.induced_checks import induced_calls
-from linkwise.check.loop_checks import loop_calls
-from linkwise.check.loop_reference import LoopReference, loop_reference
-from linkwise.check.magnitudes import Magnitudes
-from linkwise.check.model_calls import Named, against_reference
-from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.packed_layout import IndexRows
-from linkwise.check.parametric_tree import changed_values, check_bodies, tree_with
-from linkwise.check.passive_reference import passive_calls
-from linkwise.check.recorded_parts import recorded_parts
+from linkwise.check.parametric_tree import changed_values, check_bodies
 from linkwise.check.reference import Reference
-from linkwise.check.regressor_reference import regressor_calls, regressor_reference
-from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion, simulation_calls
-from linkwise.check.states import States, affordable, random_states
-from linkwise.check.sum_checks import sums_against_reference
-from linkwise.check.text_lagrangian import TextLagrangian
-from linkwise.check.torque_reference import states_of_torques, torque_reference
-from linkwise.own_process import Ended, begun, in_own_process
-from linkwise.package.entries import PassiveEntry, RigidTree
-from linkwise.package.load import Array, Model, Package, load_package, staying
+from linkwise.check.states import affordable
+from linkwise.check.subject import Subject, Way
+from linkwise.own_process import Ended, begun
+from linkwise.package.load import Model, Package, load_package, staying
 from linkwise.package.manifest import Manifest
 
 OPTIONAL = ("torch",)
@@ -81,18 +60,6 @@ def results_of(directory: Path, samples: int = 100) -> Iterator[Result]:
         loaded, missing = _load(package)
     yield from missing
     yield from _guarded("answers", _numbers(package, loaded, samples))
-
-
-class Way(NamedTuple):
-    """A back end, and the kernel that it computes by."""
-
-    backend: str
-    kernel: str
-
-    @property
-    def label(self) -> str:
-        """What results are told under: of two kernels, closed forms bear the name of the back end alone."""
-        return f"{self.backend} by rule" if self.kernel == "rule" else self.backend
 
 
 def _load(package: Package) -> tuple[dict[Way, Model], list[Result]]:
@@ -148,286 +115,64 @@ def _numbers(package: Package, loaded: Mapping[Way, Model], samples: int) -> Ite
     if f"c/{manifest.name}.h" in manifest.files:
         compiled, result = compile_c(manifest, package.directory, rows)
         yield result
-    few, rest = affordable(samples, len(manifest.joints), len(manifest.links))
+    count = few, rest = affordable(samples, len(manifest.joints), len(manifest.links))
     if few < samples:
         told = f"{few} random ones instead of {samples}, and {rest} at rest: for more it would take gigabytes"
         yield Result("states", True, None, told)
     values = dict(manifest.parameters)
-    yield from _Subject(package, "", values, loaded, rows, compiled, (few, rest)).results()
+    yield from _results(Subject(package, "", values, loaded, rows, compiled, count))
     if values:
         # Every parameter changed a little: equal ones tell no longer one from another, and none is zero.
         values = changed_values(manifest.parameters, manifest.tree)
         loaded = {way: package.load(way.backend, values, way.kernel) for way in loaded}
-        yield from _Subject(
-            package, ", other parameters", values, loaded, rows, compiled, (few, rest)
-        ).results()
+        others = ", other parameters"
+        yield from _results(Subject(package, others, values, loaded, rows, compiled, count))
 
 
-@dataclass(frozen=True)
-class _Subject:
-    """A package for given values of its parameters, and what its numbers are held against.
-
-    label: what tells its results from those for other values
-    """
-
-    package: Package
-    label: str
-    parameters: Mapping[str, float]
-    loaded: Mapping[Way, Model]
-    rows: IndexRows
-    compiled: CompiledPackage | None
-    count: tuple[int, int]
-    """Of random states, and of those at rest."""
-
-    def results(self) -> Iterator[Result]:
-        """The bodies, the texts, the C, and every back end."""
-        manifest, label = self.package.manifest, self.label
-        if manifest.tree is not None and self.parameters:
-            unphysical = bool(manifest.request.get("allow_unphysical"))
-            bodies = self.package.module.ROBOT.bodies
-            yield from check_bodies(manifest.tree, bodies, self.parameters, unphysical, label)
-        reference, tried = self._found
-        if manifest.energies is not None:
-            yield from _told(f"energies{label}", reference, tried, self.count[0])
-        if reference is None and tried:
-            return
-        yield from check_formulas(self.package, self.rows, self.parameters, label, reference)
-        if reference is None:
-            yield skipped(f"numbers{label}", "nothing here computes with the energies")
-            return
-        if self.tied and self.loops is None:
-            told = "loops close near none of the states, or only next to singular positions"
-            yield skipped(f"constraints{label}", told)
-        functions, wrong = self.functions, False
-        # A wrong function of C may write anywhere: in a process of its own, beside the back ends but native.
-        calls = begun(_c_calls(functions, f"c{label}", self)) if functions else list
-        for way, model in sorted(self.loaded.items(), key=lambda item: item[0].backend == "native"):
-            name = f"{way.label}{label}"
-            if way.backend == "native":
-                results, calls = _c_results(calls, f"c{label}"), list
-                wrong = any(result.failed for result in results)
-                yield from results
-            if way.backend == "native" and wrong:
-                # What writes beyond its arrays takes the interpreter with it.
-                yield skipped(f"{name}: not called", "its C is wrong, see above")
+def _results(subject: Subject) -> Iterator[Result]:
+    """The bodies, the texts, the C, and every back end."""
+    manifest, label = subject.package.manifest, subject.label
+    if manifest.tree is not None and subject.parameters:
+        unphysical = bool(manifest.request.get("allow_unphysical"))
+        bodies = subject.package.module.ROBOT.bodies
+        yield from check_bodies(manifest.tree, bodies, subject.parameters, unphysical, label)
+    reference, tried = subject.found
+    if manifest.energies is not None:
+        yield from _told(f"energies{label}", reference, tried, subject.count[0])
+    if reference is None and tried:
+        return
+    yield from check_formulas(subject.package, subject.rows, subject.parameters, label, reference)
+    if reference is None:
+        yield skipped(f"numbers{label}", "nothing here computes with the energies")
+        return
+    if subject.tied and subject.loops is None:
+        told = "loops close near none of the states, or only next to singular positions"
+        yield skipped(f"constraints{label}", told)
+    functions, wrong = subject.functions, False
+    # A wrong function of C may write anywhere: in a process of its own, beside the back ends but native.
+    calls = begun(_c_calls(functions, f"c{label}", subject)) if functions else list
+    for way, model in sorted(subject.loaded.items(), key=lambda item: item[0].backend == "native"):
+        name = f"{way.label}{label}"
+        if way.backend == "native":
+            results, calls = _c_results(calls, f"c{label}"), list
+            wrong = any(result.failed for result in results)
+            yield from results
+        if way.backend == "native" and wrong:
+            # What writes beyond its arrays takes the interpreter with it.
+            yield skipped(f"{name}: not called", "its C is wrong, see above")
+            continue
+        for check in CHECKS:
+            if not check.concerns(subject, way):
                 continue
-            for check in CHECKS:
-                if not check.concerns(self, way):
-                    continue
-                if check.composed and way.backend == "autograd" and self.composed_elsewhere:
-                    yield skipped(f"{name}: {check.title}", COMPOSED)
-                else:
-                    yield from _guarded(f"{name}: {check.title}", check.run(self, name, model))
-        yield from _c_results(calls, f"c{label}")
-        if self.tree is not None:
-            how = "from energies" if manifest.request.get("derivation") == "energy" else "by the rigid rule"
-            ways = {way.label: model for way, model in self.loaded.items()}
-            yield from derivations(ways, self.rows, reference, how, label)
-
-    @property
-    def composed_elsewhere(self) -> bool:
-        """Whether what autograd takes long for, of a large robot, is held of torch, which is alike in it."""
-        return self.reference.is_large and any(way.backend == "torch" for way in self.loaded)
-
-    @property
-    def manifest(self) -> Manifest:
-        """That of the package."""
-        return self.package.manifest
-
-    @cached_property
-    def tree(self) -> RigidTree | None:
-        """Rigid bodies with these parameters; energies have none."""
-        tree = self.package.manifest.tree
-        return None if tree is None else tree_with(tree, self.parameters)
-
-    @property
-    def tied(self) -> bool:
-        """Whether loops of the open tree are closed."""
-        return self.tree is not None and self.tree.tied
-
-    @property
-    def passive(self) -> tuple[PassiveEntry, ...]:
-        """What joints take of their own."""
-        return () if self.tree is None else self.tree.passive
-
-    @cached_property
-    def functions(self) -> CFunctions | None:
-        """The C, if it compiled."""
-        if self.compiled is None:
-            return None
-        return CFunctions(self.package.manifest, self.compiled, self.rows, self.parameters)
-
-    @property
-    def reference(self) -> Reference:
-        """What torques and their coefficients are held against."""
-        return _made(self._found[0])
-
-    @cached_property
-    def regressors(self) -> Reference | None:
-        """What regressors are held against; energies have none."""
-        if self.tree is None:
-            return None
-        return regressor_reference(self.manifest, self.tree, self.reference.states)
-
-    @cached_property
-    def frames(self) -> FrameReference | None:
-        """What kinematics is held against; energies have none."""
-        return None if self.tree is None else frame_reference(self.manifest, self.tree, self.reference.states)
-
-    @cached_property
-    def loops(self) -> LoopReference | None:
-        """What constraints are held against; a robot without ties has none."""
-        if self.tree is None or not self.tied:
-            return None
-        return loop_reference(self.manifest, self.tree, self.reference.states)
-
-    @property
-    def closed(self) -> States | None:
-        """States that the robot can move on from: where ties close."""
-        if not self.tied:
-            return None if self.tree is None else self.reference.states
-        return None if self.loops is None else self.loops.states
-
-    @cached_property
-    def contacts(self) -> ContactReference:
-        """What contacts are held against."""
-        return ContactReference(self.manifest, _made(self.tree), _made(self.closed))
-
-    @cached_property
-    def simulated(self) -> SimulatedMotion:
-        """A short motion."""
-        return simulated_motion(self.manifest, _made(self.tree), _made(self.closed))
-
-    @cached_property
-    def _found(self) -> tuple[Reference | None, int]:
-        """What numbers are held against, None if nothing can compute or at no state; how many were tried."""
-        manifest = self.manifest
-        if self.tree is not None:
-            samples, rest = self.count
-            states = random_states(manifest.joints, samples, rest=rest)
-            recursion, magnitudes = NewtonEuler(manifest, self.tree), Magnitudes(manifest, self.tree)
-            return body_reference(recursion, magnitudes, states), len(states.q)
-        if manifest.energies is not None and find_spec("torch"):
-            noises = (None, 1, 2, 3)
-            exact, *noisy = (
-                [TextLagrangian(energy, self.parameters, noise) for energy in manifest.energies]
-                for noise in noises
-            )
-            found = states_of_energies(exact, manifest.joints, self.count[0])
-            defined = len(found.states.q) > 0
-            return energy_reference(exact, noisy, found.states) if defined else None, found.tried
-        return self._own_reference()
-
-    def _own_reference(self) -> tuple[Reference | None, int]:
-        """The torques of one of the package's back ends, else those of its C."""
-
-        def of(name: str, torque: Callable[[Array, Array, Array], Array]) -> tuple[Reference | None, int]:
-            found = states_of_torques(torque, self.manifest.joints, self.count[0])
-            reference = torque_reference(name, torque, found.states) if len(found.states.q) else None
-            return reference, found.tried
-
-        if self.loaded:
-            way, model = next(iter(self.loaded.items()))
-            return of(way.label, model.partial_torque)
-        functions = self.functions
-        if functions is None:
-            return None, 0
-        return in_own_process(lambda: of("c", functions.torque))
-
-
-@dataclass(frozen=True)
-class Check:
-    """Calls of a back end that are held against one thing.
-
-    title: what is told where the check itself does not come to its end
-    run: its results, from the subject, the back end's label and its model
-    by_rule: whether it concerns the vectorised rule too; what is composed of answers that both kernels were
-    held against does not
-    composed: whether its calls are put together from coefficients and torques alike for every back end
-    of: of which subjects and back ends it is
-    """
-
-    title: str
-    run: Callable[[_Subject, str, Model], Iterator[Result]]
-    by_rule: bool = False
-    composed: bool = True
-    of: Callable[[_Subject, Way], bool] = lambda subject, way: True
-
-    def concerns(self, subject: _Subject, way: Way) -> bool:
-        """Whether this back end of this package has such calls."""
-        return (self.by_rule or way.kernel != "rule") and self.of(subject, way)
-
-
-T = TypeVar("T")
-
-
-def _is_rigid(subject: _Subject, way: Way) -> bool:
-    return subject.tree is not None
-
-
-def _made(what: T | None) -> T:
-    """What a check that concerns a subject finds there."""
-    assert what is not None
-    return what
-
-
-CHECKS = (
-    Check(
-        "coefficients and torques",
-        lambda s, name, model: against_reference(Named(name, model, s.rows, s.reference), s.manifest),
-        by_rule=True,
-        composed=False,
-    ),
-    Check(
-        "recorded graphs",
-        lambda s, name, model: iter([recorded_parts(Named(name, model, s.rows, s.reference))]),
-        composed=False,
-        of=lambda s, way: way.backend == "autograd",
-    ),
-    Check(
-        "sums over the links",
-        lambda s, name, model: sums_against_reference(name, model, s.reference),
-        by_rule=True,
-    ),
-    Check(
-        "regressors",
-        lambda s, name, model: regressor_calls(name, model, _made(s.regressors)),
-        by_rule=True,
-        of=lambda s, way: s.tree is not None and s.loaded[way].backend.rule is not None,
-    ),
-    Check("frames", lambda s, name, model: frame_calls(name, model, _made(s.frames)), of=_is_rigid),
-    Check(
-        "constraints",
-        lambda s, name, model: loop_calls(name, model, _made(s.loops)),
-        of=lambda s, way: s.loops is not None,
-    ),
-    Check(
-        "contacts",
-        lambda s, name, model: s.contacts.calls(name, model, s.package.module.Contact),
-        of=lambda s, way: s.closed is not None,
-    ),
-    Check(
-        "a simulated motion",
-        lambda s, name, model: simulation_calls(name, model, s.simulated),
-        of=lambda s, way: s.closed is not None,
-    ),
-    Check(
-        "passive torques",
-        lambda s, name, model: passive_calls(name, model, s.passive, s.reference),
-        by_rule=True,
-    ),
-    Check(
-        "induced accelerations",
-        lambda s, name, model: induced_calls(
-            name, model, s.passive, s.reference, s.frames, s.package.module.AppliedLoad
-        ),
-    ),
-    Check(
-        "controllers",
-        lambda s, name, model: impedance_calls(name, model, s.passive, s.reference, s.package.module.Natural),
-    ),
-)
-"""What is held of each back end, in the order in which it is told."""
+            if check.composed and way.backend == "autograd" and subject.composed_elsewhere:
+                yield skipped(f"{name}: {check.title}", COMPOSED)
+            else:
+                yield from _guarded(f"{name}: {check.title}", check.run(subject, name, model))
+    yield from _c_results(calls, f"c{label}")
+    if subject.tree is not None:
+        how = "from energies" if manifest.request.get("derivation") == "energy" else "by the rigid rule"
+        ways = {way.label: model for way, model in subject.loaded.items()}
+        yield from derivations(ways, subject.rows, reference, how, label)
 
 
 def _guarded(title: str, results: Iterator[Result]) -> Iterator[Result]:
@@ -464,7 +209,7 @@ def _told(name: str, reference: Reference | None, tried: int, samples: int) -> I
         yield Result(f"{name}: are defined", True, None, detail)
 
 
-def _c_calls(functions: CFunctions, name: str, subject: _Subject) -> Callable[[], list[Result]]:
+def _c_calls(functions: CFunctions, name: str, subject: Subject) -> Callable[[], list[Result]]:
     """What each function of the C gives, when called."""
     references = References(subject.reference, subject.regressors, subject.frames)
     return lambda: list(functions.check(name, references))

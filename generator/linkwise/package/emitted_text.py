@@ -11,7 +11,7 @@ import builtins
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -42,7 +42,9 @@ class Grammar:
     nodes: tuple[type[ast.AST], ...]
 
 
-FUNCTIONS = frozenset(("sin", "cos", "tan", "exp", "log", "sqrt", "sinh", "cosh", "tanh", "abs", "sign"))
+FUNCTIONS = frozenset(
+    ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "sign")
+)
 """What may be asked of a library of arrays, and of xp, which stands for one."""
 PLAIN = (
     *(ast.Module, ast.Expr, ast.ImportFrom, ast.Import, ast.alias, ast.Assign, ast.AnnAssign),
@@ -126,6 +128,7 @@ def foreign(directory: Path, listed: Iterable[str], name: str, version: str | No
     return found
 
 
+@lru_cache(maxsize=1024)
 def foreign_text(path: str, text: bytes, name: str, version: str | None) -> str | None:
     """The same of one file, what is wrong with it alone; None if nothing."""
     own = own_text(path)
@@ -279,4 +282,4 @@ def _c_vocabulary() -> tuple[frozenset[str], frozenset[str]]:
     plain = JINJA.sub(" ", "\n".join(file.read_text(encoding="utf-8") for file in own))
     plain = re.sub(r"/\*.*?\*/|//[^\n]*", " ", plain, flags=re.DOTALL)
     words = re.findall(r"[A-Za-z_]\w*", plain)
-    return frozenset((*words, "HUGE_VAL")), frozenset(re.findall(r"([A-Za-z_]\w*)\s*\(", plain))
+    return frozenset((*words, *FUNCTIONS, "HUGE_VAL")), frozenset(re.findall(r"([A-Za-z_]\w*)\s*\(", plain))

@@ -175,10 +175,8 @@ def open_package(directory: Path) -> Package:
         told = f"its runtime is that of linkwise {version}, which is not at hand to compare with"
         mend = "its code runs as it is; generate the robot again if you do not know where it comes from"
         warnings.warn(f"{directory}: {told}: {mend}", LinkwiseWarning, stacklevel=2)
-    # Its Python is read as it is imported, its C before any compiler sees it.
-    others = [path for path in manifest.files if not path.endswith(".py")]
-    for fault in foreign(directory, others, manifest.name, version):
-        raise LinkwiseError(f"{directory}: {fault}; do not open it: it is not what linkwise generates")
+    for fault in foreign(directory, manifest.files, manifest.name, version):
+        raise LinkwiseError(f"{directory}: {fault}; nothing of it is run: generate the robot again")
     try:
         package = load_package(directory, manifest)
     except Exception as error:  # a damaged file may raise anything

@@ -1,0 +1,169 @@
+"""What a package says is read before it runs: a foreign call is refused, whatever its hash says."""
+
+import hashlib
+import json
+import shutil
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from linkwise import LinkwiseError, check_package, generate, read_system, write_package
+from linkwise.errors import LinkwiseWarning
+from linkwise.expression.expression_graph import FUNCTIONS as OF_GRAPHS
+from linkwise.package.emitted_text import FUNCTIONS, foreign_text
+from linkwise.package.load import open_package
+from linkwise.version import VERSION
+
+FOREIGN: dict[str, tuple[str, str, str, str]] = {
+    "a call in closed forms": (
+        "forms/link_1.py",
+        "    # inputs\n",
+        "    open({mark!r}, 'w')\n    # inputs\n",
+        "names open",
+    ),
+    "an import in closed forms": (
+        "forms/link_1.py",
+        "from typing import Any",
+        "from typing import Any\nfrom os import system as xp",
+        "imports system from os",
+    ),
+    "a library under another name": (
+        "forms/link_1.py",
+        "from typing import Any",
+        "from typing import Any\nimport os as np",
+        "imports os",
+    ),
+    "an attribute of what is given": (
+        "forms/link_1.py",
+        "    # inputs\n",
+        "    q.tofile({mark!r})\n    # inputs\n",
+        "asks for .tofile",
+    ),
+    "a function of the library that reads": (
+        "forms/link_1.py",
+        "    # inputs\n",
+        "    xp.load({mark!r})\n    # inputs\n",
+        "asks for .load",
+    ),
+    "what a class hides": (
+        "forms/link_1.py",
+        "    # inputs\n",
+        "    ().__class__\n    # inputs\n",
+        "asks for .__class__",
+    ),
+    "a decorator": (
+        "energies/link_1.py",
+        "    def kinetic(",
+        "    @exec\n    def kinetic(",
+        "names exec",
+    ),
+    "a part of the runtime that runs programs": (
+        "energies/link_1.py",
+        "from typing import Any",
+        "from typing import Any\nfrom ..runtime.native.native_process import run_all",
+        "imports run_all from ..runtime.native.native_process",
+    ),
+    "a call between names": ("names.py", "ROBOT = ", "print()\nROBOT = ", "names print"),
+    "a comprehension in the tree": ("tree.py", "TREE = ", "[0 for TREE in ()]\nTREE = ", "has ListComp"),
+    "another folder of C": (
+        "__init__.py",
+        'Path(__file__).parent / "c"',
+        'Path(__file__).parent / "../c"',
+        "asks for .parent",
+    ),
+    "another meaning of a builtin": ("__init__.py", "joint_names = ", "len = ", "gives len another meaning"),
+    "a call in C": (
+        "c/link_1.h",
+        "        /* Inputs. */\n",
+        '        system("touch");\n        /* Inputs. */\n',
+        "names system",
+    ),
+    "a function behind a name in C": (
+        "c/link_1.h",
+        "        /* Inputs. */\n",
+        "        real (*sine)(void) = abort; /* Inputs. */\n",
+        "calls real",
+    ),
+    "a header of C": ("c/planar2.c", '#include "sines.h"', "#include <stdlib.h>", "has #include <stdlib.h>"),
+    "names pasted in C": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        "#define WANT_TORQUE\n#define R(x) sys##tem\n",
+        "has #define R(x) sys##tem",
+    ),
+    "a changed runtime": ("runtime/structure.py", "import ", "import  ", "is not that of linkwise"),
+}
+
+
+@pytest.fixture(scope="module")
+def planar2(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    package = tmp_path_factory.mktemp("texts") / "planar2"
+    write_package(generate(read_system("planar2"), ["numpy", "torch", "autograd", "native", "c"]), package)
+    return package
+
+
+@pytest.fixture
+def package(planar2: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(planar2, tmp_path / "planar2"))
+
+
+def rewritten(package: Path, path: str, change: Callable[[str], str]) -> None:
+    """Change a file, and its hash in the manifest with it, as whoever sends a package can."""
+    file, manifest = package / path, package / "manifest.json"
+    text = change(file.read_text())
+    assert text != file.read_text()
+    file.write_text(text)
+    data = json.loads(manifest.read_text())
+    data["files"][path] = hashlib.sha256(text.encode()).hexdigest()
+    if "checksums" in data and "files" in data["checksums"]:
+        listed = json.dumps(data["files"], sort_keys=True)
+        data["checksums"]["files"] = hashlib.sha256(listed.encode()).hexdigest()
+    manifest.write_text(json.dumps(data))
+
+
+@pytest.mark.parametrize("case", FOREIGN)
+def test_what_linkwise_does_not_write_is_refused_and_never_run(
+    case: str, package: Path, tmp_path: Path
+) -> None:
+    path, old, new, told = FOREIGN[case]
+    mark = tmp_path / "was run"
+    rewritten(package, path, lambda text: text.replace(old, new.replace("{mark!r}", repr(str(mark))), 1))
+    *before, last = check_package(package, 3)
+    assert [result.mark for result in before] == ["ok"]
+    assert (last.name, last.mark) == ("texts", "FAIL")
+    assert path in last.detail
+    assert told in last.detail
+    with pytest.raises(LinkwiseError, match=path):
+        open_package(package)
+    assert not mark.exists()
+
+
+def test_a_package_of_another_version_is_opened_with_a_word_of_what_runs_unread(package: Path) -> None:
+    rewritten(package, "__init__.py", lambda text: text.replace(f"linkwise {VERSION}", "linkwise 0.0.9", 1))
+    manifest = package / "manifest.json"
+    data = json.loads(manifest.read_text())
+    data["generator"]["linkwise"] = "0.0.9"
+    if "checksums" in data:
+        text = json.dumps(data["generator"], sort_keys=True)
+        data["checksums"]["generator"] = hashlib.sha256(text.encode()).hexdigest()
+    manifest.write_text(json.dumps(data))
+    with pytest.warns(LinkwiseWarning, match=r"its runtime is that of linkwise 0\.0\.9, .* its code runs"):
+        open_package(package)
+
+
+def test_a_package_of_this_version_is_opened_without_a_word(package: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        open_package(package)
+
+
+def test_every_function_of_closed_forms_may_be_named() -> None:
+    assert {name.lower() for name in OF_GRAPHS} <= FUNCTIONS
+
+
+@pytest.mark.parametrize("text", ["x = (\n", "x = " + "(" * 5000 + ")" * 5000, "\0"])
+def test_what_cannot_be_read_is_refused(text: str) -> None:
+    found = foreign_text("forms/link_1.py", text.encode(), "robot", VERSION)
+    assert found is not None
+    assert found.startswith("cannot be read (")
