@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from linkwise import Options, check_package, generate, read_system, write_package
-from linkwise.check.contact_checks import ContactReference
+from linkwise.check.contact_checks import HeldContacts
 from linkwise.check.loop_checks import loop_calls
 from linkwise.check.loop_reference import LoopReference, loop_reference
 from linkwise.check.parametric_tree import tree_with
@@ -118,7 +118,7 @@ def test_another_mass_is_found_under_contacts_and_in_a_simulation(
     states = reference.states if tied else random_states(package.manifest.joints, 20)
     moved = simulated_motion(manifest, manifest.tree, states)
     assert [result.held for result in simulation_calls("numpy", model, moved)] == [passes]
-    held = ContactReference(manifest, manifest.tree, states).calls("numpy", model, package.module.Contact)
+    held = HeldContacts(manifest, manifest.tree, states).calls("numpy", model, package.module.Contact)
     assert [result.held for result in held] == ([] if tied else [passes]), "one freedom is left to the ties"
 
 

@@ -235,7 +235,7 @@ def another(value: Any) -> Any:
 def complaint(package: Path) -> str:
     """What `check` says of a manifest."""
     try:
-        [wrong] = [result for result in check_package(package, 1)[:2] if result.failed]
+        [wrong] = [result for result in check_package(package, 1)[:3] if result.failed]
     except LinkwiseError as error:
         return str(error).removeprefix(str(package / "manifest.json"))
     assert wrong.name == "manifest"
@@ -294,7 +294,7 @@ def test_an_entry_that_the_package_has_otherwise_fails(case: str, package: Path)
         with pytest.raises(LinkwiseError, match=r"joints\[2\].name is 'wrist', on which no body"):
             check_package(package)
         return
-    _, result = check_package(package)
+    *_, result = check_package(package)
     assert (result.name, result.mark) == ("manifest", "FAIL")
     assert result.detail.startswith(f"manifest.json has {message}")
 
@@ -335,11 +335,11 @@ TEXTS: dict[str, tuple[Callable[[str], str], str]] = {
     "no schema": (lambda t: t.replace(f"{NUMBERED},", ""), f"schema is not the number {SCHEMA}"),
     "unknown": (
         lambda t: t.replace('"lock": {}', '"lock": {}},"more": {"a": 1'),
-        "more is not an entry of a",
+        "more is not a known entry",
     ),
     "unknown inside": (
         lambda t: t.replace('"unit": "rad"', '"unit": "rad", "a\\n": 1', 1),
-        "joints[0].'a\\n' is not an",
+        "joints[0].'a\\n' is not a known",
     ),
 }
 

@@ -97,7 +97,7 @@ def robot(folder: Path) -> Any:
 def test_check_holds_the_rods_of_rounded_places(folder: Path, robot: Any) -> None:
     manifest = Manifest.read(folder)
     assert manifest.tree is not None
-    reference = loop_reference(manifest, manifest.tree, random_states(robot.n, 15))
+    reference = loop_reference(manifest, manifest.tree, random_states(manifest.joints, 15))
     assert reference is not None
     assert not any(result.failed for result in loop_calls("numpy", robot, reference))
 

@@ -25,7 +25,7 @@ STATES = 2
 TRIED = 6
 
 
-class ContactReference:
+class HeldContacts:
     """Contacts of each kind on the frame that most joints move, at states in which ties close."""
 
     def __init__(self, manifest: Manifest, tree: RigidTree, states: States) -> None:
@@ -76,13 +76,11 @@ class ContactReference:
         q = self.states.q
         rest, rows = [k for k in range(q.shape[1]) if k not in own], held.rows(q)
         clear = far_from_singular(rows[..., rest])
+        clear = clear[steady(held.recursion, q[clear], _mapped(rows[clear], list(own), rest))][:STATES]
         if not clear.size:
             return None
-        clear = clear[steady(held.recursion, q[clear], _mapped(rows[clear], list(own), rest))][:STATES]
-        given, condition = (
-            _Given(self.states.at(clear), list(own), rest),
-            condition_of(rows[clear][..., rest]),
-        )
+        given = _Given(self.states.at(clear), list(own), rest)
+        condition = condition_of(rows[clear][..., rest])
 
         def answers(tree: RigidTree) -> dict[str, Array]:
             return _answers(self.equations(held.kind, tree), given)

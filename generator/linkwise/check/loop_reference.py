@@ -30,6 +30,8 @@ MOST = 1e6
 """The same, above which nothing is left to compare."""
 STEADY = 1e-2
 """Least eigenvalue of a mass matrix beside that of others."""
+REGULAR = 1e-8
+"""Least eigenvalue of any, with ones on its diagonal: below, joints can move together without a mass."""
 SMALL = 1e-7
 """Singular values below this part of the largest are those of rows that follow from others."""
 
@@ -59,9 +61,9 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     starts = [tried, *(tree.closed_position + tried * part for part in (0.5, 0.1, 0.02))]
     q = equations.closed_near(np.concatenate(starts))
     q = q[far_from_singular(equations.rows(q)[..., rest])]
+    q = q[steady(equations.recursion, q, equations.velocity_map(q))][: min(STATES, len(states.q))]
     if not len(q):
         return None
-    q = q[steady(equations.recursion, q, equations.velocity_map(q))][: min(STATES, len(states.q))]
     condition = condition_of(equations.rows(q)[..., rest])
     yd, ydd = states.qd[: len(q), own], states.qdd[: len(q), own]
     tau = np.random.default_rng(5).uniform(-1.0, 1.0, q.shape)
@@ -213,7 +215,9 @@ def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]
     mass = np.swapaxes(mapped, -1, -2) @ mass_matrix(recursion, q) @ mapped
     size = np.sqrt(mass.diagonal(0, -2, -1))
     least = np.linalg.eigvalsh(mass / (size[:, :, None] * size[:, None, :]))[:, 0]
-    found: NDArray[np.bool_] = least >= STEADY * np.median(least)
+    if not len(least):
+        return np.zeros(0, dtype=bool)
+    found: NDArray[np.bool_] = least >= max(STEADY * float(np.median(least)), REGULAR)
     return found
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 from linkwise.check.body_reference import body_reference
 from linkwise.check.c_functions import CFunctions
 from linkwise.check.compiled_c import CompiledPackage
-from linkwise.check.contact_checks import ContactReference
+from linkwise.check.contact_checks import HeldContacts
 from linkwise.check.energy_reference import energy_reference, states_of_energies
 from linkwise.check.frame_reference import FrameReference, frame_reference
 from linkwise.check.loop_reference import LoopReference, loop_reference
@@ -130,13 +130,13 @@ class Subject:
         return None if self.loops is None else self.loops.states
 
     @cached_property
-    def contacts(self) -> ContactReference:
+    def contacts(self) -> HeldContacts:
         """What contacts are held against."""
-        return ContactReference(self.manifest, there(self.tree), there(self.closed))
+        return HeldContacts(self.manifest, there(self.tree), there(self.closed))
 
     @cached_property
-    def simulated(self) -> SimulatedMotion:
-        """A short motion."""
+    def simulated(self) -> SimulatedMotion | None:
+        """A short motion, if there is any."""
         return simulated_motion(self.manifest, there(self.tree), there(self.closed))
 
     @cached_property
