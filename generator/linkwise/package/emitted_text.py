@@ -68,7 +68,10 @@ ARITHMETIC = Grammar(
     whole={"torch": "torch", "numpy": "np"},
     builtins=frozenset(("tuple", "type", "int", "float", "str", "dict")),
     attributes=frozenset(
-        "before twist height body kinetic potential constants turn slide slope Lagrangian".split()  # noqa: SIM905
+        (
+            *("before", "twist", "height", "body", "kinetic", "potential", "constants"),
+            *("turn", "slide", "slope", "Lagrangian"),
+        )
     ),
     nodes=(*PLAIN, ast.ClassDef, ast.Lambda, ast.Slice),
 )
