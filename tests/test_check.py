@@ -541,7 +541,8 @@ def test_graphs_of_parts_are_run_against_the_recursion(old: str, new: str, copy_
 def test_without_torch_a_users_energies_are_held_against_their_own_torques_which_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("linkwise.check.checks.find_spec", lambda name: None)
+    for module in ("checks", "subject"):
+        monkeypatch.setattr(f"linkwise.check.{module}.find_spec", lambda name: None)
     package = tmp_path / "turntable"
     write_package(generate(read_system(str(DATA / "turntable.py")), ["numpy"]), package)
     found = marks(package)
