@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from linkwise.check.reference import TOLERANCE, Reference
 from linkwise.package.load import Array
 
-ROUNDINGS = 30.0
+ROUNDINGS = 10.0
 """Roundings that a value may gather, each as large as that of the numbers that it is summed from."""
 
 

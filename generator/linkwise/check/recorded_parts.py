@@ -14,7 +14,7 @@ STATES = 10
 PAIRS = 6
 """Torques tau_ij at most: each is recorded anew."""
 CARRIERS = 16
-"""Joints that carry the links of these, at most."""
+"""Joints that carry the links of these, at most, in a large robot."""
 OPERATIONS = 2500
 """Run in all, at most: where there are more, every tau_ij has its share, by parts picked at random."""
 
@@ -36,7 +36,8 @@ def _parts(checked: Named) -> Iterator[Entries]:
     asked = [(None, 0), *((k, m) for k in range(len(joints)) for m in (1, 2))]
     # To record a torque takes the longer, the more joints carry the link.
     carriers = np.bincount(checked.rows.tau[:, 1])
-    near = checked.rows.tau[carriers[checked.rows.tau[:, 1]] <= max(CARRIERS, carriers.min())]
+    most = max(CARRIERS, carriers.min()) if reference.is_large else carriers.max()
+    near = checked.rows.tau[carriers[checked.rows.tau[:, 1]] <= most]
     pairs = generator.permutation(near)[:PAIRS].tolist()
     for i, j in pairs:
         graphs = {(part.coordinate, part.order): part for part in checked.model.backend.graph_parts(i, j)}
