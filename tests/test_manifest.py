@@ -51,6 +51,7 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
     },
     "no joints": (lambda data: data.update(joints=[]), "there must be a joint and a link"),
     "joint": (lambda data: data["joints"].append(3), "joints[2] is not an object"),
+    "name": (lambda data: data.update(name=""), "name is '', which no module can be called"),
     "path": (lambda data: data["links"][0].update(path=[7]), "the path of link 'link1' names a joint"),
     "path of words": (lambda data: data["links"][0].update(path="ab"), "links[0].path is not a list"),
     "request": (lambda data: data.update(request=3), "request is not an object"),

@@ -11,7 +11,7 @@ import pytest
 from linkwise import LinkwiseError, check_package, generate, read_system, write_package
 from linkwise.errors import LinkwiseWarning
 from linkwise.expression.expression_graph import FUNCTIONS as OF_GRAPHS
-from linkwise.package.emitted_text import FUNCTIONS, foreign_text
+from linkwise.package.emitted_text import FUNCTIONS, Source, foreign_text
 from linkwise.package.load import open_package
 from linkwise.version import VERSION
 
@@ -92,6 +92,72 @@ FOREIGN: dict[str, tuple[str, str, str, str]] = {
         "#define WANT_TORQUE\n#define R(x) sys##tem\n",
         "has #define R(x) sys##tem",
     ),
+    "code behind a comment's encoding": (
+        "forms/link_1.py",
+        '"""',
+        "# coding: raw_unicode_escape\n# \\u000aimport os\n" + '"""',
+        "imports os",
+    ),
+    "another meaning of all names": (
+        "forms/link_1.py",
+        "    # inputs\n",
+        "    # inputs\n    run = lambda __builtins__: 0\n",
+        "gives __builtins__ another meaning",
+    ),
+    "a declaration in a comment of C": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        "#define WANT_TORQUE\n/* int system */ static int a = sizeof(system);\n",
+        "names system",
+    ),
+    "a word of C under another name": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        "#define WANT_TORQUE\nstatic int system;\n#define observe system\n",
+        "has #define observe system",
+    ),
+    "a trigraph that ends a string elsewhere": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        '#define WANT_TORQUE\nstatic const char a[] = "??/" /* "; // " */;\n',
+        "has '??'",
+    ),
+    "a word of C on two lines": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        "#define WANT_TORQUE\nstatic int a = sys\\\ntem(0);\n",
+        "has '\\\\\\n'",
+    ),
+    "a directive in other letters": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        "#define WANT_TORQUE\n%:define observe abort\n",
+        "has %:",
+    ),
+    "what runs when a library is loaded": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        "#define WANT_TORQUE\nstatic int constructor;\n__attribute__((constructor)) void R(void);\n",
+        "names __attribute__",
+    ),
+    "a function of C that is called as the robot": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        "#define WANT_TORQUE\nint planar2_spawn(const char *command);\n",
+        "names planar2_spawn",
+    ),
+    "a file that is not listed": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        '#define WANT_TORQUE\n#include "link_99.h"\n',
+        'has #include "link_99.h", which is not listed',
+    ),
+    "a header of C beside the package": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        '#define WANT_TORQUE\n#include "math.h"\n',
+        'has #include "math.h", which is not listed',
+    ),
     "a changed runtime": ("runtime/structure.py", "import ", "import  ", "is not that of linkwise"),
 }
 
@@ -164,6 +230,6 @@ def test_every_function_of_closed_forms_may_be_named() -> None:
 
 @pytest.mark.parametrize("text", ["x = (\n", "x = " + "(" * 5000 + ")" * 5000, "\0"])
 def test_what_cannot_be_read_is_refused(text: str) -> None:
-    found = foreign_text("forms/link_1.py", text.encode(), "robot", VERSION)
+    found = foreign_text("forms/link_1.py", text.encode(), Source("robot", VERSION, frozenset()))
     assert found is not None
     assert found.startswith("cannot be read (")

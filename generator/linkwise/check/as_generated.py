@@ -49,8 +49,7 @@ def check_files(directory: Path, manifest: Manifest) -> list[Result]:
 
 def check_texts(directory: Path, manifest: Manifest) -> Result:
     """Read every file that could run as text: nothing is imported or compiled that linkwise doesn't write."""
-    version = manifest.generator.get("linkwise")
-    wrong = foreign(directory, manifest.files, manifest.name, version)
+    wrong = foreign(directory, manifest)
     return _result("texts", wrong, "hold arithmetic and calls of the runtime alone, read before they run")
 
 

@@ -98,7 +98,7 @@ CHECKS = (
     ),
     Check(
         "controllers",
-        lambda s, name, model: impedance_calls(name, model, s.passive, s.reference, s.package.module.Natural),
+        lambda s, name, model: impedance_calls(name, model, s.tree, s.reference, s.package.module.Natural),
     ),
 )
 """What is held of each back end, in the order in which it is told."""

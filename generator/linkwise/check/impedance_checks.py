@@ -10,7 +10,7 @@ from linkwise.check.passive_reference import passive_reference
 from linkwise.check.reference import Reference
 from linkwise.check.states import States
 from linkwise.check.sum_checks import is_tied, regular
-from linkwise.package.entries import PassiveEntry
+from linkwise.package.entries import PassiveEntry, RigidTree
 from linkwise.package.load import Array, Model
 
 WIDTH = 0.5
@@ -20,7 +20,7 @@ WIDTH = 0.5
 def impedance_calls(
     name: str,
     model: Model,
-    joints: Sequence[PassiveEntry],
+    tree: RigidTree | None,
     reference: Reference,
     natural: Callable[..., Any],
 ) -> Iterator[Result]:
@@ -33,31 +33,45 @@ def impedance_calls(
         return
     # an impedance is there where M is positive, which that of negative masses is not
     positive = rows[np.linalg.eigvalsh(reference.values["c2"][rows].sum(2)).min(-1) > 0.0]
+    joints = () if tree is None else tree.passive
     entries = [_cancelled(model, joints, reference, rows)]
     if positive.size:
-        entries += _shaped(model, joints, reference, positive, natural)
+        links = len(model.link_names)
+        kept = np.linspace(0.5, 1.5, links) if _are_masses(tree) else np.full(links, 0.7)
+        entries += _shaped(model, joints, reference, positive, kept, natural)
     yield compare(f"{name}: controllers make the impedance that is asked for", entries, reference.tolerance)
 
 
+def _are_masses(tree: RigidTree | None) -> bool:
+    """Whether no link has an inertia that is negative anywhere, so that each may be kept in part."""
+    if tree is None:
+        return False
+    moments = np.linalg.eigvalsh([body.inertia for body in tree.bodies])
+    return (
+        bool((moments[:, 0] >= -1e-9 * moments[:, 2]).all()) and min(body.mass for body in tree.bodies) >= 0.0
+    )
+
+
 def _shaped(
-    model: Model, joints: Sequence[PassiveEntry], reference: Reference, rows: Any, natural: Any
+    model: Model,
+    joints: Sequence[PassiveEntry],
+    reference: Reference,
+    rows: Any,
+    kept: Array,
+    natural: Any,
 ) -> Iterator[Entries]:
     """M* qdd + B* qd + K* e = f of the acceleration, and the torque that the plant takes for it.
 
-    How much of each link is kept differs where no link has an inertia that is negative anywhere, which those
-    of a user's energies, and of negative masses, may have.
+    kept: how much of each link M* has, (N,)
     """
-    n, links = len(model.joint_names), len(model.link_names)
+    n = len(model.joint_names)
     q, qd, _ = reference.states.at(rows).motion
     mass, scale = (source["c2"][rows] for source in (reference.values, reference.scales))
-    each = np.moveaxis(mass, 2, 1)
-    bodies = model.backend.tree is not None and np.linalg.eigvalsh(each).min() >= -1e-9 * np.abs(each).max()
-    kept = np.linspace(0.5, 1.5, links) if bodies else np.full(links, 0.7)
     coriolis, size = (source["c1"][rows] for source in (reference.values, reference.scales))
     own = float(np.abs(mass.sum(2)).max())
     more, stiffness, at = own * np.linspace(0.1, 0.3, n), own * np.linspace(1.0, 3.0, n), 0.9 * q
     force = reference.values["tau"][rows].sum(-1)
-    shares = np.broadcast_to(kept, (n, links))
+    shares = np.broadcast_to(kept, (n, len(kept)))
     controller = model.partial_impedance(
         inertia=natural(shares),
         damping=natural(shares, plus=more),

@@ -203,7 +203,7 @@ def mass_matrix(recursion: NewtonEuler, q: Array) -> Array:
     """M (samples, n, n), column by column, all columns at once."""
     samples, n = q.shape
     rest, units = np.zeros((samples * n, n)), np.tile(np.eye(n), (samples, 1))
-    torque = recursion.partial_torque(np.repeat(q, n, 0), rest, units, gravity=False).sum(-1)
+    torque = recursion.torque(np.repeat(q, n, 0), rest, units, gravity=False)
     return np.swapaxes(torque.reshape(samples, n, n), -1, -2)
 
 
@@ -227,7 +227,7 @@ def held_motion(
     """qdd and lambda of torques under rows that do not follow from each other."""
     q, qd, _ = states.motion
     mass = mass_matrix(recursion, q)
-    bias = recursion.partial_torque(q, qd, 0.0 * q).sum(-1)
+    bias = recursion.torque(q, qd, 0.0 * q)
     null = np.swapaxes(np.linalg.svd(rows)[2][:, rows.shape[1] :], -1, -2)
     back = np.swapaxes(null, -1, -2)
     moved = -np.linalg.pinv(rows, rcond=SMALL) @ (rates @ qd[..., None])

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwise.check.curve_reference import displacement
 from linkwise.package.load import Array
@@ -47,6 +48,7 @@ class NewtonEuler:
         self.n = len(manifest.joints)
         index = {body.link: b for b, body in enumerate(self.bodies)}
         self.links = [index[link.name] for link in manifest.links]
+        self.paths = [_Path.of(self.bodies, at) for at in self.links]
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
         """τ_ij, shape (samples, n, N), for inputs of shape (samples, n)."""
@@ -59,24 +61,39 @@ class NewtonEuler:
         """τ_ij (samples, n, N, X) where each link has the masses of X bodies in turn, not its own."""
         motions = self._motions(q, qd, qdd, self.gravity if gravity else 0.0 * self.gravity)
         axes, origins = (
-            np.stack(parts, 1)
+            np.stack(parts, 1)[:, :, None]
             for parts in zip(*((motion.axis, motion.frame.origin) for motion in motions), strict=True)
         )
-        slopes = np.stack([displacement(body, q, 1)[:, 0] for body in self.bodies], 1)
+        slopes = np.stack([displacement(body, q, 1) for body in self.bodies], 1)
         shape = len(q), self.n, len(self.links), len(carried[0])
         tau = np.zeros(shape, np.result_type(q, qd, qdd))
-        for j, at in enumerate(self.links):
-            path = path_of(self.bodies, at)
-            turning = np.array([self.bodies[b].kind == "revolute" for b in path])
-            coordinates = [self.bodies[b].coordinate for b in path]
-            for x, body in enumerate(carried[j]):
-                force, moment, com = _wrench(body, motions[at].frame)
-                # On a joint that turns, the moment about its origin; on one that slides, the force.
-                about = moment[:, None] + _cross(com[:, None] - origins[:, path], force[:, None])
-                share = np.where(turning[:, None], about, force[:, None])
-                work = slopes[:, path] * (axes[:, path] * share).sum(-1)
-                for k, column in zip(coordinates, np.moveaxis(work, 1, 0), strict=True):
-                    tau[:, k, j, x] += column
+        for j, (at, bodies, path) in enumerate(zip(self.links, carried, self.paths, strict=True)):
+            force, moment, com = (part[:, None] for part in _wrenches(bodies, motions[at].frame))
+            # On a joint that turns, the moment about its origin; on one that slides, the force.
+            about = moment + _cross(com - origins[:, path.bodies], force)
+            share = np.where(path.turning[:, None, None], about, force)
+            work = slopes[:, path.bodies] * (axes[:, path.bodies] * share).sum(-1)
+            # several bodies of a path may move by one coordinate
+            np.add.at(tau[:, :, j].swapaxes(0, 1), path.coordinates, work.swapaxes(0, 1))
+        return tau
+
+    def torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
+        """τ_i of all links together, (samples, n), by one pass inwards; inputs as of `partial_torque`."""
+        motions = self._motions(q, qd, qdd, self.gravity if gravity else 0.0 * self.gravity)
+        tau = np.zeros(q.shape, np.result_type(q, qd, qdd))
+        forces, moments = np.zeros((2, len(self.bodies), len(q), 3), tau.dtype)
+        for at in reversed(range(len(self.bodies))):
+            body, (frame, axis) = self.bodies[at], motions[at]
+            if at in self.links:
+                force, moment, com = (part[:, 0] for part in _wrenches([body], frame))
+                forces[at] += force
+                moments[at] += moment + _cross(com - frame.origin, force)
+            share = moments[at] if body.kind == "revolute" else forces[at]
+            tau[:, body.coordinate] += displacement(body, q, 1)[:, 0] * (axis * share).sum(-1)
+            if body.parent is not None:
+                arm = frame.origin - motions[body.parent].frame.origin
+                forces[body.parent] += forces[at]
+                moments[body.parent] += moments[at] + _cross(arm, forces[at])
         return tau
 
     def energies(self, q: Array, qd: Array) -> tuple[Array, Array]:
@@ -87,7 +104,7 @@ class NewtonEuler:
             body, frame = self.bodies[at], motions[at].frame
             lever = frame.rotation @ np.array(body.com)
             v_com = frame.v + _cross(frame.omega, lever)
-            spin = _applied(_inertia(body, frame), frame.omega)
+            spin = _applied(_turned(np.array(body.inertia), frame.rotation), frame.omega)
             kinetic.append(0.5 * (body.mass * _dot(v_com, v_com) + _dot(frame.omega, spin)))
             potential.append(-body.mass * (frame.origin + lever) @ self.gravity)
         return np.stack(kinetic, -1), np.stack(potential, -1)
@@ -160,6 +177,22 @@ def _moved(body: BodyEntry, up: _FrameMotion, turn: Array, rate: Array, change: 
     return _BodyMotion(_FrameMotion(rotation, up.origin + arm, v, omega, alpha, a), axis)
 
 
+@dataclass(frozen=True)
+class _Path:
+    """What carries a link, from its body to the ground: bodies, whether each turns, and its coordinate."""
+
+    bodies: NDArray[np.intp]
+    turning: NDArray[np.bool_]
+    coordinates: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, bodies: Sequence[BodyEntry], at: int) -> "_Path":
+        """That of the body at a place."""
+        path = path_of(bodies, at)
+        turning = np.array([bodies[b].kind == "revolute" for b in path])
+        return cls(np.array(path), turning, np.array([bodies[b].coordinate for b in path]))
+
+
 def path_of(bodies: Sequence[BodyEntry], at: int) -> list[int]:
     """A body, what carries it, and so on to the ground."""
     back, path = bodies[at].parent, [at]
@@ -169,25 +202,34 @@ def path_of(bodies: Sequence[BodyEntry], at: int) -> list[int]:
     return path
 
 
-def _wrench(body: BodyEntry, frame: _FrameMotion) -> tuple[Array, Array, Array]:
-    """Force at the centre of mass, moment about it, and where it is."""
-    lever, inertia, omega = frame.rotation @ np.array(body.com), _inertia(body, frame), frame.omega
-    turning = _cross(frame.alpha, lever) + _cross(omega, _cross(omega, lever))
-    spin = _cross(omega, _applied(inertia, omega))
-    return body.mass * (frame.a + turning), _applied(inertia, frame.alpha) + spin, frame.origin + lever
+def _wrenches(bodies: Sequence[BodyEntry], frame: _FrameMotion) -> tuple[Array, Array, Array]:
+    """Force at the centre of mass, moment about it, and where it is, (samples, X, 3), of each of X bodies."""
+    mass, com, inertia = (
+        np.array([getattr(body, name) for body in bodies]) for name in ("mass", "com", "inertia")
+    )
+    rotation, origin, omega, alpha, a = (
+        part[:, None] for part in (frame.rotation, frame.origin, frame.omega, frame.alpha, frame.a)
+    )
+    lever, spun = _applied(rotation, com), _turned(inertia, rotation)
+    turning = _cross(alpha, lever) + _cross(omega, _cross(omega, lever))
+    moment = _applied(spun, alpha) + _cross(omega, _applied(spun, omega))
+    return mass[:, None] * (a + turning), moment, origin + lever
 
 
-def _inertia(body: BodyEntry, frame: _FrameMotion) -> Array:
+def _turned(inertia: Array, rotation: Array) -> Array:
     """Inertia about the centre of mass, in the world's axes."""
-    turn = frame.rotation
-    inertia: Array = turn @ np.array(body.inertia) @ turn.transpose(0, 2, 1)
-    return inertia
+    turned: Array = rotation @ inertia @ rotation.swapaxes(-1, -2)
+    return turned
 
 
 def _cross(a: Array, b: Array) -> Array:
     """Vector product of each pair (..., 3), as np.cross gives it in ten times the time."""
-    (a0, a1, a2), (b0, b1, b2) = (np.moveaxis(x, -1, 0) for x in (a, b))
-    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], -1)
+    (a0, a1, a2), (b0, b1, b2) = ([x[..., k] for k in range(3)] for x in (a, b))
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
+    product[..., 0] = a1 * b2 - a2 * b1
+    product[..., 1] = a2 * b0 - a0 * b2
+    product[..., 2] = a0 * b1 - a1 * b0
+    return product
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -198,7 +240,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 def _applied(matrices: Array, vectors: Array) -> Array:
     """Each matrix times its vector."""
-    product: Array = np.einsum("sab,sb->sa", matrices, vectors)
+    product: Array = (matrices @ vectors[..., None])[..., 0]
     return product
 
 

@@ -59,7 +59,7 @@ def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Sim
     calm = np.array([int(np.where(np.isfinite(sizes), sizes, np.inf).argmin())])
     q, qd, _ = tried.at(calm).motion
     qdd = np.random.default_rng(9).uniform(-1.0, 1.0, q.shape)  # that of states may be none
-    tau = recursion.partial_torque(q, qd, qdd).sum(-1)
+    tau = recursion.torque(q, qd, qdd)
 
     def ends(tree: RigidTree) -> dict[str, Array]:
         found = _integrated(motion(tree, tau), (q, qd[:, own], np.zeros(1)))
@@ -110,8 +110,8 @@ def _integrated(motion: Rates, start: tuple[Array, Array, Array]) -> tuple[Array
 
 def _free(recursion: NewtonEuler, tau: Array) -> Rates:
     def motion(q: Array, qd: Array) -> tuple[Array, Array, Array, Array]:
-        bias = recursion.partial_torque(q, qd, 0.0 * q).sum(-1)
-        moved = np.linalg.solve(mass_matrix(recursion, q), (tau - bias)[..., None])[..., 0]
+        bias = recursion.torque(q, qd, 0.0 * q)
+        moved: Any = np.linalg.solve(mass_matrix(recursion, q), (tau - bias)[..., None])[..., 0]
         return q, qd, moved, (qd * tau).sum(-1)
 
     return motion

@@ -9,12 +9,14 @@ that are the same in every package are compared with those of this version, byte
 import ast
 import builtins
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
-from importlib.resources import files
+from functools import lru_cache
 from pathlib import Path
 
+from linkwise.package.emitted_c import FUNCTIONS, ORDINARY, foreign_c, foreign_includes
+from linkwise.package.manifest import Manifest
+from linkwise.package.own_files import own_text
 from linkwise.version import VERSION
 
 RUNTIME = "runtime."
@@ -42,10 +44,6 @@ class Grammar:
     nodes: tuple[type[ast.AST], ...]
 
 
-FUNCTIONS = frozenset(
-    ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "sign")
-)
-"""What may be asked of a library of arrays, and of xp, which stands for one."""
 PLAIN = (
     *(ast.Module, ast.Expr, ast.ImportFrom, ast.Import, ast.alias, ast.Assign, ast.AnnAssign),
     *(ast.FunctionDef, ast.Return, ast.arguments, ast.arg, ast.keyword, ast.Constant, ast.Name),
@@ -104,49 +102,63 @@ OWN_C = "Path(__file__).parent / 'c'"
 MAKING = ("_MAKERS[backend]", "(made.face or Dynamics)", "made.face or Dynamics")
 """What else it calls: each of them is named in it."""
 BUILTINS = frozenset(dir(builtins))
-ORDINARY = "arithmetic, sines and the like, and names"
 
 
-def foreign(directory: Path, listed: Iterable[str], name: str, version: str | None) -> list[str]:
-    """What in the listed files linkwise does not write, each with its file and line; empty if nothing.
+def foreign(directory: Path, manifest: Manifest) -> list[str]:
+    """What in a package's files linkwise does not write, each with its file and line; empty if nothing.
 
-    version: the one that wrote the package; files of another's runtime are not at hand to compare with.
     Raises OSError for a file that cannot be read.
     """
+    source = Source.of(manifest)
     found = []
-    for path in listed:
-        told = foreign_text(path, (directory / path).read_bytes(), name, version)
+    for path in manifest.files:
+        told = foreign_text(path, (directory / path).read_bytes(), source)
         found += [] if told is None else [f"{path} {told}"]
     return found
 
 
+@dataclass(frozen=True)
+class Source:
+    """What a manifest says of the package that a file is of.
+
+    version: the linkwise that wrote it; files of another's runtime are not at hand to compare with
+    files: paths of all that are listed
+    """
+
+    name: str
+    version: str | None
+    files: frozenset[str]
+
+    @classmethod
+    def of(cls, manifest: Manifest) -> "Source":
+        """That of a package's manifest."""
+        return cls(manifest.name, manifest.generator.get("linkwise"), frozenset(manifest.files))
+
+
 @lru_cache(maxsize=1024)
-def foreign_text(path: str, text: bytes, name: str, version: str | None) -> str | None:
+def foreign_text(path: str, text: bytes, source: Source) -> str | None:
     """The same of one file, what is wrong with it alone; None if nothing."""
-    own = own_text(path)
-    if own is not None or path.startswith("runtime/"):
-        return None if version != VERSION or own == text else f"is not that of linkwise {VERSION}"
-    ending = path.rpartition(".")[2]
+    own, ending = own_text(path), path.rpartition(".")[2]
     try:
-        if ending == "py":
-            return next(_python(LOADING if path == "__init__.py" else ARITHMETIC, text.decode()), None)
-        return next(_c(text.decode(), name), None) if ending in ("h", "c") else None
+        if own is not None or path.startswith("runtime/"):
+            if source.version == VERSION and own != text:
+                return f"is not that of linkwise {VERSION}"
+        elif ending == "py":
+            return next(_python(LOADING if path == "__init__.py" else ARITHMETIC, text), None)
+        elif ending in ("h", "c") and (told := next(foreign_c(text.decode(), source.name), None)):
+            return told
+        # That of the runtime is compiled with Python's headers.
+        in_c = ending in ("h", "c") and not path.startswith("runtime/")
+        return next(foreign_includes(text.decode(), source.files), None) if in_c else None
     except (SyntaxError, ValueError, RecursionError) as error:
         return f"cannot be read ({' '.join(str(error).split())})"
 
 
-@cache
-def own_text(path: str) -> bytes | None:
-    """The file of linkwise that a package has a copy of at this path; None where that is no copy."""
-    folder, _, name = path.partition("/")
-    places = {"runtime": files("linkwise.runtime"), "c": files("linkwise.runtime").joinpath("c")}
-    if folder in places and (file := places[folder].joinpath(name)).is_file():
-        return file.read_text(encoding="utf-8").encode()  # as it was written, whatever ends lines here
-    return None
+def _python(grammar: Grammar, text: bytes) -> Iterator[str]:
+    """What a module of a package says beside what its grammar allows.
 
-
-def _python(grammar: Grammar, text: str) -> Iterator[str]:
-    """What a module of a package says beside what its grammar allows."""
+    Of the bytes, as Python reads them: a comment in them may say in what encoding.
+    """
     tree = ast.parse(text)
     known = _bound(tree) | grammar.builtins
     own_c = {id(part) for node in ast.walk(tree) if _is_own_c(node) for part in ast.walk(node)}
@@ -193,7 +205,8 @@ def _beside(node: ast.AST, grammar: Grammar, known: set[str]) -> str:
             return "" if name in known else f"names {name}"
         case ast.Name(id=name) | ast.arg(arg=name) | ast.FunctionDef(name=name) | ast.ClassDef(name=name):
             taken = name in BUILTINS or name in grammar.whole.values()
-            return f"gives {name} another meaning" if taken or (name[:2] == "__" != name[-2:]) else ""
+            own = name[:2] == "__" and name != "__all__"  # Python's own: __builtins__ is what all names mean
+            return f"gives {name} another meaning" if taken or own else ""
         case ast.Attribute(value=ast.Name(id="xp" | "torch" | "np"), attr=attribute):
             return "" if attribute in FUNCTIONS else f"asks for .{attribute}"
         case ast.Attribute(attr=attribute):
@@ -210,68 +223,3 @@ def _may_import(grammar: Grammar, module: str, name: str, level: int) -> bool:
         return re.fullmatch(r"link_\d+", name) is not None
     inside = module.startswith(RUNTIME) or module in ("names", "tree", "forms", "energies")
     return name in grammar.imports.get(module, ()) and (level > 0) == inside
-
-
-C_TOKEN = re.compile(
-    r"""(?P<comment>/\*.*?\*/|//[^\n]*)|(?P<include>^[ \t]*\#[ \t]*include\b[^\n]*)
-    |(?P<pasting>^[^\n]*\#\#[^\n]*)|(?P<string>"(?:[^"\\\n]|\\.)*")
-    |(?P<word>[A-Za-z_]\w*)|(?P<number>\.?\d(?:[eEpP][-+]|[\w.])*)|(?P<quote>["'])
-    |(?P<called>[])][ \t\n]*\()""",
-    re.DOTALL | re.MULTILINE | re.VERBOSE,
-)
-DECLARED = re.compile(r"\b(?:real|int|short|char|size_t|double|float)\s+\**\s*(?:RESTRICT\s+)?(\w+)")
-PASTING = re.compile(r"#define (?:SIZED\(name\) name##_\w+|API\(function\) F\(\w+_##function\))")
-MADE = re.compile(r"\b(?:KERNEL|API|F|SIZED)\(\w*$")
-"""Before the bracket that ends it: a name that a macro makes, which may be called."""
-OF_LINK = re.compile(r"links?_\d+(?:_\w+)?|at_p_\w+")
-JINJA = re.compile(r"\{[{%#].*?[}%#]\}", re.DOTALL)
-TAKEN = frozenset(("asm", "__asm__", "__asm", "goto"))
-HEADERS = frozenset(("math.h", "stddef.h"))
-
-
-def _c(text: str, name: str) -> Iterator[str]:
-    """What a C file of a package says beside the vocabulary of linkwise's own C and local numbers.
-
-    Words that neither that nor the robot's name has are numbers declared in the file, and never called.
-    """
-    words, calls = _c_vocabulary()
-    robots = (f"{name}_", f"{name.upper()}_", f"LINKWISE_{name.upper()}")
-    local = set(DECLARED.findall(text))
-    for token in C_TOKEN.finditer(text):
-        what, told = token[0], ""
-        match token.lastgroup:
-            case "word" if not (what.startswith(robots) or OF_LINK.fullmatch(what)):
-                called = re.match(r"\s*\(", text[token.end() : token.end() + 80])
-                if what in TAKEN or (what not in words and (called or what not in local)):
-                    told = f"names {what}"
-                elif called and what not in calls:
-                    told = f"calls {what}"
-            case "include":
-                told = "" if _is_own(what, name) else f"has {' '.join(what.split())}"
-            case "pasting":
-                told = "" if PASTING.fullmatch(what.strip()) else f"has {' '.join(what.split())}"
-            case "quote":
-                told = "has a string that does not end"
-            case "called":
-                told = "" if MADE.search(text[: token.start()][-80:]) else "calls what an expression gives"
-        if told:
-            line = text.count("\n", 0, token.start()) + 1
-            yield f"line {line} {told}, where linkwise writes {ORDINARY} alone"
-
-
-def _is_own(include: str, name: str) -> bool:
-    """Whether an include is of the package's own files, or of one of HEADERS."""
-    file = include.partition("include")[2].split("/*")[0].strip()[1:-1]
-    robots = re.fullmatch(rf"(?:link_\d+|{re.escape(name)}f?(?:_\w+)?)\.[ch]", file)
-    return file in HEADERS or robots is not None or own_text(f"c/{file}") is not None
-
-
-@cache
-def _c_vocabulary() -> tuple[frozenset[str], frozenset[str]]:
-    """Words of linkwise's own C, and those of them that stand before a bracket."""
-    folders = (files(place).joinpath("c") for place in ("linkwise.runtime", "linkwise.templates"))
-    own = (file for folder in folders for file in folder.iterdir() if file.name.endswith((".h", ".j2")))
-    plain = JINJA.sub(" ", "\n".join(file.read_text(encoding="utf-8") for file in own))
-    plain = re.sub(r"/\*.*?\*/|//[^\n]*", " ", plain, flags=re.DOTALL)
-    words = re.findall(r"[A-Za-z_]\w*", plain)
-    return frozenset((*words, *FUNCTIONS, "HUGE_VAL")), frozenset(re.findall(r"([A-Za-z_]\w*)\s*\(", plain))

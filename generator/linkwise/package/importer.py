@@ -13,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 from linkwise.package.contents import link_on_the_way
-from linkwise.package.emitted_text import foreign_text
+from linkwise.package.emitted_text import Source, foreign_text
 from linkwise.package.manifest import FILE, Manifest
 
 
@@ -83,7 +83,7 @@ class _Verified(SourceLoader):
         if link_on_the_way(self.directory, self.file) is None:
             data, manifest = (self.directory / self.file).read_bytes(), self.manifest
             if hashlib.sha256(data).hexdigest() == manifest.files[self.file]:
-                told = foreign_text(self.file, data, manifest.name, manifest.generator.get("linkwise"))
+                told = foreign_text(self.file, data, Source.of(manifest))
                 if told is None:
                     return data
         raise ImportError(f"{self.file} {told}", path=str(self.directory / self.file))

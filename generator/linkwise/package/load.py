@@ -175,7 +175,7 @@ def open_package(directory: Path) -> Package:
         told = f"its runtime is that of linkwise {version}, which is not at hand to compare with"
         mend = "its code runs as it is; generate the robot again if you do not know where it comes from"
         warnings.warn(f"{directory}: {told}: {mend}", LinkwiseWarning, stacklevel=2)
-    for fault in foreign(directory, manifest.files, manifest.name, version):
+    for fault in foreign(directory, manifest):
         raise LinkwiseError(f"{directory}: {fault}; nothing of it is run: generate the robot again")
     try:
         package = load_package(directory, manifest)

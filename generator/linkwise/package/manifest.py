@@ -97,6 +97,8 @@ class Manifest:
 
     def __post_init__(self) -> None:
         """Raise ValueError where entries contradict each other, or a path leads out of the package."""
+        if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", self.name, re.ASCII):
+            raise ValueError(f"name is {self.name[:80]!a}, which no module can be called")
         count = len(self.joints)
         if not count or not self.links:
             raise ValueError("there must be a joint and a link")

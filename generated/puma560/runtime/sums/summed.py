@@ -14,7 +14,7 @@ from .joint_matrices import JointMatrices
 from .namespace import hidden, namespace
 
 AT_ONCE = 1 << 22
-"""Packed numbers of one chunk of samples, each at n unit velocities."""
+"""Packed numbers of one chunk of samples, each at n unit velocities; of one sample at some of them."""
 
 Compute = Callable[[str, Sequence[Any]], Sequence[Any]]
 """The results of another call, by its name."""
@@ -92,17 +92,23 @@ class Summed:
         return self._christoffel(q, lambda c1: self._dense.spread(c1, "velocity"))
 
     def _christoffel(self, q: Any, made: Callable[[Any], Any]) -> tuple[Any, ...]:
-        n, batch = self._structure.n, tuple(q.shape[:-1])
-        flat, most = q.reshape(-1, n), max(1, AT_ONCE // (n * max(1, sum(self._structure.sizes))))
-        starts = [0] if hidden(flat) else range(0, max(1, len(flat)), most)
-        parts = [self._of_units(flat if hidden(flat) else flat[at : at + most], made) for at in starts]
-        whole = parts[0] if len(parts) == 1 else namespace(q).concat(parts, 0)
+        n, batch, each = self._structure.n, tuple(q.shape[:-1]), max(1, sum(self._structure.sizes))
+        flat, units = q.reshape(-1, n), self._backend.constant(np.eye(n), q)
+        if hidden(flat):
+            whole = self._of_units(flat, units, made)
+        else:
+            samples, rates = max(1, AT_ONCE // (n * each)), max(1, AT_ONCE // each)
+            whole = _joined(
+                [
+                    _joined([self._of_units(part, some, made) for some in _pieces(units, rates)], -1)
+                    for part in _pieces(flat, samples)
+                ],
+                0,
+            )
         return (whole.reshape(*batch, *whole.shape[1:]),)
 
-    def _of_units(self, q: Any, made: Callable[[Any], Any]) -> Any:
-        """What is made of c1 at unit velocities e_l, for samples (count, n); l is the last axis."""
-        n = self._structure.n
-        units = self._backend.constant(np.eye(n), q)
+    def _of_units(self, q: Any, units: Any, made: Callable[[Any], Any]) -> Any:
+        """What is made of c1 at some unit velocities e_l, for samples (count, n); l is the last axis."""
         places, rates = q[:, None, :] + 0.0 * units, 0.0 * q[:, None, :] + units
         values = self._compute("packed", (places, rates, 0.0 * rates))[1]
         if self._structure.linear:
@@ -115,3 +121,12 @@ class Summed:
 
     def _rest(self, q: Any) -> Any:
         return self._backend.zeros(q, self._structure.n)
+
+
+def _pieces(rows: Any, most: int) -> list[Any]:
+    """Rows (count, n), so many at a time; one piece of none where there are none."""
+    return [rows[at : at + most] for at in range(0, max(1, len(rows)), most)]
+
+
+def _joined(parts: list[Any], axis: int) -> Any:
+    return parts[0] if len(parts) == 1 else namespace(parts[0]).concat(parts, axis)
