@@ -12,7 +12,7 @@ import numpy as np
 
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.contact_equations import KINDS, ContactEquations
-from linkwise.check.loop_equations import RANK, LoopEquations
+from linkwise.check.loop_equations import RANK, LoopEquations, following
 from linkwise.check.loop_reference import condition_of, far_from_singular, held_motion, steady
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.rounding import measured
@@ -76,7 +76,7 @@ class HeldContacts:
         q = self.states.q
         rest, rows = [k for k in range(q.shape[1]) if k not in own], held.rows(q)
         clear = far_from_singular(rows[..., rest])
-        clear = clear[steady(held.recursion, q[clear], _mapped(rows[clear], list(own), rest))][:STATES]
+        clear = clear[steady(held.recursion, q[clear], following(rows[clear], own))][:STATES]
         if not clear.size:
             return None
         given = _Given(self.states.at(clear), list(own), rest)
@@ -119,7 +119,7 @@ class _Given:
 def _answers(held: ContactEquations, given: _Given) -> dict[str, Array]:
     q, own, rest = given.states.q, given.own, given.rest
     rows = held.rows(q)
-    inverse, follows = np.linalg.pinv(rows[..., rest]), _mapped(rows, own, rest)
+    inverse, follows = np.linalg.pinv(rows[..., rest]), following(rows, own)
     qd = (follows @ given.yd[..., None])[..., 0]
     rates = held.rates(q, qd)
     qdd = (follows @ given.ydd[..., None])[..., 0]
@@ -128,7 +128,7 @@ def _answers(held: ContactEquations, given: _Given) -> dict[str, Array]:
     basis = np.linalg.svd(rows[..., rest])[0][..., : len(rest)]
     onto = np.swapaxes(basis, -1, -2)
     states = given.moved(qd, qdd)
-    moved, forces = held_motion(held.recursion, states, onto @ rows, onto @ rates, given.tau)
+    moved, forces = held_motion(held.recursion, states, onto @ rows, onto @ rates, given.tau, own)
     forces = (basis @ forces[..., None])[..., 0]
     return {
         **_of_rows(held, rows, rates, forces),
@@ -164,10 +164,3 @@ def _of_rows(held: ContactEquations, rows: Array, rates: Array, forces: Array) -
         "A^T lambda": (np.swapaxes(rows, -1, -2) @ forces[..., None])[..., 0],
         "lambda": forces[:, slice(contact.stop - 3, contact.stop)],
     }
-
-
-def _mapped(rows: Array, own: list[int], rest: list[int]) -> Array:
-    """G (samples, n, m)."""
-    found = np.zeros((len(rows), rows.shape[2], len(own)))
-    found[:, own], found[:, rest] = np.eye(len(own)), -np.linalg.pinv(rows[..., rest]) @ rows[..., own]
-    return found

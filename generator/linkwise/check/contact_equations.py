@@ -16,6 +16,8 @@ POINT = np.array([0.1, -0.2, 0.15])
 AXIS = np.array([0.3, 0.5, -0.8])
 NORMAL = np.array([0.2, -0.1, 0.9])
 RADIUS = 0.07
+SPACIOUS = 20.0
+"""Contacts are nearer on links that reach less than 1 / this, in m."""
 KINDS = {"held": 6, "hinged": 5, "point": 3, "rolling": 3}
 """Number of rows of each."""
 
@@ -32,11 +34,12 @@ class ContactEquations:
     @property
     def asked(self) -> dict[str, Any]:
         """What the package is asked for."""
-        given: dict[str, Any] = {"frame": self.frame.name, "kind": self.kind, "point": tuple(POINT)}
+        length = min(1.0, SPACIOUS * self.recursion.reach)
+        given: dict[str, Any] = {"frame": self.frame.name, "kind": self.kind, "point": tuple(length * POINT)}
         if self.kind == "hinged":
             given["axis"] = tuple(AXIS)
         if self.kind == "rolling":
-            given |= {"normal": tuple(NORMAL), "radius": RADIUS}
+            given |= {"normal": tuple(NORMAL), "radius": length * RADIUS}
         return given
 
     def own(self, rows: Any) -> slice:

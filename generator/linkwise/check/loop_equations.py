@@ -3,6 +3,7 @@
 Rows of A are velocities of frames at one unit velocity after the other, and their complex step is dA/dt.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -99,12 +100,7 @@ class LoopEquations(NamedTuple):
 
     def velocity_map(self, q: Array) -> Array:
         """G (samples, n, m) of qd = G yd, y the tree's independent joints, by least squares."""
-        rows, own = self.rows(q), list(self.tree.independent)
-        rest = [k for k in range(q.shape[1]) if k not in own]
-        found = np.zeros((*q.shape, len(own)))
-        found[:, own] = np.eye(len(own))
-        found[:, rest] = -np.linalg.pinv(rows[..., rest]) @ rows[..., own]
-        return found
+        return following(self.rows(q), self.tree.independent)
 
     def basis(self, q: Array) -> Array:
         """Orthonormal columns (samples, C, d) of what dependent joints move of the rows.
@@ -136,3 +132,13 @@ class LoopEquations(NamedTuple):
             q[moving] += step * (LONGEST / np.maximum(size[moving], LONGEST))[:, None]
         closed: Array = q[(np.abs(self.violation(q)).max(-1) < CLOSED) & (size < SETTLED)]
         return closed
+
+
+def following(rows: Array, own: Sequence[int]) -> Array:
+    """G (samples, n, m) of qd = G yd under rows A (samples, C, n), y the joints `own`, by least squares."""
+    samples, _, n = rows.shape
+    rest = [k for k in range(n) if k not in own]
+    found = np.zeros((samples, n, len(own)))
+    found[:, own] = np.eye(len(own))
+    found[:, rest] = -np.linalg.pinv(rows[..., rest]) @ rows[..., own]
+    return found

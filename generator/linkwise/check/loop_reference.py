@@ -2,7 +2,8 @@
 
 With N an orthonormal basis of the null space, M qdd + h = tau + A^T lambda and A qdd = -dA/dt qd give
 (N^T M N) z = N^T (tau - h - M p) for qdd = N z + p, p = -A^+ dA/dt qd; lambda is what A^T lambda fits best.
-The package goes another way: it takes the dependent joints out, by QR.
+N is orthonormal in joints measured by sqrt(M_ii), so that a light link's motion is not lost beside a body's.
+The package goes another way: it takes the dependent joints out, by QR. What that may lose is in the noise.
 
 Loops may be open by some micrometres, where a file's numbers are rounded: rows are those of `basis`, U^T A
 and U^T dA/dt for U^T lambda, which are as good as all of them where loops close.
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.check.body_reference import by_unit
-from linkwise.check.loop_equations import LoopEquations
+from linkwise.check.loop_equations import LoopEquations, following
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.rounding import measured
 from linkwise.check.states import States
@@ -100,7 +101,7 @@ def _answers(equations: LoopEquations, motion: tuple[Array, Array, Array], tau: 
     followed = _Followed(equations, own, rest, q)
     qd = followed.velocity(yd)
     qdd, rates = followed.acceleration(qd, ydd), equations.rates(q, qd)
-    accelerations, forces = held_motion(equations.recursion, States(q, qd, qd), held, onto @ rates, tau)
+    accelerations, forces = held_motion(equations.recursion, States(q, qd, qd), held, onto @ rates, tau, own)
     shares, link_forces = _shared(equations, own, held, States(q, qd, qdd))
 
     def share(speed: Array, change: Array, gravity: bool = False) -> Array:
@@ -149,7 +150,7 @@ def _induced(
     (rows, rates, basis), torque = tied, equations.recursion.partial_torque
     q, qd, _ = states.motion
     n, rest = q.shape[1], 0.0 * q
-    mass = mass_matrix(equations.recursion, q)
+    mass = held_mass(equations.recursion, q, rows, equations.tree.independent)
     velocity = by_unit(lambda q, qd, _, e: 0.5 * torque(q, qd + 1j * e, 0.0 * q, gravity=False).imag, states)
     forces = {
         "actuators": np.eye(n) * tau[:, None, :],
@@ -157,7 +158,7 @@ def _induced(
         "gravity": -torque(q, rest, rest),
         "constraints": np.zeros((*q.shape, n)),
     }
-    null = np.swapaxes(np.linalg.svd(rows)[2][:, rows.shape[1] :], -1, -2)
+    null = motions(mass, rows)
     back, turned = np.swapaxes(null, -1, -2), np.swapaxes(rows, -1, -2)
     own = -np.linalg.pinv(rows, rcond=SMALL) @ (rates * qd[:, None, :])
     found = {}
@@ -166,7 +167,10 @@ def _induced(
         bias = own if source == "constraints" else 0.0 * flat
         driven = np.linalg.solve(back @ mass @ null, back @ (flat - mass @ bias))
         shares = null @ driven + bias
-        held = np.linalg.pinv(turned, rcond=SMALL) @ (mass @ shares - flat)
+        left = mass @ shares - flat
+        if equations.recursion.noise:
+            left = equations.recursion.noise(left, np.abs(mass) @ np.abs(shares) + np.abs(flat))
+        held = np.linalg.pinv(turned, rcond=SMALL) @ left
         found[f"{source}: accelerations"] = shares.reshape(force.shape)
         found[f"{source}: reactions"] = (basis @ held).reshape(len(q), -1, *force.shape[2:])
     return found
@@ -204,7 +208,32 @@ def mass_matrix(recursion: NewtonEuler, q: Array) -> Array:
     samples, n = q.shape
     rest, units = np.zeros((samples * n, n)), np.tile(np.eye(n), (samples, 1))
     torque = recursion.torque(np.repeat(q, n, 0), rest, units, gravity=False)
-    return np.swapaxes(torque.reshape(samples, n, n), -1, -2)
+    mass = np.swapaxes(torque.reshape(samples, n, n), -1, -2)
+    return recursion.noise(mass, np.abs(mass)) if recursion.noise else mass
+
+
+def held_mass(recursion: NewtonEuler, q: Array, rows: Array, own: Sequence[int]) -> Array:
+    """M, with noise where who takes the others out by G has that of G^T M G: in rows and columns of `own`."""
+    mass = mass_matrix(recursion, q)
+    if recursion.noise:
+        of_own = np.ix_(range(len(q)), own, own)
+        followed = np.abs(following(rows, own))
+        size = np.swapaxes(followed, -1, -2) @ np.abs(mass) @ followed
+        mass[of_own] = recursion.noise(mass[of_own], size)
+    return mass
+
+
+def motions(mass: Array, rows: Array) -> Array:
+    """N (samples, n, m), what joints may do under rows A: orthonormal if each is measured by sqrt(M_ii)."""
+    size = unit_sizes(mass)
+    null = np.swapaxes(np.linalg.svd(rows / size[:, None, :])[2][:, rows.shape[1] :], -1, -2)
+    return null / size[:, :, None]
+
+
+def unit_sizes(mass: Array) -> Array:
+    """sqrt(M_ii) (samples, n), 1 where that is none: what a coordinate is measured by in a mass matrix."""
+    diagonal = np.abs(mass.diagonal(0, -2, -1))
+    return np.where(diagonal > 0.0, np.sqrt(diagonal), 1.0)
 
 
 def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]:
@@ -213,7 +242,7 @@ def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]
     mapped: G (samples, n, m); of G^T M G, with ones on its diagonal, the least eigenvalue counts
     """
     mass = np.swapaxes(mapped, -1, -2) @ mass_matrix(recursion, q) @ mapped
-    size = np.sqrt(mass.diagonal(0, -2, -1))
+    size = unit_sizes(mass)
     least = np.linalg.eigvalsh(mass / (size[:, :, None] * size[:, None, :]))[:, 0]
     if not len(least):
         return np.zeros(0, dtype=bool)
@@ -222,18 +251,20 @@ def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]
 
 
 def held_motion(
-    recursion: NewtonEuler, states: States, rows: Array, rates: Array, tau: Array
+    recursion: NewtonEuler, states: States, rows: Array, rates: Array, tau: Array, own: Sequence[int]
 ) -> tuple[Array, Array]:
-    """qdd and lambda of torques under rows that do not follow from each other."""
+    """qdd and lambda of torques under rows that do not follow from each other and leave `own` free."""
     q, qd, _ = states.motion
-    mass = mass_matrix(recursion, q)
+    mass = held_mass(recursion, q, rows, own)
     bias = recursion.torque(q, qd, 0.0 * q)
-    null = np.swapaxes(np.linalg.svd(rows)[2][:, rows.shape[1] :], -1, -2)
+    null = motions(mass, rows)
     back = np.swapaxes(null, -1, -2)
     moved = -np.linalg.pinv(rows, rcond=SMALL) @ (rates @ qd[..., None])
     driven = back @ ((tau - bias)[..., None] - mass @ moved)
     qdd = null @ np.linalg.solve(back @ mass @ null, driven) + moved
     left = mass @ qdd + (bias - tau)[..., None]
+    if recursion.noise:
+        left = recursion.noise(left, np.abs(mass) @ np.abs(qdd) + np.abs(bias - tau)[..., None])
     forces = np.linalg.pinv(np.swapaxes(rows, -1, -2), rcond=SMALL) @ left
     return qdd[..., 0], forces[..., 0]
 

@@ -2,6 +2,7 @@
 
 Spatial vectors about the base, with lengths for vectors: sums add magnitudes, products multiply them,
 so that nothing cancels. Closed forms in a common frame add such numbers too, and lose what cancels of them.
+Along a path of many joints they do so again and again, by which its sizes are larger here.
 A torque that is 0 by geometry has no size of its own; of its operands rounding leaves some 1e-16.
 """
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from linkwise.check.curve_reference import displacement_bound
 from linkwise.check.newton_euler import Points, path_of
+from linkwise.check.rounding import gathered
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
@@ -65,7 +67,7 @@ class Magnitudes:
                 moment = reach * force + abs(body.mass) * (frame.v + frame.omega * reach) ** 2
                 moment = moment + float(np.linalg.norm(body.inertia)) * turning
                 about = moment[:, None] + reaches[:, path] * force[:, None]
-                work = slopes[:, path] * np.where(turns, about, force[:, None])
+                work = slopes[:, path] * np.where(turns, about, force[:, None]) * gathered(len(path))
                 for k, column in zip(coordinates, work.T, strict=True):
                     tau[:, k, j, x] += column
         return tau

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.check.curve_reference import displacement
+from linkwise.check.rounding import NoisyTree
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, FrameEntry, Manifest, RigidTree
 
@@ -44,7 +45,11 @@ class NewtonEuler:
 
     def __init__(self, manifest: Manifest, tree: RigidTree) -> None:
         self.bodies: tuple[BodyEntry, ...] = tree.bodies
+        self.noise = tree.rounded if isinstance(tree, NoisyTree) else None
         self.gravity = np.array(tree.gravity)
+        self.reach = max(
+            float(np.linalg.norm(x)) for body in self.bodies for x in (body.com, body.translation)
+        )
         self.n = len(manifest.joints)
         index = {body.link: b for b, body in enumerate(self.bodies)}
         self.links = [index[link.name] for link in manifest.links]
@@ -68,7 +73,7 @@ class NewtonEuler:
         shape = len(q), self.n, len(self.links), len(carried[0])
         tau = np.zeros(shape, np.result_type(q, qd, qdd))
         for j, (at, bodies, path) in enumerate(zip(self.links, carried, self.paths, strict=True)):
-            force, moment, com = (part[:, None] for part in _wrenches(bodies, motions[at].frame))
+            force, moment, com = (part[:, None] for part in self._wrenches(bodies, motions[at].frame))
             # On a joint that turns, the moment about its origin; on one that slides, the force.
             about = moment + _cross(com - origins[:, path.bodies], force)
             share = np.where(path.turning[:, None, None], about, force)
@@ -85,7 +90,7 @@ class NewtonEuler:
         for at in reversed(range(len(self.bodies))):
             body, (frame, axis) = self.bodies[at], motions[at]
             if at in self.links:
-                force, moment, com = (part[:, 0] for part in _wrenches([body], frame))
+                force, moment, com = (part[:, 0] for part in self._wrenches([body], frame))
                 forces[at] += force
                 moments[at] += moment + _cross(com - frame.origin, force)
             share = moments[at] if body.kind == "revolute" else forces[at]
@@ -132,9 +137,36 @@ class NewtonEuler:
             arm = at.rotation @ place
             speed = _cross(at.omega, arm)
             change = _cross(at.alpha, arm) + _cross(at.omega, speed)
-            speeds.append(np.concatenate([at.omega, at.v + speed], -1))
+            shift = at.v + speed
+            if self.noise and not np.iscomplexobj(q):  # of a complex step it would be no slope's
+                reach = _length(at.origin + arm)
+                shift = self.noise(shift, _length(at.v) + _length(at.omega) * reach)
+            speeds.append(np.concatenate([at.omega, shift], -1))
             changes.append(np.concatenate([at.alpha, at.a + change], -1))
         return np.stack(speeds, 1), np.stack(changes, 1)
+
+    def _wrenches(self, bodies: Sequence[BodyEntry], frame: _FrameMotion) -> tuple[Array, Array, Array]:
+        """Force at the centre of mass, moment about it, and where it is, (samples, X, 3), of X bodies.
+
+        Noise is of the size of what both are summed from about the base, as closed forms do in one frame.
+        """
+        mass, com, inertia = (
+            np.array([getattr(body, name) for body in bodies]) for name in ("mass", "com", "inertia")
+        )
+        rotation, origin, omega, alpha, a = (
+            part[:, None] for part in (frame.rotation, frame.origin, frame.omega, frame.alpha, frame.a)
+        )
+        lever, spun = _applied(rotation, com), _turned(inertia, rotation)
+        turning = _cross(alpha, lever) + _cross(omega, _cross(omega, lever))
+        force = mass[:, None] * (a + turning)
+        moment = _applied(spun, alpha) + _cross(omega, _applied(spun, omega))
+        if self.noise:
+            reach, rates = _length(origin + lever), _length(alpha) + _length(omega) ** 2
+            size = np.abs(mass)[:, None] * (_length(a) + rates * reach)
+            force = self.noise(force, size)
+            sizes = np.sqrt((inertia**2).sum((-2, -1)))[:, None]
+            moment = self.noise(moment, reach * size + sizes * rates)
+        return force, moment, origin + lever
 
     def _carriers(self, bodies: Sequence[int | None], q: Array, qd: Array, qdd: Array) -> list[_FrameMotion]:
         """Frames of some bodies, or of the ground, in motion without gravity."""
@@ -202,20 +234,6 @@ def path_of(bodies: Sequence[BodyEntry], at: int) -> list[int]:
     return path
 
 
-def _wrenches(bodies: Sequence[BodyEntry], frame: _FrameMotion) -> tuple[Array, Array, Array]:
-    """Force at the centre of mass, moment about it, and where it is, (samples, X, 3), of each of X bodies."""
-    mass, com, inertia = (
-        np.array([getattr(body, name) for body in bodies]) for name in ("mass", "com", "inertia")
-    )
-    rotation, origin, omega, alpha, a = (
-        part[:, None] for part in (frame.rotation, frame.origin, frame.omega, frame.alpha, frame.a)
-    )
-    lever, spun = _applied(rotation, com), _turned(inertia, rotation)
-    turning = _cross(alpha, lever) + _cross(omega, _cross(omega, lever))
-    moment = _applied(spun, alpha) + _cross(omega, _applied(spun, omega))
-    return mass[:, None] * (a + turning), moment, origin + lever
-
-
 def _turned(inertia: Array, rotation: Array) -> Array:
     """Inertia about the centre of mass, in the world's axes."""
     turned: Array = rotation @ inertia @ rotation.swapaxes(-1, -2)
@@ -230,6 +248,12 @@ def _cross(a: Array, b: Array) -> Array:
     product[..., 1] = a2 * b0 - a0 * b2
     product[..., 2] = a0 * b1 - a1 * b0
     return product
+
+
+def _length(vectors: Array) -> Array:
+    """Length of each (..., 3), (..., 1)."""
+    length: Array = np.sqrt((np.abs(vectors) ** 2).sum(-1, keepdims=True))
+    return length
 
 
 def _dot(a: Array, b: Array) -> Array:

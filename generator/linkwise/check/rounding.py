@@ -1,12 +1,12 @@
 """How far rounding may move an answer: the same answer of a robot whose every number is off by a little.
 
 What is found by solving equations loses as many digits as their matrix is badly conditioned, which no bound
-of sums tells. Noise of a known size in all that goes in changes it; that change, over the size of the noise,
-is how large the numbers are that such an answer is summed from.
+of sums tells. Noise of a known size in all that goes in, and in what is summed of it on the way, changes it;
+that change, over the size of the noise, is how large the numbers are that such an answer is summed from.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,11 @@ NOISE = 1e-11
 DRAWS = 2
 JOINTS = 10
 """From so many on their number counts."""
+
+
+def gathered(joints: int) -> float:
+    """How many times more roundings there are of so many joints, one after the other, than of a few."""
+    return max(1.0, joints / JOINTS)
 
 
 def measured(
@@ -37,8 +42,7 @@ def measured(
         for what, value in values.items():
             moved = np.abs(changed[what] - value).reshape(len(value), -1).max(-1, initial=0.0)
             scales[what] = np.maximum(scales[what], moved / NOISE)
-    # Who eliminates one joint after the other gathers roundings as there are joints.
-    losing = losing * max(1.0, len(tree.bodies) / JOINTS)
+    losing = losing * gathered(len(tree.bodies))
     scales = {what: scale * losing for what, scale in scales.items()}
     return values, {
         what: np.broadcast_to(scale.reshape(-1, *[1] * (values[what].ndim - 1)), values[what].shape)
@@ -46,7 +50,21 @@ def measured(
     }
 
 
-def _noisy(tree: RigidTree, generator: np.random.Generator) -> RigidTree:
+@dataclass(frozen=True)
+class NoisyTree(RigidTree):
+    """A tree with noise in its numbers, with which the recursion puts noise in its sums too."""
+
+    generator: np.random.Generator
+
+    def rounded(self, value: Array, size: Array) -> Array:
+        """The value with noise of what it is summed from, in both parts of a complex one."""
+        noise = NOISE * size * self.generator.standard_normal(value.shape)
+        if np.iscomplexobj(value):
+            noise = noise + 1j * NOISE * size * self.generator.standard_normal(value.shape)
+        return value + noise
+
+
+def _noisy(tree: RigidTree, generator: np.random.Generator) -> NoisyTree:
     """The tree with NOISE in every number, by the size of the vector or matrix that it is of."""
 
     def off(number: float) -> float:
@@ -86,6 +104,6 @@ def _noisy(tree: RigidTree, generator: np.random.Generator) -> RigidTree:
         for coupling in tree.couplings
     )
     ties = tuple(replace(tie, length=off(tie.length)) for tie in tree.ties)
-    return replace(
-        tree, gravity=vector(tree.gravity), bodies=bodies, frames=frames, couplings=couplings, ties=ties
-    )
+    entries = {field.name: getattr(tree, field.name) for field in fields(RigidTree)}
+    entries |= {"bodies": bodies, "frames": frames, "couplings": couplings, "ties": ties}
+    return NoisyTree(**entries | {"gravity": vector(tree.gravity)}, generator=generator)

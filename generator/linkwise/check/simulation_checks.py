@@ -133,7 +133,7 @@ def _tied(recursion: NewtonEuler, tree: RigidTree, tau: Array) -> Rates:
         qd[:, own] = v
         qd[:, rest] = -(np.linalg.pinv(rows[..., rest]) @ rows[..., own] @ v[..., None])[..., 0]
         onto = np.swapaxes(np.linalg.svd(rows[..., rest])[0][..., : len(rest)], -1, -2)
-        moved = held_motion(recursion, States(q, qd, qd), onto @ rows, onto @ ties.rates(q, qd), tau)[0]
+        moved = held_motion(recursion, States(q, qd, qd), onto @ rows, onto @ ties.rates(q, qd), tau, own)[0]
         return q, qd, moved[:, own], (qd * tau).sum(-1)
 
     return motion
