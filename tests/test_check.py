@@ -397,9 +397,30 @@ def test_c_that_does_not_compile_fails_with_the_compilers_words(copy_for: Copy) 
             "planar2_power is declared, and there is",
         ),
         ("void planar2_link_2f(", "void link_2f(", "planar2_link_2f is not declared"),
+        ('"joint1",', '"joint7",', "the names of the joints are wrong"),
+        (
+            "planar2_lower_limit[PLANAR2_JOINTS] = {-",
+            "planar2_lower_limit[PLANAR2_JOINTS] = {",
+            "the lower limits",
+        ),
+        (
+            "planar2_upper_limit[PLANAR2_JOINTS] = {H",
+            "planar2_upper_limit[PLANAR2_JOINTS] = {-H",
+            "the upper limits",
+        ),
+        (
+            "velocity_limit[PLANAR2_JOINTS] = {HUGE_VAL",
+            "velocity_limit[PLANAR2_JOINTS] = {1.0",
+            "the velocity limits",
+        ),
+        (
+            "effort_limit[PLANAR2_JOINTS] = {HUGE_VAL,",
+            "effort_limit[PLANAR2_JOINTS] = {",
+            "the effort limits",
+        ),
     ],
 )
-def test_a_header_that_declares_other_functions_fails(old: str, new: str, fault: str, copy_for: Copy) -> None:
+def test_a_header_that_says_something_else_fails(old: str, new: str, fault: str, copy_for: Copy) -> None:
     package = copy_for("c")
     change_file(package, "c/planar2.h", old, new)
     found = {result.name: result for result in check_package(package, 3)}

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from linkwise.check.c_headers import wrong_header
 from linkwise.check.compare import Entries, Result, compare, skipped
-from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype, declared
+from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype
 from linkwise.check.control_functions import CONTROL, control_calls, control_prototypes
 from linkwise.check.frame_reference import FrameReference
 from linkwise.check.impedance_functions import NOT_CALLED, impedance_calls, impedance_prototypes
@@ -19,7 +20,6 @@ from linkwise.check.packed_layout import IndexRows, Rows, packed
 from linkwise.check.reference import Reference, dense_quantities
 from linkwise.check.states import NUMBERS
 from linkwise.errors import LinkwiseError
-from linkwise.escape import identifiers
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
@@ -235,56 +235,9 @@ def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[Com
         return None, skipped("c: not checked", " ".join(str(error).split()))
     except (LinkwiseError, OSError) as error:
         return None, Result("c: compiles", False, None, " ".join(str(error).split()))
-    wrong = (
-        _wrong_number(manifest, compiled, rows)
-        or _wrong_table(manifest, directory, rows)
-        or _wrong_function(manifest, compiled, rows)
-    )
+    wrong = wrong_header(manifest, compiled, directory, rows, prototypes(manifest, rows))
     detail = wrong or "as the manifest's paths say"
     return compiled, Result("c: numbers, indices and functions of the headers", not wrong, None, detail)
-
-
-def _wrong_number(manifest: Manifest, compiled: CompiledPackage, rows: IndexRows) -> str:
-    sizes = {what.upper(): len(rows.of(what)) for what in ("c2", "c1", "g", "h1")}
-    expected = {"JOINTS": len(manifest.joints), "LINKS": len(manifest.links), "BLOCK": 8, "BLOCKF": 16}
-    expected |= {key: size for key, size in sizes.items() if size or key != "H1"}
-    expected |= {"PARAMETERS": len(manifest.parameters)} if manifest.parameters else {}
-    if manifest.tree is not None:
-        names = [frame.name for frame in manifest.tree.frames]
-        numbers = {key: f for f, key in enumerate(identifiers(names, "FRAME_"))}
-        expected |= {"FRAMES": len(names)} | numbers
-    wrong = sorted(set(expected.items()) ^ set(compiled.constants.items()))
-    return f"{wrong[0][0]} is wrong" if wrong else ""
-
-
-def _wrong_table(manifest: Manifest, directory: Path, rows: IndexRows) -> str:
-    text = (directory / "c" / f"{manifest.name}_index.h").read_text(encoding="utf-8")
-    name = re.escape(manifest.name)
-    for what in ("c2", "c1", "g", "h1"):
-        size = f"{name.upper()}_{what.upper()}"
-        head = rf"static const short {name}_{what}_index\[{size}\]\[{rows.of(what).shape[1]}\]"
-        body = re.search(rf"^{head} = \{{(.*?)\n\}};", text, re.DOTALL | re.MULTILINE)
-        found = re.findall(r"\{([\d, ]+)\}", body[1]) if body else []
-        listed = [[int(number) - 1 for number in row.split(",")] for row in found]
-        if listed != rows.of(what).tolist():
-            return f"the indices of {what} are wrong"
-    return ""
-
-
-def _wrong_function(manifest: Manifest, compiled: CompiledPackage, rows: IndexRows) -> str:
-    name = manifest.name
-    expected = {f"{name}_{f.name}": f.declaration(name) for f in prototypes(manifest, rows)}
-    found = declared(name, compiled.header)
-    wrong = [
-        *(f"{function} is not declared" for function in expected.keys() - found.keys()),
-        *(f"{function} is declared, and there is no such function" for function in found.keys() - expected),
-        *(
-            f"{function} is declared otherwise"
-            for function, text in expected.items()
-            if found.get(function, text) != text
-        ),
-    ]
-    return "; ".join(sorted(wrong)[:3])
 
 
 def _blocks(motion: Array, width: int) -> Array:
