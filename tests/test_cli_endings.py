@@ -180,6 +180,13 @@ def test_a_full_disk_behind_stdout_is_one_line() -> None:
     )
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_mistake_that_a_full_disk_leaves_no_place_to_tell_has_its_status() -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([*COMMAND, "check", "nowhere"], stderr=full, check=False)
+    assert done.returncode == 2
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="needs ulimit -v")
 def test_bounded_addresses_are_enough_or_told(tmp_path: Path) -> None:
     """Arrow reserves a gigabyte otherwise, and ends the process where what is left does not suffice."""

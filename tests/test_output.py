@@ -202,6 +202,17 @@ def test_the_file_that_blocks_is_named(way: Callable[[Path], None], blocked: str
     assert sorted(os.listdir(tmp_path)) == ["file", "link"]
 
 
+@pytest.mark.parametrize("way", [write_folder, write_set, require_writable])
+@pytest.mark.parametrize("address", ["s3://bucket/results", "file:///results"])
+def test_an_address_is_no_folder(
+    way: Callable[[Path], None], address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(LinkwiseError, match="that is an address, and results are written to folders"):
+        way(Path(address))
+    assert not list(tmp_path.iterdir())
+
+
 def test_folders_made_for_a_failed_writer_go_too(tmp_path: Path) -> None:
     (tmp_path / "kept").mkdir()
     with pytest.raises(LinkwiseError), whole_directory(tmp_path / "kept/a/b/target", nothing_refused):

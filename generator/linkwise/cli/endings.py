@@ -4,7 +4,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from linkwise.errors import LinkwiseError
@@ -29,25 +29,27 @@ def ended_in_one_line() -> Iterator[None]:
         yield
         sys.stdout.flush()  # a full disk or a closed pipe shows here, and not after the end
     except (Exception, KeyboardInterrupt) as error:
-        if isinstance(error, OSError):
-            _let_go_of_output()
         if isinstance(error, BrokenPipeError):
+            _let_go_of_output()
             sys.exit(CLOSED_PIPE)  # whoever reads has enough: nothing to be said
         if os.environ.get(TRACEBACK) == "1":
             traceback.print_exception(error)
         message, status = ending(error)
-        print(f"linkwise: {one_line(message, LONGEST_LINE)}", file=sys.stderr)
+        with suppress(OSError):  # a full disk: the status tells it all the same
+            print(f"linkwise: {one_line(message, LONGEST_LINE)}", file=sys.stderr)
+        _let_go_of_output()
         sys.exit(status)
 
 
 def _let_go_of_output() -> None:
     """Print what waits; where that cannot be, send it nowhere, as Python would try again at its end."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
-        os.close(nowhere)
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)
 
 
 def ending(error: BaseException) -> tuple[str, int]:

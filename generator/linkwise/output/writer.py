@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import shutil
 import signal
 import sys
@@ -15,6 +16,9 @@ from linkwise.errors import LinkwiseError
 from linkwise.output.exchange import exchange, flush, put
 from linkwise.output.workplace import ENDING, NEW, REST, sweep, workplace
 from linkwise.runtime.native.native_system import system_here
+
+ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:(?=/|$)")
+"""s3://bucket as a path has it; a drive of Windows is one letter."""
 
 
 @contextmanager
@@ -119,6 +123,8 @@ def _folder(directory: Path) -> Iterator[None]:
 @contextmanager
 def _told(place: Path) -> Iterator[None]:
     """Make LinkwiseError of an OSError on the way to `place`: a full disk, above all."""
+    if ADDRESS.match(place.as_posix()):
+        raise LinkwiseError(f"{place}: that is an address, and results are written to folders; choose one")
     try:
         yield
     except OSError as error:
