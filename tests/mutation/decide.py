@@ -10,7 +10,7 @@ from threading import Lock
 from mutation.mutants import Mutant
 from mutation.reach import Map, digest
 from mutation.rooms import NOT_COUNTED, ROOMS
-from mutation.tree import ROOT, Ended, Tree
+from mutation.tree import ROOT, Ended, Tree, say
 from mutation.verdicts import Record
 
 STAGES = (10.0, 40.0, 160.0)
@@ -89,4 +89,4 @@ class Decider:
     def _leave(self, name: str, why: str) -> None:
         with self._lock:
             self.unsteady[name] = why
-        print(f"no verdict by {name}: {why}", flush=True)
+        say(f"no verdict by {name}: {why}")

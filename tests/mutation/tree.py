@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 
 from mutation.mutants import Mutant
 
@@ -33,6 +34,8 @@ HEAVY = (
 PLAIN = ("-q", "-p", "no:cacheprovider", "--no-header", "--tb=short", "--assert=plain", "--disable-warnings")
 MEMORY = 12 * 2**30
 """Bytes that a process may fill: a loop without an end fills them all."""
+FORKING = Lock()
+"""Held to fork, and by whoever takes locks of libraries beside it: a child would wait for them for ever."""
 _IGNORED = shutil.ignore_patterns("__pycache__", "mutation", "test_mutation.py")
 
 
@@ -118,7 +121,8 @@ class Tree:
         """
         if self.stopped:
             raise SystemExit("stopped")
-        self.child = os.fork()
+        with FORKING:
+            self.child = os.fork()
         if self.child == 0:
             _child(self.folder, work, cpu)
         _, status = os.waitpid(self.child, 0)
@@ -154,13 +158,19 @@ class First:
             self.by = str(report.nodeid)  # type: ignore[attr-defined]
 
 
+def say(line: str) -> None:
+    """Print a line."""
+    with FORKING:
+        print(line, flush=True)
+
+
 def load_heavy() -> None:
     """Load what tests load, and say which of it is lacking."""
     for name in HEAVY:
         try:
             importlib.import_module(name)
         except ImportError:
-            print(f"without {name}: tests that need it are skipped")
+            say(f"without {name}: tests that need it are skipped")
 
 
 def _child(folder: Path, work: Callable[[Callable[..., int]], int], cpu: float) -> None:
