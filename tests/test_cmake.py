@@ -9,6 +9,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import linkwise
 import numpy as np
 import pytest
 import urdf_text
@@ -24,7 +25,7 @@ each_generator = pytest.mark.parametrize(
     [pytest.param(tool, marks=needs(tool)) for tool in GENERATORS],
 )
 needs_ninja = needs("ninja")
-MODULE = Path(__file__).parents[1] / "generator/linkwise/cmake"
+MODULE = Path(linkwise.__file__).parent / "cmake"
 PROGRAM = Path(sys.executable).parent / "linkwise"
 
 LISTS = """cmake_minimum_required(VERSION 3.20)

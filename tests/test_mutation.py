@@ -210,6 +210,21 @@ def test_a_verdict_stays_for_the_same_texts_alone(tmp_path: Path, monkeypatch: p
             assert not again.decided(one)
 
 
+def test_what_a_mutant_survived_is_not_run_again_on_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mutant, changed = some_mutants()[0], "tests/test_graphs.py"
+    first = Record(tmp_path / "verdicts.json")
+    first.add("single-files", mutant, "survived", "3 s of tests")
+    monkeypatch.setattr(verdicts, "digest", lambda path: "new" if path == ROOT / changed else digest(path))
+    reach = Map(tmp_path / "reach")
+    tests = {name: Reached("", {f"{name}::x": 1.0}, {}) for name in (changed, "tests/test_cli.py")}
+    monkeypatch.setattr(reach, "files", tests)
+    monkeypatch.setattr(reach, "tests", lambda path, line: [(f"{name}::x", 1.0) for name in tests])
+    decider = Decider(reach, Record(tmp_path / "verdicts.json"))
+    assert list(decider.stages("single-files", mutant)) == [([f"{changed}::x"], 1.0)]
+
+
 def test_quick_tests_that_are_about_a_function_come_first_and_the_rest_of_their_files_last(
     tmp_path: Path,
 ) -> None:

@@ -10,13 +10,13 @@ from threading import Lock
 from mutation.mutants import Mutant
 from mutation.reach import Map, digest
 from mutation.rooms import NOT_COUNTED, ROOMS
-from mutation.tree import ROOT, Ended, Tree
+from mutation.tree import ROOT, Ended, Tree, say
 from mutation.verdicts import Record
 
 STAGES = (10.0, 40.0, 160.0)
 """Seconds of tests, as the map has measured them, of the processes that a mutant is put to in turn."""
 UNKNOWN = 300.0
-"""Seconds for a file that a room names, which no map has measured."""
+"""Seconds for a file that a room names, which no map has measured: new ones, and those of `make ship`."""
 
 
 class Decider:
@@ -30,14 +30,18 @@ class Decider:
         self._lock = Lock()
 
     def stages(self, room: str, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
-        """Tests of each process, and their seconds: what reaches the change, else what the room names."""
+        """Tests of each process, and their seconds: what reaches the change, else what the room names.
+
+        Those that it is known to survive are left out.
+        """
+        tried = self.record.survived(mutant)
         near = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else []
         if not near:
-            for name in ROOMS[room].tests:
+            for name in (name for name in ROOMS[room].tests if name not in tried):
                 known = self.reach.files.get(name)
-                yield [name], sum(known.seconds.values()) if known else UNKNOWN
+                yield [name], (sum(known.seconds.values()) if known else 0.0) or UNKNOWN
             return
-        ranked = iter(near)
+        ranked = iter([item for item in near if item[0].partition("::")[0] not in tried])
         for limit in STAGES:
             tests: list[str] = []
             total = 0.0
@@ -65,6 +69,8 @@ class Decider:
                     return ("too slow" if ended.too_slow else "killed"), ended.by or tests[0]
                 if not ended.by:
                     raise SystemExit(f"{' '.join(tests)} end with {ended.code} without a mutant, too")
+        if not total and self.record.survived(mutant):
+            return "survived", self.record.verdicts[mutant.key].by
         return "survived", f"{total:.0f} s of tests" if total else "nothing reaches it"
 
     def _trusted(self, ended: Ended, tests: list[str], seconds: float, left: list[str], tree: Tree) -> bool:
@@ -89,4 +95,4 @@ class Decider:
     def _leave(self, name: str, why: str) -> None:
         with self._lock:
             self.unsteady[name] = why
-        print(f"no verdict by {name}: {why}", flush=True)
+        say(f"no verdict by {name}: {why}")

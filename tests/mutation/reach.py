@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mutation.tree import ROOT, Tree
+from mutation.tree import FORKING, ROOT, Tree, say
 
 HOUSE = "generator/linkwise"
 SLOW = 1800
@@ -211,9 +211,11 @@ def _reached(name: str, tree: Tree) -> Reached:
 
     code = tree.forked(work, SLOW)
     if not seconds.is_file():
-        print(f"{name}: ended with {code} under coverage, and is not in the map", flush=True)
+        say(f"{name}: ended with {code} under coverage, and is not in the map")
         return Reached(digest(ROOT / name), {}, {})
-    return Reached(digest(ROOT / name), json.loads(seconds.read_text()), _collected(folder, tree))
+    with FORKING:
+        functions = _collected(folder, tree)
+    return Reached(digest(ROOT / name), json.loads(seconds.read_text()), functions)
 
 
 def _collected(folder: Path, tree: Tree) -> dict[str, dict[str, list[str]]]:

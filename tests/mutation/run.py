@@ -25,7 +25,7 @@ from mutation.decide import Decider
 from mutation.mutants import Mutant
 from mutation.reach import Map
 from mutation.rooms import ROOMS, drawn, test_files
-from mutation.tree import ROOT, Tree, load_heavy
+from mutation.tree import ROOT, Tree, load_heavy, say
 from mutation.verdicts import Record, explained, scores, table, written
 
 PAGE = ROOT / "docs/trust.md"
@@ -82,9 +82,9 @@ def swept(options: argparse.Namespace) -> bool:
         trees = [Tree(Path(folder) / str(k)) for k in range(options.jobs)]
         unknown = [name for name in test_files() if name not in reach.files]
         if unknown:
-            print(f"{len(unknown)} files of tests run under coverage first", flush=True)
+            say(f"{len(unknown)} files of tests run under coverage first")
         for name in side_by_side(unknown, reach.add, trees, end):
-            print(f"mapped: {name}", flush=True)
+            say(f"mapped: {name}")
         if any(name not in reach.files for name in test_files()):
             return False
 
@@ -93,11 +93,11 @@ def swept(options: argparse.Namespace) -> bool:
             verdict, by = decider.decide(room, mutant, tree)
             record.add(room, mutant, verdict, by)
             if verdict == "survived":
-                print(f"survives: {mutant.key} (line {mutant.line}; {by})", flush=True)
+                say(f"survives: {mutant.key} (line {mutant.line}; {by})")
 
         todo = in_turn(options.only, record)
         done = sum(1 for _ in side_by_side(todo, decide, trees, end))
-    print(f"{done} of {len(todo)} mutants decided", flush=True)
+    say(f"{done} of {len(todo)} mutants decided")
     return done == len(todo) and not decider.unsteady
 
 

@@ -9,11 +9,13 @@ import resource
 import shutil
 import signal
 import sys
+import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 
 from mutation.mutants import Mutant
 
@@ -32,7 +34,14 @@ HEAVY = (
 """Loaded once, before the first fork; nothing of linkwise is."""
 PLAIN = ("-q", "-p", "no:cacheprovider", "--no-header", "--tb=short", "--assert=plain", "--disable-warnings")
 MEMORY = 12 * 2**30
-"""Bytes that a process may fill: a loop without an end fills them all."""
+"""Bytes that a run of tests may fill, with its programs: a loop without an end fills them all.
+
+It is watched, for under the system's own limit of memory programs do not run that look after their memory.
+"""
+WATCHED = 0.2
+"""Seconds between two looks at what runs."""
+FORKING = Lock()
+"""Held to fork, and by whoever takes locks of libraries beside it: a child would wait for them for ever."""
 _IGNORED = shutil.ignore_patterns("__pycache__", "mutation", "test_mutation.py")
 
 
@@ -118,10 +127,15 @@ class Tree:
         """
         if self.stopped:
             raise SystemExit("stopped")
-        self.child = os.fork()
+        with FORKING:
+            self.child = os.fork()
         if self.child == 0:
             _child(self.folder, work, cpu)
-        _, status = os.waitpid(self.child, 0)
+        while not (ended := os.waitpid(self.child, os.WNOHANG))[0]:
+            time.sleep(WATCHED)
+            if _filled(self.child) > MEMORY:
+                self._end()
+        status = ended[1]
         self._end()  # what a test left running
         if self.stopped:
             raise SystemExit("stopped")
@@ -154,13 +168,29 @@ class First:
             self.by = str(report.nodeid)  # type: ignore[attr-defined]
 
 
+def _filled(group: int) -> int:
+    """Bytes of memory that the processes of a group fill; 0 where there is no /proc."""
+    pages = 0
+    for place in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # one that has ended since
+            fields = place.read_text(encoding="utf-8").rpartition(")")[2].split()
+            pages += int(fields[21]) if int(fields[2]) == group else 0
+    return pages * resource.getpagesize()
+
+
+def say(line: str) -> None:
+    """Print a line."""
+    with FORKING:
+        print(line, flush=True)
+
+
 def load_heavy() -> None:
     """Load what tests load, and say which of it is lacking."""
     for name in HEAVY:
         try:
             importlib.import_module(name)
         except ImportError:
-            print(f"without {name}: tests that need it are skipped")
+            say(f"without {name}: tests that need it are skipped")
 
 
 def _child(folder: Path, work: Callable[[Callable[..., int]], int], cpu: float) -> None:
@@ -170,7 +200,6 @@ def _child(folder: Path, work: Callable[[Callable[..., int]], int], cpu: float) 
     os.dup2(out, 1)
     os.dup2(out, 2)
     resource.setrlimit(resource.RLIMIT_CPU, (int(cpu) + 1, int(cpu) + 6))
-    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     signal.alarm(int(10 * cpu) + 1)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)  # ignored in the background: programs under test inherit that

@@ -24,6 +24,7 @@ class Verdict:
 
     verdict: killed, too slow or survived; by: the test that failed, else how much was run;
     source: digest of the file that is changed; tests: of the file of the test that failed, else of all
+    together
     """
 
     room: str
@@ -39,12 +40,13 @@ class Record:
     def __init__(self, file: Path) -> None:
         """Take what is there."""
         self.file = file
-        kept = json.loads(file.read_text()) if file.is_file() else {"verdicts": {}, "sound": {}}
-        self.verdicts = {key: Verdict(**entry) for key, entry in kept["verdicts"].items()}
-        self.sound: dict[str, str] = kept["sound"]
-        self.all_tests = hashlib.sha256(
-            "".join(f"{name} {digest(ROOT / name)}\n" for name in test_files()).encode()
-        ).hexdigest()[:16]
+        kept = json.loads(file.read_text()) if file.is_file() else {}
+        self.verdicts = {key: Verdict(**entry) for key, entry in kept.get("verdicts", {}).items()}
+        self.sound: dict[str, str] = kept.get("sound", {})
+        now = {name: digest(ROOT / name) for name in test_files()}
+        texts = "".join(f"{name} {text}\n" for name, text in now.items())
+        self.all_tests = hashlib.sha256(texts.encode()).hexdigest()[:16]
+        self.suites: dict[str, dict[str, str]] = kept.get("suites", {}) | {self.all_tests: now}
 
     def tests(self, verdict: str, by: str) -> str:
         """Digest of the tests that a verdict rests on."""
@@ -58,6 +60,13 @@ class Record:
             return None
         return kept if kept.tests == self.tests(kept.verdict, kept.by) else None
 
+    def survived(self, mutant: Mutant) -> set[str]:
+        """Files of tests, as they are now, that this mutant of the text as it is has survived before."""
+        kept, now = self.verdicts.get(mutant.key), self.suites[self.all_tests]
+        if kept is None or kept.verdict in CAUGHT or kept.source != digest(ROOT / mutant.path):
+            return set()
+        return {name for name, text in self.suites.get(kept.tests, {}).items() if now.get(name) == text}
+
     def add(self, room: str, mutant: Mutant, verdict: str, by: str) -> None:
         """Keep a verdict."""
         tests = self.tests(verdict, by)
@@ -66,7 +75,12 @@ class Record:
 
     def save(self) -> None:
         """Write the record, whole or not at all."""
-        data = {"verdicts": {k: asdict(v) for k, v in self.verdicts.items()}, "sound": self.sound}
+        used = {self.all_tests, *(verdict.tests for verdict in self.verdicts.values())}
+        data = {
+            "verdicts": {k: asdict(v) for k, v in self.verdicts.items()},
+            "sound": self.sound,
+            "suites": {k: suite for k, suite in self.suites.items() if k in used},
+        }
         beside = self.file.with_suffix(".new")
         beside.write_text(json.dumps(data, indent=1))
         beside.replace(self.file)
