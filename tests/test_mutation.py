@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -218,9 +219,9 @@ def test_what_a_mutant_survived_is_not_run_again_on_it(
     first.add("single-files", mutant, "survived", "3 s of tests")
     monkeypatch.setattr(verdicts, "digest", lambda path: "new" if path == ROOT / changed else digest(path))
     reach = Map(tmp_path / "reach")
-    tests = {name: Reached("", {f"{name}::x": 1.0}, {}) for name in (changed, "tests/test_cli.py")}
+    tests = {name: Reached("", {f"{name}::x": 1.0}, {}, {}) for name in (changed, "tests/test_cli.py")}
     monkeypatch.setattr(reach, "files", tests)
-    monkeypatch.setattr(reach, "tests", lambda path, line: [(f"{name}::x", 1.0) for name in tests])
+    monkeypatch.setattr(reach, "tests", lambda path, line: ([(f"{name}::x", 1.0) for name in tests], []))
     decider = Decider(reach, Record(tmp_path / "verdicts.json"))
     assert list(decider.stages("single-files", mutant)) == [([f"{changed}::x"], 1.0)]
 
@@ -235,22 +236,31 @@ def test_quick_tests_that_are_about_a_function_come_first_and_the_rest_of_their_
     reach = Map(tmp_path)
     reach.files = {
         "tests/a.py": Reached(
-            "", {"a::slow": 9.0, "a::quick": 1.0, "a::far": 0.1}, {path: {function: ["a::slow", "a::quick"]}}
+            "",
+            {"a::slow": 9.0, "a::quick": 1.0, "a::far": 0.1},
+            {path: {function: ["a::slow", "a::quick"]}},
+            {},
         ),
-        "tests/b.py": Reached("", {"b::x": 3.0, "b::y": 2.0}, {path: {function: [""]}}),
+        "tests/b.py": Reached("", {"b::x": 3.0, "b::y": 2.0}, {path: {function: [""]}}, {}),
         "tests/d.py": Reached(
             "",
             {"d::of_all": 2.0},
             {path: {function: ["d::of_all"]}, "elsewhere/b.py": {f"f{k}": [""] for k in range(9)}},
+            {},
         ),
-        "tests/c.py": Reached("", {"c::z": 0.1}, {path: {"": [""]}}),
+        "tests/c.py": Reached("", {"c::z": 0.1}, {path: {"": [""]}}, {}),
     }
-    assert [name for name, _ in reach.tests(path, line)] == [
-        *("b::y", "b::x", "a::quick", "a::slow", "d::of_all", "a::far"),
-    ]
-    at_import = [name for name, _ in reach.tests(path, 1)]
-    assert {"a::quick", "a::slow", "d::of_all"} == {*at_import[:-4]}
-    assert {"a::far", "b::x", "b::y", "c::z"} == {*at_import[-4:]}
+
+    def near_and_far(line: int) -> list[list[str]]:
+        return [[name for name, _ in part] for part in reach.tests(path, line)]
+
+    assert near_and_far(line) == [["b::y", "b::x", "a::quick", "a::slow", "d::of_all"], ["a::far"]]
+    near, far = near_and_far(1)
+    assert {"a::quick", "a::slow", "d::of_all"} == {*near}
+    assert {"a::far", "b::x", "b::y", "c::z"} == {*far}
+    of_line = {path: {text.splitlines()[line - 1].strip(): ["a::slow"]}}
+    reach.files["tests/a.py"] = replace(reach.files["tests/a.py"], lines=of_line)
+    assert near_and_far(line) == [["a::slow"], ["a::far", "a::quick"]]
 
 
 def test_a_sweep_maps_decides_and_goes_on(tmp_path: Path) -> None:

@@ -15,6 +15,8 @@ from mutation.verdicts import Record
 
 STAGES = (10.0, 40.0, 160.0)
 """Seconds of tests, as the map has measured them, of the processes that a mutant is put to in turn."""
+BESIDE = 40.0
+"""Seconds of the other tests of the same files."""
 UNKNOWN = 300.0
 """Seconds for a file that a room names, which no map has measured: new ones, and those of `make ship`."""
 
@@ -35,14 +37,16 @@ class Decider:
         Those that it is known to survive are left out.
         """
         tried = self.record.survived(mutant)
-        near = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else []
+        near, far = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
         if not near:
             for name in (name for name in ROOMS[room].tests if name not in tried):
                 known = self.reach.files.get(name)
                 yield [name], (sum(known.seconds.values()) if known else 0.0) or UNKNOWN
             return
-        ranked = iter([item for item in near if item[0].partition("::")[0] not in tried])
-        for limit in STAGES:
+        close, beside = (
+            iter([item for item in part if item[0].partition("::")[0] not in tried]) for part in (near, far)
+        )
+        for ranked, limit in (*((close, limit) for limit in STAGES), (beside, BESIDE)):
             tests: list[str] = []
             total = 0.0
             for name, seconds in ranked:

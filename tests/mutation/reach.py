@@ -1,7 +1,8 @@
-"""Which tests reach a function: each file of tests runs under coverage.py, anew when its text changes.
+"""Which tests reach a line: each file of tests runs under coverage.py, anew when its text changes.
 
-Kept by the function's name, not by line, so that it stays true while lines move. What programs of the tests
-reach counts for the test that runs them, what fixtures of many tests reach for every test of their file.
+Kept by the text of the line and by the function's name, not by number, so that it stays true while lines
+move. What programs of the tests reach counts for the test that runs them, what fixtures of many tests reach
+for every test of their file.
 """
 
 import ast
@@ -37,12 +38,21 @@ class Reached:
     """What one file of tests reaches.
 
     seconds: of the processor, of each of its tests; functions: of a source, by name, "" for what runs at
-    its import: tests, or "" where every test of the file may depend on it
+    its import: tests, or "" where every test of the file may depend on it; lines: the same of lines within
+    functions, by their text, None for all tests that reach the function
     """
 
     digest: str
     seconds: dict[str, float]
     functions: dict[str, dict[str, list[str]]]
+    lines: dict[str, dict[str, list[str] | None]]
+
+    def of_line(self, path: str, function: str, text: str) -> set[str] | None:
+        """Tests that reach a line within a function; None where none does."""
+        if text not in self.lines.get(path, {}):
+            return None
+        tests = self.lines[path][text]
+        return set(self.functions[path].get(function, ()) if tests is None else tests)
 
     def share(self, folder: str) -> float:
         """Of all functions that are reached, the part that is in a folder."""
@@ -77,19 +87,24 @@ class Map:
         kept = self.folder / (name.removesuffix(".py").replace("/", "+") + ".json")
         kept.write_text(json.dumps(vars(reached)))
 
-    def tests(self, path: str, line: int) -> list[tuple[str, float]]:
-        """Tests that reach the function of a line, with their seconds; first what tells most in a second.
+    def tests(self, path: str, line: int) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
+        """Tests that reach a line, else its function, with their seconds; first what tells most in a second.
 
         Files are in turn by their seconds for each share of them that is about the path's folder, in each the
-        quick tests first. After these come the other tests of these files, which may use what those kept.
+        quick tests first. Beside these the other tests of these files, which may use what those kept.
         """
-        function = name_at((ROOT / path).read_text(encoding="utf-8"), line)
+        source = (ROOT / path).read_text(encoding="utf-8")
+        function, text = name_at(source, line), source.splitlines()[line - 1].strip()
         is_known = any(function in reached.functions.get(path, {}) for reached in self.files.values())
+        of_line = {name: reached.of_line(path, function, text) for name, reached in self.files.items()}
+        is_reached = bool(function) and any(of_line.values())
         near: list[tuple[float, list[tuple[str, float]]]] = []
         far: list[tuple[float, list[tuple[str, float]]]] = []
-        for reached in self.files.values():
+        for file, reached in self.files.items():
             here = reached.functions.get(path, {})
-            if function and is_known:
+            if is_reached:
+                names = of_line[file] or set()
+            elif function and is_known:
                 names = set(here.get(function, ()))
             else:  # what runs at import may matter to all that use the module
                 names = {name for found in here.values() for name in found if name}
@@ -102,8 +117,11 @@ class Map:
             far.append(
                 (sum(reached.seconds.values()) / share, [item for item in ranked if item not in close])
             )
-        groups = [group for part in (near, far) for _, group in sorted(part, key=lambda item: item[0])]
-        return [item for group in groups for item in group]
+
+        def joined(part: list[tuple[float, list[tuple[str, float]]]]) -> list[tuple[str, float]]:
+            return [item for _, group in sorted(part, key=lambda pair: pair[0]) for item in group]
+
+        return joined(near), joined(far)
 
 
 @cache
@@ -212,17 +230,20 @@ def _reached(name: str, tree: Tree) -> Reached:
     code = tree.forked(work, SLOW)
     if not seconds.is_file():
         say(f"{name}: ended with {code} under coverage, and is not in the map")
-        return Reached(digest(ROOT / name), {}, {})
+        return Reached(digest(ROOT / name), {}, {}, {})
     with FORKING:
-        functions = _collected(folder, tree)
-    return Reached(digest(ROOT / name), json.loads(seconds.read_text()), functions)
+        functions, lines = _collected(folder, tree)
+    return Reached(digest(ROOT / name), json.loads(seconds.read_text()), functions, lines)
 
 
-def _collected(folder: Path, tree: Tree) -> dict[str, dict[str, list[str]]]:
-    """Functions that were reached, of all processes' data."""
+def _collected(
+    folder: Path, tree: Tree
+) -> tuple[dict[str, dict[str, list[str]]], dict[str, dict[str, list[str] | None]]]:
+    """Functions and lines that were reached, of all processes' data."""
     import coverage
 
     found: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    lines: dict[str, dict[tuple[str, str], set[str]]] = defaultdict(lambda: defaultdict(set))
     for file in folder.glob("reached*"):
         data = coverage.CoverageData(str(file))
         try:
@@ -234,10 +255,24 @@ def _collected(folder: Path, tree: Tree) -> dict[str, dict[str, list[str]]]:
             if path is None:
                 continue
             text = (ROOT / path).read_text(encoding="utf-8")
+            numbered = text.splitlines()
             for line, contexts in data.contexts_by_lineno(measured).items():
                 tests = {test_of(part) for part in contexts}
-                found[path][name_at(text, line)] |= {test if "::" in test else "" for test in tests}
-    return {path: {name: sorted(tests) for name, tests in inner.items()} for path, inner in found.items()}
+                tests, name = {test if "::" in test else "" for test in tests}, name_at(text, line)
+                found[path][name] |= tests
+                if name:
+                    lines[path][name, numbered[line - 1].strip()] |= tests
+    functions = {
+        path: {name: sorted(tests) for name, tests in inner.items()} for path, inner in found.items()
+    }
+    by_line = {
+        path: {
+            line: None if tests == found[path][name] else sorted(tests)
+            for (name, line), tests in inner.items()
+        }
+        for path, inner in lines.items()
+    }
+    return functions, by_line
 
 
 def _source(measured: str, tree: Tree) -> str | None:
