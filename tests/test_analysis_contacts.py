@@ -245,6 +245,15 @@ def test_the_command_writes_forces_and_draws_them(folder: Path, tmp_path: Path) 
     assert any("force/sole force_y/pelvis" in line for line in header[:3])
 
 
+def test_a_contact_stands_by_one_column(folder: Path, tmp_path: Path) -> None:
+    words = "analyze", "still.csv", "--robot", "leg", "--out", tmp_path / "out", "--contact", "sole:foot=held"
+    done = run_linkwise(*words, *(("--contact-while", "sole=stands>0.5") * 2), folder=folder)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "linkwise: error: --contact-while sole=stands>0.5: sole has one already; give one for each contact\n"
+    )
+
+
 BAD = {
     "foot=glued": "write it as FRAME=KIND@X,Y,Z, the kind one of held, point, hinged, rolling",
     "foot=rolling": "--contact foot=rolling: write it as FRAME=rolling,RADIUS@X,Y,Z, in m",

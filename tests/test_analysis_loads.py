@@ -256,6 +256,8 @@ def test_values_that_are_no_load_are_refused(arm: Path) -> None:
             Load("f", "tool", np.zeros((4, 3)), time=np.arange(5)),
             r"force has shape \(4, 3\); give .* \(5, 3\)",
         ),
+        (Load("f", "tool", time=np.zeros((2, 3))), r"load 'f': time has shape \(2, 3\); give \(S,\), in s"),
+        (Load("f", "tool", time=[]), r"load 'f': time has shape \(0,\); give \(S,\), in s"),
         (Load("f", "tool", (1, 2, np.inf)), r"load 'f': a value is not finite; fill the gap"),
         (Load("f", "tool", time=np.array([0.0, 1.0, 0.5])), r"load 'f': row 3, time column: time runs back"),
         (Load("f", "tool", axes="tol"), r"load 'f', given in the axes of 'tol': test has no such body"),

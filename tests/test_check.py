@@ -296,6 +296,12 @@ WRONG = {
         "stream_rows(G, r[t].g, g + 0 * at",
         "c: planar2_d",
     ),
+    "large batches with their zeros": (
+        "c/planar2.c",
+        "s + t * BLOCK, samples_of(count - s, t), &wait, to)",
+        "s + 0 * BLOCK, samples_of(count - s, t), &wait, to)",
+        "c: planar2_coefficients",
+    ),
     "one link alone": (
         "c/planar2.c",
         "m.sine, m.cosine, c2, c1",

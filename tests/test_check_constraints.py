@@ -149,3 +149,88 @@ def test_states_next_to_a_singular_mass_matrix_are_left_out(tmp_path: Path) -> N
     (tmp_path / "walker.toml").write_text(FLOATING)
     write_package(generate(read_system(tmp_path / "walker.toml"), ["numpy"]), tmp_path / "walker")
     assert not [result for result in check_package(tmp_path / "walker", samples=5) if result.failed]
+
+
+BODY = "inertia = {xx = 0.001, yy = 0.002, zz = 0.0025}"
+SLIDER = f"""schema = 1
+name = "right"
+gravity = [0, 0, -9.81]
+link = [
+  {{name = "crank", mass = 1.0, com = [0.05, 0, 0], {BODY}}},
+  {{name = "piston", mass = 0.5, {BODY}}},
+]
+joint = [
+  {{name = "turn", parent = "base", child = "crank", axis = [0, 1, 0]}},
+  {{name = "slide", type = "prismatic", parent = "base", child = "piston", axis = [1, 0, 0]}},
+]
+[[constraint]]
+name = "rod"
+type = "distance"
+length = 0.3
+first = {{frame = "crank", xyz = [0.1, 0, 0]}}
+second = {{frame = "piston"}}
+"""
+CAM = f"""schema = 1
+name = "right"
+gravity = [0, 0, -9.81]
+link = [
+  {{name = "a", mass = 1.0, com = [0.1, 0, 0], inertia = {{xx = 0.01, yy = 0.01, zz = 0.01}}}},
+  {{name = "b", mass = 0.3, com = [0.05, 0.02, 0], {BODY}}},
+]
+joint = [
+  {{name = "ja", parent = "base", child = "a", axis = [0, 1, 0]}},
+  {{name = "jb", type = "prismatic", parent = "a", child = "b", xyz = [0.2, 0, 0], axis = [1, 0, 1]}},
+]
+[[constraint]]
+name = "cam"
+type = "coupling"
+terms = {{jb = 1, ja = [0.05, -0.1, 0.02, 0.003]}}
+"""
+LIGHT = """schema = 1
+name = "right"
+gravity = [0, 0, -9.81]
+link = [
+  {name = "b", mass = 10.0, com = [0.01, 0, 0.02], inertia = {xx = 1.0, yy = 1.2, zz = 0.9}},
+  {name = "w", mass = 1e-4, com = [0, 0, 0.1], inertia = {xx = 1e-8, yy = 1e-8, zz = 1e-9}},
+]
+joint = [
+  {name = "f", type = "floating", parent = "base", child = "b"},
+  {name = "a", type = "ball", parent = "b", child = "w", xyz = [0.3, 0, 0]},
+]
+"""
+FAR = (
+    (Path(__file__).parent / "data/fourbar.toml")
+    .read_text()
+    .replace('parent = "base", child = "crank"', 'parent = "base", child = "crank", xyz = [1000, 500, 0]')
+    .replace('xyz = ["ground", 0, 0]', 'xyz = ["ground + 1000", 500, 0]')
+)
+DAMPED = f"""schema = 1
+name = "right"
+link = [
+  {{name = "a", mass = 1.0, com = [0.1, 0, 0], {BODY}}},
+  {{name = "b", mass = 0.3, com = [0.05, 0.02, 0], {BODY}}},
+]
+joint = [
+  {{name = "ja", parent = "base", child = "a", damping = 0.7, friction = 0.4, armature = 0.05}},
+  {{name = "jb", parent = "a", child = "b", xyz = [0.2, 0, 0], stiffness = 3, rest = 0.2, damping = 0.2}},
+]
+"""
+RIGHT = {
+    "a slider-crank, one joint of which bears nothing by velocity": (SLIDER, "numpy", "auto"),
+    "a cam that follows a polynomial": (CAM, "numpy", "auto"),
+    "a light link on a body, whose contact leaves hardly any mass": (LIGHT, "numpy", "auto"),
+    "a four-bar a kilometre away": (FAR, "numpy", "auto"),
+    "joints that take torques of their own, in C": (DAMPED, "c", "auto"),
+    "the same in loops": (DAMPED, "c", "loops"),
+}
+
+
+@pytest.mark.parametrize("robot", RIGHT)
+def test_a_right_package_is_never_called_wrong(robot: str, tmp_path: Path) -> None:
+    text, backend, kernel = RIGHT[robot]
+    (tmp_path / "robot.toml").write_text(text)
+    files = generate(read_system(tmp_path / "robot.toml"), [backend], kernel=kernel)
+    write_package(files, tmp_path / "right")
+    results = check_package(tmp_path / "right")
+    assert not [result for result in results if result.failed]
+    assert backend != "c" or "c: right_coefficients" in {result.name for result in results if result.held}

@@ -69,10 +69,11 @@ def urdf(mass: str = "1.5") -> str:
 
 @dataclass(frozen=True)
 class Project:
-    """A project in a folder with a space in its name, and where it is built."""
+    """A project in a folder with a space in its name; program: the folder of linkwise's."""
 
     tool: str
     source: Path
+    program: Path = PROGRAM.parent
 
     @property
     def build(self) -> Path:
@@ -84,7 +85,7 @@ class Project:
 
     def configure(self, *options: str) -> subprocess.CompletedProcess[str]:
         command = ["cmake", "-G", GENERATORS[self.tool], "-S", str(self.source), "-B", str(self.build)]
-        path = f"{PROGRAM.parent}{os.pathsep}{os.environ['PATH']}"
+        path = f"{self.program}{os.pathsep}{os.environ['PATH']}"
         return subprocess.run(
             [*command, f"-Dlinkwise_DIR={MODULE}", *options],
             env=os.environ | {"PATH": path},
@@ -305,6 +306,24 @@ def test_a_robot_that_another_folder_makes_may_change_even_its_name(tool: str, t
 
 
 @needs_ninja
+def test_a_project_may_be_built_beside_the_build_that_it_is_part_of(tmp_path: Path) -> None:
+    whole, part = Project("ninja", tmp_path / "whole"), tmp_path / "part"
+    write_project(part, f"{LISTS.partition('linkwise_add_robot')[0]}add_subdirectory(made)\n")
+    with (part / "CMakeLists.txt").open("a") as lists:
+        lists.write('linkwise_add_robot(arm ROBOT "${PROJECT_BINARY_DIR}/made/arm.urdf")\n')
+    (part / "made").mkdir()
+    (part / "made/CMakeLists.txt").write_text(
+        'set(robot "${PROJECT_SOURCE_DIR}/arm one.urdf")\n'
+        'add_custom_command(OUTPUT arm.urdf COMMAND cmake -E copy "${robot}" arm.urdf)\n'
+        "add_custom_target(description DEPENDS arm.urdf)\n"
+    )
+    head = "cmake_minimum_required(VERSION 3.20)\nproject(whole LANGUAGES C CXX)\n"
+    write_project(whole.source, f"{head}add_subdirectory({part} {tmp_path / 'built'})\n")
+    done = whole.configure()
+    assert done.returncode == 0, done.stderr
+
+
+@needs_ninja
 def test_a_project_of_cpp_alone_and_one_for_another_machine(tmp_path: Path) -> None:
     project = Project("ninja", tmp_path / "cpp")
     lists = LISTS.partition("linkwise_add_robot")[0].replace("C CXX", "CXX")
@@ -368,6 +387,17 @@ def test_a_program_of_another_installation_is_refused(tmp_path: Path) -> None:
     done = project.configure(f"-DLINKWISE_EXECUTABLE={other}")
     assert done.returncode != 0
     assert "is not of the installation in" in " ".join(done.stderr.split())
+
+
+@needs_ninja
+def test_without_the_program_it_is_told_what_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folders = os.environ["PATH"].split(os.pathsep)
+    monkeypatch.setenv("PATH", os.pathsep.join(f for f in folders if not (Path(f) / "linkwise").exists()))
+    project = Project("ninja", tmp_path / "alone", program=tmp_path)
+    write_project(project.source)
+    done = project.configure()
+    assert done.returncode != 0
+    assert "the program linkwise is not in PATH; set LINKWISE_EXECUTABLE" in " ".join(done.stderr.split())
 
 
 def test_linkwise_prints_the_folder_of_its_module() -> None:

@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+import warnings
 from types import FrameType
 
 import pytest
@@ -37,6 +38,19 @@ def test_limits_are_of_what_the_work_takes_itself() -> None:
     with pytest.raises(OutOfTime, match="it took more than 1 s"):
         in_own_process(turn, LIMITS)
     assert len(held) == 256 << 20
+
+
+def test_forks_beside_threads_of_others_are_no_matter_for_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    fork = os.fork
+
+    def warning() -> int:
+        warnings.warn("this process has threads", DeprecationWarning, stacklevel=2)  # as from Python 3.12 on
+        return fork()
+
+    monkeypatch.setattr(os, "fork", warning)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert in_own_process(lambda: 3) == 3
 
 
 def test_an_interrupt_ends_the_work_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -71,6 +71,7 @@ from linkwise.study import RayCluster
 before = dict(os.environ)
 assert list(RayCluster().outcomes(())) == []
 assert {name: os.environ.get(name) for name in before} == before
+assert "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER" not in os.environ
 parents = {int(stat.parent.name): int(stat.read_text().rpartition(")")[2].split()[1])
            for stat in Path("/proc").glob("[0-9]*/stat") if stat.exists()}
 
