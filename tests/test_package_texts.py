@@ -152,6 +152,12 @@ FOREIGN: dict[str, tuple[str, str, str, str]] = {
         '#define WANT_TORQUE\n#include "link_99.h"\n',
         'has #include "link_99.h", which is not listed',
     ),
+    "a header of C behind a comment": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        "#define WANT_TORQUE\n/* */ # /* */ include <stdlib.h>\n",
+        "include <stdlib.h>, which is not listed",
+    ),
     "a header of C beside the package": (
         "c/planar2.c",
         "#define WANT_TORQUE\n",

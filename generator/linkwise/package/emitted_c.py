@@ -53,7 +53,7 @@ TAKEN = frozenset(("asm", "goto"))
 
 def foreign_includes(text: str, listed: frozenset[str]) -> Iterator[str]:
     """What a C file of a package includes beside listed files and headers of the standard."""
-    for found in INCLUDE.finditer(text):
+    for found in INCLUDE.finditer(_blanked(text, "comment")[0]):
         quote, file = found[1], found[2].strip()
         if not (file in HEADERS if quote == "<" else quote == '"' and f"c/{file}" in listed):
             yield f"line {_line(text, found.start())} has {' '.join(found[0].split())}, which is not listed"
@@ -71,7 +71,7 @@ def foreign_c(text: str, name: str) -> Iterator[str]:
 def _read(text: str, name: str) -> Iterator[tuple[int, str]]:
     if found := SPLICED.search(text):
         yield found.start(), f"has {found[0]!a}"
-    code, wrong = _code(text)
+    code, wrong = _blanked(text, "comment", "string")
     yield from wrong
     if found := DIGRAPH.search(code):
         yield found.start(), f"has {found[0]}"
@@ -91,14 +91,14 @@ def _read(text: str, name: str) -> Iterator[tuple[int, str]]:
             yield token.start(), told
 
 
-def _code(text: str) -> tuple[str, list[tuple[int, str]]]:
-    """The text with blanks in place of comments and strings, and strings that do not end."""
+def _blanked(text: str, *kinds: str) -> tuple[str, list[tuple[int, str]]]:
+    """The text with blanks in place of comments, of strings too if asked; and strings that do not end."""
     wrong: list[tuple[int, str]] = []
 
     def blank(found: re.Match[str]) -> str:
         if found.lastgroup == "quote":
             wrong.append((found.start(), "has a string that does not end"))
-        return re.sub(r"[^\n]", " ", found[0])
+        return re.sub(r"[^\n]", " ", found[0]) if found.lastgroup in kinds else found[0]
 
     return QUOTED.sub(blank, text), wrong
 
