@@ -216,6 +216,9 @@ def test_curves_are_linked_to_the_slider(page):
         "return (line.left + line.width / 2 - area.left) / area.width"
     )
     assert share == pytest.approx(700 / 999, abs=2e-3)
+    for end in (0, 999):
+        choose(page, "slider", end)
+        assert page.find_element("id", "curves-cursor").is_displayed()
     page.execute_script("document.getElementById('map').emit('plotly_click', {points: [{x: 2, y: 1}]})")
     assert page.find_element("id", "joint").get_attribute("value") == "1"
     assert page.find_element("id", "curves-title").text == "On joint2, through all links, by cause"
