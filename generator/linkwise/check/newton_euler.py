@@ -78,8 +78,10 @@ class NewtonEuler:
             about = moment + _cross(com - origins[:, path.bodies], force)
             share = np.where(path.turning[:, None, None], about, force)
             work = slopes[:, path.bodies] * (axes[:, path.bodies] * share).sum(-1)
-            # several bodies of a path may move by one coordinate
-            np.add.at(tau[:, :, j].swapaxes(0, 1), path.coordinates, work.swapaxes(0, 1))
+            if len(set(path.coordinates)) == len(path.coordinates):
+                tau[:, path.coordinates, j] = work
+            else:  # several bodies move by one coordinate
+                np.add.at(tau[:, :, j].swapaxes(0, 1), path.coordinates, work.swapaxes(0, 1))
         return tau
 
     def torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:

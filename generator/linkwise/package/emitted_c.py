@@ -7,7 +7,7 @@ one of those that linkwise writes, and what a compiler would join or replace bef
 
 import re
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from typing import NamedTuple
 
@@ -75,7 +75,7 @@ def _read(text: str, name: str) -> Iterator[tuple[int, str]]:
     yield from wrong
     if found := DIGRAPH.search(code):
         yield found.start(), f"has {found[0]}"
-    local = set(DECLARED.findall(code))
+    local = frozenset(DECLARED.findall(code))
     for token in TOKEN.finditer(code):
         what, told = token[0], ""
         match token.lastgroup:
@@ -103,7 +103,7 @@ def _blanked(text: str, *kinds: str) -> tuple[str, list[tuple[int, str]]]:
     return QUOTED.sub(blank, text), wrong
 
 
-def _directive(line: str, local: set[str], name: str) -> str:
+def _directive(line: str, local: frozenset[str], name: str) -> str:
     """What is wrong with a line for the preprocessor; what it includes is looked at by itself."""
     found = DIRECTIVE.fullmatch(line)
     if found is None or found["robot"] not in (None, name):
@@ -112,7 +112,8 @@ def _directive(line: str, local: set[str], name: str) -> str:
     return next(filter(None, (_word(word, False, local, name) for word in words)), "")
 
 
-def _word(what: str, called: bool, local: set[str], name: str) -> str:
+@lru_cache(maxsize=4096)
+def _word(what: str, called: bool, local: frozenset[str], name: str) -> str:
     """What is wrong with a word, in words; empty if nothing."""
     known = _vocabulary()
     if OF_LINK.fullmatch(what):
