@@ -53,7 +53,7 @@ class NewtonEuler:
         self.n = len(manifest.joints)
         index = {body.link: b for b, body in enumerate(self.bodies)}
         self.links = [index[link.name] for link in manifest.links]
-        self.paths = [_Path.of(self.bodies, at) for at in self.links]
+        self.paths = [_LinkPath.of(self.bodies, at) for at in self.links]
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
         """τ_ij, shape (samples, n, N), for inputs of shape (samples, n)."""
@@ -212,7 +212,7 @@ def _moved(body: BodyEntry, up: _FrameMotion, turn: Array, rate: Array, change: 
 
 
 @dataclass(frozen=True)
-class _Path:
+class _LinkPath:
     """What carries a link, from its body to the ground: bodies, whether each turns, and its coordinate."""
 
     bodies: NDArray[np.intp]
@@ -220,7 +220,7 @@ class _Path:
     coordinates: NDArray[np.intp]
 
     @classmethod
-    def of(cls, bodies: Sequence[BodyEntry], at: int) -> "_Path":
+    def of(cls, bodies: Sequence[BodyEntry], at: int) -> "_LinkPath":
         """That of the body at a place."""
         path = path_of(bodies, at)
         turning = np.array([bodies[b].kind == "revolute" for b in path])
