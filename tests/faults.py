@@ -23,7 +23,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.output import whole_directory
 from needed import missing
 
-WHEN = {"write": 40, "generate": 150, "analyze": 150}
+WHEN = {"write": 40, "generate": 1000, "analyze": 400}
 """More calls of each kind than a job makes."""
 NO_EXCHANGE = "--inject=renameat2:error=ENOSYS"
 """A file system that cannot exchange two folders in one step."""
