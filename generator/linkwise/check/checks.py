@@ -1,8 +1,7 @@
 """The checks of `linkwise check`."""
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,7 +12,6 @@ from linkwise.check.as_generated import check_files, check_made, check_manifest,
 from linkwise.check.back_end_checks import CHECKS
 from linkwise.check.c_functions import CFunctions, References, compile_c
 from linkwise.check.compare import Result, skipped
-from linkwise.check.compiled_c import CompiledPackage
 from linkwise.check.derivations import derivations
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.packed_layout import IndexRows
@@ -62,12 +60,10 @@ def results_of(directory: Path, samples: int = 100) -> Iterator[Result]:
     if agrees.failed:
         return
     yield made
-    with ThreadPoolExecutor(1) as beside:  # compilers take a while
-        compiling = beside.submit(_compiled, package)
-        with staying():
-            loaded, missing = _load(package)
-        yield from missing
-        yield from _guarded("answers", _numbers(package, loaded, compiling, samples))
+    with staying():
+        loaded, missing = _load(package)
+    yield from missing
+    yield from _guarded("answers", _numbers(package, loaded, samples))
 
 
 def _load(package: Package) -> tuple[dict[Way, Model], list[Result]]:
@@ -115,27 +111,14 @@ def _lacks(error: Exception) -> bool:
     return isinstance(error, RuntimeError) and here and " failed: " not in str(error)
 
 
-def _compiled(package: Package) -> tuple[CompiledPackage | None, Iterable[Result]]:
-    """A package's C, and what is to be told of it."""
-    manifest = package.manifest
-    if f"c/{manifest.name}.h" not in manifest.files:
-        return None, ()
-    rows = IndexRows.of_paths([link.path for link in manifest.links], package.module.ROBOT.linear)
-    compiled, result = compile_c(manifest, package.directory, rows)
-    return compiled, (result,)
-
-
-def _numbers(
-    package: Package,
-    loaded: Mapping[Way, Model],
-    compiling: "Future[tuple[CompiledPackage | None, Iterable[Result]]]",
-    samples: int,
-) -> Iterator[Result]:
+def _numbers(package: Package, loaded: Mapping[Way, Model], samples: int) -> Iterator[Result]:
     """Everything for the parameters as generated, and, where there are some, for others too."""
     manifest = package.manifest
     rows = IndexRows.of_paths([link.path for link in manifest.links], package.module.ROBOT.linear)
-    compiled, told_of_c = compiling.result()
-    yield from told_of_c
+    compiled = None
+    if f"c/{manifest.name}.h" in manifest.files:
+        compiled, result = compile_c(manifest, package.directory, rows)
+        yield result
     count = few, rest = affordable(samples, len(manifest.joints), len(manifest.links))
     if few < samples:
         told = f"{few} random ones instead of {samples}, and {rest} at rest: for more it would take gigabytes"
