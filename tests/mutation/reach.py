@@ -156,20 +156,26 @@ def _spent() -> float:
 class Watch:
     """Tells coverage which test runs, and how long each takes."""
 
-    def __init__(self, switch: Callable[[str], None]) -> None:
-        self.switch = switch
+    def __init__(self) -> None:
         self.now = ""
         self.seconds: dict[str, float] = defaultdict(float)
 
     @contextmanager
     def _as(self, name: str) -> Iterator[None]:
         before, self.now = self.now, name
-        self.switch(name)
+        self.tell()
         try:
             yield
         finally:
             self.now = before
-            self.switch(before)
+            self.tell()
+
+    def tell(self) -> None:
+        """Tell what measures in this process which test runs."""
+        import coverage
+
+        if cover := coverage.Coverage.current():
+            cover.switch_context(self.now)
 
     def pytest_configure(self, config: Any) -> None:
         """Wrap what pytest calls; written so that this module does not need pytest."""
@@ -220,7 +226,8 @@ def _reached(name: str, tree: Tree) -> Reached:
         os.environ["COVERAGE_PROCESS_START"] = str(settings)
         cover = coverage.Coverage(config_file=str(settings))
         cover.start()
-        watch = Watch(cover.switch_context)
+        watch = Watch()
+        os.register_at_fork(after_in_child=watch.tell)  # after coverage's own, which starts without a context
         code = pytest_main(["-m", "not ship", name], [watch])
         cover.stop()
         cover.save()
