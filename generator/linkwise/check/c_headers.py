@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from linkwise.check.compiled_c import CompiledPackage, Prototype, declared
 from linkwise.check.packed_layout import IndexRows
 from linkwise.escape import identifiers
@@ -50,9 +52,11 @@ def _wrong_table(manifest: Manifest, directory: Path, rows: IndexRows) -> str:
         size = f"{name.upper()}_{what.upper()}"
         head = rf"static const short {name}_{what}_index\[{size}\]\[{rows.of(what).shape[1]}\]"
         body = re.search(rf"^{head} = \{{(.*?)\n\}};", text, re.DOTALL | re.MULTILINE)
-        found = re.findall(r"\{([\d, ]+)\}", body[1]) if body else []
-        listed = [[int(number) - 1 for number in row.split(",")] for row in found]
-        if listed != rows.of(what).tolist():
+        expected = rows.of(what) + 1
+        row = r"\{\d+" + r", \d+" * (expected.shape[1] - 1) + r"\}"
+        found = ",".join(re.findall(row, body[1])) if body else ""
+        listed = np.fromstring(re.sub(r"[{}]", "", found), dtype=int, sep=",")
+        if not np.array_equal(listed, expected.ravel()):
             return f"the indices of {what} are wrong"
     return ""
 
