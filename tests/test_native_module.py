@@ -242,13 +242,22 @@ def test_nothing_is_leaked_or_freed_twice(planar3: ModuleType) -> None:
     assert max(least) < 50, least
 
 
-def test_a_robot_that_nobody_holds_is_gone(planar3: ModuleType) -> None:
-    robot = planar3.load("native")
-    robot.packed(*np.ones((3, 3)))
-    gone = weakref.ref(robot.backend)
-    del robot
+def test_robots_that_nobody_holds_are_gone_and_let_go_of_what_they_held(planar3: ModuleType) -> None:
+    def called() -> Any:
+        robot = planar3.load("native")
+        robot.packed(*np.ones((3, 3)))
+        return robot
+
+    kind = type(called().packed(*np.ones((3, 3))))
     gc.collect()
-    assert gone() is None
+    before = sys.getrefcount(kind)
+    robots = [called() for _ in range(20)]
+    held = (o for robot in robots for o in (robot.backend, robot.backend.calls.constants(np.dtype("f8"))))
+    gone = [weakref.ref(o) for o in held]
+    robots.clear()
+    gc.collect()
+    assert not [reference for reference in gone if reference() is not None]
+    assert sys.getrefcount(kind) < before + 10
 
 
 def test_threads_call_side_by_side(planar3: ModuleType) -> None:
