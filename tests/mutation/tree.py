@@ -1,6 +1,7 @@
 """A copy of the project in which one file at a time is changed, and tests in processes forked from here."""
 
 import compileall
+import gc
 import importlib
 import json
 import os
@@ -21,15 +22,10 @@ from mutation.mutants import Mutant
 
 ROOT = Path(__file__).parents[2]
 HEAVY = (
-    *("numpy", "sympy", "torch", "jinja2", "typer", "rich", "pytest", "hypothesis", "scipy.signal"),
-    *(
-        "pyarrow",
-        "matplotlib.pyplot",
-        "plotly.graph_objects",
-        "mujoco",
-        "pinocchio",
-        "defusedxml.ElementTree",
-    ),
+    *("numpy", "sympy", "torch", "jinja2", "typer", "rich", "pytest", "hypothesis", "fsspec", "tomlkit"),
+    *("scipy.signal", "scipy.optimize", "scipy.spatial", "scipy.interpolate", "clarabel", "networkx"),
+    *("pyarrow.parquet", "xarray", "zarr", "h5netcdf", "h5py", "matplotlib.pyplot", "plotly.graph_objects"),
+    *("mujoco", "pinocchio", "defusedxml.ElementTree"),
 )
 """Loaded once, before the first fork; nothing of linkwise is."""
 PLAIN = ("-q", "-p", "no:cacheprovider", "--no-header", "--tb=short", "--assert=plain", "--disable-warnings")
@@ -191,6 +187,7 @@ def load_heavy() -> None:
             importlib.import_module(name)
         except ImportError:
             say(f"without {name}: tests that need it are skipped")
+    gc.freeze()  # else each process that is forked looks through all of it, several times
 
 
 def _child(folder: Path, work: Callable[[Callable[..., int]], int], cpu: float) -> None:
