@@ -38,15 +38,13 @@ class Decider:
         """
         tried = self.record.survived(mutant)
         near, far = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
+        limits = STAGES
         if not near:
-            for name in (name for name in ROOMS[room].tests if name not in tried):
-                known = self.reach.files.get(name)
-                yield [name], (sum(known.seconds.values()) if known else 0.0) or UNKNOWN
-            return
+            near, limits = self._named(room), (*STAGES[:2], float("inf"))
         close, beside = (
             iter([item for item in part if item[0].partition("::")[0] not in tried]) for part in (near, far)
         )
-        for ranked, limit in (*((close, limit) for limit in STAGES), (beside, BESIDE)):
+        for ranked, limit in (*((close, limit) for limit in limits), (beside, BESIDE)):
             tests: list[str] = []
             total = 0.0
             for name, seconds in ranked:
@@ -57,6 +55,14 @@ class Decider:
                     break
             if tests:
                 yield tests, total
+
+    def _named(self, room: str) -> list[tuple[str, float]]:
+        """Tests of the files that a room names, with their seconds, quick ones first."""
+        found = []
+        for name in ROOMS[room].tests:
+            known = self.reach.files.get(name)
+            found += list(known.seconds.items()) if known and known.seconds else [(name, UNKNOWN)]
+        return sorted(found, key=lambda item: item[1])
 
     def decide(self, room: str, mutant: Mutant, tree: Tree) -> tuple[str, str]:
         """Killed, too slow or survived; and by which test, or after how many seconds of tests."""
