@@ -142,7 +142,7 @@ def _is_made(macro: str, word: str) -> bool:
 
 
 def _line(text: str, place: int) -> int:
-    return text.count("\n", 0, place) + 1
+    return text[:place].count("\n") + 1
 
 
 class Vocabulary(NamedTuple):

@@ -48,7 +48,7 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
         ha="left",
         fontsize=11,
     )
-    told = [phase.told for phase in asked_phases(result, i)] if len(phases) > 1 else []
+    told = [phase.told for phase in asked_phases(result, i)]
     below = " · ".join(["motion: acceleration and velocity together", *told, foot(result)])
     figure.supxlabel(textwrap.fill(below, 140), x=0.01, ha="left", fontsize=7, color="#5A6270")
     figure.draw_without_rendering()  # places the panels, so that labels have a width in their numbers
