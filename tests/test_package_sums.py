@@ -232,3 +232,12 @@ def test_joints_and_links_have_numbers_by_name(package_of: Packages) -> None:
         robot.link_index("link3")
     with pytest.raises(ValueError, match="link is -1; choose a link by number"):
         robot.link_index(-1)
+
+
+@pytest.mark.parametrize(("vague", "where"), [([1], "sample 1: "), ([1, 3, 4], "sample 3 and 2 others: ")])
+def test_samples_that_are_nearly_singular_are_told_and_counted(vague: list[int], where: str) -> None:
+    mass = np.tile(np.eye(2), (6, 1, 1))
+    for sample in vague:
+        mass[sample, 0, 1] = mass[sample, 1, 0] = 1.0 - (1e-11 if sample == 3 else 1e-10)
+    with pytest.warns(RuntimeWarning, match=rf"nearly singular at {where}the joints a, b can move"):
+        solved(mass, np.ones((6, 2)), ["a", "b"])
