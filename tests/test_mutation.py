@@ -1,6 +1,5 @@
 """`make mutate` visits every room, trusts no test that fails by itself, and goes on where it stopped."""
 
-import json
 import shutil
 import subprocess
 import sys
@@ -155,7 +154,7 @@ FAILS, PASSES = Ended(1, BY), Ended(0)
 @pytest.fixture
 def decider(tmp_path: Path) -> Decider:
     """One that has a room's three files of tests to ask."""
-    made = Decider(Map(tmp_path / "reach"), Record(tmp_path / "verdicts.json"))
+    made = Decider(Map(tmp_path / "reach"), Record(tmp_path / "survived.json", tmp_path / "caught.json"))
     made.stages = lambda room, mutant: iter([(["a"], 1.0), (["b"], 2.0)])  # type: ignore[method-assign]
     return made
 
@@ -195,10 +194,10 @@ def some_mutants() -> list[Mutant]:
 
 def test_a_verdict_stays_for_the_same_texts_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     one, other, third = some_mutants()[:3]
-    record = Record(tmp_path / "verdicts.json")
-    record.add("single-files", one, "killed", BY)
-    record.add("single-files", other, "survived", "3 s of tests")
-    again = Record(tmp_path / "verdicts.json")
+    record = Record(tmp_path / "survived.json", tmp_path / "caught.json")
+    record.add(one, "killed", BY)
+    record.add(other, "survived", "3 s of tests")
+    again = Record(tmp_path / "survived.json", tmp_path / "caught.json")
     assert [m and m.verdict for m in map(again.decided, (one, other, third))] == ["killed", "survived", None]
     again.all_tests = "one more test"
     assert again.decided(one)
@@ -211,18 +210,36 @@ def test_a_verdict_stays_for_the_same_texts_alone(tmp_path: Path, monkeypatch: p
             assert not again.decided(one)
 
 
+def test_what_caught_a_mutant_is_tried_first_once_the_text_is_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mutant, files = some_mutants()[0], (tmp_path / "survived.json", tmp_path / "caught.json")
+    Record(*files).add(mutant, "killed", f"{BY}[one]")
+    monkeypatch.setattr(
+        verdicts, "digest", lambda path: "new" if path == ROOT / mutant.path else digest(path)
+    )
+    reach = Map(tmp_path / "reach")
+    seconds = {"tests/test_graphs.py::quick": 1.0, BY: 2.0}
+    monkeypatch.setattr(reach, "files", {"tests/test_graphs.py": Reached("", seconds, {}, {})})
+    monkeypatch.setattr(reach, "tests", lambda path, line: (list(seconds.items()), []))
+    record = Record(*files)
+    assert not record.decided(mutant)
+    stages = [tests for tests, _ in Decider(reach, record).stages("single-files", mutant)]
+    assert stages == [[BY], list(seconds)]
+
+
 def test_what_a_mutant_survived_is_not_run_again_on_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mutant, changed = some_mutants()[0], "tests/test_graphs.py"
-    first = Record(tmp_path / "verdicts.json")
-    first.add("single-files", mutant, "survived", "3 s of tests")
+    first = Record(tmp_path / "survived.json", tmp_path / "caught.json")
+    first.add(mutant, "survived", "3 s of tests")
     monkeypatch.setattr(verdicts, "digest", lambda path: "new" if path == ROOT / changed else digest(path))
     reach = Map(tmp_path / "reach")
     tests = {name: Reached("", {f"{name}::x": 1.0}, {}, {}) for name in (changed, "tests/test_cli.py")}
     monkeypatch.setattr(reach, "files", tests)
     monkeypatch.setattr(reach, "tests", lambda path, line: ([(f"{name}::x", 1.0) for name in tests], []))
-    decider = Decider(reach, Record(tmp_path / "verdicts.json"))
+    decider = Decider(reach, Record(tmp_path / "survived.json", tmp_path / "caught.json"))
     assert list(decider.stages("single-files", mutant)) == [([f"{changed}::x"], 1.0)]
 
 
@@ -285,10 +302,8 @@ def test_a_sweep_maps_decides_and_goes_on(tmp_path: Path) -> None:
     said = swept()
     assert "mapped: tests/test_one.py" in said
     assert "no verdict by tests/test_one.py::test_fails_now_and_then: failed, and passed" in said
-    kept = json.loads((tmp_path / "out/mutate/verdicts.json").read_text())["verdicts"]
-    by = {
-        key.partition(" [")[0].rpartition(": ")[2]: (one["verdict"], one["by"]) for key, one in kept.items()
-    }
+    kept = Record(tmp_path / "out/mutate/survived.json", tmp_path / "tests/mutation/caught.json").verdicts
+    by = {key.partition(" [")[0].rpartition(": ")[2]: (one.verdict, one.by) for key, one in kept.items()}
     assert by["return a + 1"] == ("killed", "tests/test_one.py::test_program")
     assert by["return a - 2"] == ("killed", "tests/test_one.py::test_copy")
     assert by["return a * 3"][0] == "survived"

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from threading import Lock
 
 from mutation.mutants import Mutant
-from mutation.reach import Map, digest
+from mutation.reach import Map, digest, test_of
 from mutation.rooms import NOT_COUNTED, ROOMS
 from mutation.tree import ROOT, Ended, Tree, say
 from mutation.verdicts import Record
@@ -41,6 +41,10 @@ class Decider:
         limits = STAGES
         if not near:
             near, limits = self._named(room), (*STAGES[:2], float("inf"))
+        before = self.record.caught_before(mutant)
+        known = self.reach.files.get(before.partition("::")[0])
+        if known and test_of(before) in known.seconds:
+            yield [test_of(before)], known.seconds[test_of(before)]
         close, beside = (
             iter([item for item in part if item[0].partition("::")[0] not in tried]) for part in (near, far)
         )

@@ -6,7 +6,8 @@ Each mutant runs in a process forked from one that has the heavy libraries, in a
 killed when a test that may notice it fails, or takes far more processor time than without it. What survives
 is to be killed by a test, or listed in equivalents.json with the reason why nothing that is promised changes.
 First the files of tests that are new run once under coverage, which tells what they reach. --minutes ends
-the sweep, and the next one goes on from there; --write puts the scores into docs/trust.md.
+the sweep, and the next one goes on from there, in any clone: what is caught is in caught.json. --write puts
+the scores into docs/trust.md.
 """
 
 import argparse
@@ -75,7 +76,7 @@ def side_by_side(
 def swept(options: argparse.Namespace) -> bool:
     """Map, decide, and say whether all is decided and every test that failed could be trusted."""
     end = time.monotonic() + 60 * options.minutes
-    reach, record = Map(options.out / "reach"), Record(options.out / "verdicts.json")
+    reach, record = Map(options.out / "reach"), Record(options.out / "survived.json")
     decider = Decider(reach, record)
     load_heavy()
     with tempfile.TemporaryDirectory() as folder:
@@ -91,7 +92,7 @@ def swept(options: argparse.Namespace) -> bool:
         def decide(item: tuple[str, Mutant], tree: Tree) -> None:
             room, mutant = item
             verdict, by = decider.decide(room, mutant, tree)
-            record.add(room, mutant, verdict, by)
+            record.add(mutant, verdict, by)
             if verdict == "survived":
                 say(f"survives: {mutant.key} (line {mutant.line}; {by})")
 
@@ -116,16 +117,18 @@ def main() -> None:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     if options.write:
-        found = scores(Record(options.out / "verdicts.json"))
+        record = Record(options.out / "survived.json")
+        found = scores(record)
         if waiting := sum(score.open for score in found):
             sys.exit(f"{waiting} mutants are not decided yet: run `make mutate` before --write")
+        record.keep({mutant.key for room in ROOMS for mutant in drawn(room)})
         PAGE.write_text(written(PAGE.read_text(encoding="utf-8"), found), encoding="utf-8")
         return
     try:
         whole = swept(options)
     except KeyboardInterrupt:
         sys.exit("interrupted; the next run goes on from here")
-    found = scores(Record(options.out / "verdicts.json"), options.only)
+    found = scores(Record(options.out / "survived.json"), options.only)
     report = "\n".join([table(found), *(f"- {key}" for score in found for key in score.survivors)]) + "\n"
     (options.out / "mutants.md").write_text(report, encoding="utf-8")
     print(report)

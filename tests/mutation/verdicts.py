@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -12,6 +12,8 @@ from mutation.rooms import ROOMS, drawn, test_files
 from mutation.tree import ROOT
 
 CAUGHT = ("killed", "too slow")
+KEPT = Path(__file__).with_name("caught.json")
+"""What is caught, and by which test, kept with the tests: a sweep begins with what caught it before."""
 EQUIVALENTS = Path(__file__).with_name("equivalents.json")
 MARK = "<!-- from here on by tests/mutation/run.py --write -->\n"
 END = "<!-- to here -->\n"
@@ -27,7 +29,6 @@ class Verdict:
     together
     """
 
-    room: str
     verdict: str
     by: str
     source: str
@@ -37,12 +38,15 @@ class Verdict:
 class Record:
     """Verdicts by mutant, and the tests that pass without one."""
 
-    def __init__(self, file: Path) -> None:
-        """Take what is there."""
-        self.file = file
+    def __init__(self, file: Path, caught: Path = KEPT) -> None:
+        """Take what is there; file: of those that survive."""
+        self.file, self.caught = file, caught
         kept = json.loads(file.read_text()) if file.is_file() else {}
-        self.verdicts = {key: Verdict(**entry) for key, entry in kept.get("verdicts", {}).items()}
-        self.sound: dict[str, str] = kept.get("sound", {})
+        self.verdicts = {key: Verdict(**entry) for key, entry in kept.get("survived", {}).items()}
+        of_paths = json.loads(caught.read_text(encoding="utf-8")) if caught.is_file() else {}
+        for path, changes in of_paths.items():
+            self.verdicts |= {f"{path}: {change}": _read(told) for change, told in changes.items()}
+        self.sound: dict[str, str] = {}
         now = {name: digest(ROOT / name) for name in test_files()}
         texts = "".join(f"{name} {text}\n" for name, text in now.items())
         self.all_tests = hashlib.sha256(texts.encode()).hexdigest()[:16]
@@ -60,6 +64,11 @@ class Record:
             return None
         return kept if kept.tests == self.tests(kept.verdict, kept.by) else None
 
+    def caught_before(self, mutant: Mutant) -> str:
+        """The test that caught a mutant of another text, or did so when it was another itself; else empty."""
+        kept = self.verdicts.get(mutant.key)
+        return kept.by if kept is not None and kept.verdict in CAUGHT and "::" in kept.by else ""
+
     def survived(self, mutant: Mutant) -> set[str]:
         """Files of tests, as they are now, that this mutant of the text as it is has survived before."""
         kept, now = self.verdicts.get(mutant.key), self.suites[self.all_tests]
@@ -67,23 +76,40 @@ class Record:
             return set()
         return {name for name, text in self.suites.get(kept.tests, {}).items() if now.get(name) == text}
 
-    def add(self, room: str, mutant: Mutant, verdict: str, by: str) -> None:
+    def add(self, mutant: Mutant, verdict: str, by: str) -> None:
         """Keep a verdict."""
         tests = self.tests(verdict, by)
-        self.verdicts[mutant.key] = Verdict(room, verdict, by, digest(ROOT / mutant.path), tests)
+        self.verdicts[mutant.key] = Verdict(verdict, by, digest(ROOT / mutant.path), tests)
         self.save()
 
     def save(self) -> None:
-        """Write the record, whole or not at all."""
-        used = {self.all_tests, *(verdict.tests for verdict in self.verdicts.values())}
-        data = {
-            "verdicts": {k: asdict(v) for k, v in self.verdicts.items()},
-            "sound": self.sound,
-            "suites": {k: suite for k, suite in self.suites.items() if k in used},
-        }
-        beside = self.file.with_suffix(".new")
-        beside.write_text(json.dumps(data, indent=1))
-        beside.replace(self.file)
+        """Write all to disk, each file at once."""
+        caught: dict[str, dict[str, str]] = {}
+        survived = {}
+        for key, verdict in sorted(self.verdicts.items()):
+            path, _, change = key.partition(": ")
+            if verdict.verdict in CAUGHT:
+                told = f"{verdict.source} {verdict.tests} {verdict.verdict}: {verdict.by}"
+                caught.setdefault(path, {})[change] = told
+            else:
+                survived[key] = asdict(verdict)
+        suites = {kept.tests: self.suites.get(kept.tests, {}) for kept in self.verdicts.values()}
+        suites = {tests: files for tests, files in suites.items() if files}
+        for file, data in ((self.caught, caught), (self.file, {"survived": survived, "suites": suites})):
+            beside = file.with_suffix(".new")
+            beside.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+            beside.replace(file)
+
+    def keep(self, keys: Collection[str]) -> None:
+        """Forget all other mutants: of texts that have gone."""
+        self.verdicts = {key: verdict for key, verdict in self.verdicts.items() if key in keys}
+        self.save()
+
+
+def _read(told: str) -> Verdict:
+    source, tests, rest = told.split(" ", 2)
+    verdict, _, by = rest.partition(": ")
+    return Verdict(verdict, by, source, tests)
 
 
 @dataclass(frozen=True)
