@@ -4,7 +4,8 @@ import hashlib
 import json
 import os
 import subprocess
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import urdf_text
 from command_line import run_linkwise
 from conftest import DATA, PANDA
 from linkwise import Options
+from linkwise.check.compare import Result
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -109,6 +111,21 @@ def test_a_package_of_one_back_end_passes_its_check(backend: str, linkwise: Run)
     assert linkwise("generate", "planar1", "--out", "out", "--backend", backend).returncode == 0
     done = linkwise("check", "out/planar1", "--samples", "1")
     assert (done.returncode, "FAIL" in done.stdout) == (0, False), done.stdout
+
+
+def test_check_tells_each_result_before_it_makes_the_next(
+    linkwise: Run, planar2: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[bytes] = []
+
+    def results(package: Path, samples: int) -> Iterator[Result]:
+        for name in ("first", "second"):
+            yield Result(name, True, None, "")
+            seen.append(sys.stdout.buffer.getvalue())  # type: ignore[attr-defined]
+
+    monkeypatch.setattr("linkwise.cli.check.results_of", results)
+    linkwise("check", planar2)
+    assert [text.split()[1::2] for text in seen] == [[b"first"], [b"first", b"second"]]
 
 
 def test_check_catches_a_tampered_file(linkwise: Run, planar2: Path) -> None:

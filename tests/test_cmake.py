@@ -378,6 +378,18 @@ def test_a_mistake_is_told_when_the_project_is_configured(line: str, tmp_path: P
 
 
 @needs_ninja
+@pytest.mark.parametrize("version", [VERSION, f"{VERSION} EXACT", VERSION.partition(".")[0], f"{VERSION}.9"])
+def test_this_version_or_an_older_one_may_be_asked_for(version: str, tmp_path: Path) -> None:
+    project = Project("ninja", tmp_path / "asked")
+    lists = LISTS.partition("linkwise_add_robot")[0]
+    write_project(
+        project.source, lists.replace("find_package(linkwise ", f"find_package(linkwise {version} ")
+    )
+    done = project.configure()
+    assert (done.returncode == 0) == (version != f"{VERSION}.9"), done.stderr
+
+
+@needs_ninja
 def test_a_program_of_another_installation_is_refused(tmp_path: Path) -> None:
     project = Project("ninja", tmp_path / "other")
     write_project(project.source)
