@@ -211,6 +211,20 @@ def test_what_linkwise_does_not_write_is_refused_and_never_run(
     assert not mark.exists()
 
 
+@pytest.mark.parametrize(
+    ("path", "line"),
+    [
+        ("c/planar2.c", "static int a = system;"),
+        ("c/planar2.c", '#include "link_99.h"'),
+        ("forms/link_1.py", "import os"),
+    ],
+)
+def test_the_line_of_what_linkwise_does_not_write_is_told(path: str, line: str, package: Path) -> None:
+    number = (package / path).read_text().count("\n") + 1
+    rewritten(package, path, lambda text: f"{text}{line}\n")
+    assert f"{path} line {number} " in check_package(package, 3)[-1].detail
+
+
 def test_a_package_of_another_version_is_opened_with_a_word_of_what_runs_unread(package: Path) -> None:
     rewritten(package, "__init__.py", lambda text: text.replace(f"linkwise {VERSION}", "linkwise 0.0.9", 1))
     manifest = package / "manifest.json"
