@@ -16,6 +16,7 @@ import typer
 from linkwise.cli.app import COMMANDS, REPORTS, readable
 from linkwise.cli.options import robot_options
 from linkwise.robot import DESCRIPTIONS, Options
+from search_path import before
 from typer.core import TyperGroup
 
 HEAVY = {"sympy", "numpy", "scipy", "torch", "matplotlib", "pyarrow", "plotly", "mujoco", "jinja2"}
@@ -32,7 +33,7 @@ def loaded(code: str, *arguments: str) -> set[str]:
 
 def test_what_stdout_cannot_encode_is_escaped() -> None:
     command = [sys.executable, "-m", "linkwise", "report", "terms", "planar1"]
-    environment = {"PYTHONIOENCODING": "latin-1"}
+    environment = os.environ | {"PYTHONIOENCODING": "latin-1"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert "| \\u03c4_1,1 | link1 |" in done.stdout
@@ -48,7 +49,7 @@ STARTS = {
 @pytest.mark.parametrize("start", STARTS)
 def test_an_interrupt_while_libraries_are_imported_is_one_line(start: str, tmp_path: Path) -> None:
     (tmp_path / "typer.py").write_text("raise KeyboardInterrupt")
-    command, environment = [sys.executable, *STARTS[start]], os.environ | {"PYTHONPATH": str(tmp_path)}
+    command, environment = [sys.executable, *STARTS[start]], os.environ | {"PYTHONPATH": before(tmp_path)}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (130, "linkwise: interrupted\n")
 

@@ -23,6 +23,7 @@ from linkwise.runtime.native.native_compiler import FLAGS, AppleCompiler, find_c
 from linkwise.runtime.native.native_process import answer
 from linkwise.runtime.native.native_system import MacOS, Windows
 from other_system import UNFIT, locks
+from search_path import before
 
 TESTS = Path(__file__).parent
 MINGW = "x86_64-w64-mingw32-gcc"
@@ -69,7 +70,7 @@ def test_commands_work_there_and_say_what_stands_in_the_way(system: str, tmp_pat
     parts = [urdf_text.joint("ab", "a", "b"), urdf_text.joint("bc", "b", "c")]
     (tmp_path / "arm.urdf").write_text(urdf_text.chain(*parts))
     (tmp_path / "session.py").write_text(SESSION)
-    few = {"PATH": "/nowhere", "PYTHONPATH": str(TESTS), "PYTHONUTF8": "0", "PYTHONIOENCODING": "cp1252"}
+    few = {"PATH": "/nowhere", "PYTHONPATH": before(TESTS), "PYTHONUTF8": "0", "PYTHONIOENCODING": "cp1252"}
     command = [sys.executable, str(TESTS / "other_system.py"), system, "--core", "session.py"]
     done = subprocess.run(command, cwd=tmp_path, env=os.environ | few, capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b""), done.stderr.decode(errors="replace")

@@ -11,6 +11,7 @@ import pytest
 from linkwise import LinkwiseError
 from linkwise.study import ProcessPool, run_study
 from linkwise.study.study_folder import held_study
+from search_path import before
 from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 
 pd = pytest.importorskip("pandas")
@@ -126,8 +127,7 @@ pathlib.Path.open = deadly
 def killing(folder: Path, who: str, deadly: str) -> dict[str, str]:
     """Surroundings in which processes are ended so: workers, or "not" workers."""
     (folder / "sitecustomize.py").write_text(KILLER.format(who=who, deadly=deadly))
-    paths = [str(folder), *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {"PYTHONPATH": os.pathsep.join(paths)}
+    return {"PYTHONPATH": before(folder)}
 
 
 @pytest.mark.parametrize("deadly", ["SIGKILL", "SIGTERM"])

@@ -10,6 +10,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, cast
 
+from search_path import before
+
 from fuzz.case import Case
 from fuzz.worker import MODULES, Outcome
 
@@ -58,13 +60,12 @@ class Client:
         return outcome
 
     def _start(self) -> subprocess.Popen[bytes]:
-        paths = os.pathsep.join(filter(None, (str(TESTS), os.environ.get("PYTHONPATH", ""))))
-        environment = os.environ | {"PYTHONPATH": paths, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         self._process = subprocess.Popen(
             [sys.executable, "-c", f"from fuzz.worker import serve; serve({self._seconds}, {self._modules})"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env=environment,
+            env=os.environ | threads | {"PYTHONPATH": before(TESTS)},
         )
         return self._process
 
