@@ -254,6 +254,14 @@ def test_a_contact_stands_by_one_column(folder: Path, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("said", ["sole", "sole=", "=stands", "=", ""])
+def test_when_a_contact_stands_is_a_name_and_a_column(said: str, folder: Path, tmp_path: Path) -> None:
+    words = "analyze", "still.csv", "--robot", "leg", "--out", tmp_path / "out", "--contact", "sole:foot=held"
+    done = run_linkwise(*words, f"--contact-while={said}", folder=folder)
+    told = f"linkwise: error: --contact-while {said}: write it as NAME=COLUMN>VALUE\n"
+    assert (done.returncode, done.stderr) == (2, told)
+
+
 BAD = {
     "foot=glued": "write it as FRAME=KIND@X,Y,Z, the kind one of held, point, hinged, rolling",
     "foot=rolling": "--contact foot=rolling: write it as FRAME=rolling,RADIUS@X,Y,Z, in m",

@@ -160,6 +160,20 @@ def test_a_joint_that_bears_one_load_has_the_phases_of_that_load(pushed, analysi
     assert list(shown) == ["the whole movement"]
 
 
+def test_a_panel_says_what_it_shows_and_in_which_unit(analysis):
+    over_time, means, sizes = analysis.figure("causes:joint1").axes
+    titles = [panel.get_title() or panel.get_title(loc="left") for panel in (over_time, means, sizes)]
+    assert titles == ["all causes together", "mean (N·m)", "root mean square (N·m)"]
+    assert over_time.get_ylabel() == "N·m"
+
+
+def test_figures_are_shown_in_a_notebook(analysis, monkeypatch):
+    loaded = []
+    monkeypatch.setattr("linkwise.analysis.job.extra", loaded.append)
+    analysis.figure("paper")
+    assert loaded == ["matplotlib.pyplot"]
+
+
 def test_many_causes_are_named_by_size_and_the_rest_is_one(analysis, monkeypatch):
     monkeypatch.setattr("linkwise.analysis.show.cause_curves.MOST", 1)
     rows, shown = bars(analysis.figure("causes:joint1"))
@@ -209,6 +223,7 @@ def test_power_figure_draws_joint_power_and_work_by_link(analysis):
     ends = widths[:3].sum(axis=0) + widths[3:].sum(axis=0)
     np.testing.assert_allclose(bars.lines[0].get_xdata(), ends, atol=1e-12)
     assert [text.get_text() for text in bars.get_legend().get_texts()] == ["net", "link1", "link2", "link3"]
+    assert curves.get_ylabel() == "W"
     figure.draw_without_rendering()
 
 

@@ -6,7 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -215,6 +215,30 @@ def test_streams_that_the_caller_closed_change_nothing_else(closed: str, tmp_pat
     status, printed = run("generate", "planar1", "--out", "out", "--backend", "numpy")
     assert (status, printed) == (0, "")
     assert (tmp_path / "out/planar1/manifest.json").is_file()
+
+
+@pytest.mark.parametrize("numbers", [(2,), (1, 2), (0, 1, 2)])
+def test_programs_that_linkwise_starts_may_write_to_streams_that_the_caller_closed(
+    numbers: Sequence[int],
+) -> None:
+    code = (
+        "from linkwise.__main__ import _open_closed; import os, subprocess, sys; _open_closed(); "
+        "sys.exit(subprocess.run(['sh', '-c', 'echo 1 && echo 2 >&2 && cat'], close_fds=False).returncode)"
+    )
+    closed = " ".join(f"{number}{'<' if number == 0 else '>'}&-" for number in numbers)
+    command = ["sh", "-c", f'exec "$@" {closed}', "sh", sys.executable, "-c", code]
+    assert subprocess.run(command, stdin=subprocess.DEVNULL, check=False).returncode == 0
+
+
+def test_a_file_that_took_the_number_of_a_closed_stream_stays_open(tmp_path: Path) -> None:
+    code = (
+        "from linkwise.__main__ import _open_closed; import os, sys; "
+        f"there = os.open({str(tmp_path / 'there')!r}, os.O_WRONLY | os.O_CREAT); assert there == 2; "
+        "_open_closed(); os.write(there, b'kept'); print('lost', file=sys.stderr)"
+    )
+    command = ["sh", "-c", 'exec "$@" 2>&-', "sh", sys.executable, "-c", code]
+    assert subprocess.run(command, check=False).returncode == 0
+    assert (tmp_path / "there").read_bytes() == b"kept"
 
 
 def test_letters_that_the_terminal_lacks_are_written_as_escapes() -> None:

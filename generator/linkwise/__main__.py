@@ -20,17 +20,14 @@ def _open_closed() -> None:
 
     Python has None for them, and prints what is meant for stderr to stdout.
     """
-    for number, name in enumerate(("stdin", "stdout", "stderr")):
-        if getattr(sys, name) is not None:
-            continue
+    closed = [(k, name) for k, name in enumerate(("stdin", "stdout", "stderr")) if getattr(sys, name) is None]
+    for number, _ in closed:
         try:
             os.fstat(number)
         except OSError:
-            nowhere = os.open(os.devnull, os.O_RDWR)
-            if nowhere != number:
-                os.dup2(nowhere, number)
-                os.close(nowhere)
-            os.set_inheritable(number, True)  # compilers and workers print, too
+            # A file gets the lowest free number, this one; compilers and workers print there, too.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+    for number, name in closed:
         setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115
 
 

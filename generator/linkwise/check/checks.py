@@ -30,16 +30,18 @@ LARGE = (
     "of a robot as large as this: batches of other shapes, modules of links beyond the first, and recorded "
     "graphs of links that many joints carry; what cuts batches and records graphs is alike for all robots"
 )
+SAMPLES = 100
+"""Random states, where none are asked for."""
 LEAST = 10
 """States below which nothing is proved of energies that are not defined everywhere."""
 
 
-def check_package(directory: Path, samples: int = 100) -> list[Result]:
+def check_package(directory: Path, samples: int = SAMPLES) -> list[Result]:
     """Run every check on a package; raises LinkwiseError when `directory` holds none that can be read."""
     return list(results_of(directory, samples))
 
 
-def results_of(directory: Path, samples: int = 100) -> Iterator[Result]:
+def results_of(directory: Path, samples: int = SAMPLES) -> Iterator[Result]:
     """The same, each result as soon as it is there."""
     manifest = Manifest.read(directory)
     files = check_files(directory, manifest)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from linkwise.check import results_of
+from linkwise.check.checks import SAMPLES, results_of
 from linkwise.check.compare import Result
 from linkwise.cli import Json, counted, tell
 from linkwise.escape import json_text
@@ -23,7 +23,7 @@ WIDTH = 64
 @app.command()
 def check(
     package: Annotated[Path, typer.Argument(help="Directory of a generated package")],
-    samples: Annotated[int, typer.Option(min=1, help="Random states")] = 100,
+    samples: Annotated[int, typer.Option(min=1, help="Random states")] = SAMPLES,
     as_json: Json = False,
 ) -> None:
     """Prove a package right: hashes, and every entry of every formula, back end and C function."""
