@@ -84,6 +84,7 @@ def test_forces_of_links_and_loads_sum_to_what_the_ground_bears(folder: Path) ->
     assert np.abs(sum(parts) - result["force/sole force_x"]).max() < 1e-9
     assert np.abs(result["force_load/sole force_x/push"] + 20.0).max() < 1e-9
     assert np.abs(result["tau_load/ankle_angle_r/push"]).max() > 1.0  # by way of the ground
+    assert result.record()["contacts"]["held"][0]["on"] == "always"
 
 
 def test_measured_loads_say_when_a_foot_stands_and_load_nothing(folder: Path) -> None:
@@ -97,6 +98,7 @@ def test_measured_loads_say_when_a_foot_stands_and_load_nothing(folder: Path) ->
     assert (
         np.abs(result["force_measured/sole force_y"] - np.interp(result.time, time, force[:, 1])).max() < 1e-9
     )
+    assert result.record()["contacts"]["held"][0]["on"] == {"force_above": 50.0}
     loaded = analyze(folder / "moving.csv", folder / "leg", loads=[plate])
     for joint in JOINTS:
         assert np.abs(result[f"tau_as_loads/{joint}"] - loaded[f"tau/{joint}"]).max() < 1e-9
@@ -120,6 +122,9 @@ def test_a_tie_bears_what_the_ground_gives_to_a_joint_that_follows(folder: Path)
     assert np.abs(needed[:, [0, 1, 2, 5]]).max() < 1e-9 * scale
     by_link = sum(result[f"force/gear/{link}"] for link in MASSES)
     assert np.abs(by_link - result["force/gear"]).max() < 1e-9 * scale
+    panel = result.figure("contacts").axes[0]
+    (drawn,) = (line for line in panel.get_lines() if line.get_label() == "found from the motion")
+    np.testing.assert_allclose(drawn.get_ydata(), result["force/sole force_y"], rtol=0, atol=1e-9 * scale)
 
 
 @pytest.mark.parametrize("undriven", [JOINTS[:3], (*JOINTS[:2], "knee_angle_r")], ids=["base", "knee"])
@@ -164,6 +169,7 @@ def test_losses_loads_and_measured_forces_of_a_tied_leg_each_balance(
     slip = np.einsum("srn,sn->sr", rows, result.qd)
     for row, values in zip(("angular_z", "x", "y"), slip.T, strict=True):
         assert np.abs(result[f"slip/sole {row}"] - values).max() < 1e-12
+    assert result.largest_slip(0) == pytest.approx((np.abs(slip[:, 1:]).max(), np.abs(slip[:, 0]).max()))
     poses = model.kinematics.pose(result.q, "foot")[:, :3, :3]
     arm = poses @ (np.array(plate.point) - FOOT.point)
     assert np.abs(result["force_measured/sole force_y"] - 700.0).max() < 1e-9

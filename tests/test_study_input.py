@@ -63,6 +63,17 @@ BAD: dict[str, tuple[tuple[str, ...], str]] = {
         (HEAD, '[[compare]]\nfactor = "condition"\nbetween = ["slow", "mad"]\ncolumns = ["tau/*"]\n', TRIALS),
         "no trial has the condition 'mad'; there are 'fast', 'slow'",
     ),
+    **{
+        f"{told} to compare": (
+            (HEAD, f'[[compare]]\nfactor = "condition"\nbetween = {levels}\ncolumns = ["tau/*"]\n', TRIALS),
+            f"[[compare]]: 'between' is {levels}; give two levels",
+        )
+        for told, levels in {
+            "one level": ["slow"],
+            "three levels": ["slow", "fast", "mad"],
+            "a level twice": ["slow", "slow"],
+        }.items()
+    },
     "another robot": (
         (
             HEAD,
