@@ -99,6 +99,8 @@ def test_measured_loads_say_when_a_foot_stands_and_load_nothing(folder: Path) ->
         np.abs(result["force_measured/sole force_y"] - np.interp(result.time, time, force[:, 1])).max() < 1e-9
     )
     assert result.record()["contacts"]["held"][0]["on"] == {"force_above": 50.0}
+    legend = result.figure("causes:ankle_angle_r").axes[0].get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["sole stands", "sole does not stand"]
     loaded = analyze(folder / "moving.csv", folder / "leg", loads=[plate])
     for joint in JOINTS:
         assert np.abs(result[f"tau_as_loads/{joint}"] - loaded[f"tau/{joint}"]).max() < 1e-9

@@ -41,6 +41,14 @@ def test_paper_figure_draws_the_numbers(analysis):
     figure.draw_without_rendering()
 
 
+def test_links_and_loads_have_looks_of_their_own_in_the_paper_figure(pushed):
+    path, push, _ = pushed
+    loads = [push, Load("pull", "link3", (5.0, 0.0, 0.0))]
+    figure = analyze(path, PLANAR3, Reading(ignore_extra=True), loads=loads).figure("paper:joint1")
+    looks = [(line.get_color(), line.get_linestyle()) for line in figure.axes[2].lines[:-1]]
+    assert len(looks) == len(set(looks)) == 5
+
+
 def test_shares_fill_the_bars(analysis):
     figure = analysis.figure("shares")
     for axis in figure.axes:

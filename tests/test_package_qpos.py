@@ -207,6 +207,10 @@ def test_what_is_no_qpos_is_refused_with_the_reason(walker: tuple[Any, Path]) ->
         robot.from_qpos(qpos, order="mujuco")
     with pytest.raises(ValueError, match=r"^joints has 'ankle', which does not move by itself here"):
         robot.from_qpos(qpos, joints=["free", "hip", "ankle", "lift", "turn"])
+    with pytest.raises(ValueError, match=r"^joints lacks lift, turn; give each joint once"):
+        robot.from_qpos(qpos, joints=["free", "hip", "knee"])
+    with pytest.raises(ValueError, match=r"^joints has a joint twice; give each joint once"):
+        robot.from_qpos(qpos, joints=["free", "hip", "knee", "lift", "turn", "hip"])
 
 
 def test_a_joint_locked_in_part_has_no_quaternion(tmp_path: Path) -> None:
