@@ -61,9 +61,9 @@ def _undo(done: list[tuple[Path, Path]], former: Path) -> None:
         except OSError:
             # Another writer's is in the place of `former`, which is of no use any more. Where all fails,
             # `former` is where `workplace.sweep` looks for it.
-            rest = former.parents[1] / REST
-            rest.mkdir(exist_ok=True)
             if there == former and os.path.lexists(here):
+                rest = former.parents[1] / REST
+                rest.mkdir(exist_ok=True)
                 former.rename(tempfile.mkdtemp(dir=rest))
 
 
