@@ -155,6 +155,9 @@ def test_causes_in_each_phase_are_numpys_and_add_up(pushed):
     sizes = [np.sqrt((curves[row] ** 2).mean()) for row in rows[1:]]
     assert sizes == sorted(sizes, reverse=True)
     assert result.record()["phases"][::2] == ["stance: force of push above 20 N", "half: from 0 to 1.995 s"]
+    assert "half: from 0 to 1.995 s" in " ".join(figure.get_supxlabel().split())
+    whole = analyze(path, PLANAR3, Reading(ignore_extra=True), phases=["all=0..99"]).figure("causes:joint2")
+    assert "all: from 0 to 99 s" in " ".join(whole.get_supxlabel().split())
     figure.draw_without_rendering()
 
 

@@ -436,6 +436,15 @@ def test_a_header_that_says_something_else_fails(old: str, new: str, fault: str,
 
 
 @needs_compiler
+@pytest.mark.parametrize("new", ["{2,2,2}, {2, 2, 2}", "{2, 2, 02}", "{2, 2, 2, 2}", "{2, 2}", ""])
+def test_a_table_of_indices_has_these_rows_and_nothing_else(new: str, copy_for: Copy) -> None:
+    package = copy_for("c")
+    change_file(package, "c/planar2_index.h", "{2, 2, 2}", new)
+    found = {result.name: result for result in check_package(package, 3)}
+    assert found["c: numbers, indices and functions of the headers"].detail == "the indices of c2 are wrong"
+
+
+@needs_compiler
 def test_a_c_function_is_called_whether_or_not_its_header_declares_it(copy_for: Copy) -> None:
     package = copy_for("c")
     text = (package / "c/planar2.h").read_text()

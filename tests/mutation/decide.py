@@ -34,19 +34,21 @@ class Decider:
     def stages(self, room: str, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
         """Tests of each process, and their seconds: what reaches the change, else what the room names.
 
-        Those that it is known to survive are left out.
+        First what caught it before; what it is known to survive is left out.
         """
         tried = self.record.survived(mutant)
         near, far = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
         limits = STAGES
         if not near:
             near, limits = self._named(room), (*STAGES[:2], float("inf"))
-        before = self.record.caught_before(mutant)
+        before = test_of(self.record.caught_before(mutant))
         known = self.reach.files.get(before.partition("::")[0])
-        if known and test_of(before) in known.seconds:
-            yield [test_of(before)], known.seconds[test_of(before)]
+        if known and before in known.seconds:
+            yield [before], known.seconds[before]
+            tried = tried | {before}
         close, beside = (
-            iter([item for item in part if item[0].partition("::")[0] not in tried]) for part in (near, far)
+            iter([item for item in part if not tried & {item[0], item[0].partition("::")[0]}])
+            for part in (near, far)
         )
         for ranked, limit in (*((close, limit) for limit in limits), (beside, BESIDE)):
             tests: list[str] = []

@@ -8,7 +8,7 @@ from linkwise.check.frame_reference import frame_calls
 from linkwise.check.impedance_checks import impedance_calls
 from linkwise.check.induced_checks import induced_calls
 from linkwise.check.loop_checks import loop_calls
-from linkwise.check.model_calls import Named, against_reference, dense_calls
+from linkwise.check.model_calls import Named, against_reference
 from linkwise.check.passive_reference import passive_calls
 from linkwise.check.recorded_parts import recorded_parts
 from linkwise.check.regressor_reference import regressor_calls
@@ -51,11 +51,6 @@ CHECKS = (
         lambda s, name, model: against_reference(Named(name, model, s.rows, s.reference), s.manifest),
         by_rule=True,
         composed=False,
-    ),
-    Check(
-        "all calls agree with these",
-        lambda s, name, model: dense_calls(Named(name, model, s.rows, s.reference)),
-        by_rule=True,
     ),
     Check(
         "recorded graphs",

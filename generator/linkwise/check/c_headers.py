@@ -52,11 +52,11 @@ def _wrong_table(manifest: Manifest, directory: Path, rows: IndexRows) -> str:
         size = f"{name.upper()}_{what.upper()}"
         head = rf"static const short {name}_{what}_index\[{size}\]\[{rows.of(what).shape[1]}\]"
         body = re.search(rf"^{head} = \{{(.*?)\n\}};", text, re.DOTALL | re.MULTILINE)
-        expected = rows.of(what) + 1
-        row = r"\{\d+" + r", \d+" * (expected.shape[1] - 1) + r"\}"
-        found = ",".join(re.findall(row, body[1])) if body else ""
-        listed = np.fromstring(re.sub(r"[{}]", "", found), dtype=int, sep=",")
-        if not np.array_equal(listed, expected.ravel()):
+        expected, written = rows.of(what) + 1, body[1] if body else ""
+        row = r"\{" + ", ".join([r"[1-9]\d*"] * expected.shape[1]) + r"\}"
+        numbers = re.sub(r"[{}]", "", ",".join(re.findall(row, written)))
+        listed = np.fromstring(numbers, dtype=int, sep=",")
+        if re.sub(row, "", written).strip(" ,\n") or not np.array_equal(listed, expected.ravel()):
             return f"the indices of {what} are wrong"
     return ""
 

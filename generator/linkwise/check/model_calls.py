@@ -40,6 +40,7 @@ def against_reference(checked: Named, manifest: Manifest) -> Iterator[Result]:
         yield compare(f"{name}: {shown} {told}", [entries], reference.tolerance)
     slopes = dense("c0", model.position_gradient(*states.motion), reference)
     yield compare(f"{name}: c0 {told}", [slopes], reference.tolerance)
+    yield compare(f"{name}: all calls agree with these", _calls(checked), reference.tolerance)
     yield compare(f"{name}: single samples and odd batches", _batches(checked), reference.tolerance)
     if reference.fits_single().any():
         yield compare(f"{name}: single precision", _single(checked), **FLOAT32)
@@ -48,12 +49,6 @@ def against_reference(checked: Named, manifest: Manifest) -> Iterator[Result]:
     if hasattr(model.backend, "modules"):
         yield from _energies(checked)
     yield from _structure(checked, manifest)
-
-
-def dense_calls(checked: Named) -> Iterator[Result]:
-    """What is composed of the packed answers."""
-    told = f"{checked.name}: all calls agree with these"
-    yield compare(told, _calls(checked), checked.reference.tolerance)
 
 
 def _layout(checked: Named) -> Result:
@@ -109,10 +104,10 @@ def _batches(checked: Named) -> Iterator[Entries]:
     states, count = reference.states, len(reference.states.q)
     if not count:
         return
-    for shape in ((),) if reference.is_large else ((), (1,), (7,), (9,), (17,), (2, 3), (0,)):
+    for shape in ((), (2, 3)) if reference.is_large else ((), (1,), (7,), (9,), (17,), (2, 3), (0,)):
         at = np.arange(int(np.prod(shape))).reshape(shape) * 5 % count
         yield from _few(checked, states.at(at), at)
-    same = np.zeros((2, 3) if reference.is_large else 5, dtype=int)
+    same = np.zeros(5, dtype=int)
     alike = States(states.q[0], states.qd[same], states.qdd[:1])
     yield from _few(checked, alike, same)
 

@@ -63,7 +63,7 @@ def _undo(done: list[tuple[Path, Path]], former: Path) -> None:
             # `former` is where `workplace.sweep` looks for it.
             if there == former and os.path.lexists(here):
                 rest = former.parents[1] / REST
-                rest.mkdir(exist_ok=True)
+                rest.mkdir()
                 former.rename(tempfile.mkdtemp(dir=rest))
 
 
