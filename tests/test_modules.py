@@ -422,3 +422,17 @@ def test_traced_by_torch_jit_a_call_is_right_or_refused(planar2: ModuleType) -> 
     ):
         with pytest.raises(TypeError, match=r"^torch.jit.trace does not see how .* take the back end torch"):
             torch.jit.trace(call, some if call is differentiated or not hasattr(call, "robot") else some[:1])
+
+
+@pytest.mark.parametrize("backend", ["torch", "autograd"])
+def test_a_call_of_a_robot_that_was_not_called_before_is_compiled_whole(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    package = package_of("planar3")
+    q = torch.rand(4, 3, dtype=torch.float64)
+    module = package.load(backend).module("kinematics.pose", frame="link3")
+    found = torch.compile(module, fullgraph=True, backend="eager")(q)
+    torch.testing.assert_close(
+        found, package.load(backend).kinematics.pose(q, "link3"), rtol=1e-13, atol=1e-13
+    )
+    torch._dynamo.reset()

@@ -12,6 +12,9 @@ from torch import Tensor
 from ..chosen_names import short
 from .run_time_values import RunTimeValues, hold
 
+MOTION = {"q", "qd", "qdd", "tau"}
+"""Arguments of shape (..., n)."""
+
 
 class CallModule(torch.nn.Module):
     """module(q, ...) answers as the call does; where that has several results, with a dict of them by name.
@@ -60,6 +63,15 @@ class CallModule(torch.nn.Module):
         if not isinstance(self.robot, torch.nn.Module):
             self.robot.backend.parameters = self.values
             self.robot.backend.bodies = self.bodies
+        self._make_tables()
+
+    def _make_tables(self) -> None:
+        """Call with no samples: torch.compile cannot trace what a first call makes, and finds it made."""
+        needed = [name for name, p in self._left.parameters.items() if p.default is p.empty or name == "tau"]
+        if MOTION.issuperset(needed):
+            for dtype in (torch.float32, torch.float64):
+                with contextlib.suppress(TypeError, ValueError):  # which a call of the user's will raise
+                    self.forward(*(torch.zeros(0, self.robot.n, dtype=dtype) for _ in needed))
 
 
 class BodyTensors(torch.nn.Module):
