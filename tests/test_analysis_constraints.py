@@ -19,6 +19,7 @@ from linkwise.analysis import Processing, Reading, analyze
 from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.run import analyze_to
+from linkwise.analysis.settings import Lowpass
 from linkwise.analysis.show.page import page_data
 from linkwise.progress import silent
 from motion_logs import write_csv
@@ -265,6 +266,19 @@ def test_a_loop_that_cannot_follow_is_refused_at_its_time(folder: Path, tmp_path
         LinkwiseError, match=r"log.csv: time 0\.\d+ s: the joints that follow turn cannot be led there"
     ):
         analyze(log, tmp_path / "far")
+
+
+def test_a_motion_that_a_filter_carries_out_of_reach_is_refused(folder: Path, tmp_path: Path) -> None:
+    """The crank of the far rocker gets to 1.989 rad; a low-pass overshoots a step to 1.986 rad."""
+    far = FOUR_BAR.replace("xyz = [0.5, 0, 0], rpy", "xyz = [0.8, 0, 0], rpy")
+    (tmp_path / "far.toml").write_text(far)
+    write_package(generate(read_system(tmp_path / "far.toml"), ["numpy"]), tmp_path / "far")
+    time = np.arange(200) / 100
+    step = 1.0 + 0.493 * (1.0 + np.tanh(60.0 * (time - 1.0)))
+    log = write_csv(tmp_path / "log.csv", np.column_stack([time, step]), ["turn"])
+    assert analyze(log, tmp_path / "far").q[:, 0].max() < 1.989
+    with pytest.raises(LinkwiseError, match=r"log.csv: between 0 and 1\.99 s: pin does not close at sample"):
+        analyze(log, tmp_path / "far", processing=Processing(lowpass=Lowpass(6.0)))
 
 
 def test_page_table_and_record_have_the_joints_that_are_driven(folder: Path, tmp_path: Path) -> None:

@@ -45,6 +45,7 @@ def test_parquet_holds_the_analysis(call, log, tmp_path):
     expected = analyze(log, PLANAR3, processing=Processing(lowpass=Lowpass(9.0)))
     assert table.column_names == [column.name for column in expected.columns]
     np.testing.assert_array_equal(np.array([c.to_numpy() for c in table.columns]), expected.values)
+    assert not any(field.nullable for field in table.schema)
     meta = table.schema.field("tau_qd/joint1/link3/joint2").metadata
     assert meta[b"unit"].decode() == "N·m"
     assert (meta[b"joint"], meta[b"link"], meta[b"cause"]) == (b"0", b"2", b"1")
@@ -54,6 +55,18 @@ def test_parquet_holds_the_analysis(call, log, tmp_path):
     assert record.pop("files") == ["analysis.json", "analysis.parquet"]
     assert record == json.loads(json.dumps(expected.record()))
     assert sorted(file.name for file in tmp_path.iterdir()) == ["log.csv", "out"]
+
+
+def test_columns_stand_by_joint_link_and_cause(log):
+    result = analyze(log, PLANAR3)
+    places: dict[str, list[tuple[int, ...]]] = {}
+    for c in result.columns[1:]:
+        places.setdefault(c.quantity, []).append(
+            (c.joint, *(at for at in (c.link, c.cause) if at is not None))
+        )
+    assert {"tau_qdd", "tau_qd", "tau_gravity", "tau_link"} <= set(places)
+    for quantity, found in places.items():
+        assert found == sorted(found), quantity
 
 
 def test_power_terms_are_written_where_asked_for_and_leave_the_page_alone(call, log, tmp_path):

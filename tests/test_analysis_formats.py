@@ -87,6 +87,9 @@ def test_uneven_time_is_told_about_resampling(tmp_path: Path) -> None:
         LinkwiseError, match=r"a\.npz: rows 30 to 31, .* gap of 0.02 .*; fill it, or .* --resample 100"
     ):
         analyze(tmp_path / "a.npz", PLANAR3)
+    gap = write_bag(tmp_path / "gap", states(dropped, JOINTS))
+    with pytest.raises(LinkwiseError, match=r"gap: rows 30 to 31, time column: a gap of 0.02 "):
+        analyze(gap, PLANAR3)
     bag = write_bag(tmp_path / "bag", states(jitter, JOINTS))
     with pytest.raises(
         LinkwiseError, match=r"bag: row \d+, time column: a step of .* --resample (99|100)\.\d+"

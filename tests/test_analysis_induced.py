@@ -1,6 +1,7 @@
 """Induced accelerations in an analysis: columns that sum up, of joints, points and the centre of mass."""
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,19 @@ def test_payloads_accelerate_as_links_and_weigh_in_the_centre_of_mass(arm: Path)
     own = 4.5  # three moving links of 1.5 kg
     mean = (own * alone["acc/centre-of-mass/y"] + 2.0 * carried["acc/d,0.1,0.2,0.3/y"]) / (own + 2.0)
     assert relative_error(found["acc/centre-of-mass/y"], mean) <= 1e-9
+
+
+def test_losses_stand_in_the_order_of_the_joints(tmp_path: Path) -> None:
+    names, damped = "abcdefghij", ("bc", "ij")
+    inner = '<dynamics damping="0.4"/>'
+    joints = [one + two for one, two in pairwise(names)]
+    text = robot(*map(link, names), *(joint(j, *j, inner=inner if j in damped else "") for j in joints))
+    (tmp_path / "arm.urdf").write_text(text)
+    write_package(generate(read_system(tmp_path / "arm.urdf"), ["numpy"]), tmp_path / "arm")
+    log = write_csv(tmp_path / "log.csv", smooth(40, 9), joints)
+    found = analyze(log, tmp_path / "arm", induced=["joints"])
+    losses = [column.name for column in found.columns if column.name.startswith("acc_damping/joints/ab/")]
+    assert losses == [f"acc_damping/joints/ab/{j}" for j in damped]
 
 
 def test_the_command_writes_them_with_units_meaning_and_residual(

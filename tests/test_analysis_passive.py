@@ -71,6 +71,9 @@ def test_every_file_and_picture_has_them(analysed, tmp_path):
     record = json.loads((tmp_path / "out/analysis.json").read_text())
     meanings = {column["name"]: column["meaning"] for column in record["columns"]}
     assert meanings["tau_spring/bc"] == "what the joint takes for its own spring"
+    named = result.to_xarray().passive_torque
+    for source, of in (("spring", "bc"), ("damping", "ab"), ("friction", "ab")):
+        np.testing.assert_array_equal(named.sel(source=source, joint=of), result[f"tau_{source}/{of}"])
     labels = [text.get_text() for text in result.figure("shares").legends[0].get_texts()]
     assert labels[:4] == ["gravity", "own spring", "own damping", "own friction"]
     assert {"tau_spring", "tau_damping"} <= {c["quantity"] for c in json.loads(page_data(result))["columns"]}

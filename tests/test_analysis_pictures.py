@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -176,6 +177,15 @@ def test_a_panel_says_what_it_shows_and_in_which_unit(analysis):
     titles = [panel.get_title() or panel.get_title(loc="left") for panel in (over_time, means, sizes)]
     assert titles == ["all causes together", "mean (N·m)", "root mean square (N·m)"]
     assert over_time.get_ylabel() == "N·m"
+
+
+def test_the_figure_of_causes_has_room_for_every_cause(analysis):
+    figure = analysis.figure("causes:joint1")
+    figure.draw_without_rendering()
+    places = [text.get_window_extent() for text in figure.axes[1].get_yticklabels()]
+    places.sort(key=lambda place: place.y0)
+    assert len(places) == 5
+    assert all(below.y1 < above.y0 for below, above in pairwise(places))
 
 
 def test_figures_are_shown_in_a_notebook(analysis, monkeypatch):

@@ -75,6 +75,13 @@ def test_work_is_the_integral_of_the_power(there_and_back):
     assert (result.work.given[1:, 0] == 0).all()  # joint 2 does not move link 1
 
 
+def test_work_counts_a_motion_from_its_first_sample_to_its_last(tmp_path):
+    result = analyze(write_csv(tmp_path / "a.csv", smooth(30, 3)), PLANAR3)
+    assert (np.abs(result.joint_power[[0, 1, -2, -1]]) > 1e-3).all()
+    net = np.trapezoid(result.joint_power, result.time, axis=0)
+    np.testing.assert_allclose(result.joint_work.net, net, rtol=1e-11)
+
+
 def test_joints_at_rest_send_no_power(tmp_path):
     """In the paper's simulated motion only joint 3 moves until 3 s, though the others carry torque."""
     (path,) = write_motions(tmp_path, [SIMULATED])

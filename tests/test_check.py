@@ -30,7 +30,7 @@ from linkwise import (
     write_package,
 )
 from linkwise.check.as_generated import check_made
-from linkwise.check.compare import Result
+from linkwise.check.compare import Entries, Result, compare
 from linkwise.package.load import load_package, open_package
 from linkwise.package.manifest import Manifest
 from linkwise.version import VERSION
@@ -442,6 +442,26 @@ def test_a_table_of_indices_has_these_rows_and_nothing_else(new: str, copy_for: 
     change_file(package, "c/planar2_index.h", "{2, 2, 2}", new)
     found = {result.name: result for result in check_package(package, 3)}
     assert found["c: numbers, indices and functions of the headers"].detail == "the indices of c2 are wrong"
+
+
+@needs_compiler
+def test_all_that_a_package_has_is_held(passing: Copy) -> None:
+    package = passing("numpy", "c")
+    found = marks(package)
+    assert set(found.values()) == {"ok"}
+    headers = "".join(path.read_text() for path in (package / "c").glob("planar2*.h"))
+    functions = set(re.findall(r"\w+ (planar2_\w+)\(", headers))
+    called = {name.removeprefix("c: ") for name in found if name.startswith("c: planar2_")}
+    assert functions - called == {f"planar2_frame_partial_impedance{real}" for real in ("", "f")}
+    for what in ("M^j", "c1", "g", "tau_ij", "c0", "regressors", "poses of frames", "a simulated motion"):
+        assert f"numpy: {what} against Newton-Euler recursion" in found
+    for what in ("sums over the links", "passive torques of the joints", "regressors in single precision"):
+        assert {f"numpy: {what}", f"numpy by rule: {what}"} <= set(found)
+
+
+def test_where_nothing_is_compared_nothing_is_held() -> None:
+    assert compare("nothing", []).mark == "skip"
+    assert compare("no numbers", [Entries("c0", np.zeros((3, 0)), np.zeros((3, 0)), 1.0)]).mark == "ok"
 
 
 @needs_compiler

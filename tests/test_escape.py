@@ -113,6 +113,10 @@ def test_json_has_no_nan() -> None:
         to.json_text(float("nan"))
 
 
+def test_json_to_read_has_letters_as_they_are_and_escapes_for_what_nobody_sees() -> None:
+    assert to.json_text("Größe 角\u202e") == '"Größe 角\\u202e"'
+
+
 @pytest.mark.parametrize("name", EVIL, ids=ascii)
 def test_python_takes_it_for_a_string_and_a_docstring(name: str) -> None:
     assert ast.literal_eval(to.python_literal(name)) == name

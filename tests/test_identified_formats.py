@@ -29,7 +29,7 @@ MJCF = """<mujoco model="arm">
           <geom type="capsule" size="0.05" fromto="0 0 0 0 0 0.2"/>
           <body name="hand" pos="0.02 0 0.25">
             <inertial pos="0 0.01 0.04" mass="0.6" fullinertia="0.0008 0.0011 0.0009 0.0001 0 0"/>
-            <body name="finger" pos="0 0 0.1" childclass="finger">
+            <body pos="0 0 0.1" childclass="finger">
               <joint name="slide" type="slide" axis="1 0 0"/>
               <geom size="0.03" pos="0 0.01 0.02"/><site name="tip" pos="0 0 0.06"/>
             </body>

@@ -81,6 +81,13 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda data: data["links"][1].update(path=[1]),
         "the path of link 'link2' is not that of the tree",
     ),
+    "passive entry": (
+        lambda data: data["tree"]["passive"].append(
+            {"joint": "joint1", "coordinate": 1, "ratio": 1.0}
+            | dict.fromkeys(("stiffness", "rest", "damping", "friction", "armature"), 0.5)
+        ),
+        "passive entry 0 of the tree is not of a joint that moves so",
+    ),
     "joint of the tree": (
         lambda data: bodies(data)[1].update(joint="wrist"),
         "joints[1].name is 'joint2', on which no body of the tree hangs",

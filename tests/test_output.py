@@ -213,6 +213,52 @@ def test_an_address_is_no_folder(
     assert not list(tmp_path.iterdir())
 
 
+def test_a_signal_while_a_workplace_is_tidied_up_is_not_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cleared, struck = workplace._cleared, [KeyboardInterrupt()]
+
+    def strike(work: Path) -> None:
+        if struck:
+            raise struck.pop()
+        cleared(work)
+
+    monkeypatch.setattr(workplace, "_cleared", strike)
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path / "target", "new")
+    assert os.listdir(tmp_path) == ["target"]
+
+
+def test_a_lock_that_no_try_makes_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened, tries = os.open, iter(range(3))
+
+    def full(path: Path, flags: int, mode: int = 0o777) -> int:
+        if Path(path).name == workplace.LOCK:
+            next(tries)
+            raise OSError(28, "No space left on device")
+        return opened(path, flags, mode)
+
+    monkeypatch.setattr(os, "open", full)
+    with pytest.raises(LinkwiseError, match="No space left on device"):
+        write(tmp_path / "target", "new")
+
+
+def test_all_of_a_draft_is_on_the_disk_before_it_takes_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path / "target", "old")
+    flushed: dict[Path, str] = {}
+    system = type(exchange.system_here())
+    file = tmp_path / "target" / NAMES[0]
+    monkeypatch.setattr(system, "flush", lambda _, place: flushed.update({place: file.read_text()}))
+    with whole_directory(tmp_path / "target", nothing_refused) as draft:
+        for name in NAMES:
+            (draft / name).parent.mkdir(exist_ok=True)
+            (draft / name).write_text("new")
+    places = {draft, *(draft / name for name in NAMES), *((draft / name).parent for name in NAMES)}
+    assert {flushed[place] for place in places} == {"old"}
+
+
 def test_folders_made_for_a_failed_writer_go_too(tmp_path: Path) -> None:
     (tmp_path / "kept").mkdir()
     with pytest.raises(LinkwiseError), whole_directory(tmp_path / "kept/a/b/target", nothing_refused):

@@ -372,12 +372,23 @@ def test_a_choice_that_cannot_be_is_told(
         (("a", "hinged", (0, 0, 0), (0, 0, 0)), "contacts[0].axis is (0, 0, 0), which has no direction"),
         (("a", "point", (0, 0)), "contacts[0].point is (0, 0); give x, y, z"),
         (("a", "rolling"), "contacts[0].radius is 0.0; what rolls has one above 0, in m"),
+        (
+            ("a", "rolling", (0, 0, 0), (0, 0, 1), (0, 0, 0), 0.1),
+            "contacts[0].normal is (0, 0, 0), which has no direction",
+        ),
     ],
 )
 def test_a_contact_that_cannot_be_is_told(
     fourbar: ModuleType, one: Any, made: tuple[Any, ...], message: str
 ) -> None:
     refused(lambda: one.constrained(contacts=[fourbar.Contact(*made)]), message)
+
+
+def test_what_rolls_without_gravity_needs_a_normal(tmp_path: Path) -> None:
+    floating = package(tmp_path, FOURBAR.replace("gravity = [0, -9.81, 0]", "gravity = [0, 0, 0]"))
+    wheel = floating.Contact("a", "rolling", radius=0.1)
+    told = "contacts[0] has no normal, and no gravity tells one; give normal=(x, y, z)"
+    refused(lambda: floating.load("numpy").constrained(contacts=[wheel]), told)
 
 
 def test_a_torque_of_a_wrong_shape_and_forward_dynamics_of_the_open_tree_are_refused(one: Any) -> None:

@@ -16,7 +16,10 @@ from compiled import compile_library, name_of
 from conftest import PANDA, needs_compiler
 from linkwise import generate, read_system, write_package
 from linkwise.check.checks import check_package
+from linkwise.check.passive_reference import passive_reference
+from linkwise.check.states import States
 from linkwise.package.load import import_package
+from linkwise.package.manifest import Manifest
 from urdf_text import joint, link, mimic, robot
 
 BACKENDS = ("numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler))
@@ -57,6 +60,16 @@ def written(folder: Path, backends: list[str] | None = None) -> Path:
 @pytest.fixture(scope="module")
 def hand(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     return import_package(written(tmp_path_factory.mktemp("hand")))
+
+
+def test_an_error_is_held_against_all_that_a_share_is_summed_from(tmp_path: Path) -> None:
+    tree = Manifest.read(written(tmp_path, ["numpy"])).tree
+    assert tree is not None
+    motion = random_states(2, 20)
+    shares, sizes = passive_reference(tree.passive, States(*motion))
+    for share, size, own in zip(shares, sizes, by_hand(*motion), strict=True):
+        np.testing.assert_allclose(share, own, rtol=1e-12, atol=1e-14)
+        assert (size >= abs(share) * (1 - 1e-12)).all()
 
 
 def taken(model: Any, arrays: Any) -> Any:

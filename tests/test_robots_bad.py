@@ -228,6 +228,10 @@ BAD_TOML = {
         'schema = 1\nname = ["""a"""", {' + ".".join(["a"] * 40_000) + " = 1}]",
         "malformed TOML: a dotted key 40000 deep",
     ),
+    "a name that is a number": (
+        toml().replace('name = "rod"', "name = 3", 1),
+        "link 3 needs 'name', a string",
+    ),
     "large": (
         "#" * (2**20 + 1),
         "the file is larger than 1 MiB, which no robot's description is; give one",
@@ -245,6 +249,17 @@ def test_defect_of_a_toml_file_is_named(case: str, parameters: Any, tmp_path: Pa
     assert message in str(caught.value)
     assert str(caught.value).startswith(f"{tmp_path / 'bad.toml'}: ")
     assert "\n" not in str(caught.value)
+
+
+def test_a_description_may_have_four_mebibytes_of_xml(tmp_path: Path) -> None:
+    whole = chain(joint("ab", "a", "b"))
+    for size in (4 * 2**20, 4 * 2**20 + 1):
+        comment = "<!--" + " " * (size - len(whole.encode()) - 7) + "-->"
+        (tmp_path / "arm.urdf").write_text(whole + comment)
+        if size == 4 * 2**20:
+            assert read_robot(tmp_path / "arm.urdf").coordinates
+    with pytest.raises(LinkwiseError, match="the file is larger than 4 MiB"):
+        read_robot(tmp_path / "arm.urdf")
 
 
 @pytest.mark.parametrize("opening", ['"', '"""'])

@@ -39,6 +39,23 @@ def test_planar_arms_have_the_torques_of_the_textbook(package_of: Callable[[str]
     np.testing.assert_allclose(answer, np.stack(exact, -1), rtol=0, atol=1e-14)
 
 
+def test_the_puma_has_the_gravity_constants_that_were_published_with_it(
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    """Armstrong, Khatib and Burdick 1986: the torque on joint 2 at rest, to 0.2 % or the digits printed."""
+    q = np.random.default_rng(3).uniform(-3.0, 3.0, (40, 6))
+    found = package_of("puma560").load("numpy").inverse_dynamics(q, 0.0 * q, 0.0 * q)[:, 1]
+    c2, s2 = np.cos(q[:, 1]), np.sin(q[:, 1])
+    c23, s23 = np.cos(q[:, 1] + q[:, 2]), np.sin(q[:, 1] + q[:, 2])
+    c4, c5, s5 = np.cos(q[:, 3]), np.cos(q[:, 4]), np.sin(q[:, 4])
+    shapes = np.stack([c2, s23, s2, c23, s23 * c5 + c23 * c4 * s5], -1)
+    constants, rest, *_ = np.linalg.lstsq(shapes, found, rcond=None)
+    assert rest.item() < 1e-20
+    published = np.array([-37.2, -8.44, 1.02, 0.249, -0.0282])
+    near = np.maximum(2e-3 * abs(published), [0.05, 0.005, 0.005, 0.0005, 0.00005])
+    assert (abs(constants - published) <= near).all(), constants
+
+
 def test_torso_is_a_small_tree() -> None:
     system = read_system("torso")
     assert [link.name for link in system.links] == [

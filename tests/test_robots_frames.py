@@ -36,6 +36,13 @@ def test_every_body_of_the_file_has_a_frame_wherever_it_went(tmp_path: Path) -> 
     assert tool.translation == (0.1, 0.2, 0.3)
 
 
+def test_frames_of_a_robot_that_was_given_none_are_those_of_its_links(tmp_path: Path) -> None:
+    found = replace(read(tmp_path / "arm.urdf", ARM), frames=())
+    upright = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    given = [(frame.name, frame.link, frame.rotation, frame.translation) for frame in found.named_frames]
+    assert given == [(link.name, at, upright, (0, 0, 0)) for at, link in enumerate(found.links)]
+
+
 def test_links_between_the_axes_of_one_joint_have_frames_too(tmp_path: Path) -> None:
     found = read(tmp_path / "arm.urdf", ARM, base="floating")
     names = {frame.name: frame.link for frame in found.frames}

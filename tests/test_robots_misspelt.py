@@ -37,6 +37,11 @@ MISSPELT = {
         ('<axis xyz="', '<axis xzy="'),
         "<axis> has xzy=…, which is not read; did you mean xyz=…?",
     ),
+    "two wrong letters of six": (
+        URDF,
+        ("<origin", "<oregen"),
+        "has <oregen>, which is not read; did you mean <origin>?",
+    ),
     "turn as a quaternion": (
         URDF,
         (' rpy="', ' quat_xyzw="0 0 0.6 0.8" rpy="'),

@@ -18,7 +18,7 @@ def bag(tmp_path: Path) -> Path:
 
 
 def test_each_file_of_a_folder_counts(bag: Path) -> None:
-    plan = StudyPlan("arms", bag.parent / "study.toml", ("subject",), ())
+    plan = StudyPlan("arms", bag.parent / "study.toml", ("subject",), (), pages=False, trust_python=False)
     trial = Trial("a", (("subject", "S1"),), str(bag), "planar3", AnalysisChoices())
     key, files = trial_key(plan, trial, {})
     assert list(files) == [str(bag / "metadata.yaml"), str(bag / "part/0.db3")]

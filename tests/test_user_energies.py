@@ -390,6 +390,8 @@ def test_parameters_that_no_energy_has_are_left_out() -> None:
     links = [LinkEnergy("disc", used * x.qd**2, 0)]
     system = energy_system("puck", [x], links, {used: 1.0, unused: 2.0}, symbolic=True)
     assert system.parameters == {used: 1.0}
+    assert system.request == {"parameters": "symbolic"}
+    assert energy_system("puck", [x], links, {used: 1.0}).request == {"parameters": "numeric"}
 
 
 @pytest.mark.parametrize(("file", "told"), [("turntable.py", True), ("cart_pendulum.py", False)])

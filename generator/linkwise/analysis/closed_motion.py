@@ -99,8 +99,8 @@ def _closed(model: ConstrainedModel, time: Array, q: Array) -> Array:
         return np.asarray(model.constraints.closed(q))
     except ValueError as error:
         raise LinkwiseError(
-            f"between {time[0]:.6g} and {time[-1]:.6g} s: {_reason(error)}; mend the log's columns of joints"
-            f" that follow, or leave them out: {', '.join(model.constraints.dependent)}"
+            f"between {time[0]:.6g} and {time[-1]:.6g} s: {reason_of(error)}; mend the log's columns of"
+            f" joints that follow, or leave them out: {', '.join(model.constraints.dependent)}"
         ) from None
 
 
@@ -154,11 +154,11 @@ def _led(model: ConstrainedModel, start: Array | None, wanted: Array, time: floa
         return np.asarray(model.constraints.closed(wanted[list(model.following.independent)], start=start))
     except ValueError as error:
         raise LinkwiseError(
-            f"time {time:.6g} s: {_reason(error)}; give the log columns for them:"
+            f"time {time:.6g} s: {reason_of(error)}; give the log columns for them:"
             f" {', '.join(model.constraints.dependent)}"
         ) from None
 
 
-def _reason(error: ValueError) -> Any:
+def reason_of(error: ValueError) -> Any:
     """What a package says without the mend that is for callers of its own."""
     return getattr(error, "reason", error)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from linkwise.analysis.borne_forces import BorneForces
+from linkwise.analysis.closed_motion import reason_of
 from linkwise.analysis.contacts.contact_terms import ContactTerms
 from linkwise.analysis.contacts.contact_times import ContactTimes
 from linkwise.analysis.contacts.ground_contacts import Standing
@@ -110,7 +111,10 @@ class Decomposer:
             try:
                 q, qd, qdd = self.robot.constrained.consistent(q, qd, qdd)
             except ValueError as error:
-                raise LinkwiseError(f"between {time[0]:.6g} and {time[-1]:.6g} s: {error}") from None
+                raise LinkwiseError(
+                    f"between {time[0]:.6g} and {time[-1]:.6g} s: {reason_of(error)}; the log's joints close"
+                    " there, and filtered they do not: filter less, or mend the log"
+                ) from None
         packed, standing = self.robot.model.packed(q, qd, qdd), self._standing(time, q)
         unborne, free = packed, self.robot.model.inverse_dynamics(q, qd, qdd)
         partial = self._dense(packed.torque, q.shape[1])

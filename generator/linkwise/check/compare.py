@@ -68,10 +68,12 @@ def compare(
     """Hold groups of entries against what is expected of them, and report the worst.
 
     A value's error is relative to the value itself; where that is next to nothing, an error as large as what
-    rounding leaves of its operands, ROUNDINGS · epsilon · scale, passes just so.
+    rounding leaves of its operands, ROUNDINGS · epsilon · scale, passes just so. Where there are no entries,
+    nothing is held.
     """
-    worst, place = 0.0, ""
+    worst, place, compared = 0.0, "", False
     for entries in groups:
+        compared = True
         value, expected = np.asarray(entries.value), entries.expected
         if value.shape != expected.shape:
             return Result(
@@ -97,6 +99,8 @@ def compare(
             shown = at if entries.rows is None else entries.rows[at[0]]
             indices = f"({', '.join(str(index + 1) for index in shown)})" if at else ""
             place = f"{entries.what}{indices}"
+    if not compared:
+        return skipped(name, "there was nothing to compare")
     detail = f"largest relative error {worst:.1e}"
     return Result(name, worst <= tolerance, worst, detail if worst <= tolerance else f"{detail} at {place}")
 

@@ -62,8 +62,8 @@ def read_study(path: Path, trust_python: bool = False) -> StudyPlan:
             given_texts(data, "columns", ("**",)),
             tuple(filled(Comparison, "[[compare]]", item) for item in tables(data, "compare")),
             tuple(filled(PaperFigure, "[[figure]]", item) for item in tables(data, "figure")),
-            given_flag(data, "pages"),
-            trust_python,
+            pages=given_flag(data, "pages"),
+            trust_python=trust_python,
         )
         _check(plan)
     return plan

@@ -115,6 +115,6 @@ class StudyPlan:
     """Patterns of the columns that tables keep."""
     comparisons: tuple[Comparison, ...] = ()
     figures: tuple[PaperFigure, ...] = ()
-    pages: bool = True
-    trust_python: bool = field(default=False, repr=False)
+    pages: bool = field(kw_only=True)
+    trust_python: bool = field(kw_only=True, repr=False)
     """Whether robots that are Python files are run; no result depends on it."""

@@ -15,6 +15,8 @@ COMMENT_OR_INDEX = re.compile(r"/\*.*?\*/|\[[^\]]*\]", re.DOTALL)
 OPERATOR = re.compile(r" [-+*/] ")
 WORD = re.compile(r" [-+*/] |x\.\w|p\[at")
 NUMBER = re.compile(r"\bR\(")
+SHORTS = re.compile(r"static const short \w+\[\] = \{([^}]*)\}")
+"""Tables of the joints above each link, which grow with its square: of 80 joints in a row 13 kB."""
 LINK = re.compile(r"^void \w+_link_\d+\(", re.MULTILINE)
 
 STRAIGHT, LOOPS, ENERGIES = (9_000, 8_300), (12_450, 10_900), (3_700, 3_700)
@@ -38,6 +40,8 @@ def code_size(name: str, files: Mapping[str, str]) -> CodeSize | None:
     operations = sum(len(OPERATOR.findall(COMMENT_OR_INDEX.sub("", text))) for text in kernels)
     links = len(LINK.findall(header)) // 2  # of double and float
     settings, numbers = len(WORD.findall(tree)), len(NUMBER.findall(tree))
+    tables = SHORTS.findall(tree) + SHORTS.findall(COMMENT.sub("", files[f"c/{name}.c"]))
+    above = sum(len(table.split(",")) - 1 for table in tables)
     base = ENERGIES if not tree else STRAIGHT if kernels else LOOPS
     free = (FREE_STRAIGHT if kernels else FREE_LOOPS) if "frame_partial_impedance(" in header else (0, 0)
     double, single = (
@@ -46,6 +50,7 @@ def code_size(name: str, files: Mapping[str, str]) -> CodeSize | None:
         + round(OPERATION[at] * operations)
         + SETTING[at] * settings
         + OWN[at] * links
+        + 2 * above
         + numbers * real
         for at, real in enumerate((8, 4))
     )
