@@ -5,11 +5,13 @@ import re
 from dataclasses import replace
 from itertools import pairwise
 
+import matplotlib
 import numpy as np
 import pytest
 from linkwise.analysis import Load, Reading, analyze
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.result_columns import Column
+from linkwise.analysis.show import figure_png
 from linkwise.analysis.show.largest_few import largest_few
 from linkwise.analysis.show.page import page_data
 from linkwise.analysis.show.poses import poses
@@ -177,6 +179,12 @@ def test_a_panel_says_what_it_shows_and_in_which_unit(analysis):
     titles = [panel.get_title() or panel.get_title(loc="left") for panel in (over_time, means, sizes)]
     assert titles == ["all causes together", "mean (N·m)", "root mean square (N·m)"]
     assert over_time.get_ylabel() == "N·m"
+
+
+def test_the_users_own_settings_of_matplotlib_change_no_figure(analysis):
+    expected = figure_png(analysis, "paper")
+    with matplotlib.rc_context({"axes.facecolor": "red", "lines.marker": "o"}):
+        assert figure_png(analysis, "paper") == expected
 
 
 def test_the_figure_of_causes_has_room_for_every_cause(analysis):

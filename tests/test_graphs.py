@@ -100,6 +100,14 @@ def test_an_operation_names_the_file_of_its_line(package_of: Packages) -> None:
     assert sine in graph.shared_with(robot.graph(0, 2))
 
 
+def test_an_operation_says_how_often_the_energy_was_differentiated(package_of: Packages) -> None:
+    robot = package_of("planar3").load("autograd")
+    most = {(0, 1, None, 0): 1, (0, 1, 1, 2): 2, (0, 1): 2, (0, 1, 1, 1): 3, (0, 1, 1, 0): 3}
+    for asked, order in most.items():
+        found = {node.derivative for node in robot.graph(*asked).operations}
+        assert found == {0, order} if asked == (0, 1, 1, 2) else found == {*range(order + 1)}, asked
+
+
 def test_parameters_are_leaves_and_get_gradients(package_of: Packages) -> None:
     package = package_of("planar3 symbolic")
     masses = torch.tensor([0.4, 0.9], dtype=torch.float64, requires_grad=True)
@@ -195,6 +203,23 @@ def test_an_edited_energy_may_compute_by_any_operation(
     assert any(node.shape for node in part.operations) is (name == "vectors")
     with torch.inference_mode():
         assert robot.graph(0, 0, 0, 2).evaluate(q[0], qd[0], qdd[0]).shape == ()
+
+
+def test_a_slope_is_of_the_line_that_it_differentiates(tmp_path: Path) -> None:
+    energy = """qd[0] ** 2 * (
+            torch.exp(q[0])
+            + torch.sinh(q[0])
+            + torch.sin(q[0])
+        )"""
+    robot, _ = edited(tmp_path / "lines", energy)
+    inertia, damping = (
+        {node.name: node for node in robot.graph(0, 0, 0, m).operations if node.operands == ("q[0]",)}
+        for m in (2, 1)
+    )
+    for function, slope in (("sinh", "cosh"), ("sin", "cos")):
+        assert damping[slope].source == inertia[function].source
+        assert damping[slope].derivative > inertia[function].derivative == 0
+    assert inertia["sin"].source != inertia["sinh"].source
 
 
 def test_a_number_that_is_taken_off_is_drawn_with_its_sign(tmp_path: Path) -> None:

@@ -221,6 +221,12 @@ def test_more_axes_than_arrays_have_are_named(
     assert robot.partial_torque(*(part.reshape(-1, 3) for part in given)).shape == (1, 3, 3)
 
 
+def test_a_tensor_of_more_axes_than_numpy_has_is_named(package_of: Callable[[str], ModuleType]) -> None:
+    motion = [torch.ones(*[1] * (count - 1), 3, dtype=torch.float64) for count in (1, 65, 1)]
+    with pytest.raises(ValueError, match=r"^qd: 65 axes are too many for this back end; join .* qd\.reshape"):
+        package_of("planar3").load("numpy").partial_torque(*motion)
+
+
 @pytest.mark.parametrize("tensors", [False, True])
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_shapes_that_do_not_go_together_are_named(
