@@ -1,5 +1,6 @@
 """Two derivations of one thing: the rigid-link rule, and Euler–Lagrange on the energy of the same link."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,10 @@ import sympy as sp
 from answers import random_states, relative_error
 from conftest import DATA, LOCKED_FINGERS, PANDA
 from evaluation import evaluate
-from linkwise import Options, read_system
+from linkwise import Options, generate, read_system
 from linkwise.dynamics.coefficients import LinkForms
 from linkwise.dynamics.derive import derive, link_kernel
-from linkwise.dynamics.frame_search import FrameSearch, _spread
+from linkwise.dynamics.frame_search import MAX_AXES, FrameSearch, _spread
 from linkwise.dynamics.kernel import lowering
 from linkwise.dynamics.link_motion import Origin
 from linkwise.dynamics.screws import CommonAxes, Orientation
@@ -109,6 +110,23 @@ def test_every_common_frame_gives_the_same_numbers_and_says_which_it_is(
     for block in BLOCKS:
         by_rule = numbers(kernel.graph, kernel.forms[0], block, states)
         assert relative_error(by_rule, numbers(graph, forms, block, states)) <= 1e-12, block
+
+
+def test_an_origin_beside_the_common_axes_own_is_taken_where_it_costs_less() -> None:
+    system = read_system(DATA / "skew.toml")
+    assert isinstance(system, RigidSystem)
+    tree = [(f - 1, joint) for f, joint in enumerate(system.links[2].joints)]
+    found = list(FrameSearch(system, [2], tree, [range(3)]).framed(MAX_AXES))
+    own = min(cost for cost, axes, origin in found if axes.frame == origin.frame)
+    beside = min(cost for cost, axes, origin in found if axes.frame != origin.frame)
+    assert beside < own
+    kernel = link_kernel(system, 2, "rule")
+    assert count_operations(kernel.graph, kernel.forms[0].decomposition()).arithmetic <= beside
+
+
+def test_sums_of_a_torque_are_called_by_joint_and_cause() -> None:
+    forms = generate(read_system("planar3"), ["numpy"])["forms/link_2.py"]
+    assert {"c1_1_1", "tau1_1", "tau2_1"} <= set(re.findall(r"^ +(\w+) = ", forms, re.MULTILINE))
 
 
 @pytest.mark.parametrize(("count", "most"), [(3, 4), (5, 4), (10, 4), (30, 3), (31, 7)])

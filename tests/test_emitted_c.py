@@ -16,7 +16,7 @@ import pytest
 from answers import random_states, relative_error
 from compiled import Compiled, check_syntax, compile_library, library_of, link_parts, name_of
 from conftest import DATA, PANDA, needs_compiler
-from linkwise import Coordinate, LinkEnergy, energy_system, generate, read_system, write_package
+from linkwise import Coordinate, LinkEnergy, Options, energy_system, generate, read_system, write_package
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
@@ -78,6 +78,15 @@ def test_the_header_says_how_to_compile_it(directory_of: Callable[[str], Path], 
     for command, made in zip(commands, ("planar3.o", "planar3f.o", "planar3.o"), strict=True):
         subprocess.run(command, cwd=tmp_path / "c", check=True)
         (tmp_path / "c" / made).unlink()
+
+
+def test_the_header_says_of_each_function_whether_it_reads_parameters() -> None:
+    for request, has in (("numeric", False), ("symbolic", True)):
+        header = generate(read_system("planar3", Options(request)), ["c"])["c/planar3.h"]
+        functions = re.findall(r"/\*([^/]*?\bReads [^/]*?)\*/\n(?:void|int) (\w+)\(([^)]*)\);", header)
+        assert len(functions) >= 30
+        for text, name, arguments in functions:
+            assert ("p (PARAMETERS)" in text) == bool(re.search(r"\*p\b", arguments)) == has, name
 
 
 def test_the_header_gives_units_by_those_of_the_joints(directory_of: Callable[[str], Path]) -> None:

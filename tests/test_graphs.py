@@ -189,6 +189,12 @@ def edited(directory: Path, energy: str) -> tuple[Any, str]:
             lambda q: 2 * np.hypot(q, 2),
             lambda q: 2 * q / np.hypot(q, 2),
         ),
+        (
+            "options",
+            "qd[0] ** 2 * torch.add(q[0], q[0] ** 2, alpha=3.0)",
+            lambda q: 2 * q + 6 * q**2,
+            lambda q: 2 + 12 * q,
+        ),
     ],
 )
 def test_an_edited_energy_may_compute_by_any_operation(
