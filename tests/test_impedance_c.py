@@ -283,6 +283,21 @@ def test_an_arm_of_parallel_slides_has_one_motion_too_many(tmp_path: Path) -> No
     assert c.frame(at, at, "c", {"rows": [4, 5]})[0] == -2
 
 
+def test_a_turn_that_is_rounding_alone_is_no_turn(tmp_path: Path) -> None:
+    """Slides tilt by 0.3 and 0.4 rad about y, and the hinge by -0.7: it turns about the vertical."""
+    tilts = [("ab", "prismatic", 0.3), ("bc", "prismatic", 0.4), ("cd", "revolute", -0.7)]
+    joints = [joint(n, *n, type=kind, axis="0 0 1", rpy=f"0 {tilt} 0") for n, kind, tilt in tilts]
+    (tmp_path / "tilted.urdf").write_text(chain(*joints))
+    write_package(generate(read_system(tmp_path / "tilted.urdf"), ["c", "numpy"]), tmp_path / "tilted")
+    c, at = ImpedanceInC(tmp_path / "tilted", tmp_path / "tilted.so"), np.array([0.1, 0.2, 0.3])
+    model = import_package(tmp_path / "tilted").load("numpy")
+    turn = model.kinematics.jacobian(at, "d")[:3, 2]
+    assert 0.0 < abs(turn[0]) < 1e-15
+    assert c.frame(at, at, "d", {"rows": [2]})[0] == 0
+    for rows in ([0], [1]):
+        assert c.frame(at, at, "d", {"rows": rows})[0] == -1
+
+
 @pytest.mark.parametrize(
     "robot", ["torso", f"{CRANE} loops", TURNTABLE], ids=["straight", "loops", "energies"]
 )

@@ -324,6 +324,11 @@ def test_a_compiler_that_does_not_compile_is_named(
     assert [path.suffix for path in (tmp_path / "cache").iterdir()] in ([], [".lock"])
 
 
+def test_sources_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match=f"^cannot read {tmp_path / 'gone'}: .*; generate it again$"):
+        native_build.digest_of(tmp_path / "gone")
+
+
 def test_a_library_that_cannot_be_loaded_is_named_and_not_kept(
     tiny: Sources, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -165,6 +165,20 @@ def test_long_arms_are_controlled_in_single_precision(count: int, tmp_path: Path
     assert relative_error(found, expected) <= 1e-5
 
 
+@needs_compiler
+def test_c_pulls_a_frame_of_one_sample(package_of: Packages, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arrays have no part in it: C has answered before they are asked."""
+    package = package_of("puma560")
+    robot, q = package.load("native"), np.linspace(0.1, 0.6, 6)
+    frame = package.FrameImpedance(robot.kinematics.frames[-1], stiffness=2.0, damping=1.0)
+    pose = robot.kinematics.pose(q + 0.01, frame.frame)
+    target = package.Target(pose=pose, velocity=np.ones(6), acceleration=np.ones(6))
+    expected = package.load("numpy").partial_impedance(frame=frame)(q, q, target)
+    control = robot.partial_impedance(frame=frame)
+    monkeypatch.setattr(type(control._answers), "_followed", lambda *asked: pytest.fail("arrays were asked"))
+    assert relative_error(control(q, q, target), expected) <= 1e-9
+
+
 def test_a_controller_maps_over_samples(package_of: Packages) -> None:
     model = package_of("torso").load("torch")
     q, qd, at = (torch.from_numpy(a) for a in random_states(model.n, 4, seed=5))
