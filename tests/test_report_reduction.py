@@ -21,6 +21,7 @@ from linkwise.report import (
     Timing,
     count_polynomial,
     curve,
+    derivation_seconds,
     draw_savings,
     fit,
     held_against,
@@ -36,6 +37,7 @@ from linkwise.report.seconds import row_view
 from linkwise.report.spatial_arms import is_spatial
 from linkwise.report.uncombined_terms import uncombined_terms
 from linkwise.robot import Options, read_robot
+from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.system import RigidSystem, System, rigid_system
 from matplotlib.figure import Figure
 
@@ -186,6 +188,17 @@ def test_uncombined_terms_end_at_the_budget() -> None:
     system = planar(5)
     assert isinstance(system, RigidSystem)
     assert len(list(uncombined_terms(system, 5, 100))) == 3
+
+
+def test_what_is_timed_derives_the_torques() -> None:
+    system, rng = planar(2), np.random.default_rng(4)
+    state = dict(system.parameters) | {
+        s: rng.uniform(-1.0, 1.0) for c in system.coordinates for s in (c.q, c.qd, c.qdd)
+    }
+    for link, lagrangian in enumerate(derivation_seconds._lagrangians(system, 2)):
+        for i, torque in partial_torques(system, link).items():
+            timed = derivation_seconds._torque(lagrangian, system.coordinates[i], system.coordinates)
+            assert float(timed.subs(state)) == pytest.approx(float(torque.subs(state)), rel=1e-12)
 
 
 def test_deriving_by_sympy_stops_at_its_limit_of_time() -> None:
