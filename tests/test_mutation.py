@@ -13,7 +13,7 @@ import pytest
 from mutation import rooms, verdicts
 from mutation.decide import Decider
 from mutation.mutants import Mutant, mutants
-from mutation.reach import Map, Reached, digest, name_at
+from mutation.reach import Map, Reached, digest, digest_of_test, name_at
 from mutation.rooms import LEFT_OUT, NOT_COUNTED, ROOMS, drawn, rooms_of, sources
 from mutation.tree import ROOT, Ended
 from mutation.verdicts import END, HEAD, MARK, Record, explained
@@ -202,12 +202,25 @@ def test_a_verdict_stays_for_the_same_texts_alone(tmp_path: Path, monkeypatch: p
     again.all_tests = "one more test"
     assert again.decided(one)
     assert not again.decided(other)
-    for changed in (BY.partition("::")[0], one.path):
+    for changed in ("digest", "digest_of_test"):
         with monkeypatch.context() as patch:
-            patch.setattr(
-                verdicts, "digest", lambda path, c=changed: "new" if path == ROOT / c else digest(path)
-            )
+            patch.setattr(verdicts, changed, lambda *of: "new")
             assert not again.decided(one)
+
+
+def test_a_verdict_hangs_on_its_test_and_what_the_file_has_beside_tests(tmp_path: Path) -> None:
+    text = "import a\nONE = 1\n\n@mark\ndef test_x():\n    assert ONE\n\ndef test_y():\n    assert a\n"
+    file = tmp_path / "test_one.py"
+
+    def found(new: str) -> str:
+        file.write_text(new)
+        return digest_of_test(file, "test_x")
+
+    own = found(text)
+    for same in (("import a", "import b"), ("assert a", "assert not a"), ("import a\n", "import a, c\n\n")):
+        assert found(text.replace(*same)) == own, same
+    for other in (("ONE = 1", "ONE = 2"), ("assert ONE", "assert not ONE"), ("@mark", "@mark(2)")):
+        assert found(text.replace(*other)) != own, other
 
 
 def test_what_caught_a_mutant_is_tried_first_once_the_text_is_another(

@@ -73,6 +73,13 @@ def test_numbers_of_formulas_are_rounded_to_what_they_are_worth() -> None:
         assert max(len(digits) for digits in re.findall(r"[0-9]+", files[name])) <= 15
 
 
+def test_fractions_of_many_digits_are_rounded() -> None:
+    x = Coordinate("x", "m")
+    steep = LinkEnergy("a", x.qd**2, sp.Rational(10**15 + 1, 7) * x.q**2)
+    files = generate(energy_system("steep", [x], [steep]), ["formulas"])
+    assert re.findall(r"[0-9]{13,}", files["formulas.txt"]) == []
+
+
 RX = Coordinate("x", "m")
 K, C = sp.symbols("k c")
 KEPT = {

@@ -66,6 +66,20 @@ def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
+def digest_of_test(path: Path, test: str) -> str:
+    """Short hash of a test and of what its file has beside tests and imports: other tests may change."""
+    text = path.read_text(encoding="utf-8")
+    lines = text.splitlines()
+    kept = []
+    for node in ast.parse(text).body:
+        named = node.name if isinstance(node, ast.FunctionDef) else test
+        if isinstance(node, ast.Import | ast.ImportFrom) or (named.startswith("test_") and named != test):
+            continue
+        first = min([node.lineno, *(one.lineno for one in getattr(node, "decorator_list", []))])
+        kept += lines[first - 1 : node.end_lineno]
+    return hashlib.sha256("\n".join(kept).encode()).hexdigest()[:16]
+
+
 class Map:
     """What each file of tests reaches, kept in a folder."""
 

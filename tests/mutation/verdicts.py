@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from mutation.mutants import Mutant
-from mutation.reach import digest
+from mutation.reach import digest, digest_of_test, test_of
 from mutation.rooms import ROOMS, drawn, test_files
 from mutation.tree import ROOT
 
@@ -25,8 +25,7 @@ class Verdict:
     """What became of a mutant.
 
     verdict: killed, too slow or survived; by: the test that failed, else how much was run;
-    source: digest of the file that is changed; tests: of the file of the test that failed, else of all
-    together
+    source: digest of the file that is changed; tests: of the test that failed, else of all together
     """
 
     verdict: str
@@ -54,8 +53,11 @@ class Record:
 
     def tests(self, verdict: str, by: str) -> str:
         """Digest of the tests that a verdict rests on."""
-        file = ROOT / by.partition("::")[0]
-        return digest(file) if verdict in CAUGHT and by and file.is_file() else self.all_tests
+        name, _, test = test_of(by).partition("::")
+        file = ROOT / name
+        if verdict not in CAUGHT or not by or not file.is_file():
+            return self.all_tests
+        return digest_of_test(file, test) if test else digest(file)
 
     def decided(self, mutant: Mutant) -> Verdict | None:
         """Verdict on a mutant for the texts as they are."""
