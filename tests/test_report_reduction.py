@@ -207,6 +207,13 @@ def test_deriving_by_sympy_stops_at_its_limit_of_time() -> None:
     assert min(first.rule, second.rule) > 0.0
 
 
+def test_deriving_by_sympy_is_timed_up_to_the_last_link() -> None:
+    (last,) = measure_derivations(planar(1), (1,), silent)
+    assert last.whole is not None
+    assert last.link is not None
+    assert min(last.whole, last.link) > 0.0
+
+
 def test_no_polynomial_is_claimed_without_counts_to_confirm_it() -> None:
     assert count_polynomial([1, 2, 4, 8, 16, 32]) is None
     assert count_polynomial([3, 14, 44, 112, 247, 490, 896]) is None
