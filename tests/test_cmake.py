@@ -36,6 +36,7 @@ foreach(tool CLANG_TIDY CPPCHECK CPPLINT INCLUDE_WHAT_YOU_USE)
     set(CMAKE_C_${tool} false)
 endforeach()
 linkwise_add_robot(arm_shared ROBOT "arm one.urdf" NAME arm SHARED)
+set(kind INTERFACE) # the project's own
 linkwise_add_robot(arm_float ROBOT "arm one.urdf" NAME arm FLOAT)
 foreach(tool CLANG_TIDY CPPCHECK CPPLINT INCLUDE_WHAT_YOU_USE)
     unset(CMAKE_C_${tool})
@@ -150,6 +151,14 @@ def test_programs_in_c_and_cpp_say_what_python_does(
     tau = expected(built[tool], tmp_path)
     for program, accuracy in (("in_c", 1e-14), ("in_cpp", 1e-14), ("in_float", 1e-6)):
         assert built[tool].answer(program) == pytest.approx(tau, rel=accuracy, abs=accuracy), program
+
+
+@each_generator
+def test_robots_are_compiled_as_their_headers_say(tool: str, built: dict[str, Project]) -> None:
+    names = {"ninja": ("build.ninja",), "make": ("flags.make",)}[tool]
+    told = "".join(path.read_text() for path in built[tool].build.rglob("*") if path.name in names)
+    flags = ("-ftree-vectorize", "-fno-tree-slp-vectorize", "-ffp-contract=fast")
+    assert [told.count(flag) for flag in flags] == [3] * 3  # one robot, as three libraries
 
 
 @each_generator
@@ -410,6 +419,11 @@ def test_without_the_program_it_is_told_what_lacks(tmp_path: Path, monkeypatch: 
     done = project.configure()
     assert done.returncode != 0
     assert "the program linkwise is not in PATH; set LINKWISE_EXECUTABLE" in " ".join(done.stderr.split())
+    optional = 'find_package(linkwise CONFIG)\nmessage(STATUS "found ${linkwise_FOUND}")'
+    lists = LISTS.partition("find_package")[0] + optional
+    (project.source / "CMakeLists.txt").write_text(lists)
+    done = project.configure()
+    assert (done.returncode, "found 0" in done.stdout) == (0, True), done.stderr
 
 
 def test_linkwise_prints_the_folder_of_its_module() -> None:

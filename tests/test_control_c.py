@@ -129,6 +129,26 @@ def test_forward_dynamics_says_which_joint_moves_no_mass(kernel: str, tmp_path: 
         assert (qdd == 7.0).all()
 
 
+@pytest.mark.parametrize("kernel", ["straight", "loops"])
+def test_a_wrist_is_as_singular_beside_another_arm(kernel: str, tmp_path: Path) -> None:
+    """And as nearly singular next to it; the joint of the other arm comes first."""
+    arm = [link("arm"), joint("lift", "base", "arm", **ROLL)]
+    first = WRIST.index("<joint")
+    path = tmp_path / "wrist.urdf"
+    path.write_text("\n".join([WRIST[:first], *arm, WRIST[first:]]), encoding="utf-8")
+    write_package(generate(read_system(path), ["c"], kernel=kernel), tmp_path / "wrist")
+    compile_library(tmp_path / "wrist", tmp_path / "wrist.so")
+    library = ctypes.CDLL(str(tmp_path / "wrist.so"))
+    function = getattr(library, f"{name_of(tmp_path / 'wrist')}_forward_dynamics")
+    names = [coordinate.name for coordinate in read_system(path).coordinates]
+    assert names == ["lift", "roll", "pitch", "turn"]
+    qd, tau, qdd = np.zeros((3, 4))
+    for q in np.random.default_rng(1).uniform(-3.0, 3.0, (30, 4)):
+        for pitch, number in ((0.5, 0), (1e-6, -4), (0.0, 4), (np.pi, 4), (np.pi - 1e-6, -4)):
+            q[2] = pitch
+            assert function(*(ctypes.c_void_p(a.ctypes.data) for a in (q, qd, tau, qdd))) == number
+
+
 def test_native_names_the_joints_that_move_no_mass(tmp_path: Path) -> None:
     path = tmp_path / "wrist.urdf"
     path.write_text(WRIST, encoding="utf-8")

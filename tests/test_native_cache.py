@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from conftest import needs_compiler
 from linkwise.package.load import import_package
-from linkwise.runtime.native import native_build, native_compiler, native_process
+from linkwise.runtime.native import native_build, native_cache, native_compiler, native_process
 from linkwise.runtime.native.native_build import Sources, library
 from linkwise.runtime.native.native_cache import cache_directory, is_whole, locked
 from linkwise.runtime.native.native_library import function
@@ -322,6 +322,10 @@ def test_a_compiler_that_does_not_compile_is_named(
         library(tiny, "double")
     assert str(compiler) in one_line(error)
     assert [path.suffix for path in (tmp_path / "cache").iterdir()] in ([], [".lock"])
+
+
+def test_files_of_ones_own_and_of_root_are_taken() -> None:
+    assert set(native_cache._trusted()) == {os.getuid(), 0}
 
 
 def test_sources_that_cannot_be_read_are_named(tmp_path: Path) -> None:

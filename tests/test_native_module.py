@@ -154,6 +154,7 @@ def test_arguments_are_taken_by_name_as_by_order(planar3: ModuleType) -> None:
         (3, {"q": None}, r"^Dynamics\.partial_torque\(\) got multiple values for argument 'q'$"),
         (3, {"convention": "closing"}, r"got an unexpected keyword argument 'convention'$"),
         (5, {}, r"^Dynamics\.partial_torque\(\) takes from 4 to 5 positional arguments but 6 were given$"),
+        (3, {"out": np.empty((3, 3)), "to": None}, r"got an unexpected keyword argument 'to'$"),
         (2, {"qdd": None}, r"^qdd is None; give an array"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from linkwise.report import (
     study,
     verdicts,
 )
+from linkwise.report.reduction_verdicts import _limit_verdict
 from linkwise.report.seconds import row_view
 from linkwise.report.spatial_arms import is_spatial
 from linkwise.report.uncombined_terms import uncombined_terms
@@ -212,6 +214,18 @@ def test_deriving_by_sympy_is_timed_up_to_the_last_link() -> None:
     assert last.whole is not None
     assert last.link is not None
     assert min(last.whole, last.link) > 0.0
+
+
+def test_a_curve_whose_counts_grow_alike_has_a_limit_below_one() -> None:
+    total, kept = (count_polynomial([k * n**2 + 1 for n in range(1, 9)]) for k in (3, 2))
+    assert total is not None
+    assert kept is not None
+    assert total.degree == kept.degree == 2
+    assert _limit_verdict(total, kept).startswith("**Weaker: many DoF.**")
+    result = study("arm", planar(3), 1, 3, 3, 10**6, silent)
+    for told, known in ((True, (total, kept)), (False, (None, kept)), (False, (total, None))):
+        said = " ".join(verdicts(replace(result, total=known[0], kept=known[1])))
+        assert ("many DoF" in said) == told
 
 
 def test_no_polynomial_is_claimed_without_counts_to_confirm_it() -> None:
