@@ -290,6 +290,18 @@ def test_an_interrupted_build_leaves_nothing_broken(
     assert fresh.read_bytes() == kept.read_bytes()
 
 
+@needs_ninja
+def test_a_robot_that_a_command_before_makes_is_found(tmp_path: Path) -> None:
+    project = Project("ninja", tmp_path / "made")
+    lists = LISTS.partition("linkwise_add_robot")[0]
+    copied = 'cmake -E copy "${CMAKE_SOURCE_DIR}/arm one.urdf" made.urdf'
+    command = f'add_custom_command(OUTPUT made.urdf COMMAND {copied} DEPENDS "arm one.urdf")\n'
+    write_project(project.source, f"{lists}{command}linkwise_add_robot(arm ROBOT made.urdf)\n")
+    done = project.configure()
+    assert done.returncode == 0, done.stderr
+    assert "Generating the dynamics of arm" in project.make()
+
+
 @each_generator
 def test_a_robot_that_another_folder_makes_may_change_even_its_name(tool: str, tmp_path: Path) -> None:
     project = Project(tool, tmp_path / "renamed")

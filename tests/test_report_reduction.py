@@ -280,6 +280,7 @@ def test_the_comparison_is_titled_by_what_is_shown_and_its_legend_tells_dashes()
     result = study("arm", planar(9), 1, 4, 9, 10**6, silent)
     timings = [Timing(n, method, 1.0, 2.0, 3.0) for n in (1, 2) for method in ("closed form", "autograd")]
     assert drawn(savings_lines(result)).get_title("left") == "arm: savings in terms and operations"
+    assert drawn(savings_lines(result)).get_xlabel().startswith("degrees of freedom")
     assert not [line.label for line in savings_lines(result) if "paper" in line.label]  # it names no form
     measured = drawn(savings_lines(result, timings))
     assert measured.get_title("left") == "arm: savings in terms, operations and seconds"

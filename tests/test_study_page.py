@@ -67,6 +67,13 @@ def of_subjects(out: Path, factor: str | None, column: str) -> dict[str, Any]:
     return {level: each.loc[level] for level in each.index.unique("level")}
 
 
+def test_it_opens_with_the_column_that_it_says(page: Any) -> None:
+    chosen = "return document.getElementById('column').selectedOptions[0].text"
+    assert page.execute_script(chosen) == page.find_element("id", "bands-title").text != ""
+    choose(page, "column", 1)
+    assert page.execute_script(chosen) == page.find_element("id", "bands-title").text == "tau/joint2"
+
+
 @pytest.mark.parametrize("factor", ["condition", "day", None])
 def test_its_curves_and_bands_are_those_of_the_chosen_factors_subjects(
     page: Any, out: Path, factor: str | None
