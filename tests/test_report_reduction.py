@@ -35,7 +35,7 @@ from linkwise.report import (
     verdicts,
 )
 from linkwise.report.reduction_verdicts import _limit_verdict
-from linkwise.report.seconds import row_view
+from linkwise.report.seconds import first_links, row_view
 from linkwise.report.spatial_arms import is_spatial
 from linkwise.report.uncombined_terms import uncombined_terms
 from linkwise.robot import Options, read_robot
@@ -190,6 +190,16 @@ def test_uncombined_terms_end_at_the_budget() -> None:
     system = planar(5)
     assert isinstance(system, RigidSystem)
     assert len(list(uncombined_terms(system, 5, 100))) == 3
+
+
+def test_an_arms_first_links_are_an_arm_of_their_own() -> None:
+    for spec in ("planar5", "puma560"):
+        whole = rigid_system(read_robot(spec, Options()))
+        part = first_links(whole, 3)
+        assert isinstance(part, RigidSystem)
+        assert [link.name for link in part.robot.links] == [link.name for link in whole.robot.links[:3]]
+        assert [link.name for link in part.links] == [link.name for link in whole.links[:3]]
+        assert len(part.coordinates) == 3
 
 
 def test_what_is_timed_derives_the_torques() -> None:
