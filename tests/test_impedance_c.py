@@ -200,7 +200,9 @@ def test_a_frame_is_pulled_by_its_angle_however_small(angle: float, robots: Any,
         np.testing.assert_allclose(pull, -angle * np.ones(3), rtol=digits, atol=1e-15)
 
 
-@pytest.mark.parametrize("robot", ["torso", TURNTABLE], ids=["rigid", "energies"])
+@pytest.mark.parametrize(
+    "robot", ["torso", "planar3 symbolic", TURNTABLE], ids=["rigid", "parameters", "energies"]
+)
 @pytest.mark.parametrize("dtype", PRECISION, ids=["double", "float"])
 def test_a_joint_whose_inertia_cannot_be_is_told(robot: str, dtype: Any, robots: Any) -> None:
     model, c = robots(robot)

@@ -1,6 +1,7 @@
 """The cost-reduction curve against the goldens, its fit, and the polynomials behind it."""
 
 import json
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +36,7 @@ from linkwise.report import (
     verdicts,
 )
 from linkwise.report.reduction_verdicts import _limit_verdict
-from linkwise.report.seconds import first_links, row_view
+from linkwise.report.seconds import _elapsed, first_links, row_view
 from linkwise.report.spatial_arms import is_spatial
 from linkwise.report.uncombined_terms import uncombined_terms
 from linkwise.robot import Options, read_robot
@@ -190,6 +191,10 @@ def test_uncombined_terms_end_at_the_budget() -> None:
     system = planar(5)
     assert isinstance(system, RigidSystem)
     assert len(list(uncombined_terms(system, 5, 100))) == 3
+
+
+def test_seconds_are_those_that_pass() -> None:
+    assert 0.02 <= _elapsed(lambda: time.sleep(0.01), 2) < 60.0
 
 
 def test_an_arms_first_links_are_an_arm_of_their_own() -> None:
