@@ -267,6 +267,8 @@ BAD = {
     ),
     "no version": (('version="1.11"', ""), "<sdf version=None>; give the format's version, such as 1.9"),
     "no inertia": ((LOWER, ""), "link 'lower' has no <inertial>, which SDFormat takes for 1 kg and 1 kg m²"),
+    "no mass": (("<mass>1</mass>", ""), "link 'lower': <inertial> has no <mass>; write it out"),
+    "no moment": (("<iyy>0.01</iyy>", ""), "link 'lower': <inertial> has no <iyy>; write it out"),
     "shapes": (
         ("<inertial><pose>0 0.1", "<inertial auto='true'><pose>0 0.1"),
         "is worked out of shapes by Gazebo",
