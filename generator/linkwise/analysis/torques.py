@@ -112,8 +112,8 @@ class Decomposer:
                 q, qd, qdd = self.robot.constrained.consistent(q, qd, qdd)
             except ValueError as error:
                 raise LinkwiseError(
-                    f"between {time[0]:.6g} and {time[-1]:.6g} s: {reason_of(error)}; the log's joints close"
-                    " there, and filtered they do not: filter less, or mend the log"
+                    f"between {time[0]:.6g} and {time[-1]:.6g} s: {reason_of(error)}; mend the log, or filter"
+                    " it less where a filter carries joints out of reach"
                 ) from None
         packed, standing = self.robot.model.packed(q, qd, qdd), self._standing(time, q)
         unborne, free = packed, self.robot.model.inverse_dynamics(q, qd, qdd)
