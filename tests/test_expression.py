@@ -31,6 +31,7 @@ def test_constants_fold_and_units_vanish() -> None:
     assert g.add(x, g.zero) == g.mul(x, g.one) == x
     assert g.mul(x, g.zero) == g.sub(x, x) == g.zero
     assert g.mul(g.const(2.0), g.mul(g.const(3.0), x)) == g.mul(g.const(6.0), x)
+    assert [g.nodes[g.mul(g.const(number), x)][0] for number in (2.0, -2.0)] == ["mul", "neg"]
 
 
 def test_simplifications_are_these() -> None:

@@ -1,13 +1,17 @@
 """Pictures of autograd's graphs: colours, counts and arrows are those of the parts that need an operation."""
 
+import os
 import re
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from linkwise import LinkwiseError
 from linkwise.escape import html_text
 from linkwise.graphs import dot_text, folded, graph_files, overlay
+from linkwise.graphs.graph_files import _drawn
 from linkwise.plotstyle import COLOURS, GRAVITY, PALE
 
 LOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -102,6 +106,14 @@ def test_each_part_ends_where_it_was_recorded_and_what_is_taken_off_is_marked(
         if node.name in ("sub", "div") and len(node.operands) == 2
     }
     assert marked == taken
+
+
+def test_why_dot_draws_nothing_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "dot").write_text("#!/bin/sh\necho no fonts here >&2\nexit 3\n")
+    (tmp_path / "dot").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    with pytest.raises(LinkwiseError, match="^dot draws nothing: no fonts here$"):
+        _drawn("digraph {}", "svg")
 
 
 def test_a_part_by_position_names_its_file_by_its_joint(robot: Any) -> None:
