@@ -112,7 +112,7 @@ def test_why_dot_draws_nothing_is_told(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "dot").write_text("#!/bin/sh\necho no fonts here >&2\nexit 3\n")
     (tmp_path / "dot").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
-    with pytest.raises(LinkwiseError, match="^dot draws nothing: no fonts here$"):
+    with pytest.raises(LinkwiseError, match=r"^dot draws nothing: no fonts here$"):
         _drawn("digraph {}", "svg")
 
 
