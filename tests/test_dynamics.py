@@ -124,6 +124,13 @@ def test_an_origin_beside_the_common_axes_own_is_taken_where_it_costs_less() -> 
     assert count_operations(kernel.graph, kernel.forms[0].decomposition()).arithmetic <= beside
 
 
+def test_a_decomposition_is_of_all_four_quantities() -> None:
+    forms = link_kernel(read_system("planar3"), 2, "rule").forms[0]
+    parts = (forms.acceleration, forms.velocity, forms.gravity, forms.decomposed_torque)
+    assert list(forms.decomposition()) == [node for part in parts for node in part.values()]
+    assert [len(part) for part in parts] == [6, 9, 3, 3]
+
+
 def test_sums_of_a_torque_are_called_by_joint_and_cause() -> None:
     forms = generate(read_system("planar3"), ["numpy"])["forms/link_2.py"]
     assert {"c1_1_1", "tau1_1", "tau2_1"} <= set(re.findall(r"^ +(\w+) = ", forms, re.MULTILINE))

@@ -30,6 +30,11 @@ def test_answers_and_errors_come_back() -> None:
         in_own_process(os.abort, LIMITS)
 
 
+def test_what_a_library_says_of_its_end_is_told_by_nobody_else(capfd: pytest.CaptureFixture[str]) -> None:
+    in_own_process(lambda: (os.write(1, b"answer"), os.write(2, b"terminate called")), LIMITS)
+    assert capfd.readouterr() == ("answer", "")
+
+
 def test_limits_are_of_what_the_work_takes_itself() -> None:
     held = bytearray(256 << 20)
     assert in_own_process(lambda: len(bytearray(16 << 20)), LIMITS) == 16 << 20

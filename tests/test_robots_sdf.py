@@ -267,6 +267,10 @@ BAD = {
     ),
     "no version": (('version="1.11"', ""), "<sdf version=None>; give the format's version, such as 1.9"),
     "no inertia": ((LOWER, ""), "link 'lower' has no <inertial>, which SDFormat takes for 1 kg and 1 kg m²"),
+    "no axis": (
+        ("<xyz>-0.6 0 0.8</xyz>", "<xyz>0 0 0</xyz>"),
+        "has a zero axis; give its direction, such as",
+    ),
     "no mass": (("<mass>1</mass>", ""), "link 'lower': <inertial> has no <mass>; write it out"),
     "no moment": (("<iyy>0.01</iyy>", ""), "link 'lower': <inertial> has no <iyy>; write it out"),
     "shapes": (
