@@ -236,7 +236,7 @@ def pinocchio_says(motion: Any) -> Any:
 
 
 @needs("arm-none-eabi-gcc")
-@pytest.mark.parametrize("robot", [*KINDS.values(), "puma560 loops", "torso", "planar10", "planar40 loops"])
+@pytest.mark.parametrize("robot", [*KINDS.values(), "puma560 loops", "torso", "planar10", "planar80 loops"])
 def test_the_manifests_size_is_what_the_compiler_makes_to_a_fifth(
     robot: str, directory_of: Callable[[str], Path]
 ) -> None:

@@ -5,6 +5,7 @@ import shutil
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from faults import NAMES, NO_EXCHANGE, faults, suffer, untraceable
@@ -211,6 +212,17 @@ def test_an_address_is_no_folder(
     with pytest.raises(LinkwiseError, match="that is an address, and results are written to folders"):
         way(Path(address))
     assert not list(tmp_path.iterdir())
+
+
+def test_the_exchange_that_the_system_has_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linux calls it otherwise than macOS, and some have none: there the two names are renamed."""
+    linux, mac = SimpleNamespace(renameat2=lambda *of: 5), SimpleNamespace(renamex_np=lambda *of: 7)
+    found = {}
+    for library in (linux, mac, SimpleNamespace()):
+        monkeypatch.setattr(exchange.ctypes, "CDLL", lambda _, library=library: library)
+        swap = exchange._swap.__wrapped__()
+        found[tuple(vars(library))] = swap(b"one", b"other") if swap else None
+    assert found == {("renameat2",): 5, ("renamex_np",): 7, (): None}
 
 
 def test_a_signal_while_a_workplace_is_tidied_up_is_not_lost(

@@ -142,18 +142,18 @@ def test_what_is_told_is_what_the_torques_of_mujoco_have_beyond(case: str, tmp_p
     assert error > 1e-6 if told and APART not in told else error < 1e-12
 
 
-@pytest.mark.parametrize("what", ["damping", "stiffness"])
-def test_what_a_ball_joint_takes_of_its_own_is_told_and_left_out(what: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("what", "called"), [("damping", "damping"), ("stiffness", "spring")])
+def test_what_a_ball_joint_takes_of_its_own_is_told_and_left_out(
+    what: str, called: str, tmp_path: Path
+) -> None:
     path = tmp_path / "arm.xml"
     text = ARM.format(option="", joint="", body="", geom="", more="")
     hinge = '<joint name="b" axis="0 1 0.2"/>'
     assert hinge in text
     path.write_text(text.replace(hinge, f'<joint name="b" type="ball" {what}="0.5"/>'))
     robot = read_system(path).robot
-    word = {"damping": "damping", "stiffness": "spring"}[what]
-    assert [
-        line for line in effects(robot.notes) if line.startswith(f"{word} left out of the torques: b (0.5")
-    ]
+    told = f"{called} left out of the torques: b (0.5"
+    assert [line for line in effects(robot.notes) if line.startswith(told)]
     assert not robot.passive
 
 

@@ -72,8 +72,8 @@ def digest_of_test(path: Path, test: str) -> str:
     lines = text.splitlines()
     kept = []
     for node in ast.parse(text).body:
-        named = node.name if isinstance(node, ast.FunctionDef) else test
-        if isinstance(node, ast.Import | ast.ImportFrom) or (named.startswith("test_") and named != test):
+        name = getattr(node, "name", "")
+        if isinstance(node, ast.Import | ast.ImportFrom) or (name.startswith("test_") and name != test):
             continue
         first = min([node.lineno, *(one.lineno for one in getattr(node, "decorator_list", []))])
         kept += lines[first - 1 : node.end_lineno]
