@@ -399,7 +399,11 @@ def test_a_mistake_is_told_when_the_project_is_configured(line: str, tmp_path: P
 
 
 @needs_ninja
-@pytest.mark.parametrize("version", [VERSION, f"{VERSION} EXACT", VERSION.partition(".")[0], f"{VERSION}.9"])
+@pytest.mark.parametrize(
+    "version",
+    [VERSION, f"{VERSION} EXACT", VERSION.partition(".")[0], f"{VERSION}.9"],
+    ids=["this", "exactly this", "of this major", "a newer one"],
+)
 def test_this_version_or_an_older_one_may_be_asked_for(version: str, tmp_path: Path) -> None:
     project = Project("ninja", tmp_path / "asked")
     lists = LISTS.partition("linkwise_add_robot")[0]
