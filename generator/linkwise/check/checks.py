@@ -1,9 +1,12 @@
 """The checks of `linkwise check`."""
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, suppress
+from functools import partial
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +25,7 @@ from linkwise.check.subject import Subject, Way
 from linkwise.own_process import Ended, begun
 from linkwise.package.load import Model, Package, load_package, staying
 from linkwise.package.manifest import Manifest
+from linkwise.runtime.native.native_build import PARTS, Sources, library
 
 OPTIONAL = ("torch",)
 """Libraries that a package's back ends may need beside NumPy."""
@@ -62,10 +66,20 @@ def results_of(directory: Path, samples: int = SAMPLES) -> Iterator[Result]:
     if agrees.failed:
         return
     yield made
+    compiled = begun(partial(_compile, package)) if "native" in package.backends else lambda: None
     with staying():
         loaded, missing = _load(package)
     yield from missing
     yield from _guarded("answers", _numbers(package, loaded, samples))
+    compiled()
+
+
+def _compile(package: Package) -> None:
+    """Make the libraries of `native` beside other work; that there are none is told when it is called."""
+    sources = Sources(package.manifest.name, package.directory / "c")
+    with suppress(RuntimeError), open(os.devnull, "w") as nobody, redirect_stderr(nobody):
+        for real, what in product(("double", "float"), PARTS):
+            library(sources, real, what)
 
 
 def _load(package: Package) -> tuple[dict[Way, Model], list[Result]]:

@@ -54,6 +54,7 @@ class NewtonEuler:
         index = {body.link: b for b, body in enumerate(self.bodies)}
         self.links = [index[link.name] for link in manifest.links]
         self.paths = [_LinkPath.of(self.bodies, at) for at in self.links]
+        self._placed = [(np.array(body.rotation), np.array(body.translation)) for body in self.bodies]
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
         """τ_ij, shape (samples, n, N), for inputs of shape (samples, n)."""
@@ -183,25 +184,28 @@ class NewtonEuler:
         upright = np.broadcast_to(np.eye(3), (len(q), 3, 3))
         ground = _FrameMotion(upright, zero, zero, zero, zero, zero - gravity)
         motions: list[_BodyMotion] = []
-        for body in self.bodies:
+        for body, placed in zip(self.bodies, self._placed, strict=True):
             up = ground if body.parent is None else motions[body.parent].frame
             speed, push = (x[:, body.coordinate : body.coordinate + 1] for x in (qd, qdd))
             slope = displacement(body, q, 1)
             turn, rate = displacement(body, q), slope * speed
             change = slope * push + displacement(body, q, 2) * speed**2
-            motions.append(_moved(body, up, turn, rate, change))
+            motions.append(_moved(body.kind, placed, up, turn, rate, change))
         return motions
 
 
-def _moved(body: BodyEntry, up: _FrameMotion, turn: Array, rate: Array, change: Array) -> _BodyMotion:
-    """Motion of a body on its parent `up`; turn, rate and change are those of its joint (samples, 1)."""
-    rotation, omega, alpha = up.rotation @ np.array(body.rotation), up.omega, up.alpha
-    axis, arm = rotation[:, :, 2], up.rotation @ np.array(body.translation)
-    if body.kind == "prismatic":
+def _moved(
+    kind: str, placed: tuple[Array, Array], up: _FrameMotion, turn: Array, rate: Array, change: Array
+) -> _BodyMotion:
+    """Motion of a body placed on `up`, its parent; turn, rate and change of its joint are (samples, 1)."""
+    rotation, omega, alpha = up.rotation @ placed[0], up.omega, up.alpha
+    axis, arm = rotation[:, :, 2], up.rotation @ placed[1]
+    if kind == "prismatic":
         arm = arm + turn * axis
-    v = up.v + _cross(omega, arm)
-    a = up.a + _cross(alpha, arm) + _cross(omega, _cross(omega, arm))
-    if body.kind == "prismatic":
+    speed = _cross(omega, arm)
+    v = up.v + speed
+    a = up.a + _cross(alpha, arm) + _cross(omega, speed)
+    if kind == "prismatic":
         v = v + rate * axis
         a = a + 2 * _cross(omega, rate * axis) + change * axis
     else:
