@@ -337,6 +337,16 @@ def test_check_holds_them_against_the_manifest(tmp_path: Path) -> None:
         forged(directory, file, text)
 
 
+def test_check_calls_the_c_of_them(tmp_path: Path) -> None:
+    directory = written(tmp_path, ["c"])
+    of_joints = {f"c: test_{name}" for name in ("passive_torque", "passive_torquef", "forward_dynamics")}
+    told = {result.name: result.held for result in check_package(directory, 20)}
+    assert {told[name] for name in of_joints} == {True}
+    tree = (directory / "c" / "test_tree.h").read_text()
+    forged(directory, "c/test_tree.h", tree.replace("R(0.0), R(0.5), R(0.2)", "R(0.0), R(0.6), R(0.2)"))
+    assert of_joints <= {result.name for result in check_package(directory, 20) if result.failed}
+
+
 def forged(directory: Path, file: str, text: str) -> None:
     """Write a file, with its hash in the manifest, or with the manifest's own checksums."""
     (directory / file).write_text(text)
