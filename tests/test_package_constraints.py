@@ -215,6 +215,20 @@ def test_contacts_stay_where_they_took_hold(tmp_path: Path) -> None:
     np.testing.assert_allclose(constraints.closed(moved, held_at=NEAR), [*NEAR[:2], moved[2]], atol=1e-12)
 
 
+def test_where_they_took_hold_is_in_the_world(tmp_path: Path) -> None:
+    """Places are counted from a base that slides, for the digits' sake, but not these."""
+    arm = FOURBAR.split("[[constraint]]")[0].replace('parent = "base"', 'parent = "cart"')
+    joint = '{name = "x", type = "prismatic", parent = "base", child = "cart", axis = [1, 0, 0]},'
+    cart = '{name = "cart", mass = 1.0, inertia = {xx = 0.1, yy = 0.1, zz = 0.1}},'
+    module = package(
+        tmp_path, arm.replace("joint = [", f"joint = [{joint}").replace("link = [", f"link = [{cart}")
+    )
+    robot: Any = module.load("numpy")
+    constraints = robot.constrained(contacts=[module.Contact("b", "point", (0.7, 0.0, 0.0))])
+    before, after = np.array([[0.5, *NEAR], [1.5, *NEAR]])
+    np.testing.assert_allclose(constraints.violation(after, held_at=before), [1.0, 0.0, 0.0], atol=1e-15)
+
+
 def test_a_motion_keeps_contacts_where_they_took_hold(package_of: Callable[[str], ModuleType]) -> None:
     """However long its steps: joints that follow are closed from there, and not from where they came."""
     module, point = package_of("torso"), (0.1, -0.2, 0.3)

@@ -165,6 +165,18 @@ def test_long_arms_are_controlled_in_single_precision(count: int, tmp_path: Path
     assert relative_error(found, expected) <= 1e-5
 
 
+def test_half_of_the_digits_of_a_wanted_inertia_are_asked_for(sprung: ModuleType) -> None:
+    def control(left: float) -> None:
+        """left: of either joint's inertia when the other moves freely."""
+        beside = np.sqrt(1.0 - left)
+        inertia = np.array([[1.0, beside], [beside, 1.0]])
+        sprung.load("numpy").partial_impedance(inertia, 2.0, 5.0)(Q, Q, 0.0 * Q)
+
+    control(1e-6)  # warnings are errors here
+    with pytest.warns(RuntimeWarning, match="float64 knows"):
+        control(3e-9)
+
+
 @needs_compiler
 def test_c_pulls_a_frame_of_one_sample(package_of: Packages, monkeypatch: pytest.MonkeyPatch) -> None:
     """Arrays have no part in it: C has answered before they are asked."""

@@ -32,6 +32,8 @@ MODULES = (*LIBRARIES, *(f"linkwise.cli.{command}" for command in COMMANDS))
 GIGABYTE = 1 << 30
 LONGEST = 1100
 """Characters of a message and what stands before it, the folder apart."""
+RUN = " is a Python program, which was run"
+"""How a note of it ends, which stands before the error."""
 FAULT = re.compile(r"linkwise: fault: (\w+ \([^)]*\))")
 """How a fault of linkwise itself is told, and where it was."""
 
@@ -144,8 +146,9 @@ class Worker:
             yield trace.strip().splitlines()[-1][:200]
         lines = error.splitlines()
         if status == 2:
-            if len(lines) != 1 or not error.endswith("\n"):
-                yield f"{len(lines)} lines on stderr with exit status 2"
+            told = [line for line in lines if not (line.startswith("note: ") and line.endswith(RUN))]
+            if len(told) != 1 or not error.endswith("\n"):
+                yield f"{len(told)} lines on stderr with exit status 2"
             if not lines or not lines[-1].startswith("linkwise: error: "):
                 yield "the last line on stderr is not the error"
             if len(error.replace(str(self.room.root), "")) > LONGEST:
