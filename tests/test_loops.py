@@ -19,13 +19,14 @@ from linkwise import LinkwiseError, Options, generate, read_system, write_packag
 from linkwise.check import check_package
 from linkwise.cli.app import app
 from linkwise.emit.backend import BACKENDS
+from linkwise.emit.c.loop_costs import decomposition_cost, link_costs
 from linkwise.emit.kernel_choice import check_size, chosen_kernel
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 from needed import needs
 from test_emitted_c import COMPILERS, aligned, counting, strict
 from typer.testing import CliRunner
-from urdf_text import joint, link, robot
+from urdf_text import joint, link, mimic, robot
 
 CRANE, LEG, TURNTABLE = str(DATA / "crane.urdf"), str(DATA / "leg.toml"), str(DATA / "turntable.py")
 KNEE = str(DATA / "knee.osim")
@@ -203,6 +204,14 @@ def test_the_header_counts_its_operations(
     # Besides, numbers that do not vary are spread over all samples: 2 for the base, 5 for each link.
     links = len(Manifest.read(directory).links)
     assert [int(count) - 2 - 5 * links for count in counted] == [int(found[1]) for found in told if found]
+
+
+def test_a_link_counts_what_a_robot_counts_that_has_no_other(tmp_path: Path) -> None:
+    """Of a finger, whose second joint follows the first."""
+    finger = joint("a", "base", "one") + joint("b", "one", "tip", inner=mimic("a", 0.5))
+    (tmp_path / "finger.urdf").write_text(robot(link("base"), '<link name="one"/>', link("tip"), finger))
+    system = read_system(tmp_path / "finger.urdf")
+    assert link_costs(system) == [decomposition_cost(system)]
 
 
 @needs_compiler
