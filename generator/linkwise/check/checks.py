@@ -71,7 +71,8 @@ def results_of(directory: Path, samples: int = SAMPLES) -> Iterator[Result]:
         loaded, missing = _load(package)
     yield from missing
     yield from _guarded("answers", _numbers(package, loaded, samples))
-    compiled()
+    with suppress(Ended):
+        compiled()
 
 
 def _compile(package: Package) -> None:
