@@ -82,9 +82,10 @@ corpus: $(READY)
 exports: $(READY)
 	$(BIN)/python tests/exports.py --out out/exports
 
-# `generate` and `analyze` killed at each system call that touches files; needs strace: minutes.
+# `generate` and `analyze` killed at each system call that touches files, which needs strace, and `study` interrupted: hours.
 crash: $(READY)
 	$(BIN)/python tests/crash.py
+	$(BIN)/python tests/interrupts.py
 
 # 200 random robots of up to 15 joints, each link beside Pinocchio: ten minutes.
 random: $(READY)

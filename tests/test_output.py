@@ -2,7 +2,9 @@
 
 import os
 import shutil
+import signal
 import threading
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -239,6 +241,29 @@ def test_a_signal_while_a_workplace_is_tidied_up_is_not_lost(
     with pytest.raises(KeyboardInterrupt):
         write(tmp_path / "target", "new")
     assert os.listdir(tmp_path) == ["target"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there kill ends a process, whatever its handlers")
+def test_signals_wait_though_another_thread_takes_them() -> None:
+    """The system gives one that this thread blocks to any other, and Python acts on it in this one."""
+    over, steps = threading.Event(), list[str]()
+    other = threading.Thread(target=over.wait)
+
+    def struck() -> None:
+        with workplace.signals_held():
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.05)
+            steps.append("the last")
+
+    other.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            struck()
+    finally:
+        over.set()
+        other.join()
+    assert steps == ["the last"]
+    assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
 
 
 def test_a_lock_that_no_try_makes_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,8 +14,9 @@ import os
 import shutil
 import signal
 import tempfile
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from linkwise.runtime.native.native_system import system_here
@@ -31,14 +32,15 @@ ENDING = [int(getattr(signal, name)) for name in ("SIGTERM", "SIGHUP", "SIGBREAK
 @contextmanager
 def workplace(parent: Path) -> Iterator[Path]:
     """Yield a new folder in `parent`, which goes at the end with all that is in it; raises OSError."""
-    mask = _hold_signals()
+    held = ExitStack()
+    held.enter_context(signals_held())
     try:
         work, lock = _made(parent)
     except BaseException:
-        _release_signals(mask)
+        held.close()
         raise
     try:
-        _release_signals(mask)  # one that came meanwhile strikes here, where the folder is tidied up
+        held.close()  # one that came meanwhile strikes here, where the folder is tidied up
         yield work
     finally:
         try:
@@ -63,24 +65,29 @@ def passing_folder() -> Iterator[Path]:
 
 @contextmanager
 def signals_held() -> Iterator[None]:
-    """Let signals wait till the end of a few steps that must not be parted."""
-    mask = _hold_signals()
+    """Let signals wait till the end of a few steps that must not be parted.
+
+    Blocked, for processes that begin meanwhile, and in the main thread put off as well: of one that another
+    thread takes Python calls the handler there all the same.
+    """
+    in_main = threading.current_thread() is threading.main_thread()
+    kinds = (signal.SIGINT, *ENDING) if in_main else ()
+    former = {kind: handler for kind in kinds if (handler := signal.getsignal(kind)) is not None}
+    came: list[int] = []
+    mask = None
     try:
+        for kind in former:
+            signal.signal(kind, lambda number, _: came.append(number))
+        if hasattr(signal, "pthread_sigmask"):
+            mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, *ENDING})
         yield
     finally:
-        _release_signals(mask)
-
-
-def _hold_signals() -> set[int] | None:
-    """Let signals wait, where the system can; returns what `_release_signals` needs."""
-    if not hasattr(signal, "pthread_sigmask"):
-        return None
-    return signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, *ENDING})
-
-
-def _release_signals(mask: set[int] | None) -> None:
-    if mask is not None:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        if mask is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for kind in reversed(former):  # Ctrl-C's last: it may strike at once
+            signal.signal(kind, former[kind])
+        for number in came:
+            signal.raise_signal(number)
 
 
 def sweep(parent: Path) -> None:
