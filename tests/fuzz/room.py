@@ -40,7 +40,8 @@ class Room:
         return [argument.replace("{robot}", str(self.robot)) for argument in arguments]
 
     def left_behind(self, status: int | None) -> Iterator[str]:
-        allowed = {self.root / "in", self.root / "out"}
+        kept = self.places["home"] / "packages"  # robots' packages, and their lock
+        allowed = {self.root / "in", self.root / "out", kept}
         for file in self.root.rglob("*"):
             if file not in self.places.values() and not allowed & {file, *file.parents}:
                 yield f"left {file.relative_to(self.root)} behind"

@@ -81,6 +81,7 @@ class Worker:
         os.environ |= {"HOME": str(self.room.places["home"]), "LINKWISE_CACHE": str(self.room.places["home"])}
         signal.signal(signal.SIGPROF, self._hang)
         used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        self.held = most_memory()
         resource.setrlimit(resource.RLIMIT_AS, (used + 3 * GIGABYTE, resource.RLIM_INFINITY))
         resource.setrlimit(resource.RLIMIT_FSIZE, (GIGABYTE, resource.RLIM_INFINITY))
         self.watch = Watch()
@@ -97,7 +98,7 @@ class Worker:
         faults = list(self._faults(status, error, trace, case))
         faults += self.room.left_behind(status)
         faults += [f"outside: {what}" for what in dict.fromkeys(self.watch.seen)]
-        peak = most_memory()
+        peak = most_memory() - self.held  # a fork begins with what all libraries hold
         if peak > GIGABYTE:
             faults.append(f"took {peak / GIGABYTE:.1f} GB")
         if fault := FAULT.search(error):
