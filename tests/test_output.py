@@ -266,6 +266,19 @@ def test_signals_wait_though_another_thread_takes_them() -> None:
     assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
 
 
+def test_an_interrupt_strikes_while_a_draft_is_written(tmp_path: Path) -> None:
+    steps = list[str]()
+
+    def writing() -> None:
+        with whole_directory(tmp_path / "target", nothing_refused):
+            signal.raise_signal(signal.SIGINT)
+            steps.append("one more")
+
+    with pytest.raises(KeyboardInterrupt):
+        writing()
+    assert (steps, os.listdir(tmp_path)) == ([], [])
+
+
 def test_a_lock_that_no_try_makes_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened, tries = os.open, iter(range(3))
 
