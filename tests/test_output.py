@@ -5,7 +5,7 @@ import shutil
 import signal
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -243,8 +243,16 @@ def test_a_signal_while_a_workplace_is_tidied_up_is_not_lost(
     assert os.listdir(tmp_path) == ["target"]
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Ctrl-C as a program meets it that was not started with it ignored."""
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, former)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="there kill ends a process, whatever its handlers")
-def test_signals_wait_though_another_thread_takes_them() -> None:
+def test_signals_wait_though_another_thread_takes_them(interruptible: None) -> None:
     """The system gives one that this thread blocks to any other, and Python acts on it in this one."""
     over, steps = threading.Event(), list[str]()
     other = threading.Thread(target=over.wait)
@@ -266,7 +274,7 @@ def test_signals_wait_though_another_thread_takes_them() -> None:
     assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
 
 
-def test_an_interrupt_strikes_while_a_draft_is_written(tmp_path: Path) -> None:
+def test_an_interrupt_strikes_while_a_draft_is_written(tmp_path: Path, interruptible: None) -> None:
     steps = list[str]()
 
     def writing() -> None:
