@@ -20,9 +20,11 @@ from test_study_killed import begun, records
 
 COUNT = 100
 SECONDS = 5.0
-DONE, INTERRUPTED = 0, 130
-LATE = -signal.SIGINT
-"""What Python makes of one that comes while it tidies up, after its program's last word."""
+START = 0.5
+"""Seconds in which Python itself begins, before linkwise can have a say."""
+TOLD = "linkwise: interrupted\n"
+ENDED = (130, -signal.SIGINT)
+"""As linkwise ends, and as Python makes of it where it executes text, or after the program's last word."""
 
 
 def whole(file: Path, out: Path) -> float:
@@ -51,8 +53,8 @@ def left_of(group: int) -> bool:
     return True
 
 
-def wrong(study: subprocess.Popen[str], out: Path, alone: bool) -> tuple[float, str]:
-    """Interrupt it; the seconds until it ended, and what was not as promised, empty if nothing."""
+def struck(study: subprocess.Popen[str], out: Path, alone: bool) -> tuple[bool, float, str]:
+    """Interrupt it: whether it had done all, the seconds until it ended, and what was not as promised."""
     before = {path: path.stat().st_mtime_ns for path in records(out)}
     start = time.monotonic()
     (os.kill if alone else os.killpg)(study.pid, signal.SIGINT)
@@ -60,19 +62,20 @@ def wrong(study: subprocess.Popen[str], out: Path, alone: bool) -> tuple[float, 
         said, told = study.communicate(timeout=60)
     except subprocess.TimeoutExpired:
         os.killpg(study.pid, signal.SIGKILL)
-        return 60.0, "it did not end"
-    took = time.monotonic() - start
-    if study.returncode not in (DONE, INTERRUPTED, LATE) or (study.returncode == LATE and not said):
-        return took, f"status {study.returncode}: {told}"
-    if study.returncode == INTERRUPTED and told != "linkwise: interrupted\n":
-        return took, f"it said {told!r}"
-    if took > SECONDS:
-        return took, f"it took {took:.1f} s"
-    if left_of(study.pid):
-        return took, "it left a process"
-    if any(not path.exists() or path.stat().st_mtime_ns != when for path, when in before.items()):
-        return took, "what was done is gone, or was done once more"
-    return took, "it left a draft" if list(out.rglob(".linkwise-*")) else ""
+        return False, 60.0, "it did not end"
+    took, status, complaint = time.monotonic() - start, study.returncode, ""
+    done = bool(said) and not told
+    if status not in (0, *ENDED)[not done :] or not (done or told == TOLD):
+        complaint = f"status {status}, and it said {told!r}"
+    elif took > SECONDS:
+        complaint = f"it took {took:.1f} s"
+    elif left_of(study.pid):
+        complaint = "it left a process"
+    elif any(not path.exists() or path.stat().st_mtime_ns != when for path, when in before.items()):
+        complaint = "what was done is gone, or was done once more"
+    elif list(out.rglob(".linkwise-*")):
+        complaint = "it left a draft"
+    return done, took, complaint
 
 
 def main() -> int:
@@ -82,17 +85,17 @@ def main() -> int:
         undisturbed, out = Path(folder) / "undisturbed", Path(folder) / "out"
         most = whole(file, undisturbed)
         for number in range(COUNT):
-            alone, delay = number % 3 == 0, generator.uniform(0.0, most)
+            alone, delay = number % 3 == 0, generator.uniform(START, most)
             study = begun(file, out)
             time.sleep(delay)
-            took, complaint = wrong(study, out, alone)
-            longest, ended = max(longest, took), study.returncode in (DONE, LATE)
-            ends["ended before"] += ended
-            ends["in the midst"] += not ended and bool(records(out))
+            done, took, complaint = struck(study, out, alone)
+            longest = max(longest, took)
+            ends["when all was done"] += done
+            ends["between trials"] += not done and bool(records(out))
             if complaint:
                 failures += 1
                 print(f"FAIL  interrupt {number}, after {delay:.2f} s: {complaint}", flush=True)
-            if ended:
+            if done:
                 pd.testing.assert_frame_equal(trials(out), trials(undisturbed))
                 out = out.with_name(f"out{number}")
         whole(file, out)
