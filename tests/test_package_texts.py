@@ -146,6 +146,14 @@ FOREIGN: dict[str, tuple[str, str, str, str]] = {
         "#define WANT_TORQUE\nint planar2_spawn(const char *command);\n",
         "names planar2_spawn",
     ),
+    "a comment of C that ends before its line does": (
+        "c/planar2.c",
+        "#define WANT_TORQUE\n",
+        "#define WANT_TORQUE\n// this \r__attribute__((constructor)) void R(void);\n",
+        "has '\\r'",
+    ),
+    "text that is repeated": ("forms/link_1.py", "PATH", "LONG = 'a' * 9999999999\nPATH", "no arithmetic"),
+    "a power of numbers": ("forms/link_1.py", "PATH", "LONG = 9**9**9\nPATH", "has a power of numbers"),
     "a file that is not listed": (
         "c/planar2.c",
         "#define WANT_TORQUE\n",
@@ -209,6 +217,17 @@ def test_what_linkwise_does_not_write_is_refused_and_never_run(
     with pytest.raises(LinkwiseError, match=path):
         open_package(package)
     assert not mark.exists()
+
+
+@pytest.mark.parametrize("path", ["forms/link_1.so", "c/extra.inc", "c/extra.S", "Makefile"])
+def test_files_of_kinds_that_linkwise_does_not_write_are_refused(path: str, package: Path) -> None:
+    """Python would take the first for a module, before the text beside it; C includes any."""
+    (package / path).write_text("")
+    rewritten(package, path, lambda text: "int foreign;\n")
+    rewritten(package, "c/planar2.c", lambda text: f'{text}#include "{Path(path).name}"\n')
+    detail = check_package(package, 3)[-1].detail
+    assert f"{path} is no file that linkwise writes" in detail
+    assert "which is not listed" in detail
 
 
 @pytest.mark.parametrize(

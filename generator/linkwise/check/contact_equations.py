@@ -34,7 +34,7 @@ class ContactEquations:
     @property
     def asked(self) -> dict[str, Any]:
         """What the package is asked for."""
-        length = min(1.0, SPACIOUS * self.recursion.reach)
+        length = min(1.0, SPACIOUS * self.recursion.reach) or 1.0  # no reach: all of it in one point
         given: dict[str, Any] = {"frame": self.frame.name, "kind": self.kind, "point": tuple(length * POINT)}
         if self.kind == "hinged":
             given["axis"] = tuple(AXIS)

@@ -16,8 +16,8 @@ FUNCTIONS = frozenset(
     ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "sign")
 )
 """Of closed forms; C has fabs in place of abs."""
-SPLICED = re.compile(r"\?\?|\\[ \t\f\v\r]*\n|[^\t\n\r -~]")
-"""Trigraphs and lines that go on: what a compiler reads is another text than this; and what is not ASCII."""
+SPLICED = re.compile(r"\?\?|\\[ \t\f\v\r]*\n|\r(?!\n)|[^\t\n\r -~]")
+"""Trigraphs and lines that go on or end otherwise: a compiler reads another text than this; and no ASCII."""
 DIGRAPH = re.compile(r"<:|:>|<%|%>|%:")
 QUOTED = re.compile(
     r"""(?P<comment>/\*.*?\*/|//[^\n]*)|(?P<string>"(?:[^"\\\n]|\\.)*")|(?P<quote>["'])""", re.DOTALL
@@ -55,7 +55,8 @@ def foreign_includes(text: str, listed: frozenset[str]) -> Iterator[str]:
     """What a C file of a package includes beside listed files and headers of the standard."""
     for found in INCLUDE.finditer(_blanked(text, "comment")[0]):
         quote, file = found[1], found[2].strip()
-        if not (file in HEADERS if quote == "<" else quote == '"' and f"c/{file}" in listed):
+        own = file.endswith((".h", ".c")) and f"c/{file}" in listed
+        if not (file in HEADERS if quote == "<" else quote == '"' and own):
             yield f"line {_line(text, found.start())} has {' '.join(found[0].split())}, which is not listed"
 
 

@@ -102,6 +102,10 @@ OWN_C = "Path(__file__).parent / 'c'"
 MAKING = ("_MAKERS[backend]", "(made.face or Dynamics)", "made.face or Dynamics")
 """What else it calls: each of them is named in it."""
 BUILTINS = frozenset(dir(builtins))
+READ = frozenset(("formulas.txt", "formulas.tex", "py.typed"))
+"""Files that nothing runs."""
+OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.BitOr)
+"""Of numbers, and of types."""
 
 
 def foreign(directory: Path, manifest: Manifest) -> list[str]:
@@ -145,7 +149,9 @@ def foreign_text(path: str, text: bytes, source: Source) -> str | None:
                 return f"is not that of linkwise {VERSION}"
         elif ending == "py":
             return next(_python(LOADING if path == "__init__.py" else ARITHMETIC, text), None)
-        elif ending in ("h", "c") and (told := next(foreign_c(text.decode(), source.name), None)):
+        elif ending not in ("h", "c"):
+            return None if path in READ else "is no file that linkwise writes"
+        elif told := next(foreign_c(text.decode(), source.name), None):
             return told
         # That of the runtime is compiled with Python's headers.
         in_c = ending in ("h", "c") and not path.startswith("runtime/")
@@ -211,11 +217,26 @@ def _beside(node: ast.AST, grammar: Grammar, known: set[str]) -> str:
             return "" if attribute in FUNCTIONS else f"asks for .{attribute}"
         case ast.Attribute(attr=attribute):
             return "" if attribute in grammar.attributes else f"asks for .{attribute}"
+        case ast.BinOp(op=operator):
+            # Of numbers alone a power may be as long as memory, and so may text, repeated.
+            of_text = not isinstance(operator, ast.Div) and (_is_text(node.left) or _is_text(node.right))
+            if of_text or not isinstance(operator, OPERATORS):
+                return "does what is no arithmetic"
+            return "" if not isinstance(operator, ast.Pow) or _names(node.left) else "has a power of numbers"
         case ast.Call(func=ast.Name() | ast.Attribute() | ast.Call()):
             return ""
         case ast.Call(func=func):
             return "" if ast.unparse(func) in MAKING else "calls what an expression gives"
     return ""
+
+
+def _is_text(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str | bytes)
+
+
+def _names(node: ast.AST) -> bool:
+    """Whether a value hangs on anything but numbers."""
+    return any(isinstance(part, ast.Name) for part in ast.walk(node))
 
 
 def _may_import(grammar: Grammar, module: str, name: str, level: int) -> bool:
