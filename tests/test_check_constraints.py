@@ -215,7 +215,31 @@ joint = [
   {{name = "jb", parent = "a", child = "b", xyz = [0.2, 0, 0], stiffness = 3, rest = 0.2, damping = 0.2}},
 ]
 """
+PARALLEL = f"""schema = 1
+name = "right"
+link = [
+  {{name = "a", mass = 1.0, com = [0.1, 0, 0], {BODY}}},
+  {{name = "b", mass = 1.0, com = [0.1, 0, 0], {BODY}}},
+]
+joint = [
+  {{name = "ja", parent = "base", child = "a"}},
+  {{name = "jb", parent = "base", child = "b", xyz = [0.3, 0, 0]}},
+]
+[[constraint]]
+name = "rod"
+type = "distance"
+first = {{frame = "a", xyz = [0.1, 0, 0]}}
+second = {{frame = "b", xyz = [0.1, 0, 0]}}
+length = 0.3
+"""
+ONE_POINT = f"""schema = 1
+name = "right"
+link = [{{name = "a", mass = 1.0, {BODY}}}]
+joint = [{{name = "ja", type = "floating", parent = "base", child = "a"}}]
+"""
 RIGHT = {
+    "two cranks and a rod, which at zero is across to how they move": (PARALLEL, "numpy", "auto"),
+    "a body that floats about its centre of mass, all in one point": (ONE_POINT, "numpy", "auto"),
     "a slider-crank, one joint of which bears nothing by velocity": (SLIDER, "numpy", "auto"),
     "a cam that follows a polynomial": (CAM, "numpy", "auto"),
     "a light link on a body, whose contact leaves hardly any mass": (LIGHT, "numpy", "auto"),

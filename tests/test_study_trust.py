@@ -1,5 +1,7 @@
 """What a study's file may have done: it names files to read, and runs no code by itself."""
 
+import hashlib
+import json
 import zipfile
 from collections.abc import Iterator
 from functools import partial
@@ -10,7 +12,8 @@ from threading import Thread
 import pytest
 from command_line import run_linkwise
 from conftest import DATA
-from linkwise import LinkwiseError
+from linkwise import LinkwiseError, generate, read_system, write_package
+from linkwise.errors import LinkwiseWarning
 from linkwise.study import run_study
 from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 
@@ -61,6 +64,28 @@ def test_python_beside_a_study_is_run_only_where_that_is_asked_for_and_then_told
     done = run_linkwise("study", file, "--out", "out", "--workers", 1, "--trust-python", folder=tmp_path)
     assert (done.returncode, ran.exists()) == (0, True)
     assert f"note: {tmp_path}/cart.py is a Python program, which was run" in done.stderr.splitlines()
+
+
+def test_a_package_of_another_version_is_not_run_by_a_study(tmp_path: Path) -> None:
+    """Its runtime is not at hand to compare with, and may do anything."""
+    file, mark = with_program(tmp_path, "cart"), tmp_path / "was run"
+    write_package(generate(read_system(DATA / "cart_pendulum.py"), ["numpy"]), tmp_path / "cart")
+    runtime, manifest = tmp_path / "cart/runtime/structure.py", tmp_path / "cart/manifest.json"
+    runtime.write_text(f"{runtime.read_text()}\nopen({str(mark)!r}, 'w').close()\n")
+    data = json.loads(manifest.read_text())
+    data["generator"]["linkwise"] = "0.0.9"
+    data["files"]["runtime/structure.py"] = hashlib.sha256(runtime.read_bytes()).hexdigest()
+    data["checksums"] = {
+        key: hashlib.sha256(json.dumps(data[key], sort_keys=True).encode()).hexdigest()
+        for key in data["checksums"]
+    }
+    manifest.write_text(json.dumps(data))
+    with pytest.raises(LinkwiseError, match=r"package of linkwise 0\.0\.9, .* give --trust-python"):
+        run_study(file, tmp_path / "out", Here())
+    assert not mark.exists()
+    with pytest.warns(LinkwiseWarning, match="its code runs"), pytest.raises(LinkwiseError, match=r"0\.0\.9"):
+        run_study(file, tmp_path / "out", Here(), trust_python=True)
+    assert mark.exists()
 
 
 def test_a_trial_of_a_changed_program_is_done_again(tmp_path: Path) -> None:

@@ -90,6 +90,20 @@ def test_emitted_c_has_the_linear_part_too(
 
 
 X, Y = Coordinate("x", "m"), Coordinate("y")
+
+
+@pytest.mark.parametrize("factor", [1 / (1 + X.q**2), 1 / (2 + X.q), 3 - 1 / (2 + X.q**2)], ids=str)
+def test_graphs_of_quotients_say_what_torques_are(factor: sp.Expr, tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    links = [LinkEnergy("a", X.qd**2 / 2 + Y.qd**2 * factor / 2, 0)]
+    write_package(generate(energy_system("bead", [X, Y], links), ["autograd"]), tmp_path / "bead")
+    robot = import_package(tmp_path / "bead").load("autograd")
+    (x, _), (v, w), (_, a) = motion = np.array([[0.7, 0.2], [1.3, -0.4], [0.5, 2.0]])
+    # d/dt(qd_y f(x)) = f qdd_y + f' qd_x qd_y
+    f, slope = (float(value.subs(X.q, x)) for value in (factor, sp.diff(factor, X.q)))
+    assert float(robot.graph(1, 0).evaluate(*motion)) == pytest.approx(f * a + slope * v * w, rel=1e-12)
+
+
 WITHOUT_FORCE = {
     "a belt": [LinkEnergy("cart", 2 * (X.qd + 3) ** 2 / 2, 2 * X.q**2)],
     "beside others": [

@@ -45,12 +45,15 @@ class ClosedLoops(NamedTuple):
     def position(self, independent: Sequence[int]) -> tuple[float, ...]:
         """The first one of them where the other joints follow well, as far as any does, to 1e-9."""
         dependent = [k for k in range(self.rows.shape[1]) if k not in independent]
-        least = [
-            np.linalg.svd(at.comparable[:, dependent], compute_uv=False)[-1] / np.abs(at.comparable).max()
-            for at in self.closed
-        ]
+        least = [_share(at.comparable, dependent) for at in self.closed]
         best = next(at for at, size in zip(self.closed, least, strict=True) if size >= FAR * max(least))
         return tuple(round(float(x), 9) + 0.0 for x in best.q)
+
+
+def _share(rows: Array, dependent: Sequence[int]) -> float:
+    """How well dependent joints follow beside how well any may; not at all where no joint moves the rows."""
+    most = float(np.abs(rows).max())
+    return float(np.linalg.svd(rows[:, dependent], compute_uv=False)[-1]) / most if most else 0.0
 
 
 def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:

@@ -14,6 +14,7 @@ from linkwise.progress import Progress
 from linkwise.robot import is_description
 from linkwise.study.study_paths import is_address, opened_here, version_of
 from linkwise.study.study_plan import StudyPlan
+from linkwise.version import VERSION
 
 ROBOTS = 4
 """Robots that a worker keeps in memory: trials of one subject follow one another."""
@@ -48,7 +49,8 @@ def _owner(plan: StudyPlan, robot: str) -> str:
 def package_of(robot: str, plan: StudyPlan) -> KeptPackage:
     """The package of a trial's robot: itself, or the one that is kept of its file, address or name.
 
-    Raises LinkwiseError, before it is fetched or run, for a Python file that nobody vouches for.
+    Raises LinkwiseError, before it is fetched or run, for a Python file that nobody vouches for, and before
+    it is run for a package of another version.
     """
     if Path(robot).suffix == PYTHON:
         _refuse_untrusted(robot, plan)
@@ -56,6 +58,8 @@ def package_of(robot: str, plan: StudyPlan) -> KeptPackage:
     if is_description(robot) and not is_address(robot) and not Path(robot).exists():
         return kept_package(robot, options=options)
     with opened_here(robot) as path:
+        if Path(path).is_dir() and not plan.trust_python:
+            _refuse_unread(robot, Path(path))
         return kept_package(path, options=options)
 
 
@@ -69,6 +73,16 @@ def _refuse_untrusted(robot: str, plan: StudyPlan) -> None:
         raise LinkwiseError(
             f"robot {robot} is a Python program, which a study does not run by itself; read it, and give"
             " --trust-python if you trust it"
+        )
+
+
+def _refuse_unread(robot: str, package: Path) -> None:
+    """Raise LinkwiseError for a package whose runtime is another linkwise's: it would run as it is."""
+    version = Manifest.read(package).generator.get("linkwise")
+    if version != VERSION:
+        raise LinkwiseError(
+            f"robot {robot} is a package of linkwise {version}, whose code is not at hand to compare with;"
+            " generate it again, or read it, and give --trust-python if you trust it"
         )
 
 
