@@ -144,6 +144,8 @@ def digest_of(directory: Path) -> str:
     digest = hashlib.sha256()
     try:
         for path in sorted(directory.iterdir()):
+            if not path.is_file():  # a pipe, say, whose end would be waited for
+                raise RuntimeError(f"{path} is no file; generate it again")
             digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     except OSError as error:
         raise RuntimeError(f"cannot read {error.filename}: {error.strerror}; generate it again") from None

@@ -199,11 +199,14 @@ def _place(value: Tensor) -> Any:
 
 
 def _same(name: str, arguments: Any, options: Any, result: Tensor) -> Any:
-    """The operand that a product with 1 or a sum with 0 is, or the number 0 for a product with it."""
+    """The operand that a product with 1, or a sum with 0, is, or the number 0 for a product with it.
+
+    Of a difference and a quotient only the second may be such a number.
+    """
     if options or len(arguments) != 2 or name not in NEUTRAL or result.dim():
         return None
     one, other = arguments
-    if isinstance(other, Ref) and name != "sub":
+    if isinstance(other, Ref) and name in ("add", "mul"):
         one, other = other, one
     if not isinstance(one, Ref) or not isinstance(other, float | int):
         return None
