@@ -29,6 +29,7 @@ from linkwise import (
     read_system,
     write_package,
 )
+from linkwise.check import back_end_checks, compiled_c
 from linkwise.check.as_generated import check_made
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.package.load import load_package, open_package
@@ -457,6 +458,25 @@ def test_all_that_a_package_has_is_held(passing: Copy) -> None:
         assert f"numpy: {what} against Newton-Euler recursion" in found
     for what in ("sums over the links", "passive torques of the joints", "regressors in single precision"):
         assert {f"numpy: {what}", f"numpy by rule: {what}"} <= set(found)
+
+
+@needs_compiler
+def test_want_of_memory_speaks_neither_for_a_package_nor_against_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: Any) -> Any:
+        yield from ()
+        raise RuntimeError("DefaultCPUAllocator: can't allocate memory")
+
+    def unmapped(*_: Any) -> Any:
+        raise OSError("checked.so: failed to map segment from shared object")
+
+    write_package(generate(read_system("planar1"), ["numpy", "c"]), tmp_path / "arm")
+    monkeypatch.setattr(back_end_checks, "frame_calls", full)
+    monkeypatch.setattr(compiled_c.ctypes, "CDLL", unmapped)
+    found = {result.name: result.mark for result in check_package(tmp_path / "arm", 3)}
+    assert (found["numpy: frames"], found["c: not checked"]) == ("skip", "skip")
+    assert "FAIL" not in found.values()
 
 
 def test_where_nothing_is_compared_nothing_is_held() -> None:

@@ -333,6 +333,12 @@ def test_sources_that_cannot_be_read_are_named(tmp_path: Path) -> None:
         native_build.digest_of(tmp_path / "gone")
 
 
+def test_a_pipe_among_the_sources_is_not_waited_for(tiny: Sources) -> None:
+    os.mkfifo(tiny.directory / "extra.h")
+    with pytest.raises(RuntimeError, match=r"extra\.h is no file; generate it again"):
+        library(tiny, "double")
+
+
 def test_a_library_that_cannot_be_loaded_is_named_and_not_kept(
     tiny: Sources, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

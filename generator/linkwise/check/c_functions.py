@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from linkwise.check.c_headers import wrong_header
-from linkwise.check.compare import Entries, Result, compare, skipped
+from linkwise.check.compare import Entries, Result, compare, is_short_of_memory, skipped
 from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype
 from linkwise.check.control_functions import CONTROL, control_calls, control_prototypes
 from linkwise.check.frame_reference import FrameReference
@@ -231,10 +231,11 @@ def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[Com
     results = sum(len(rows.of(what)) for what in ("c2", "c1", "g", "tau", "h1"))
     try:
         compiled = CompiledPackage(manifest.name, directory / "c", MANY * results)
-    except RuntimeError as error:
-        return None, skipped("c: not checked", " ".join(str(error).split()))
-    except (LinkwiseError, OSError) as error:
-        return None, Result("c: compiles", False, None, " ".join(str(error).split()))
+    except (RuntimeError, LinkwiseError, OSError) as error:
+        told, here = " ".join(str(error).split()), isinstance(error, RuntimeError)
+        if here or is_short_of_memory(error):
+            return None, skipped("c: not checked", told)
+        return None, Result("c: compiles", False, None, told)
     wrong = wrong_header(manifest, compiled, directory, rows, prototypes(manifest, rows))
     detail = wrong or "as the manifest's paths say"
     return compiled, Result("c: numbers, indices and functions of the headers", not wrong, None, detail)

@@ -14,7 +14,7 @@ import numpy as np
 from linkwise.check.as_generated import check_files, check_made, check_manifest, check_texts
 from linkwise.check.back_end_checks import CHECKS
 from linkwise.check.c_functions import CFunctions, References, compile_c
-from linkwise.check.compare import Result, skipped
+from linkwise.check.compare import Result, is_short_of_memory, skipped
 from linkwise.check.derivations import derivations
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.packed_layout import IndexRows
@@ -121,6 +121,8 @@ def _one_thread() -> Iterator[None]:
 
 def _lacks(error: Exception) -> bool:
     """Whether a library, a compiler, a place to compile or stack is missing here: not the package's fault."""
+    if is_short_of_memory(error):
+        return True
     if isinstance(error, ImportError):
         library = (error.name or "").partition(".")[0]
         return library in OPTIONAL and find_spec(library) is None
@@ -208,11 +210,11 @@ def _guarded(title: str, results: Iterator[Result]) -> Iterator[Result]:
             # Energies of a user's own need not be defined everywhere.
             with staying(), np.errstate(all="ignore"), _one_thread():
                 result = next(results, None)
-        except MemoryError as error:
-            yield skipped(title, f"it takes more memory than there is here: {error}")
-            return
         except Exception as error:
-            yield Result(title, False, None, _line(error))
+            if is_short_of_memory(error):
+                yield skipped(title, f"it takes more memory than there is here: {_line(error)}")
+            else:
+                yield Result(title, False, None, _line(error))
             return
         if result is None:
             return

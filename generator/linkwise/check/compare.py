@@ -15,6 +15,8 @@ ROUNDINGS = 10.0
 """Roundings that a value may gather, each as large as that of the numbers that it is summed from."""
 
 
+SHORT_OF_MEMORY = ("allocate memory", "failed to map segment")
+"""In errors of torch, and of the system where it loads a library."""
 BLOCK = 1 << 20
 """Entries compared at a time."""
 
@@ -46,6 +48,11 @@ class Result:
 def skipped(name: str, reason: str) -> Result:
     """What could not be checked, and why."""
     return Result(name, None, None, reason)
+
+
+def is_short_of_memory(error: Exception) -> bool:
+    """Whether there was too little of it for an array, for one of torch's or for a library."""
+    return isinstance(error, MemoryError) or any(words in str(error) for words in SHORT_OF_MEMORY)
 
 
 @dataclass(frozen=True)
