@@ -88,15 +88,27 @@ def _shaped(
         return product
 
     weight = kept[:, None]
-    wanted = along((weight * mass).sum(2), qdd) + armature
+    inertia = (weight * mass).sum(2)
+    wanted = along(inertia, qdd) + armature
     pull = force - along((weight * coriolis).sum(2), qd) - more * qd - stiffness * (q - at)
-    wanted_size = along((weight * scale).sum(2), np.abs(qdd)) + armature_size
+    wanted_size = along((weight * scale).sum(2) + _eliminated(inertia), np.abs(qdd)) + armature_size
     pull_size = np.abs(force) + along((weight * size).sum(2), np.abs(qd)) + more * np.abs(qd)
     yield Entries("M* qdd", wanted, pull, wanted_size + pull_size + stiffness * np.abs(q - at))
     gravity, gravity_size = (source["g"][rows].sum(-1) for source in (reference.values, reference.scales))
     taken = along(mass.sum(2), qdd) + armature + along(coriolis.sum(2), qd) + gravity + rest
     taken_size = along(scale.sum(2), np.abs(qdd)) + armature_size + along(size.sum(2), np.abs(qd))
     yield Entries("torque", tau + force, taken, taken_size + gravity_size + rest_size + np.abs(force))
+
+
+def _eliminated(inertia: Array) -> Array:
+    """What elimination sums for each entry of M (samples, n, n): |L| |L^T|, at most sqrt(M_ii M_kk).
+
+    Rounding of that is in whoever solves M x = f, also where M_ik is next to nothing (Higham, Accuracy and
+    Stability of Numerical Algorithms, theorem 10.4).
+    """
+    size = np.sqrt(np.abs(np.einsum("sii->si", inertia)))
+    entries: Array = size[:, :, None] * size[:, None]
+    return entries
 
 
 def _cancelled(model: Model, joints: Sequence[PassiveEntry], reference: Reference, rows: Any) -> Entries:
