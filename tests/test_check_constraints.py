@@ -258,3 +258,19 @@ def test_a_right_package_is_never_called_wrong(robot: str, tmp_path: Path) -> No
     results = check_package(tmp_path / "right")
     assert not [result for result in results if result.failed]
     assert backend != "c" or "c: right_coefficients" in {result.name for result in results if result.held}
+
+
+@pytest.mark.parametrize(("size", "most"), [(1.0, 0.3), (1e-3, 0.006)])
+def test_contacts_are_as_near_as_links_are_short(size: float, most: float, tmp_path: Path) -> None:
+    """Of an arm of 0.3 m, and of one of 0.3 mm."""
+    text = f"""schema = 1
+    name = "arm"
+    link = [{{name = "a", mass = {size**3}, inertia = {{xx = {size**5}, yy = {size**5}, zz = {size**5}}}}}]
+    joint = [{{name = "j", parent = "base", child = "a", xyz = [{0.3 * size}, 0, 0]}}]
+    """
+    (tmp_path / "arm.toml").write_text(text)
+    write_package(generate(read_system(tmp_path / "arm.toml"), ["numpy"]), tmp_path / "arm")
+    manifest = Manifest.read(tmp_path / "arm")
+    assert manifest.tree is not None
+    held = HeldContacts(manifest, manifest.tree, random_states(manifest.joints, 2))
+    assert 0.0 < np.linalg.norm(held.equations("point", manifest.tree).asked["point"]) < most
