@@ -251,7 +251,6 @@ def interruptible() -> Iterator[None]:
     signal.signal(signal.SIGINT, former)
 
 
-@pytest.mark.skipif(os.name == "nt", reason="there kill ends a process, whatever its handlers")
 def test_signals_wait_though_another_thread_takes_them(interruptible: None) -> None:
     """The system gives one that this thread blocks to any other, and Python acts on it in this one."""
     over, steps = threading.Event(), list[str]()
