@@ -119,12 +119,44 @@ def test_a_writer_who_comes_between_two_renames_keeps_the_place(
 
     monkeypatch.setattr(exchange, "_swapped", lambda *_: False)
     monkeypatch.setattr(Path, "rename", interrupted)
-    with pytest.raises(OSError, match="not empty"):
-        exchange.exchange(work / "new", target)
-    assert (target / "a").read_text() == "of another"
-    assert (work / "new/a").read_text() == "new"
-    assert not (work / "old/target").exists(), "a sweep would bring it back"
-    assert [file.read_text() for file in (work / "rest").rglob("a")] == ["old"]
+    for taken in (["old"], ["of another", "old"]):
+        with pytest.raises(OSError, match="not empty"):
+            exchange.exchange(work / "new", target)
+        assert (target / "a").read_text() == "of another"
+        assert (work / "new/a").read_text() == "new"
+        assert not (work / "old/target").exists(), "a sweep would bring it back"
+        assert sorted(file.read_text() for file in (work / "rest").rglob("a")) == taken
+
+
+def test_a_writer_who_comes_and_goes_again_holds_no_other_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target, work = tmp_path / "target", tmp_path / "work"
+    for folder, text in ((target, "old"), (work / "new", "new")):
+        folder.mkdir(parents=True)
+        (folder / "a").write_text(text)
+    rename, parked = Path.rename, work / "of another"
+    came: list[Path] = []
+
+    def beside_another(here: Path, there: Path) -> None:
+        if parked.exists():
+            rename(parked, target)  # the second of its two renames
+        try:
+            rename(here, there)
+        except OSError:
+            if here == work / "old/target":
+                rename(target, parked)  # the first
+            raise
+        if here == target and not came:
+            came.append(here)
+            target.mkdir()
+            (target / "a").write_text("of another")
+
+    monkeypatch.setattr(exchange, "_swapped", lambda *_: False)
+    monkeypatch.setattr(Path, "rename", beside_another)
+    assert exchange.put(work / "new", target)
+    assert (target / "a").read_text() == "new"
+    assert (work / "new/a").read_text() == "of another"
 
 
 def test_of_two_writers_at_once_one_wins_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

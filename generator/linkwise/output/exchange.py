@@ -58,12 +58,12 @@ def _undo(done: list[tuple[Path, Path]], former: Path) -> None:
     for here, there in reversed(done):
         try:
             there.rename(here)
-        except OSError:
-            # Another writer's is in the place of `former`, which is of no use any more. Where all fails,
-            # `former` is where `workplace.sweep` looks for it.
-            if there == former and os.path.lexists(here):
+        except OSError as error:
+            # Another writer's is in the place of `former`, or was a moment ago, which is of no use any more.
+            # Where all fails, `former` is where `workplace.sweep` looks for it.
+            if there == former and (error.errno in TAKEN or os.path.lexists(here)):
                 rest = former.parents[1] / REST
-                rest.mkdir()
+                rest.mkdir(exist_ok=True)  # a writer who came between may have come before
                 former.rename(tempfile.mkdtemp(dir=rest))
 
 
