@@ -237,7 +237,24 @@ name = "right"
 link = [{{name = "a", mass = 1.0, {BODY}}}]
 joint = [{{name = "ja", type = "floating", parent = "base", child = "a"}}]
 """
+COUPLING = """[[constraint]]
+name = "curve"
+type = "coupling"
+terms = {ja = [0, 1, 0, -1], jb = [0, 0, 1]}
+"""
+MICRO = """schema = 1
+name = "right"
+link = [
+  {name = "a", mass = 1e-6, com = [1e-6, 0, 2e-6], inertia = {xx = 2e-18, yy = 3e-18, zz = 2e-18}},
+  {name = "b", mass = 1e-6, com = [2e-6, 1e-6, 0], inertia = {xx = 2e-18, yy = 3e-18, zz = 2e-18}},
+]
+joint = [
+  {name = "f", type = "floating", parent = "base", child = "a"},
+  {name = "ja", parent = "a", child = "b", xyz = [3e-6, 0, 0], axis = [0, 1, 0]},
+]
+"""
 RIGHT = {
+    "a floating robot of micrometres, whose slides move it by more than turns": (MICRO, "numpy", "auto"),
     "two cranks and a rod, which at zero is across to how they move": (PARALLEL, "numpy", "auto"),
     "a body that floats about its centre of mass, all in one point": (ONE_POINT, "numpy", "auto"),
     "a slider-crank, one joint of which bears nothing by velocity": (SLIDER, "numpy", "auto"),
@@ -258,6 +275,17 @@ def test_a_right_package_is_never_called_wrong(robot: str, tmp_path: Path) -> No
     results = check_package(tmp_path / "right")
     assert not [result for result in results if result.failed]
     assert backend != "c" or "c: right_coefficients" in {result.name for result in results if result.held}
+
+
+def test_where_one_joint_cannot_follow_another_nothing_is_asked(tmp_path: Path) -> None:
+    """Of jb*jb = ja**3 - ja, jb stands still whatever ja does where it is 0."""
+    curve = PARALLEL.split("[[constraint]]")[0] + COUPLING
+    (tmp_path / "robot.toml").write_text(curve)
+    write_package(generate(read_system(tmp_path / "robot.toml"), ["numpy"]), tmp_path / "right")
+    for samples in (1, 2, 8):
+        results = check_package(tmp_path / "right", samples)
+        assert not [result for result in results if result.failed]
+        assert "numpy: velocities in closed loops against least squares" in {r.name for r in results if r.held}
 
 
 @pytest.mark.parametrize(("size", "most"), [(1.0, 0.3), (1e-3, 0.006)])

@@ -26,6 +26,7 @@ from linkwise.own_process import Ended, begun
 from linkwise.package.load import Model, Package, load_package, staying
 from linkwise.package.manifest import Manifest
 from linkwise.runtime.native.native_build import PARTS, Sources, library
+from linkwise.runtime.native.native_system import system_here
 
 OPTIONAL = ("torch",)
 """Libraries that a package's back ends may need beside NumPy."""
@@ -66,7 +67,8 @@ def results_of(directory: Path, samples: int = SAMPLES) -> Iterator[Result]:
     if agrees.failed:
         return
     yield made
-    compiled = begun(partial(_compile, package)) if "native" in package.backends else lambda: None
+    beside = "native" in package.backends and system_here().forks
+    compiled = begun(partial(_compile, package)) if beside else lambda: None
     with staying():
         loaded, missing = _load(package)
     yield from missing

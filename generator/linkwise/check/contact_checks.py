@@ -75,7 +75,7 @@ class HeldContacts:
         """The answers, where these joints move the others."""
         q = self.states.q
         rest, rows = [k for k in range(q.shape[1]) if k not in own], held.rows(q)
-        clear = far_from_singular(rows[..., rest])
+        clear = far_from_singular(rows, rest)
         clear = clear[steady(held.recursion, q[clear], following(rows[clear], own))][:STATES]
         if not clear.size:
             return None

@@ -26,13 +26,16 @@ from linkwise.package.manifest import Manifest, RigidTree
 STATES = 12
 TRIED = 60
 FAR = 100.0
-"""Condition of A_d, the dependent joints' columns, below which a position is far from singular ones."""
+"""What A moves at most, to what A_d, the dependent joints' columns, moves at least: below, a position is far
+from singular ones. The condition of A_d alone is 1 for a single joint, whatever it moves."""
 MOST = 1e6
 """The same, above which nothing is left to compare."""
 STEADY = 1e-2
 """Least eigenvalue of a mass matrix beside that of others."""
 REGULAR = 1e-8
 """Least eigenvalue of any, with ones on its diagonal: below, joints can move together without a mass."""
+LEAST = 1e-300
+"""In place of a singular value that is 0."""
 SMALL = 1e-7
 """Singular values below this part of the largest are those of rows that follow from others."""
 
@@ -61,7 +64,7 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     tried = states.q[:TRIED]
     starts = [tried, *(tree.closed_position + tried * part for part in (0.5, 0.1, 0.02))]
     q = equations.closed_near(np.concatenate(starts))
-    q = q[far_from_singular(equations.rows(q)[..., rest])]
+    q = q[far_from_singular(equations.rows(q), rest)]
     q = q[steady(equations.recursion, q, equations.velocity_map(q))][: min(STATES, len(states.q))]
     if not len(q):
         return None
@@ -80,13 +83,14 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
 def condition_of(rows: Array) -> Array:
     """Condition number of A_d (samples, C, d), (samples,)."""
     sizes = np.linalg.svd(rows, compute_uv=False)
-    condition: Array = sizes[:, 0] / np.maximum(sizes[:, -1], 1e-300)
+    condition: Array = sizes[:, 0] / np.maximum(sizes[:, -1], LEAST)
     return condition
 
 
-def far_from_singular(rows: Array) -> NDArray[np.intp]:
-    """Which of A_d (samples, C, d) are, the best ones first if none is as far as one would like."""
-    condition = condition_of(rows)
+def far_from_singular(rows: Array, rest: Sequence[int]) -> NDArray[np.intp]:
+    """Which of A (samples, C, n) are, by columns `rest`: the best first if none is as far as one would like."""
+    most, sizes = (np.linalg.svd(part, compute_uv=False) for part in (rows, rows[..., rest]))
+    condition = most[:, 0] / np.maximum(sizes[:, -1], LEAST)
     found = np.flatnonzero(condition < FAR)
     return found if found.size else np.argsort(condition)[: np.count_nonzero(condition < MOST)]
 
