@@ -285,7 +285,9 @@ def test_where_one_joint_cannot_follow_another_nothing_is_asked(tmp_path: Path) 
     for samples in (1, 2, 8):
         results = check_package(tmp_path / "right", samples)
         assert not [result for result in results if result.failed]
-        assert "numpy: velocities in closed loops against least squares" in {r.name for r in results if r.held}
+        assert "numpy: velocities in closed loops against least squares" in {
+            r.name for r in results if r.held
+        }
 
 
 @pytest.mark.parametrize(("size", "most"), [(1.0, 0.3), (1e-3, 0.006)])

@@ -154,6 +154,18 @@ FOREIGN: dict[str, tuple[str, str, str, str]] = {
     ),
     "text that is repeated": ("forms/link_1.py", "PATH", "LONG = 'a' * 9999999999\nPATH", "no arithmetic"),
     "a power of numbers": ("forms/link_1.py", "PATH", "LONG = 9**9**9\nPATH", "has a power of numbers"),
+    "a number by a name that grows": (
+        "forms/link_1.py",
+        "PATH",
+        "A = 9\nB = A * A\nPATH",
+        "computes with numbers alone",
+    ),
+    "a function of numbers that grow": (
+        "forms/link_1.py",
+        "PATH",
+        "def grow(a):\n    return grow(a * a)\n\n\nGROWN = grow(9)\nPATH",
+        "calls its own grow",
+    ),
     "a file that is not listed": (
         "c/planar2.c",
         "#define WANT_TORQUE\n",

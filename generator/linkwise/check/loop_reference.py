@@ -88,7 +88,7 @@ def condition_of(rows: Array) -> Array:
 
 
 def far_from_singular(rows: Array, rest: Sequence[int]) -> NDArray[np.intp]:
-    """Which of A (samples, C, n) are, by columns `rest`: the best first if none is as far as one would like."""
+    """Which of A (samples, C, n) are, by columns `rest`: the best first if none is far enough."""
     most, sizes = (np.linalg.svd(part, compute_uv=False) for part in (rows, rows[..., rest]))
     condition = most[:, 0] / np.maximum(sizes[:, -1], LEAST)
     found = np.flatnonzero(condition < FAR)

@@ -166,7 +166,7 @@ def _python(grammar: Grammar, text: bytes) -> Iterator[str]:
     Of the bytes, as Python reads them: a comment in them may say in what encoding.
     """
     tree = ast.parse(text)
-    known = _bound(tree) | grammar.builtins
+    known = Known.of(tree, grammar)
     own_c = {id(part) for node in ast.walk(tree) if _is_own_c(node) for part in ast.walk(node)}
     for node in ast.walk(tree):
         if (grammar is not LOADING or id(node) not in own_c) and (told := _beside(node, grammar, known)):
@@ -175,6 +175,36 @@ def _python(grammar: Grammar, text: bytes) -> Iterator[str]:
 
 def _is_own_c(node: ast.AST) -> bool:
     return isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div) and ast.unparse(node) == OWN_C
+
+
+@dataclass(frozen=True)
+class Known:
+    """Names of a module: all that it may use, its functions and classes, those of numbers and text alone."""
+
+    names: set[str]
+    functions: set[str]
+    fixed: set[str]
+
+    @classmethod
+    def of(cls, tree: ast.Module, grammar: Grammar) -> "Known":
+        """Those of a module, whose statements are walked before those of its functions."""
+        functions, fixed = set(), set[str]()
+        for node in ast.walk(tree):
+            match node:
+                case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+                    functions.add(name)
+                case ast.Assign(value=value) | ast.AnnAssign(value=ast.expr() as value):
+                    functions |= _named(node, ast.Store) if isinstance(value, ast.Lambda) else set()
+                    fixed |= _named(node, ast.Store) if _named(value) <= fixed else set()
+        return cls(_bound(tree) | grammar.builtins, functions, fixed)
+
+    def is_fixed(self, operand: ast.AST) -> bool:
+        """Whether it is of numbers and text alone; False for what is computed: its own parts tell."""
+        return not isinstance(operand, ast.BinOp) and _named(operand) <= self.fixed
+
+
+def _named(node: ast.AST, how: type[ast.expr_context] = ast.expr_context) -> set[str]:
+    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, how)}
 
 
 def _bound(tree: ast.Module) -> set[str]:
@@ -191,7 +221,7 @@ def _bound(tree: ast.Module) -> set[str]:
     return found
 
 
-def _beside(node: ast.AST, grammar: Grammar, known: set[str]) -> str:
+def _beside(node: ast.AST, grammar: Grammar, known: Known) -> str:
     """What is wrong with a node, in words; empty if nothing."""
     if not isinstance(node, grammar.nodes):
         return f"has {type(node).__name__}"
@@ -208,7 +238,7 @@ def _beside(node: ast.AST, grammar: Grammar, known: set[str]) -> str:
         case ast.Name(id="Path" | "__file__"):
             return "names a file"
         case ast.Name(id=name, ctx=ast.Load()):
-            return "" if name in known else f"names {name}"
+            return "" if name in known.names else f"names {name}"
         case ast.Name(id=name) | ast.arg(arg=name) | ast.FunctionDef(name=name) | ast.ClassDef(name=name):
             taken = name in BUILTINS or name in grammar.whole.values()
             own = name[:2] == "__" and name != "__all__"  # Python's own: __builtins__ is what all names mean
@@ -218,11 +248,16 @@ def _beside(node: ast.AST, grammar: Grammar, known: set[str]) -> str:
         case ast.Attribute(attr=attribute):
             return "" if attribute in grammar.attributes else f"asks for .{attribute}"
         case ast.BinOp(op=operator):
-            # Of numbers alone a power may be as long as memory, and so may text, repeated.
             of_text = not isinstance(operator, ast.Div) and (_is_text(node.left) or _is_text(node.right))
             if of_text or not isinstance(operator, OPERATORS):
                 return "does what is no arithmetic"
-            return "" if not isinstance(operator, ast.Pow) or _names(node.left) else "has a power of numbers"
+            # Of numbers alone a power may be as long as memory; so may products of products, or text.
+            if isinstance(operator, ast.Pow) and _named(node.left) <= known.fixed:
+                return "has a power of numbers"
+            of_numbers = all(known.is_fixed(part) for part in (node.left, node.right))
+            return "computes with numbers alone" if of_numbers and _named(node) else ""
+        case ast.Call(func=ast.Name(id=name)) if name in known.functions:
+            return f"calls its own {name}"
         case ast.Call(func=ast.Name() | ast.Attribute() | ast.Call()):
             return ""
         case ast.Call(func=func):
@@ -232,11 +267,6 @@ def _beside(node: ast.AST, grammar: Grammar, known: set[str]) -> str:
 
 def _is_text(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, str | bytes)
-
-
-def _names(node: ast.AST) -> bool:
-    """Whether a value hangs on anything but numbers."""
-    return any(isinstance(part, ast.Name) for part in ast.walk(node))
 
 
 def _may_import(grammar: Grammar, module: str, name: str, level: int) -> bool:

@@ -41,8 +41,8 @@ class Closing(NamedTuple):
     rows: Numbers
     """A, (C, n)."""
     comparable: Numbers
-    """A without units, so that rows and columns may stand beside each other: metres, of ties and of slides, in
-    the robot's size, and couplings by their largest."""
+    """A without units, so that rows and columns may stand beside each other: metres, of ties and of slides,
+    in the robot's size, and couplings by their largest."""
 
     @property
     def is_closed(self) -> bool:
