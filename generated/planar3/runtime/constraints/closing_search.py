@@ -41,7 +41,8 @@ class Closing(NamedTuple):
     rows: Numbers
     """A, (C, n)."""
     comparable: Numbers
-    """A with rows that may stand beside each other: in m by the robot's size, couplings by their largest."""
+    """A without units, so that rows and columns may stand beside each other: metres, of ties and of slides,
+    in the robot's size, and couplings by their largest."""
 
     @property
     def is_closed(self) -> bool:
@@ -63,6 +64,8 @@ class TieEquations:
         size = max(np.abs(a).max(initial=0.0) for a in numbers) or 1.0
         turns = [row in TURNS for one in held for row in ROWS[one.kind]]
         self._sizes = np.where(turns, 1.0, size)[:, None]
+        slides = [joint.coordinate for joint in tree.joints if joint.kind == "prismatic"]
+        self._slides = np.where(np.isin(np.arange(n), slides), size, 1.0)
 
     def at(self, q: Numbers) -> Closing:
         """phi, without what contacts have, and A at q (n,)."""
@@ -72,7 +75,7 @@ class TieEquations:
         return Closing(q, phi[:, 0], rows[..., 0], self._comparable(rows[..., 0]))
 
     def _comparable(self, rows: Numbers) -> Numbers:
-        ties, couplings = np.split(rows, [len(self._sizes)])
+        ties, couplings = np.split(rows * self._slides, [len(self._sizes)])
         most = np.abs(couplings).max(-1, keepdims=True)
         return np.concatenate([ties / self._sizes, couplings / np.where(most > 0.0, most, 1.0)])
 
