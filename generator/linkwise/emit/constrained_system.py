@@ -50,8 +50,8 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
     constraints = listed([*(repr(tie.name) for tie in robot.ties), *(repr(c.name) for c in robot.couplings)])
     if not rank:
         raise LinkwiseError(
-            f"the constraints {constraints} hold however the joints move, so nothing follows from them; "
-            "remove them"
+            f"the constraints {constraints} hold however the joints move, or where these are at a dead point "
+            "alone, so nothing follows from them; remove them, or give them lengths that let the robot move"
         )
     if not free:
         raise LinkwiseError(
