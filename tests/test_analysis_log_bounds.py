@@ -54,6 +54,14 @@ def test_array_that_is_shorter_than_its_header_says_is_refused(tmp_path: Path) -
     assert refusal(path) == "array 'q' has 928 of its 1,920,000,000,000 bytes; write the file again"
 
 
+def test_header_of_an_array_is_not_unpacked_where_it_promises_more_than_one_has(tmp_path: Path) -> None:
+    length = 1 << 30
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("time.npy", b"\x93NUMPY\x02\x00" + length.to_bytes(4, "little") + bytes(1 << 29))
+    told = "its header promises 1,073,741,824 bytes, and an array of numbers has no more than 10,000"
+    assert refusal(tmp_path / "a.npz") == f"array 'time': {told}; write the file again"
+
+
 def test_array_of_more_numbers_than_a_robot_has_is_refused_or_passed_over(tmp_path: Path) -> None:
     wide = np.zeros((80, 200_000), np.uint8)
     np.savez(tmp_path / "a.npz", time=TIME, q=wide)

@@ -1,5 +1,6 @@
 """Arrays by name in NumPy's .npz files."""
 
+import io
 import math
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
@@ -14,7 +15,10 @@ from linkwise.analysis.logs.array_columns import NUMBERS, StoredArray, names_joi
 from linkwise.analysis.logs.damaged_files import read_as
 from linkwise.analysis.logs.named_once import named_once
 from linkwise.analysis.logs.promised_size import require_held
-from linkwise.errors import LinkwiseError
+from linkwise.errors import LinkwiseError, within
+
+LONGEST_HEADER = 10_000
+"""Bytes that say what an array is, of which NumPy takes no more from a stranger; numbers need a hundred."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +30,15 @@ class NpzArrays:
     def found(self) -> Mapping[str, StoredArray]:
         """Shapes of all arrays, from their headers.
 
-        Raises LinkwiseError for names of joints that are pickled, and for two arrays of one name.
+        Raises LinkwiseError for names of joints that are pickled, for two arrays of one name, and for an
+        array whose header is far longer than numbers need.
         """
         found = {}
         with self.opened() as get, zipfile.ZipFile(self.path) as file:
             members = file.infolist()
             names = named_once([member.filename.removesuffix(".npy") for member in members], "arrays")
             for name, member in zip(names, members, strict=True):
-                with file.open(member) as array:
+                with file.open(member) as array, within(f"array {name!r}"):
                     shape, dtype = _header(array)
                 size = math.prod(shape) * dtype.itemsize
                 if dtype.kind != "O" and size > member.file_size:
@@ -59,10 +64,20 @@ class NpzArrays:
 
 
 def _header(array: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Shape of an array, and the type of its numbers."""
+    """Shape of an array, and the type of its numbers.
+
+    Raises LinkwiseError for one that is longer than NumPy reads, which NumPy tells after it took it whole.
+    """
     version = np.lib.format.read_magic(array)
     if version > (2, 0):  # fields with names in Unicode: a table of its own, and not an array
         return (), np.dtype("V")
-    reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, dtype = reader(array)
+    is_first = version == (1, 0)
+    reader = np.lib.format.read_array_header_1_0 if is_first else np.lib.format.read_array_header_2_0
+    length = array.read(2 if is_first else 4)
+    if (promised := int.from_bytes(length, "little")) > LONGEST_HEADER:
+        raise LinkwiseError(
+            f"its header promises {promised:,} bytes, and an array of numbers has no more than"
+            f" {LONGEST_HEADER:,}; write the file again"
+        )
+    shape, _, dtype = reader(io.BytesIO(length + array.read(promised)))
     return shape, dtype
