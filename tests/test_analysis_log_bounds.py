@@ -121,6 +121,41 @@ def test_datasets_are_those_that_the_file_holds(
     assert told in refusal(tmp_path / "a.h5")
 
 
+def in_groups(path: Path, *names: str) -> Path:
+    """A log whose arrays lie in groups, one in the other."""
+    with h5py.File(path, "w") as file:
+        group = file
+        for name in names:
+            group = group.create_group(name)
+        group["time"], group["q"] = TIME, Q
+    return path
+
+
+@pytest.mark.parametrize("names", [["a"] * 32, ["a" * 995]], ids=["deep", "long"])
+def test_arrays_are_found_in_groups_as_deep_and_long_as_a_log_has_them(
+    tmp_path: Path, names: list[str]
+) -> None:
+    np.testing.assert_array_equal(analyze(in_groups(tmp_path / "a.h5", *names), PLANAR3).q, Q)
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (["a"] * 3_000, "groups lie more than 32 deep, from 'a/a/a/a/a/a/…a/a/a/a/a/a' on; write the arrays"),
+        (["a"] * 33, "groups lie more than 32 deep"),
+        (
+            ["a" * 996],
+            "the path 'aaaaaaaaaaaa…aaaaaa/time' has 1,001 characters, and 1,000 are the most; give",
+        ),
+    ],
+    ids=["deepest", "deep", "long"],
+)
+def test_groups_that_are_deeper_or_longer_than_any_log_has_are_not_walked(
+    tmp_path: Path, names: list[str], told: str
+) -> None:
+    assert refusal(in_groups(tmp_path / "a.h5", *names)).startswith(told)
+
+
 def test_rows_that_no_byte_stands_for_are_refused(tmp_path: Path) -> None:
     rows = 1 << 22
     empty = pa.nulls(rows, pa.float64())

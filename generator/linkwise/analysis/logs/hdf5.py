@@ -13,7 +13,12 @@ from linkwise.analysis.logs.array_columns import NAMES, NUMBERS, StoredArray, na
 from linkwise.analysis.logs.damaged_files import read_as
 from linkwise.analysis.logs.promised_size import require_held
 from linkwise.errors import LinkwiseError
+from linkwise.escape import short
 from linkwise.extras import extra
+
+DEEPEST, LONGEST_PATH = 32, 1_000
+"""Groups, one in the other, that a dataset lies in, and characters of its path: each is looked up from the
+root on, so that a file of megabytes may ask for hours, or for the memory of all its paths."""
 
 
 @dataclass(frozen=True)
@@ -23,11 +28,15 @@ class Hdf5Arrays:
     path: Path
 
     def found(self) -> Mapping[str, StoredArray]:
-        """Shapes of all datasets, and the texts of those that name joints."""
+        """Shapes of all datasets, and the texts of those that name joints.
+
+        Raises LinkwiseError for numbers in other files, and for what lies deeper than any log is.
+        """
         library = extra("h5py")
         found: dict[str, StoredArray] = {}
 
         def visit(name: str, item: Any) -> None:
+            _require_shallow(name)
             found.update(_named_by_attributes(name, item))
             if not isinstance(item, library.Dataset):
                 return
@@ -69,6 +78,20 @@ class Hdf5Arrays:
         library = extra("h5py")
         with read_as("an HDF5 file", self.path), library.File(self.path, "r") as file:
             yield file
+
+
+def _require_shallow(path: str) -> None:
+    """Raise LinkwiseError for a path that is too deep or too long."""
+    if path.count("/") > DEEPEST:
+        raise LinkwiseError(
+            f"groups lie more than {DEEPEST} deep, from {short(path)!r} on; write the arrays nearer"
+            " to the root"
+        )
+    if len(path) > LONGEST_PATH:
+        raise LinkwiseError(
+            f"the path {short(path)!r} has {len(path):,} characters, and {LONGEST_PATH:,} are the most; give"
+            " its groups shorter names"
+        )
 
 
 def _size(item: Any) -> int:
