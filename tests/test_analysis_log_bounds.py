@@ -170,6 +170,14 @@ def test_long_text_that_every_row_has_is_not_read(tmp_path: Path) -> None:
     assert refusal(tmp_path / "a.parquet") == "column 'joint1' holds string, not numbers"
 
 
+def test_file_without_lines_is_not_read_to_its_end_in_search_of_a_bag(tmp_path: Path) -> None:
+    path = tmp_path / "a.bag"
+    path.touch()
+    os.truncate(path, 1 << 30)
+    told = "not a bag of ROS, or damaged (its first line is not '#ROSBAG V2.0'); mend it"
+    assert refusal(path).startswith(told)
+
+
 def test_pipe_in_the_folder_of_a_bag_is_refused(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "bag", states(TABLE, JOINTS), "mcap")
     (bag / "bag.mcap").unlink()

@@ -18,6 +18,8 @@ from linkwise.package.load import Array
 
 MCAP_MAGIC, MCAP_BEFORE, MCAP_OF_ROS = b"\x89MCAP0\r\n", 8 + 1 + 8, "ros2"
 """The first bytes of an MCAP file, how many stand before the length of its profile, and that of ROS 2."""
+ROS1_MAGIC = b"#ROSBAG V2.0\n"
+"""The first line of a bag of ROS 1, whose end the library looks for to that of any file."""
 MEND = "mend it with `mcap recover` or `ros2 bag reindex`, or record it again"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 NAMED = 10_000
@@ -98,8 +100,18 @@ def _opened(path: Path) -> Iterator[Any]:
         )
     is_ros1 = path.is_file() and path.suffix.lower() == ".bag"
     module = extra("rosbags.rosbag1" if is_ros1 else "rosbags.rosbag2")
-    with read_as("a bag of ROS", path, MEND), module.Reader(path) as bag:
-        yield bag
+    with read_as("a bag of ROS", path, MEND):
+        if is_ros1:
+            _require_ros1(path)
+        with module.Reader(path) as bag:
+            yield bag
+
+
+def _require_ros1(path: Path) -> None:
+    """Raise ValueError for a file that does not begin as a bag of ROS 1."""
+    with path.open("rb") as file:
+        if file.read(len(ROS1_MAGIC)) != ROS1_MAGIC:
+            raise ValueError(f"its first line is not {ROS1_MAGIC.decode().strip()!r}")
 
 
 def _profile(path: Path) -> str:
