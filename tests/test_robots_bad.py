@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from linkwise import LinkwiseError, Options, read_system
+from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.robot import effects, read_robot
 from urdf_text import chain, joint, link, mimic, robot
 
@@ -462,3 +463,51 @@ def test_point_mass_with_rounding_in_its_inertia_is_not_a_defect(tmp_path: Path)
     head = f'<link name="b"><inertial><mass value="1.3"/><origin xyz="0.1 0 0"/>{noise}</inertial></link>'
     (tmp_path / "point.urdf").write_text(robot(link("a"), head, AB))
     assert not [n for n in read_system(tmp_path / "point.urdf").robot.notes if n.kind == "unphysical"]
+
+
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+LITTLE = ProcessLimits(seconds=30, memory=512 << 20)
+
+
+def urdf_chain(count: int, more: str = "") -> str:
+    links = "".join(f'<link name="l{k}">{INERTIAL}</link>' for k in range(count + 1))
+    joints = "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/>'
+        f"{more if k else ''}</joint>"
+        for k in range(count)
+    )
+    return robot(links, joints)
+
+
+def energies(count: int) -> str:
+    return (
+        "from linkwise import Coordinate, LinkEnergy\n"
+        f"coordinates = [Coordinate(f'q{{k}}', 'rad') for k in range({count})]\n"
+        "links = [LinkEnergy(c.name, c.qd**2 / 2, 0) for c in coordinates]\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "count", "mend"),
+    [
+        ("chain.urdf", urdf_chain(15_000), "15,000", "hold some by --lock, or leave some out by --root"),
+        ("chain.urdf", urdf_chain(5_000, '<mimic joint="j0"/>'), "5,000", "hold some by --lock"),
+        ("chain.urdf", urdf_chain(1_001), "1,001", "hold some by --lock"),
+        ("chain.py", energies(1_001), "1,001", "leave some out"),
+    ],
+    ids=["chain", "followers", "one too many", "energies"],
+)
+def test_more_joints_than_can_be_generated_are_refused_at_once_wherever_they_come_from(
+    name: str, text: str, count: str, mend: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(LinkwiseError) as caught:
+        in_own_process(lambda: read_system(tmp_path / name), LITTLE)
+    told = f"{count} joints move, and 1,000 are the most, as the number of coefficients grows with N³; {mend}"
+    assert str(caught.value).startswith(f"{tmp_path / name}: {told}")
+
+
+def test_a_part_of_a_chain_may_be_read_however_long_that_is(tmp_path: Path) -> None:
+    (tmp_path / "chain.urdf").write_text(urdf_chain(1_500))
+    system = read_system(tmp_path / "chain.urdf", Options(root="l700", tip="l703"))
+    assert [c.name for c in system.coordinates] == ["j700", "j701", "j702"]

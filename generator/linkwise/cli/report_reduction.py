@@ -28,7 +28,7 @@ from linkwise.report import (
     study_files,
 )
 from linkwise.robot import DESCRIPTIONS, Options, read_robot
-from linkwise.robot.read import MAX_PLANAR
+from linkwise.robot.size import MOST_JOINTS
 from linkwise.symbolic.system import System, rigid_system
 
 CHECKED_TO = 14
@@ -110,6 +110,6 @@ def _arm(robot: str, last: int, options: Options) -> tuple[str, System, int]:
 
 def _planar_joints(last: int, locked: int) -> int:
     """Joints of the planar arm of which `locked` are held, so that enough move."""
-    if last > MAX_PLANAR:
-        raise LinkwiseError(f"--dof reaches {last}, but the planar arm has at most {MAX_PLANAR} joints")
-    return min(max(last, CHECKED_TO) + locked, MAX_PLANAR)
+    if last > MOST_JOINTS:
+        raise LinkwiseError(f"--dof reaches {last}, but the planar arm has at most {MOST_JOINTS} joints")
+    return min(max(last, CHECKED_TO) + locked, MOST_JOINTS)

@@ -23,6 +23,7 @@ from linkwise.robot.notes import FREE, Note
 from linkwise.robot.parameters import numeric
 from linkwise.robot.passive import checked_passive, passive_axes, passive_notes
 from linkwise.robot.robot import Frame, Link, Parameter, Robot, Scalar, unusable
+from linkwise.robot.size import check_joints
 from linkwise.robot.ties import anchor_frames, tied_places
 from linkwise.robot.tree import check_loops, cut, depth_first
 
@@ -71,6 +72,10 @@ def build(description: Description, options: Options) -> Robot:
     joints = [(connection, expand(connection)) for connection in connections]
     axes = tuple(axis for _, parts in joints for axis in parts)
     moving = movement(axes, connections, options.lock, options.free_mimic)
+    check_joints(
+        sum(rule.coordinate is not None for rule in moving.motion.values()),
+        "hold some by --lock, or leave some out by --root and --tip",
+    )
     check_locks(connections, options.lock)
     checked_passive(connections, options.allow_unphysical)
     passive = passive_axes(connections, moving.motion)

@@ -23,6 +23,7 @@ from linkwise.robot.readers.toml_constraints import with_constraint_file
 from linkwise.robot.readers.urdf import read_urdf, root_tag
 from linkwise.robot.readers.xml_file import XACRO
 from linkwise.robot.robot import Robot
+from linkwise.robot.size import MOST_JOINTS
 
 Reader: TypeAlias = Callable[[Path], Description]
 XML: dict[str, Reader] = {"mujoco": read_mjcf, "sdf": read_sdf}
@@ -44,13 +45,10 @@ READERS: dict[str, Reader] = {
 }
 """What reads a file, by the end of its name."""
 
-MAX_PLANAR = 1000
-"""An arm of N joints has some N³/3 coefficients of each order: 1000 are far beyond what can be generated."""
-
 FILES = ("puma560", "torso")
 """Built-in robots that are TOML files beside `planar`."""
 
-BUILT_IN = ("planar3", f"planarN (N from 1 to {MAX_PLANAR})", *FILES)
+BUILT_IN = ("planar3", f"planarN (N from 1 to {MOST_JOINTS})", *FILES)
 DESCRIPTIONS = f"{', '.join(BUILT_IN)}, or a {', '.join(READERS)} or .py file; .xml is URDF, MJCF or SDFormat"
 """All that a robot may be read from, in words."""
 
@@ -123,9 +121,9 @@ def _built(description: Description, options: Options) -> Robot:
 
 
 def _joints(digits: str) -> int:
-    if len(digits) > len(str(MAX_PLANAR)) or int(digits) > MAX_PLANAR:
+    if len(digits) > len(str(MOST_JOINTS)) or int(digits) > MOST_JOINTS:
         raise LinkwiseError(
-            f"planarN takes N from 1 to {MAX_PLANAR}, as the number of coefficients grows with N³; "
+            f"planarN takes N from 1 to {MOST_JOINTS}, as the number of coefficients grows with N³; "
             "choose a smaller N"
         )
     return int(digits)

@@ -13,6 +13,7 @@ import sympy as sp
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import short
 from linkwise.robot.robot import Coordinate, unusable
+from linkwise.robot.size import check_joints
 from linkwise.symbolic.passed_over import refuse_passed_over
 from linkwise.symbolic.system import EnergySystem, LinkEnergy
 
@@ -33,9 +34,10 @@ def energy_system(
     those that no energy has are left out. Velocity terms of the potential count as kinetic, terms of the
     kinetic energy without velocities as potential.
 
-    Raises LinkwiseError naming the link.
+    Raises LinkwiseError naming the link, and for more coordinates than can be generated.
     """
     coordinates, links = tuple(coordinates), tuple(links)
+    check_joints(len(coordinates), "leave some out")
     _check_names(name, coordinates, links)
     values = _values(parameters or {}, coordinates)
     checked = []
