@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from conftest import DATA
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
+from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.package.load import import_package
 from linkwise.robot import effects
 from linkwise.robot.read import read_robot
@@ -452,3 +453,20 @@ def test_what_gazebo_does_besides_is_told(tmp_path: Path) -> None:
         "Gazebo's switch for gravity left out of the torques: lower" in line for line in effects(robot.notes)
     )
     assert any(note.kind == "ignored" and note.subject == "visual" for note in robot.notes)
+
+
+def test_poses_that_hang_on_one_another_in_a_long_chain_are_each_worked_out_once(tmp_path: Path) -> None:
+    """A chain of 8,000 has 32 million pairs."""
+    links = "".join(
+        f'<link name="l{k}"><pose relative_to="l{k - 1}">1 0 0 0 0 0</pose>{LOWER}</link>'
+        f'<joint name="j{k}" type="{"revolute" if k > 7_998 else "fixed"}"><parent>l{k - 1}</parent>'
+        f"<child>l{k}</child><axis><xyz>0 0 1</xyz></axis></joint>"
+        for k in range(1, 8_001)
+    )
+    (tmp_path / "a.sdf").write_text(
+        f'<sdf version="1.9"><model name="a"><link name="l0">{LOWER}</link>{links}</model></sdf>'
+    )
+    limits = ProcessLimits(seconds=30, memory=1 << 30)
+    robot = in_own_process(lambda: read_robot(tmp_path / "a.sdf", Options(base="fixed")), limits)
+    (hand,) = (frame for frame in robot.frames if frame.name == "l7998")
+    assert hand.translation == (7998.0, 0, 0)

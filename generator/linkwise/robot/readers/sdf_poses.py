@@ -46,6 +46,7 @@ class ModelPoses:
     def __init__(self, model: Element, version: tuple[int, int]) -> None:
         """Raises LinkwiseError for two frames of one name, and for a canonical link that is not there."""
         self._model, self._named, self._whole = version >= (1, 7), dict[str, Element](), model
+        self._poses = dict[int, Pose]()  # of links that stand in chains, each of which many ask for
         for tag in PLACED:
             for element in model.findall(tag):
                 name = element.get("name", "")
@@ -73,15 +74,17 @@ class ModelPoses:
 
     def of(self, element: Element) -> Pose:
         """Pose of a link, a joint or a frame in the model; raises LinkwiseError for poses in a circle."""
-        chain, seen = Pose(), set[int]()
+        way = dict[int, Element]()
         at: Element | None = element
-        while at is not None:
-            if id(at) in seen:
+        while at is not None and id(at) not in self._poses:
+            if id(at) in way:
                 raise LinkwiseError(f"the pose of {place_of(element)} is relative to itself, in a circle")
-            seen.add(id(at))
-            chain = pose_in(at, place_of(at)).times(chain)
+            way[id(at)] = at
             at = self._before(at)
-        return chain
+        found = Pose() if at is None else self._poses[id(at)]
+        for key, inner in reversed(way.items()):
+            found = self._poses[key] = found.times(pose_in(inner, place_of(inner)))
+        return found
 
     def named(self, name: str, asked_by: str) -> Pose:
         """Pose of a frame by its name, the world among them; raises LinkwiseError where there is none."""
