@@ -34,6 +34,7 @@ from linkwise.check.as_generated import check_made
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.package.load import load_package, open_package
 from linkwise.package.manifest import Manifest
+from linkwise.package.write import check_target
 from linkwise.version import VERSION
 
 
@@ -848,6 +849,35 @@ def test_files_other_than_the_manifest_lists_fail(case: str, package: Path) -> N
     damage(package)
     [result] = check_package(package)
     assert (result.name, result.mark, result.detail) == ("hashes", "FAIL", message)
+
+
+def test_a_file_that_is_larger_than_any_of_a_package_is_not_read(package: Path) -> None:
+    """Nor hashed to its end."""
+    run_in(package)
+    for path in ("names.py", Path(importlib.util.cache_from_source("tree.py"))):
+        os.truncate(package / path, 1 << 34)
+    has = "has 17,179,869,184 bytes, and no file of a package has more than 268,435,456"
+    with pytest.raises(LinkwiseError) as caught:
+        open_package(package)
+    assert str(caught.value) == f"{package}: names.py {has}; generate the robot again"
+    [result] = check_package(package)
+    caches = [f"__pycache__/{name}.{sys.implementation.cache_tag}.pyc" for name in ("names", "tree")]
+    names, tree = (
+        f"{cache} is not {Path(cache).name.split('.')[0]}.py compiled, delete it" for cache in caches
+    )
+    assert result.detail == f"names.py {has}; {names}; {tree}"
+
+
+def test_a_manifest_that_is_larger_than_any_is_not_read_in_search_of_a_package(tmp_path: Path) -> None:
+    (tmp_path / "manifest.json").touch()
+    os.truncate(tmp_path / "manifest.json", 1 << 40)
+    check_target(tmp_path / "planar2", "planar2")
+
+
+def test_a_pipe_among_what_python_caches_is_not_waited_for(package: Path) -> None:
+    (package / "__pycache__").mkdir()
+    os.mkfifo(package / importlib.util.cache_from_source("names.py"))
+    assert "is not names.py compiled" in check_package(package)[0].detail
 
 
 def test_files_behind_a_linked_folder_fail(package: Path) -> None:

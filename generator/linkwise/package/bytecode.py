@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType
 
+from linkwise.input_file import is_file
+from linkwise.package.manifest import is_too_large
+
 CACHE = "__pycache__"
 NAME = re.compile(
     r"(?P<module>[^.]+)\.(?P<python>[^.]+)(\.opt-(?P<optimization>\w+))?\.pyc(?P<unfinished>\.\d+)?"
@@ -69,10 +72,12 @@ def is_compiled_from_source(cache: Cache) -> bool:
 
     The cache is read as Python would read it, which like Python trusts it to be well-formed.
     """
-    data = cache.file.read_bytes()
-    if data[:4] != importlib.util.MAGIC_NUMBER:
-        return False
     try:
+        if not is_file(cache.file) or is_too_large(cache.file) or is_too_large(cache.source):
+            return False
+        data = cache.file.read_bytes()
+        if data[:4] != importlib.util.MAGIC_NUMBER:
+            return False
         code = marshal.loads(data[HEADER:])
         level = int(cache.optimization or 0)
         made = compile(cache.source.read_bytes(), code.co_filename, "exec", dont_inherit=True, optimize=level)

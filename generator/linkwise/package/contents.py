@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from linkwise.package.bytecode import CACHE, cache_of
-from linkwise.package.manifest import FILE
+from linkwise.package.manifest import FILE, LARGEST, is_too_large
 
 
 def changed(directory: Path, files: Mapping[str, str]) -> list[str]:
@@ -55,6 +55,8 @@ def _fault(directory: Path, path: str, digest: str) -> str:
     if not file.is_file():
         return "is missing"
     try:
+        if is_too_large(file):
+            return f"has {file.stat().st_size:,} bytes, and no file of a package has more than {LARGEST:,}"
         with file.open("rb") as opened:
             return "" if hashlib.file_digest(opened, "sha256").hexdigest() == digest else "was changed"
     except OSError as error:

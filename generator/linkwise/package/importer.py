@@ -14,7 +14,7 @@ from types import ModuleType
 
 from linkwise.package.contents import link_on_the_way
 from linkwise.package.emitted_text import Source, foreign_text
-from linkwise.package.manifest import FILE, Manifest
+from linkwise.package.manifest import FILE, Manifest, is_too_large
 
 
 def import_listed(directory: Path, manifest: Manifest) -> ModuleType:
@@ -80,10 +80,11 @@ class _Verified(SourceLoader):
     def get_data(self, path: str | bytes) -> bytes:
         """The source; raises ImportError if it isn't as listed, or says anything else than linkwise."""
         told: str | None = "was changed"
-        if link_on_the_way(self.directory, self.file) is None:
-            data, manifest = (self.directory / self.file).read_bytes(), self.manifest
+        source = self.directory / self.file
+        if link_on_the_way(self.directory, self.file) is None and not is_too_large(source):
+            data, manifest = source.read_bytes(), self.manifest
             if hashlib.sha256(data).hexdigest() == manifest.files[self.file]:
                 told = foreign_text(self.file, data, Source.of(manifest))
                 if told is None:
                     return data
-        raise ImportError(f"{self.file} {told}", path=str(self.directory / self.file))
+        raise ImportError(f"{self.file} {told}", path=str(source))

@@ -31,7 +31,7 @@ from linkwise.package.entries import (
 
 SCHEMA = 12
 LARGEST = 1 << 28
-"""Bytes; a robot of 1000 joints takes some 2 MB."""
+"""Bytes of a manifest, or of any file of a package; of a robot of 1000 joints a manifest takes some 2 MB."""
 __all__ = [
     "FILE",
     "BodyEntry",
@@ -47,6 +47,7 @@ __all__ = [
     "TieEntry",
     "altered_entries",
     "is_inside",
+    "is_too_large",
 ]
 
 FILE = "manifest.json"
@@ -176,6 +177,11 @@ def altered_entries(directory: Path) -> list[str]:
     ]
 
 
+def is_too_large(file: Path) -> bool:
+    """Whether a file is larger than any of a package is: nobody reads it to its end. Raises OSError."""
+    return file.stat().st_size > LARGEST
+
+
 def is_inside(path: str) -> bool:
     """Whether a path, of / and names, stays in the folder that it is relative to."""
     parts = path.split("/")
@@ -192,7 +198,7 @@ def _read(path: Path) -> dict[str, Any]:
             f"{', or with `linkwise.kept_package`' if path.parent.is_file() else ''}"
         )
     try:
-        require(path.stat().st_size <= LARGEST, f"the file of {path.stat().st_size} bytes", "a manifest")
+        require(not is_too_large(path), f"the file of {path.stat().st_size} bytes", "a manifest")
         data = parsed(path.read_text(encoding="utf-8"))
         require(isinstance(data, dict), "the whole", "an object")
     except OSError as error:

@@ -15,7 +15,7 @@ from typing import Any
 from linkwise.errors import LinkwiseError
 from linkwise.output import whole_directory
 from linkwise.package.contents import added, entries, faults
-from linkwise.package.manifest import FILE
+from linkwise.package.manifest import FILE, is_too_large
 
 
 def check_target(directory: Path, robot: str | None) -> None:
@@ -69,7 +69,8 @@ def earlier_package(directory: Path) -> dict[str, Any]:
     """What the manifest of a generated package of any version says, or an empty dictionary."""
     path = directory / FILE
     try:
-        data = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+        is_one = path.is_file() and not is_too_large(path)
+        data = json.loads(path.read_text(encoding="utf-8")) if is_one else None
     except (OSError, ValueError, RecursionError):
         return {}
     if not isinstance(data, dict):
