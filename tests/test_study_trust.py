@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import socket
 import zipfile
 from collections.abc import Iterator
 from functools import partial
@@ -20,13 +21,18 @@ from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 ENERGIES = (DATA / "cart_pendulum.py").read_text()
 
 
+def of_one_trial(folder: Path, log: str, robot: str) -> Path:
+    """A study of one trial, whose table of motion lies beside it as log.csv."""
+    rows = "\n".join(f"{k / 100},{k % 5},{k % 7}" for k in range(50))
+    (folder / "log.csv").write_text(f"time,x,theta\n{rows}\n")
+    trial = f'[[trial]]\nname = "a"\nlog = "{log}"\nrobot = "{robot}"\ncondition = "x"\n'
+    return write_study(folder, HEAD, "pages = false\n", trial, subjects=0)
+
+
 def with_program(folder: Path, robot: str) -> Path:
     """A study of a robot of energies that leaves a file when it is run."""
     (folder / "cart.py").write_text(f"{ENERGIES}\nopen({str(folder / 'ran')!r}, 'w').close()\n")
-    rows = "\n".join(f"{k / 100},{k % 5},{k % 7}" for k in range(50))
-    (folder / "log.csv").write_text(f"time,x,theta\n{rows}\n")
-    trial = f'[[trial]]\nname = "a"\nlog = "log.csv"\nrobot = "{robot}"\ncondition = "x"\n'
-    return write_study(folder, HEAD, "pages = false\n", trial, subjects=0)
+    return of_one_trial(folder, "log.csv", robot)
 
 
 @pytest.fixture
@@ -149,3 +155,19 @@ def test_a_file_called_by_its_scheme_lies_where_paths_do(
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert len(run_study(file, tmp_path / "out", Here()).done) == 4
+
+
+@pytest.mark.parametrize(
+    "files", [("{}/log.csv", "planar3"), ("log.csv", "{}/arm.urdf")], ids=["log", "robot"]
+)
+def test_a_server_that_refuses_the_connection_is_told_apart_from_one_without_the_file(
+    files: tuple[str, str], web: str, tmp_path: Path
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as nobody:
+        refusing = f"http://127.0.0.1:{nobody.getsockname()[1]}"
+    for server, said in ((refusing, "Connection refused: "), (f"{web}/gone", "no such file")):
+        file = of_one_trial(tmp_path, *(path.format(server) for path in files))
+        with pytest.raises(LinkwiseError) as caught:
+            run_study(file, tmp_path / "out", Here())
+        address = next(path for path in files if "{" in path).format(server)
+        assert str(caught.value).startswith(f"{file}: trial 'a': {address}: {said}")

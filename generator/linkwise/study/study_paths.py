@@ -4,10 +4,13 @@ Of what fsspec knows, only stores that hand out bytes are asked: others open fil
 address on to another kind, or run what a file says.
 """
 
+import errno
+import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from glob import escape, glob
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +25,8 @@ STORES = ("s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "oss", "http", "https
 LOCAL = "file://"
 CHAINED = "::"
 """Between addresses of which fsspec opens one inside the other."""
+MISSING = (HTTPStatus.NOT_FOUND, HTTPStatus.GONE)
+"""How a server says that it has no such file."""
 
 
 def is_address(path: str) -> bool:
@@ -54,7 +59,8 @@ def require_there(path: str, or_folder: bool = False) -> None:
             raise LinkwiseError(f"{path}: {error}") from error
         return
     files, name = _system(path)
-    if not _asked(path, lambda: files.isfile(name)):
+    # Not `isfile`, which says no for whatever keeps the store from answering, too.
+    if _asked(path, lambda: files.info(name))["type"] != "file":
         raise LinkwiseError(f"{path}: no such file")
 
 
@@ -118,4 +124,16 @@ def _asked(path: str, question: Any) -> Any:
     try:
         return question()
     except Exception as error:  # of whatever library serves it
-        raise LinkwiseError(f"{path}: {str(error) or type(error).__name__}") from error
+        raise LinkwiseError(f"{path}: {_reason(error)}") from error
+
+
+def _reason(error: BaseException) -> str:
+    """What an error of a file system says, in words."""
+    if isinstance(error, FileNotFoundError):
+        # Of HTTP that is said for every failure, which is then the cause.
+        if error.__cause__ is None or getattr(error.__cause__, "status", None) in MISSING:
+            return "no such file"
+        error = error.__cause__
+    said = str(error) or type(error).__name__
+    number = (isinstance(error, OSError) and error.errno) or 0
+    return f"{os.strerror(number)}: {said}" if number in errno.errorcode else said
