@@ -11,11 +11,15 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
+import urdf_text
 from command_line import run_linkwise
 from conftest import DATA
-from linkwise import LinkwiseError, generate, read_system, write_package
+from linkwise import LinkwiseError, generate, kept_package, read_system, write_package
 from linkwise.errors import LinkwiseWarning
+from linkwise.progress import silent
 from linkwise.study import run_study
+from linkwise.study.study_file import read_study
+from linkwise.study.study_robots import check_robots
 from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 
 ENERGIES = (DATA / "cart_pendulum.py").read_text()
@@ -171,3 +175,43 @@ def test_a_server_that_refuses_the_connection_is_told_apart_from_one_without_the
             run_study(file, tmp_path / "out", Here())
         address = next(path for path in files if "{" in path).format(server)
         assert str(caught.value).startswith(f"{file}: trial 'a': {address}: {said}")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("bad.csv", "time,joint1,joint2,joint3\n0,x,0,0\n", "row 2, column 'joint1': 'x' is not a number"),
+        ("bad.urdf", '<robot name="a"><link name="a"/></robot>', "no joint moves"),
+        ("bad.xml", "<mujoco><worldbody>", "malformed XML: no element found"),
+        ("bad.toml", "schema = 1\n[[link]]\n", "link None needs 'name'"),
+    ],
+    ids=["log", "urdf", "mjcf", "toml"],
+)
+def test_a_mistake_in_a_file_that_was_fetched_is_told_of_its_address(
+    name: str, text: str, said: str, web: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text)
+    address = f"{web}/{name}"
+    is_log = name.endswith(".csv")
+    file = of_one_trial(tmp_path, address if is_log else "log.csv", "planar3" if is_log else address)
+    with pytest.raises(LinkwiseError) as caught:
+        run_study(file, tmp_path / "out", Here())
+    assert str(caught.value).startswith(f"{file}: trial 'a': {address}: {said}")
+
+
+def test_what_touches_the_torques_of_a_robot_that_was_fetched_is_told_of_its_address(
+    web: str, tmp_path: Path
+) -> None:
+    chain = urdf_text.chain(urdf_text.joint("ab", "a", "b"), urdf_text.joint("bc", "b", "c", type="floating"))
+    (tmp_path / "arm.urdf").write_text(chain)
+    plan = read_study(of_one_trial(tmp_path, "log.csv", f"{web}/arm.urdf"))
+    (told,) = check_robots(plan, silent)
+    assert told.startswith(f"{web}/arm.urdf: ")
+
+
+def test_an_error_of_a_robots_file_names_it_where_a_log_is_read_too(tmp_path: Path) -> None:
+    robot = tmp_path / "bad.xml"
+    robot.write_text("<mujoco><worldbody>")
+    with pytest.raises(LinkwiseError) as caught:
+        kept_package(robot)
+    assert str(caught.value).startswith(f"{robot}: malformed XML: no element found")

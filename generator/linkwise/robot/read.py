@@ -98,12 +98,16 @@ def is_description(spec: str | Path) -> bool:
 
 
 def robot_files(spec: str | Path, options: Options) -> tuple[Path, ...]:
-    """Files that a robot is read from, with those that they include; a built-in has none."""
+    """Files that a robot is read from, with those that they include; a built-in has none.
+
+    Raises LinkwiseError, with the file, for XML that is malformed.
+    """
     path = Path(spec)
     own: tuple[Path, ...] = () if is_built_in(spec) else (path,)
-    if own and reader_of(path) is read_mjcf:
-        files = mjcf_files(path)
-        own = (*files.documents, *files.others)
+    with within(str(spec)):
+        if own and reader_of(path) is read_mjcf:
+            files = mjcf_files(path)
+            own = (*files.documents, *files.others)
     return own if options.constraints is None else (*own, Path(options.constraints))
 
 

@@ -75,7 +75,11 @@ def version_of(path: str) -> str:
 
 @contextmanager
 def opened_here(path: str) -> Iterator[Path]:
-    """The file itself, or a copy that goes when the work is done."""
+    """The file itself, or a copy that goes when the work is done.
+
+    Raises LinkwiseError where there is none; what is raised of the copy is told of the address, which is all
+    that anybody can look at afterwards.
+    """
     if not is_address(path):
         yield Path(path)
         return
@@ -85,7 +89,15 @@ def opened_here(path: str) -> Iterator[Path]:
     with passing_folder() as folder:
         copy = folder / name
         copied_here(path, copy)
-        yield copy
+        try:
+            yield copy
+        except LinkwiseError as error:
+            raise LinkwiseError(told_of(path, copy, str(error))) from error
+
+
+def told_of(path: str, copy: Path, text: str) -> str:
+    """What is told of a file's copy, as told of the file: no text of a user's names the copy's folder."""
+    return text.replace(str(copy), path)
 
 
 def copied_here(address: str, copy: Path) -> None:

@@ -1,6 +1,7 @@
 """The robots of a study: each is generated before any trial begins, and all are of one kind."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from linkwise.package_cache import KeptPackage, kept_package
 from linkwise.pipeline import PYTHON
 from linkwise.progress import Progress
 from linkwise.robot import is_description
-from linkwise.study.study_paths import is_address, opened_here, version_of
+from linkwise.study.study_paths import is_address, opened_here, told_of, version_of
 from linkwise.study.study_plan import StudyPlan
 from linkwise.version import VERSION
 
@@ -60,7 +61,8 @@ def package_of(robot: str, plan: StudyPlan) -> KeptPackage:
     with opened_here(robot) as path:
         if Path(path).is_dir() and not plan.trust_python:
             _refuse_unread(robot, Path(path))
-        return kept_package(path, options=options)
+        kept = kept_package(path, options=options)
+    return replace(kept, warnings=tuple(told_of(robot, path, warning) for warning in kept.warnings))
 
 
 def _refuse_untrusted(robot: str, plan: StudyPlan) -> None:
