@@ -137,6 +137,7 @@ def test_a_program_named_on_the_command_line_is_told_to_have_been_run(
         "local://{here}/data/S1/slow_1.csv",
         "dir://{here}/data/S1/slow_1.csv",
         "nowhere://log.csv",
+        "reference::log.csv",
     ],
 )
 def test_only_addresses_of_stores_are_read(address: str, tmp_path: Path) -> None:
@@ -149,6 +150,32 @@ def test_only_addresses_of_stores_are_read(address: str, tmp_path: Path) -> None
     with pytest.raises(LinkwiseError) as caught:
         run_study(file, tmp_path / "out", Here())
     assert str(caught.value).startswith(f"{file}: trial 'a': {log}: give a file, or an address of s3, ")
+
+
+@pytest.mark.parametrize("trust", [False, True])
+def test_a_program_inside_an_address_is_refused_as_such_and_not_to_be_trusted(
+    trust: bool, tmp_path: Path
+) -> None:
+    file = of_one_trial(tmp_path, "log.csv", "reference::evil.py")
+    with pytest.raises(LinkwiseError, match=r"trial 'a': reference::evil\.py: give a file, .* without '::'"):
+        run_study(file, tmp_path / "out", Here(), trust_python=trust)
+
+
+@pytest.mark.parametrize("trust", [False, True])
+def test_a_program_that_is_not_there_is_not_to_be_trusted(trust: bool, tmp_path: Path) -> None:
+    file = of_one_trial(tmp_path, "log.csv", "./gone.py")
+    with pytest.raises(LinkwiseError, match=r"trial 'a': .*/gone\.py: no such file"):
+        run_study(file, tmp_path / "out", Here(), trust_python=trust)
+
+
+def test_a_file_with_the_sign_of_chains_in_its_name_is_read(tmp_path: Path) -> None:
+    (tmp_path / "a::b").mkdir()
+    file = write_study(tmp_path / "a::b", subjects=1, trials=1)
+    (tmp_path / "a::b/data/S1/slow_1.csv").rename(tmp_path / "a::b/x::y.csv")
+    for log in ("x::y.csv", "x::{name}.csv"):
+        trial = f'[[trial]]\nlog = "{log}"\nrobot = "planar3"\ncondition = "x"\n'
+        file.write_text("".join((HEAD, QUICK, CHOICES, trial)))
+        assert len(run_study(file, tmp_path / "out", Here()).done) == 1
 
 
 def test_a_file_called_by_its_scheme_lies_where_paths_do(

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from glob import escape, glob
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
@@ -35,7 +35,19 @@ def is_address(path: str) -> bool:
 
 
 def resolved(path: str, folder: Path) -> str:
-    """An address itself; of other paths, file:// before them or not, those from a folder on."""
+    """An address itself; of other paths, file:// before them or not, those from a folder on.
+
+    Raises LinkwiseError for an address inside another that names its first kind alone, `reference::log.csv`,
+    unless a file is called so.
+    """
+    whole = placed(path, folder)
+    if CHAINED in path and not is_address(whole) and not os.path.lexists(whole):
+        _refuse(path)
+    return whole
+
+
+def placed(path: str, folder: Path) -> str:
+    """The same of a path with a pattern in it, which no file is called."""
     path = path.removeprefix(LOCAL)
     return path if is_address(path) else (folder / path).as_posix()
 
@@ -120,15 +132,19 @@ def removed(folder: Path) -> None:
 def _system(path: str) -> tuple[Any, str]:
     """What serves an address, and its path there; raises LinkwiseError for kinds that are not read."""
     if path.partition("://")[0] not in STORES or CHAINED in path:
-        raise LinkwiseError(
-            f"{path}: give a file, or an address of {listed(STORES, len(STORES))} without {CHAINED!r}; others"
-            " are not read, as they may run or open what they name"
-        )
+        _refuse(path)
     try:
         files, name = extra("fsspec.core").url_to_fs(path)
     except (ImportError, ValueError) as error:
         raise LinkwiseError(f"{path}: {error}") from error
     return files, name
+
+
+def _refuse(path: str) -> NoReturn:
+    raise LinkwiseError(
+        f"{path}: give a file, or an address of {listed(STORES, len(STORES))} without {CHAINED!r}; others"
+        " are not read, as they may run or open what they name"
+    )
 
 
 def _asked(path: str, question: Any) -> Any:

@@ -13,7 +13,7 @@ from linkwise.package_cache import KeptPackage, kept_package
 from linkwise.pipeline import PYTHON
 from linkwise.progress import Progress
 from linkwise.robot import is_description
-from linkwise.study.study_paths import is_address, opened_here, told_of, version_of
+from linkwise.study.study_paths import is_address, opened_here, require_there, told_of, version_of
 from linkwise.study.study_plan import StudyPlan
 from linkwise.version import VERSION
 
@@ -50,8 +50,8 @@ def _owner(plan: StudyPlan, robot: str) -> str:
 def package_of(robot: str, plan: StudyPlan) -> KeptPackage:
     """The package of a trial's robot: itself, or the one that is kept of its file, address or name.
 
-    Raises LinkwiseError, before it is fetched or run, for a Python file that nobody vouches for, and before
-    it is run for a package of another version.
+    Raises LinkwiseError, before it is fetched or run, for a Python file that is not there or that nobody
+    vouches for, and before it is run for a package of another version.
     """
     if Path(robot).suffix == PYTHON:
         _refuse_untrusted(robot, plan)
@@ -71,6 +71,7 @@ def _refuse_untrusted(robot: str, plan: StudyPlan) -> None:
             f"robot {robot} is a Python program from elsewhere, which is never run; fetch it, read it, and"
             " name your copy"
         )
+    require_there(robot)
     if not plan.trust_python:
         raise LinkwiseError(
             f"robot {robot} is a Python program, which a study does not run by itself; read it, and give"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError
-from linkwise.study.study_paths import found_by_pattern, resolved
+from linkwise.study.study_paths import found_by_pattern, placed
 
 FIELD = re.compile(r"\{([A-Za-z_]\w*)\}")
 
@@ -23,7 +23,7 @@ def expanded(entry: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]
     if not isinstance(log, str) or not fields:
         yield dict(entry)
         return
-    whole = resolved(log, folder)
+    whole = placed(log, folder)
     found = found_by_pattern(FIELD.split(whole)[::2])
     matches = {path: values for path in found if (values := _fields(whole, path))}
     if not matches:
