@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import shutil
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from linkwise import (
     read_robot,
     read_system,
 )
+from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.package.manifest import FILE
 from osim_text import ROLLING, chain
 
@@ -174,6 +176,17 @@ def test_a_cache_that_cannot_be_written_is_told_with_the_mend(blocked: str, cach
     mend = r"knee\.osim: no package of it can be kept: .*; set LINKWISE_CACHE to another directory$"
     with pytest.raises(LinkwiseError, match=mend):
         kept_package(KNEE)
+
+
+def test_a_file_that_is_no_robots_is_refused_before_it_is_read_to_its_end(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.touch()
+    os.truncate(path, 1 << 34)
+    with pytest.raises(LinkwiseError) as caught:
+        in_own_process(lambda: kept_package(path), ProcessLimits(seconds=30, memory=256 << 20))
+    assert str(caught.value).startswith(
+        f"{path}: the file is larger than 4 MiB, which no robot's description"
+    )
 
 
 def test_options_of_reading_make_another_package_and_are_refused_for_one_that_is_there(

@@ -12,7 +12,7 @@ from pathlib import Path
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.makers import generator_files
-from linkwise.package.manifest import FILE
+from linkwise.package.manifest import FILE, is_too_large
 from linkwise.package.write import write_package
 from linkwise.pipeline import plan, read_system
 from linkwise.progress import Progress, silent
@@ -101,7 +101,12 @@ def _parts(robot: str | Path, backends: Sequence[str], options: Options) -> Iter
     yield from (Path(robot).name, *backends, repr(options))
     for path in robot_files(robot, options):
         if path.is_file():
-            yield hashlib.sha256(path.read_bytes()).hexdigest()
-    for name in generator_files():
-        found = Path(name).stat()
-        yield f"{name} {found.st_size} {found.st_mtime_ns}"
+            # What no package could be made of is left to its reader to refuse, at once.
+            yield _told(path) if is_too_large(path) else hashlib.sha256(path.read_bytes()).hexdigest()
+    yield from map(_told, map(Path, generator_files()))
+
+
+def _told(path: Path) -> str:
+    """What changes when a file does, without reading it."""
+    found = path.stat()
+    return f"{path} {found.st_size} {found.st_mtime_ns}"
