@@ -1,5 +1,6 @@
 """Studies that cannot be: each is told in a line before any work begins."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -141,6 +142,39 @@ def test_a_damaged_record_of_a_trial_has_it_done_again(tmp_path: Path) -> None:
     run_study(file, out, Here())
     (out / "trials/S1-fast-1/_record.json").write_text("[" * 100_000)
     assert run_study(file, out, Here()).fresh == 1
+
+
+def put_instead(path: Path, kind: str) -> None:
+    """Something that is no regular file in the place of one."""
+    path.unlink()
+    if kind == "a pipe":
+        os.mkfifo(path)
+    elif kind == "a directory":
+        path.mkdir()
+    else:
+        path.symlink_to({"a device": "/dev/zero", "no such file": "nowhere"}[kind])
+
+
+def refusal(file: Path, out: Path) -> str:
+    """For what a study is refused, told within bounds of time and memory."""
+
+    def told() -> str:
+        with pytest.raises(LinkwiseError) as caught:
+            run_study(file, out, Here())
+        return str(caught.value)
+
+    return in_own_process(told, ProcessLimits(seconds=5, memory=1 << 30))
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a directory", "a device", "no such file"])
+def test_what_is_no_file_in_the_place_of_the_lock_is_told_and_not_waited_for(
+    kind: str, tmp_path: Path
+) -> None:
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
+    run_study(file, out, Here())
+    put_instead(out / ".lock", kind)
+    assert refusal(file, out).startswith(f"{out / '.lock'}: {'' if 'such' in kind else 'this is '}{kind}")
+    assert not (tmp_path / "out/nowhere").exists()
 
 
 def test_a_folder_of_another_study_stays(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The folder of a study: what is where in it, and whose it is."""
 
+import os
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -11,7 +12,7 @@ from linkwise.escape import file_name, file_names
 from linkwise.output import sweep
 from linkwise.runtime.native.native_system import system_here
 from linkwise.study.study_mark import StudyMark
-from linkwise.study.study_paths import removed
+from linkwise.study.study_paths import removed, require_own
 from linkwise.study.study_plan import StudyPlan
 from linkwise.study.trial_ledger import MARK, is_trial
 
@@ -37,10 +38,13 @@ def _folder_name(name: str) -> str:
 def held_study(out: Path) -> Iterator[None]:
     """Keep other processes away from a study's folder; raises LinkwiseError where one is at work there.
 
+    So it does where what is to be locked is no regular file: a pipe would keep who opens it waiting.
     What killed ones left, of this study and of its copies of files, goes before and after.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
+        if os.path.lexists(out / LOCK):
+            require_own(out / LOCK)
         file = (out / LOCK).open("a")
     except OSError as error:
         raise LinkwiseError(f"{out}: {error.strerror or error}") from error

@@ -14,7 +14,7 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any, NoReturn
 
-from linkwise.errors import LinkwiseError
+from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.input_file import require_file
@@ -27,6 +27,8 @@ CHAINED = "::"
 """Between addresses of which fsspec opens one inside the other."""
 MISSING = (HTTPStatus.NOT_FOUND, HTTPStatus.GONE)
 """How a server says that it has no such file."""
+INSTEAD = "another --out, or remove it"
+"""What to give where something is in the place of a study's own file."""
 
 
 def is_address(path: str) -> bool:
@@ -122,6 +124,12 @@ def copied_here(address: str, copy: Path) -> None:
 def beside(address: str, name: str) -> str:
     """The address of a file by its path from the folder of another."""
     return f"{address.rpartition('/')[0]}/{name}"
+
+
+def require_own(path: Path) -> None:
+    """Raise LinkwiseError, with the path, for what is no regular file where a study has one of its own."""
+    with within(str(path)):
+        require_file(path, wanted=INSTEAD)
 
 
 def removed(folder: Path) -> None:
