@@ -177,6 +177,45 @@ def test_what_is_no_file_in_the_place_of_the_lock_is_told_and_not_waited_for(
     assert not (tmp_path / "out/nowhere").exists()
 
 
+@pytest.mark.parametrize("kind", ["a pipe", "a directory", "a device"])
+def test_what_is_no_file_in_the_place_of_a_record_is_told_and_not_read(kind: str, tmp_path: Path) -> None:
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
+    run_study(file, out, Here())
+    record = out / "trials/S1-fast-1/_record.json"
+    put_instead(record, kind)
+    refused = refusal(file, out)
+    assert refused.startswith(f"{record.absolute()}: this is {kind}")
+    assert refused.endswith("; give another --out, or remove it")
+
+
+@pytest.mark.parametrize("name", ["study.json", "trials/S1-fast-1/_record.json"])
+def test_a_file_far_larger_than_a_study_writes_is_not_read(name: str, tmp_path: Path) -> None:
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
+    run_study(file, out, Here())
+    os.truncate(out / name, 1 << 35)  # sparse
+    assert refusal(file, out).startswith(f"{out / name}: the file is larger than 64 MiB")
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a device", "no such file"])
+def test_a_trial_whose_files_are_none_any_more_is_done_again(kind: str, tmp_path: Path) -> None:
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
+    run_study(file, out, Here())
+    put_instead(out / "trials/S1-fast-1/_summary.npz", kind)
+    assert run_study(file, out, Here()).fresh == 1
+
+
+def test_a_trial_whose_numbers_are_damaged_is_told(tmp_path: Path) -> None:
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
+    run_study(file, out, Here())
+    numbers = out / "trials/S1-fast-1/_summary.npz"
+    numbers.write_bytes(bytes(numbers.stat().st_size))
+    (out / "study.html").unlink()  # tables are made again
+    with pytest.raises(LinkwiseError) as caught:
+        run_study(file, out, Here())
+    assert str(caught.value).startswith(f"{numbers}: not a trial's file of arrays, or damaged (")
+    assert str(caught.value).endswith("; remove its folder")
+
+
 def test_a_folder_of_another_study_stays(tmp_path: Path) -> None:
     file, other = write_study(tmp_path, HEAD, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "other.toml"
     run_study(file, tmp_path / "out", Here())

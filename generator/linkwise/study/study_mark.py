@@ -10,6 +10,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.input_file import is_file
 from linkwise.package.decode import decoded, parsed, require
 from linkwise.package.manifest import is_inside
+from linkwise.study.study_paths import read_back
 from linkwise.study.study_plan import StudyPlan
 from linkwise.study.trial_ledger import MARK
 from linkwise.study.trial_work import TrialOutcome
@@ -52,9 +53,11 @@ class StudyMark:
         if not is_file(path):
             return None
         try:
-            mark: StudyMark = decoded(cls, parsed(path.read_text(encoding="utf-8")), "")
+            mark: StudyMark = decoded(cls, parsed(read_back(path)), "")
             for name in mark.files:
                 require(is_inside(name) and "/" not in name, f"{name!r} among 'files'", "a file's name")
+        except LinkwiseError:
+            raise
         except (ValueError, RecursionError) as error:
             reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
             raise LinkwiseError(f"{path} is damaged: {reason}; give another --out") from error

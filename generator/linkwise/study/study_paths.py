@@ -29,6 +29,8 @@ MISSING = (HTTPStatus.NOT_FOUND, HTTPStatus.GONE)
 """How a server says that it has no such file."""
 INSTEAD = "another --out, or remove it"
 """What to give where something is in the place of a study's own file."""
+LARGEST = 64 << 20
+"""Bytes of the largest file that is read back as a whole; a trial has some hundreds in it."""
 
 
 def is_address(path: str) -> bool:
@@ -130,6 +132,21 @@ def require_own(path: Path) -> None:
     """Raise LinkwiseError, with the path, for what is no regular file where a study has one of its own."""
     with within(str(path)):
         require_file(path, wanted=INSTEAD)
+
+
+def read_back(path: Path) -> str:
+    """Text of a file that a study wrote into its own folder; raises UnicodeDecodeError for what is none.
+
+    Raises LinkwiseError, with the path, for what is no regular file by now, or far too large a one.
+    """
+    require_own(path)
+    with path.open("rb") as file:
+        data = file.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise LinkwiseError(
+            f"{path}: the file is larger than {LARGEST >> 20} MiB, which none of a study's is; give {INSTEAD}"
+        )
+    return data.decode()
 
 
 def removed(folder: Path) -> None:

@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from linkwise.errors import LinkwiseError
+from linkwise.input_file import is_file
+from linkwise.study.study_paths import read_back
 from linkwise.study.study_plan import StudyPlan, Trial
 from linkwise.study.trial_key import SeenFile, trial_key
 
@@ -43,17 +45,24 @@ class TrialRecord:
 
     @classmethod
     def read(cls, folder: Path) -> "TrialRecord | None":
-        """That of a folder; None where there is none that can be read."""
+        """That of a folder; None where there is none that can be read.
+
+        Raises LinkwiseError for what is no file of a record's size.
+        """
         try:
-            data = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+            if not (folder / RECORD).exists():
+                return None
+            data = json.loads(read_back(folder / RECORD))
             files = {path: SeenFile(*seen) for path, seen in data.pop("files").items()}
             return cls(files=files, **data | {"warnings": tuple(data["warnings"])})
+        except LinkwiseError:
+            raise
         except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
             return None
 
 
 def done_before(plan: StudyPlan, folders: Mapping[str, Path]) -> dict[str, TrialRecord]:
-    """Records of trials that are done, of the same inputs."""
+    """Records of trials that are done, of the same inputs; raises LinkwiseError as `read` does."""
     found = {}
     for trial in plan.trials:
         record = TrialRecord.read(folders[trial.name])
@@ -68,8 +77,10 @@ def done_before(plan: StudyPlan, folders: Mapping[str, Path]) -> dict[str, Trial
 
 
 def outputs_in(folder: Path) -> dict[str, int]:
-    """Bytes of the files of a trial's folder, by name, but for its record."""
-    return {path.name: path.stat().st_size for path in folder.iterdir() if path.name != RECORD}
+    """Bytes of the regular files of a trial's folder, by name, but for its record."""
+    return {
+        path.name: path.stat().st_size for path in folder.iterdir() if path.name != RECORD and is_file(path)
+    }
 
 
 def is_trial(folder: Path) -> bool:

@@ -1,12 +1,15 @@
 """What is kept of each trial for what all say together."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from linkwise.analysis.logs.damaged_files import read_as
 from linkwise.package.load import Array
+from linkwise.study.study_paths import require_own
 from linkwise.study.study_plan import StudyPlan
 from linkwise.study.trial_ledger import CURVES, SUMMARY
 
@@ -25,18 +28,26 @@ class TrialSummary:
 
     @classmethod
     def read(cls, name: str, labels: Mapping[str, str], folder: Path) -> "TrialSummary":
-        """What a trial left in its folder."""
-        with np.load(folder / SUMMARY) as data:
+        """What a trial left in its folder; raises LinkwiseError for what is not as it was left."""
+        with _arrays(folder / SUMMARY) as data:
             names = data["names"].tolist()
             units = dict(zip(names, data["units"].tolist(), strict=True))
             statistics = dict(zip(names, data["statistics"].T, strict=True))
         curves: dict[str, Array] = {}
         cycles = 0
-        if (folder / CURVES).is_file():
-            with np.load(folder / CURVES) as data:
+        if (folder / CURVES).exists():
+            with _arrays(folder / CURVES) as data:
                 curves = dict(zip(data["names"].tolist(), data["curves"][0], strict=True))
                 cycles = int(data["cycles"])
         return cls(name, dict(labels), units, statistics, curves, cycles)
+
+
+@contextmanager
+def _arrays(path: Path) -> Iterator[Mapping[str, Array]]:
+    """Arrays of a trial's own file; raises LinkwiseError where they cannot be read."""
+    require_own(path)
+    with read_as("a trial's file of arrays", path, "remove its folder"), np.load(path) as data:
+        yield data
 
 
 def summaries(plan: StudyPlan, folders: Mapping[str, Path]) -> list[TrialSummary]:
