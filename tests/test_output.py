@@ -3,6 +3,7 @@
 import os
 import shutil
 import signal
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -220,6 +221,11 @@ def write_set(target: Path) -> None:
     write_files(target, {"a": b"new", "b": b"new"})
 
 
+def listen(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(path))
+
+
 def write_folder(target: Path) -> None:
     write(target, "new")
 
@@ -374,6 +380,22 @@ def test_a_set_of_files_is_written_whole_or_not_at_all(
     with pytest.raises(LinkwiseError, match="nothing was written: Input/output error"):
         write_files(tmp_path, dict.fromkeys("abc", b"new"))
     assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {"b": "old"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "make"), [("a pipe", os.mkfifo), ("a folder", os.mkdir), ("a socket", listen)]
+)
+def test_what_is_no_file_in_the_place_of_one_of_a_set_is_named_and_stays(
+    kind: str, make: Callable[[Path], None], tmp_path: Path
+) -> None:
+    make(tmp_path / "b")
+    before = (tmp_path / "b").lstat()
+    with pytest.raises(LinkwiseError) as caught:
+        write_set(tmp_path)
+    told = f"nothing was written: {kind} of that name is there; move it away, or choose another place"
+    assert str(caught.value) == f"{tmp_path / 'b'}: {told}"
+    assert os.listdir(tmp_path) == ["b"]
+    assert (tmp_path / "b").lstat() == before
 
 
 def test_a_workplace_without_locks_is_left_to_its_writer(

@@ -10,7 +10,7 @@ KINDS = {
     stat.S_IFDIR: "a directory",
     stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
-    stat.S_IFIFO: "a pipe, which cannot be read twice",
+    stat.S_IFIFO: "a pipe",
     stat.S_IFSOCK: "a socket",
 }
 
@@ -30,7 +30,13 @@ def require_file(path: Path, missing: str = "no such file", wanted: str = "a fil
     except ValueError as error:  # a zero byte
         raise LinkwiseError(f"cannot be read: {error}") from error
     if not stat.S_ISREG(mode):
-        raise LinkwiseError(f"this is {KINDS.get(stat.S_IFMT(mode), 'not a file')}; give {wanted}")
+        pipe = ", which cannot be read twice" if stat.S_ISFIFO(mode) else ""
+        raise LinkwiseError(f"this is {kind_of(mode)}{pipe}; give {wanted}")
+
+
+def kind_of(mode: int) -> str:
+    """What is no regular file, in words."""
+    return KINDS.get(stat.S_IFMT(mode), "not a file")
 
 
 def is_file(path: Path) -> bool:

@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import signal
+import stat
 import sys
 import tempfile
 import threading
@@ -13,6 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from linkwise.errors import LinkwiseError
+from linkwise.input_file import kind_of
 from linkwise.output.exchange import exchange, flush, put
 from linkwise.output.workplace import ENDING, NEW, REST, sweep, workplace
 from linkwise.runtime.native.native_system import system_here
@@ -50,8 +52,7 @@ def write_files(directory: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]
     with _ended_by_signal(), _told(directory):
         sweep(directory)
         for target in targets:
-            if target.is_dir():
-                raise FileExistsError(errno.EEXIST, "a folder of that name is there", str(target))
+            _refuse_unless_replaceable(target)
         with _folder(directory), workplace(directory) as work:
             for folder in (NEW, REST):
                 (work / folder).mkdir()
@@ -105,6 +106,16 @@ def _replace_files(work: Path, targets: tuple[Path, ...], former: set[Path]) -> 
         raise
 
 
+def _refuse_unless_replaceable(target: Path) -> None:
+    """Raise FileExistsError where something else than a file or a link is: a copy of it may never end."""
+    if not os.path.lexists(target):
+        return
+    mode = target.lstat().st_mode
+    if target.is_dir() or not (stat.S_ISREG(mode) or stat.S_ISLNK(mode)):
+        kind = "a folder" if target.is_dir() else kind_of(mode)
+        raise FileExistsError(errno.EEXIST, f"{kind} of that name is there", str(target))
+
+
 @contextmanager
 def _folder(directory: Path) -> Iterator[None]:
     """Make a folder and those above it; those made go after an error, if they are empty."""
@@ -128,13 +139,13 @@ def _told(place: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        blocker, reason = _blocker(place), error.strerror or type(error).__name__
+        blocker, reason, mend = _blocker(place), error.strerror or type(error).__name__, ""
         if blocker is not None:
             place, reason = blocker, "it is not a folder"
         elif isinstance(error, FileExistsError) and error.filename:
-            place = error.filename
-        held = isinstance(error, PermissionError) and system_here().keeps_open_files
-        mend = "close the programs that have files there open, or " if held else ""
+            place, mend = error.filename, "move it away, or "
+        elif isinstance(error, PermissionError) and system_here().keeps_open_files:
+            mend = "close the programs that have files there open, or "
         raise LinkwiseError(f"{place}: nothing was written: {reason}; {mend}choose another place") from error
 
 
