@@ -115,6 +115,13 @@ import multiprocessing, os, pathlib, signal
 
 opened = pathlib.Path.open
 
+def once():
+    try:
+        os.mkdir(os.path.join(os.path.dirname(__file__), "once"))
+    except FileExistsError:
+        return False
+    return True
+
 def deadly(self, mode="r", *rest, **more):
     if self.name == "fast_1.csv" and mode == "rb" and {who} multiprocessing.parent_process():
         os.kill(os.getpid(), signal.{deadly})
@@ -125,7 +132,7 @@ pathlib.Path.open = deadly
 
 
 def killing(folder: Path, who: str, deadly: str) -> dict[str, str]:
-    """Surroundings in which processes are ended so: workers, or "not" workers."""
+    """Surroundings in which processes are ended so: workers, "once() and" one of them, or "not" workers."""
     (folder / "sitecustomize.py").write_text(KILLER.format(who=who, deadly=deadly))
     return {"PYTHONPATH": before(folder)}
 
@@ -138,8 +145,20 @@ def test_a_process_that_dies_takes_its_trial_alone(tmp_path: Path, deadly: str) 
     study = begun(file, out, **killing(tmp_path, "", deadly))
     said, told = study.communicate(timeout=60)
     assert study.returncode == 1, told
-    assert "broken: S1-fast-1: its process died" in told
+    assert "broken: S1-fast-1: its process died twice" in told
     assert said.startswith("1 trials done, 0 of them before, 1 broken")
+    assert not list(out.rglob(".linkwise-*"))
+
+
+@pytest.mark.parametrize("deadly", ["SIGKILL", "SIGTERM"])
+def test_a_trial_whose_process_dies_is_tried_once_more(tmp_path: Path, deadly: str) -> None:
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1)
+    out = tmp_path / "out"
+    study = begun(file, out, **killing(tmp_path, "once() and", deadly))
+    said, told = study.communicate(timeout=60)
+    assert study.returncode == 0, told
+    assert (tmp_path / "once").exists()
+    assert said.startswith("2 trials done, 0 of them before, 0 broken")
     assert not list(out.rglob(".linkwise-*"))
 
 

@@ -1,4 +1,7 @@
-"""Trials in processes of this machine; one that kills its process is told, and stops no other.
+"""Trials in processes of this machine; one that kills its process twice is told, and stops no other.
+
+A process may die by no fault of its trial, ended by somebody or where memory is short for a while; so each is
+tried once more, after all others, and no more often, as it may be the trial that takes the memory.
 
 Each process has a pipe of its own and shares nothing with the others: no lock dies with one of them, and
 whoever ends at any instant leaves nobody waiting. `concurrent.futures` keeps one queue for all, and takes
@@ -22,7 +25,7 @@ from linkwise.study.trial_work import TrialOutcome, TrialTask, run_trial
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """What keeps libraries from threads of their own: there is a process for every core."""
-DIED = "its process died, as for want of memory; what is special about this log?"
+DIED = "its process died twice, as for want of memory; what is special about this log?"
 TIDYING = 3.0
 """Seconds in which a process that is told to end removes what it has half written."""
 
@@ -35,7 +38,7 @@ class ProcessPool:
 
     def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
         """Outcomes of all tasks, as they come; what is at work ends when nobody wants them any more."""
-        waiting, workers = list(reversed(tasks)), list[_Worker]()
+        waiting, workers, again = list(reversed(tasks)), list[_Worker](), set[str]()
         if sys.platform != "win32":
             resource_tracker.ensure_running()  # which lets signals pass, once, wherever it is begun
         try:
@@ -46,7 +49,14 @@ class ProcessPool:
                     workers[-1].give(waiting.pop())
                 ready = wait([worker.pipe for worker in workers])
                 for worker in [one for one in workers if one.pipe in ready]:
-                    yield worker.outcome()
+                    outcome, task = worker.outcome(), worker.at_hand
+                    if outcome is not None:
+                        yield outcome
+                    elif task.trial.name in again:
+                        yield TrialOutcome(task.trial.name, reason=DIED)
+                    else:
+                        again.add(task.trial.name)
+                        waiting.insert(0, task)
                     if waiting and worker.process.is_alive():
                         worker.give(waiting.pop())
                     else:
@@ -63,22 +73,22 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(theirs,), daemon=True)
-        self.at_hand = ""
         with _born_apart():
             self.process.start()
         theirs.close()  # the pipe ends where they do
 
     def give(self, task: TrialTask) -> None:
-        self.at_hand = task.trial.name
+        self.at_hand = task
         with suppress(OSError):  # it is dead, as its outcome tells
             self.pipe.send(task)
 
-    def outcome(self) -> TrialOutcome:
+    def outcome(self) -> TrialOutcome | None:
+        """What became of the trial at hand; None where the process died."""
         try:
             outcome: TrialOutcome = self.pipe.recv()
         except (EOFError, OSError):
             _end([self])
-            return TrialOutcome(self.at_hand, reason=DIED)
+            return None
         return outcome
 
 
