@@ -1,5 +1,7 @@
 """A study interrupted at 100 random instants, by its terminal or alone, and continued: of `make crash`.
 
+Every other time by one who is impatient, and interrupts it again and again until it has ended.
+
 Each time it ends within SECONDS, says one line and leaves no process, and what was done stays as it was. When
 all trials are there, they are those of a study that nobody interrupted.
 """
@@ -12,6 +14,9 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
+from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import pandas as pd
@@ -53,11 +58,23 @@ def left_of(group: int) -> bool:
     return True
 
 
-def struck(study: subprocess.Popen[str], out: Path, alone: bool) -> tuple[bool, float, str]:
+def interrupt(study: subprocess.Popen[str], alone: bool, pauses: Iterator[float]) -> None:
+    """Interrupt it, and once more after each pause for as long as it is there."""
+    end = time.monotonic() + SECONDS
+    for pause in chain([0.0], pauses):
+        time.sleep(pause)
+        if study.poll() is not None or time.monotonic() > end:
+            break
+        (os.kill if alone else os.killpg)(study.pid, signal.SIGINT)
+
+
+def struck(
+    study: subprocess.Popen[str], out: Path, alone: bool, pauses: Iterator[float]
+) -> tuple[bool, float, str]:
     """Interrupt it: whether it had done all, the seconds until it ended, and what was not as promised."""
     before = {path: path.stat().st_mtime_ns for path in records(out)}
     start = time.monotonic()
-    (os.kill if alone else os.killpg)(study.pid, signal.SIGINT)
+    interrupt(study, alone, pauses)
     try:
         said, told = study.communicate(timeout=60)
     except subprocess.TimeoutExpired:
@@ -88,7 +105,8 @@ def main() -> int:
             alone, delay = number % 3 == 0, generator.uniform(START, most)
             study = begun(file, out)
             time.sleep(delay)
-            done, took, complaint = struck(study, out, alone)
+            pauses = iter(partial(generator.uniform, 0.0, 0.2), None) if number % 2 else iter(())
+            done, took, complaint = struck(study, out, alone, pauses)
             longest = max(longest, took)
             ends["when all was done"] += done
             ends["between trials"] += not done and bool(records(out))

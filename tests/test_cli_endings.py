@@ -272,6 +272,28 @@ def test_ctrl_c_is_one_line_and_leaves_nothing(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+IMPATIENT = """
+import signal
+from linkwise import __main__ as start
+signal.signal(signal.SIGINT, signal.default_int_handler)
+start._heed_one_interrupt()
+for now in (10.0, 10.0, 19.9, 20.1, 20.2):
+    start.time.monotonic = lambda: now
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        print(now)
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+start._heed_one_interrupt()
+print(signal.getsignal(signal.SIGINT).name)
+"""
+
+
+def test_the_first_ctrl_c_decides_and_another_only_where_the_end_is_overdue() -> None:
+    done = subprocess.run([sys.executable, "-c", IMPATIENT], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["10.0", "20.1", "SIG_IGN"]
+
+
 def test_quick_work_on_no_terminal_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     with progress.progress() as report:
         report("analysing", 1000, 1000)

@@ -81,6 +81,22 @@ def test_an_interrupt_is_told_in_a_line_and_leaves_what_is_done(
     assert many <= len(records(out)) < 12
 
 
+@pytest.mark.parametrize("many", [0, 1])
+def test_more_interrupts_while_it_ends_change_nothing(tmp_path: Path, many: int) -> None:
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=3), tmp_path / "out"
+    study = begun(file, out)
+    while not (out / "study.json").exists():
+        time.sleep(0.01)
+    wait_for(many, study, out)
+    while study.poll() is None:
+        os.killpg(study.pid, signal.SIGINT)
+        time.sleep(0.02)
+    _, told = study.communicate(timeout=10)
+    assert told == "linkwise: interrupted\n"
+    assert study.returncode in (130, -signal.SIGINT)  # by one that comes after Python's own end has begun
+    assert not list(out.rglob(".linkwise-*"))
+
+
 def test_a_study_leaves_the_callers_environment_as_it_was(tmp_path: Path) -> None:
     file, before = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), dict(os.environ)
     assert run_study(file, tmp_path / "out", ProcessPool(2)).done == ("S1-fast-1", "S1-slow-1")

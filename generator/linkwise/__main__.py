@@ -1,18 +1,44 @@
 """`python -m linkwise`, and the script `linkwise`."""
 
 import os
+import signal
 import sys
+import time
+from types import FrameType
+
+OVERDUE = 10.0
+"""Seconds after which an interrupted command should have ended, also where others use the machine."""
 
 
 def main() -> None:
     """Run the command line; an interrupt while it is being imported ends it as a later one does."""
     _open_closed()
+    _heed_one_interrupt()
     try:
         from linkwise.cli.app import main as run
     except KeyboardInterrupt:
         print("linkwise: interrupted", file=sys.stderr)
         sys.exit(130)
     run()
+
+
+def _heed_one_interrupt() -> None:
+    """Have the first Ctrl-C decide: others, while all is tidied up, would break that off, with tracebacks.
+
+    Where a library has swallowed it, one is heeded again when the end is overdue. Whoever started this
+    program with Ctrl-C ignored, or has a way of their own with it, keeps that.
+    """
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        return
+    overdue = 0.0
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal overdue
+        if time.monotonic() >= overdue:
+            overdue = time.monotonic() + OVERDUE
+            signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, interrupt)
 
 
 def _open_closed() -> None:

@@ -110,8 +110,9 @@ def _work(tasks: Connection) -> None:
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, *ENDING})
     _end_with_parent()
-    while True:
-        tasks.send(run_trial(tasks.recv()))
+    with suppress(EOFError, OSError):  # of the pipe, whose other end is gone: a trial tells its own
+        while True:
+            tasks.send(run_trial(tasks.recv()))
 
 
 def _end_with_parent() -> None:
