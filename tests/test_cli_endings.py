@@ -13,6 +13,7 @@ import pytest
 from linkwise import progress
 from linkwise.cli import app
 from linkwise.errors import LinkwiseError
+from linkwise.extras import LEAST_ADDRESSES
 from linkwise.version import VERSION
 from motion_logs import PLANAR3, smooth, write_csv
 from test_names import chain
@@ -199,9 +200,29 @@ def test_bounded_addresses_are_enough_or_told(tmp_path: Path) -> None:
 
     assert run(1_500_000).stdout == "system\n"
     assert (
-        "LinkwiseError: ulimit -v leaves 0.92 GB of addresses, too few for pyarrow; allow a"
+        "LinkwiseError: ulimit -v leaves 0.92 GB of addresses, too few for pyarrow; allow 1 GB"
         in run(900_000).stderr
     )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs ulimit -v")
+@pytest.mark.parametrize("bound", [150_000, 300_000, 390_000])
+@pytest.mark.parametrize("command", ["inspect", "check", "analyze", "study", "identify"])
+def test_too_few_addresses_for_a_command_are_told_before_its_libraries_are_loaded(
+    command: str, bound: int
+) -> None:
+    words = ["sh", "-c", f'ulimit -v {bound}; exec "$@"', "sh", *COMMAND, command, "nowhere"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    said = f"linkwise: error: ulimit -v leaves {bound * 1024 / 1e9:.2g} GB of addresses, too few for "
+    assert (done.returncode, done.stderr[: len(said)], done.stderr.count("\n")) == (2, said, 1)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs ulimit -v")
+def test_the_addresses_that_are_asked_for_are_enough() -> None:
+    bound = LEAST_ADDRESSES["numpy"] // 1000
+    words = ["sh", "-c", f'ulimit -v {bound}; exec "$@"', "sh", *COMMAND, "inspect", "planar3"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("closed", ["2>&-", ">&-", "<&- >&- 2>&-"])

@@ -26,15 +26,14 @@ BROUGHT_BY = {
 }
 """The extra of pyproject.toml that installs each library."""
 
-LEAST_ADDRESSES = 10**9
-"""Bytes; with fewer, Arrow ends the process in the midst of its import, and says nothing of memory."""
+LEAST_ADDRESSES = {"numpy": 4 * 10**8, "pyarrow": 10**9, "torch": 10**9}
+"""Bytes; with fewer, these may end the process in the midst of their work, and say nothing of memory."""
 
 
 def extra(module: str) -> Any:
     """Import a module of an optional library; raises LinkwiseError that says how to install it."""
     library = module.partition(".")[0]
-    if library == "pyarrow":
-        _spare_addresses()
+    spare_addresses(library)
     try:
         return importlib.import_module(module)
     except ImportError as error:
@@ -43,19 +42,22 @@ def extra(module: str) -> Any:
         ) from error
 
 
-def _spare_addresses() -> None:
-    """Have Arrow not reserve a gigabyte of addresses where these are bounded, as by `ulimit -v`.
+def spare_addresses(library: str) -> None:
+    """Have libraries reserve few addresses where these are bounded, as by `ulimit -v`.
 
-    Raises LinkwiseError where they are too few for it at all.
+    Arrow reserves a gigabyte otherwise, and OpenBLAS, when NumPy is imported, some for each thread.
+    Raises LinkwiseError where they are too few for this library at all.
     """
     with suppress(ImportError):  # Windows, which has no such bound
         resource: Any = importlib.import_module("resource")
         bound, _ = resource.getrlimit(resource.RLIMIT_AS)
         if bound == resource.RLIM_INFINITY:
             return
-        if bound < LEAST_ADDRESSES:
+        least = LEAST_ADDRESSES.get(library, 0)
+        if bound < least:
             raise LinkwiseError(
-                f"ulimit -v leaves {bound / 1e9:.2g} GB of addresses, too few for pyarrow; allow a gigabyte,"
-                f" ulimit -v {LEAST_ADDRESSES // 1000}"
+                f"ulimit -v leaves {bound / 1e9:.2g} GB of addresses, too few for {library}; allow"
+                f" {least / 1e9:g} GB, ulimit -v {least // 1000}"
             )
         os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -4,6 +4,7 @@ import io
 import sys
 import warnings
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +14,7 @@ from typer.core import TyperGroup
 from linkwise.cli import tell
 from linkwise.cli.endings import CLOSED_PIPE, FAULT, INTERRUPTED, MISTAKE, TRACEBACK, ended_in_one_line
 from linkwise.errors import LinkwiseError, LinkwiseWarning
+from linkwise.extras import spare_addresses
 from linkwise.version import VERSION
 
 COMMANDS = {
@@ -29,6 +31,10 @@ REPORTS = {
     "terms": "Count terms and operations of the partial torques, and those that one bucket needs.",
     "reduction": "Draw the share of terms of τ_1 that its q̈_1 part does not need (the paper's Fig. 15).",
 }
+
+NUMPY = "numpy"
+LOADS = {"analyze": "pyarrow", "study": "pyarrow", "check": "torch", "graph": "torch"}
+"""The library of a command that wants most memory, if it is here; of others NumPy."""
 
 STATUSES = (
     f"Exit status: 0 done; 1 a check failed; {MISTAKE} a mistake in the input; {FAULT} a fault of linkwise"
@@ -47,6 +53,8 @@ class OnDemand(TyperGroup):
         name, command, rest = super().resolve_command(ctx, args)
         if command is None or isinstance(command, TyperGroup):
             return name, command and readable(command), rest
+        loads = LOADS.get(command.name or "", NUMPY)
+        spare_addresses(loads if find_spec(loads) else NUMPY)
         group = f"{self.name}_" if self.name else ""
         module = import_module(f"linkwise.cli.{group}{command.name}")
         return name, command_of(module.app), rest
