@@ -33,7 +33,7 @@ from linkwise.check import back_end_checks, compiled_c
 from linkwise.check.as_generated import check_made
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.package.load import load_package, open_package
-from linkwise.package.manifest import Manifest
+from linkwise.package.manifest import LARGEST, Manifest, is_too_large
 from linkwise.package.write import check_target
 from linkwise.version import VERSION
 
@@ -866,6 +866,13 @@ def test_a_file_that_is_larger_than_any_of_a_package_is_not_read(package: Path) 
         f"{cache} is not {Path(cache).name.split('.')[0]}.py compiled, delete it" for cache in caches
     )
     assert result.detail == f"names.py {has}; {names}; {tree}"
+
+
+def test_a_file_may_be_as_large_as_the_largest(tmp_path: Path) -> None:
+    for more, found in ((0, False), (1, True)):
+        (tmp_path / "file").touch()
+        os.truncate(tmp_path / "file", LARGEST + more)
+        assert is_too_large(tmp_path / "file") == found
 
 
 def test_a_manifest_that_is_larger_than_any_is_not_read_in_search_of_a_package(tmp_path: Path) -> None:

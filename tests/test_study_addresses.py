@@ -75,8 +75,10 @@ def test_logs_loads_and_robots_are_read_where_they_lie(store: Any, tmp_path: Pat
     assert run_study(file, tmp_path / "out", Here()).fresh == 0
 
 
-def test_what_is_not_in_the_store_is_told(store: Any, tmp_path: Path) -> None:
-    trial = '[[trial]]\nname = "a"\nlog = "s3://lab/gone.csv"\nrobot = "planar3"\ncondition = "x"\n'
+@pytest.mark.parametrize("log", ["gone.csv", "folder"])
+def test_what_is_no_file_of_the_store_is_told(log: str, store: Any, tmp_path: Path) -> None:
+    store.pipe("lab/folder/walk.csv", b"1")
+    trial = f'[[trial]]\nname = "a"\nlog = "s3://lab/{log}"\nrobot = "planar3"\ncondition = "x"\n'
     file = write_study(tmp_path, HEAD, trial)
-    with pytest.raises(LinkwiseError, match=r"trial 'a': s3://lab/gone\.csv: no such file"):
+    with pytest.raises(LinkwiseError, match=rf"trial 'a': s3://lab/{log}: no such file"):
         run_study(file, tmp_path / "out", Here())
