@@ -15,6 +15,8 @@ from linkwise.package.load import Array
 NAMES = ("tau", "c2", "c1", "g", "c0", "h1")
 
 Lagrangians = Sequence[TextLagrangian]
+GREATEST = 1e75
+"""Of numbers whose products of four are numbers too, as solutions have; of masses the inverse is as small."""
 
 
 def energy_reference(exact: Lagrangians, noisy: Sequence[Lagrangians], states: States) -> Reference:
@@ -37,12 +39,13 @@ def energy_reference(exact: Lagrangians, noisy: Sequence[Lagrangians], states: S
 
 
 def states_of_energies(lagrangians: Lagrangians, joints: Sequence[JointEntry], samples: int) -> Found:
-    """States at which the energies and every quantity are numbers."""
+    """States at which the energies and every quantity are numbers that can be computed with."""
 
     def defined(states: States) -> Any:
         values, energies, _ = _values(lagrangians, states)
-        parts = (*energies, *values.values())
-        return np.all([np.isfinite(part).reshape(len(part), -1).all(axis=1) for part in parts], axis=0)
+        mass = np.abs(np.einsum("sii->si", values["c2"].sum(2)))
+        parts = (*energies, *values.values(), 1.0 / np.where(mass > 0.0, mass, 1.0))
+        return np.all([(np.abs(part) < GREATEST).reshape(len(part), -1).all(1) for part in parts], axis=0)
 
     return states_where(defined, joints, samples)
 

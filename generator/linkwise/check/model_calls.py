@@ -16,7 +16,7 @@ from linkwise.package.manifest import Manifest
 FLOAT32 = {"tolerance": 1e-5, "epsilon": 2.0**-23}
 """How exact single precision is asked to be."""
 FEW_LINKS = 8
-TOO_LARGE = "the numbers are too large for it at every state"
+TOO_LARGE = "the numbers are too large for it, or too small, at every state"
 
 
 class Named(NamedTuple):

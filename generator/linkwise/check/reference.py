@@ -70,8 +70,15 @@ class Reference:
         return least
 
     def fits_single(self) -> NDArray[np.bool_]:
-        """Samples (samples,) whose numbers are small enough for single precision, squares included."""
-        sizes = [np.abs(v).reshape(len(v), -1).max(axis=1, initial=0.0) for v in self.values.values()]
+        """Samples (samples,) whose numbers are small enough for single precision, squares included.
+
+        Masses are large enough for their inverses; regressors have none.
+        """
+        parts = [np.abs(value) for value in self.values.values()]
+        if "c2" in self.values:
+            mass = np.abs(np.einsum("sii->si", self.values["c2"].sum(2)))
+            parts.append(1.0 / np.sqrt(np.where(mass > 0.0, mass, 1.0)))
+        sizes = [part.reshape(len(part), -1).max(axis=1, initial=0.0) for part in parts]
         fits: NDArray[np.bool_] = np.max(sizes, axis=0) < SINGLE
         return fits
 
