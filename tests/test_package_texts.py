@@ -8,11 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from linkwise import LinkwiseError, check_package, generate, read_system, write_package
+from conftest import DATA
+from linkwise import LinkwiseError, Options, check_package, generate, read_system, write_package
 from linkwise.errors import LinkwiseWarning
 from linkwise.expression.expression_graph import FUNCTIONS as OF_GRAPHS
 from linkwise.package.emitted_text import FUNCTIONS, Source, foreign_text
 from linkwise.package.load import open_package
+from linkwise.package.manifest import FILE
 from linkwise.version import VERSION
 
 FOREIGN: dict[str, tuple[str, str, str, str]] = {
@@ -70,8 +72,27 @@ FOREIGN: dict[str, tuple[str, str, str, str]] = {
         "__init__.py",
         'Path(__file__).parent / "c"',
         'Path(__file__).parent / "../c"',
-        "asks for .parent",
+        "does what is no arithmetic",
     ),
+    "a folder of C that leads elsewhere": (
+        "__init__.py",
+        'Path(__file__).parent / "c"',
+        'Path(__file__).parent / "c" / "../../evil"',
+        "does what is no arithmetic",
+    ),
+    "a type that is made": (
+        "names.py",
+        "ROBOT = ",
+        'MADE = type("Name", (str,), {})\nROBOT = ',
+        "calls type",
+    ),
+    "a class of another kind": (
+        "energies/link_1.py",
+        "class ",
+        "class Kind(metaclass=carried):\n    place = 1\n\n\nclass ",
+        "has a class of another kind",
+    ),
+    "a part that is changed": ("names.py", "ROBOT = ", "PART = {}\nPART[0] = 1\nROBOT = ", "changes a part"),
     "another meaning of a builtin": ("__init__.py", "joint_names = ", "len = ", "gives len another meaning"),
     "a call in C": (
         "c/link_1.h",
@@ -273,6 +294,29 @@ def test_a_package_of_this_version_is_opened_without_a_word(package: Path) -> No
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         open_package(package)
+
+
+@pytest.mark.parametrize(
+    ("spec", "parameters", "kernel"),
+    [
+        ("turntable.py", "numeric", "auto"),  # with terms linear in the velocities
+        ("cart_pendulum.py", "symbolic", "auto"),
+        ("skew.toml", "symbolic", "straight"),
+        ("skew.toml", "symbolic", "loops"),
+        ("fourbar.toml", "numeric", "straight"),
+        ("fourbar.toml", "symbolic", "loops"),
+        ("knee.osim", "numeric", "loops"),
+    ],
+)
+def test_whatever_linkwise_writes_is_read_as_its_own(spec: str, parameters: str, kernel: str) -> None:
+    system = read_system(DATA / spec, Options(parameters))
+    written = generate(system, ["numpy", "torch", "autograd", "native", "c"], "robot", kernel=kernel)
+    source = Source("robot", VERSION, frozenset(written))
+    found = {
+        path: foreign_text(path, text.encode(), source) for path, text in written.items() if path != FILE
+    }
+    assert not [told for told in found.values() if told]
+    assert "c/robot.h" in found
 
 
 def test_every_function_of_closed_forms_may_be_named() -> None:

@@ -28,6 +28,7 @@ TOKEN = re.compile(
     re.MULTILINE | re.VERBOSE,
 )
 DECLARED = re.compile(r"\b(?:real|int|short|char|size_t|double|float)\s+\**\s*(?:RESTRICT\s+)?(\w+)")
+ENUMERATED = re.compile(r"\benum\s*\{([^{}]*)\}")
 MADE = re.compile(r"\b(KERNEL|API|F|SIZED)\((\w+)$")
 """Before the bracket that ends it: a name that a macro makes, which may be called."""
 OF_LINK = re.compile(r"links?_\d+(?:_\w+)?|at_p_\w+")
@@ -76,7 +77,8 @@ def _read(text: str, name: str) -> Iterator[tuple[int, str]]:
     yield from wrong
     if found := DIGRAPH.search(code):
         yield found.start(), f"has {found[0]}"
-    local = frozenset(DECLARED.findall(code))
+    enumerated = (re.findall(r"([A-Za-z_]\w*)\s*=", names) for names in ENUMERATED.findall(code))
+    local = frozenset(DECLARED.findall(code)).union(*enumerated)
     for token in TOKEN.finditer(code):
         what, told = token[0], ""
         match token.lastgroup:

@@ -34,12 +34,14 @@ class Grammar:
     """What a Python file of a package may hold beside names that it gives something to itself.
 
     imports: names by module, those of the package's own after "runtime."; whole: libraries, under which name
-    builtins, attributes: which may be named and asked for; nodes: of the syntax
+    builtins, attributes: which may be named and asked for; calls: of the builtins those that may be called,
+    for types make others; nodes: of the syntax
     """
 
     imports: Mapping[str, frozenset[str]]
     whole: Mapping[str, str]
     builtins: frozenset[str]
+    calls: frozenset[str]
     attributes: frozenset[str]
     nodes: tuple[type[ast.AST], ...]
 
@@ -65,6 +67,7 @@ ARITHMETIC = Grammar(
     ),
     whole={"torch": "torch", "numpy": "np"},
     builtins=frozenset(("tuple", "type", "int", "float", "str", "dict")),
+    calls=frozenset(),
     attributes=frozenset(
         (
             *("before", "twist", "height", "body", "kinetic", "potential", "constants"),
@@ -90,6 +93,7 @@ LOADING = Grammar(
     ),
     whole={},
     builtins=frozenset(("tuple", "type", "bool", "str", "dict", "ValueError")),
+    calls=frozenset(("tuple", "dict", "ValueError")),
     attributes=frozenset(["parameters", "joint_names", "link_names", "bodies", "join", "face", "values"]),
     nodes=(
         *(*PLAIN, ast.If, ast.Raise, ast.JoinedStr, ast.FormattedValue, ast.Compare, ast.cmpop),
@@ -226,6 +230,10 @@ def _beside(node: ast.AST, grammar: Grammar, known: Known) -> str:
     if not isinstance(node, grammar.nodes):
         return f"has {type(node).__name__}"
     match node:
+        case ast.ClassDef(keywords=[_, *_]):
+            return "has a class of another kind"
+        case ast.Attribute(ctx=ast.Store()) | ast.Subscript(ctx=ast.Store()):
+            return "changes a part of what there is"
         case ast.Import(names=names):
             wrong = [
                 alias for alias in names if grammar.whole.get(alias.name) != (alias.asname or alias.name)
@@ -247,6 +255,8 @@ def _beside(node: ast.AST, grammar: Grammar, known: Known) -> str:
             return "" if attribute in FUNCTIONS else f"asks for .{attribute}"
         case ast.Attribute(attr=attribute):
             return "" if attribute in grammar.attributes else f"asks for .{attribute}"
+        case ast.BinOp(op=ast.Div()) if grammar is LOADING:
+            return "does what is no arithmetic"  # but for OWN_C: of a path, that leads elsewhere
         case ast.BinOp(op=operator):
             of_text = not isinstance(operator, ast.Div) and (_is_text(node.left) or _is_text(node.right))
             if of_text or not isinstance(operator, OPERATORS):
@@ -258,6 +268,8 @@ def _beside(node: ast.AST, grammar: Grammar, known: Known) -> str:
             return "computes with numbers alone" if of_numbers and _named(node) else ""
         case ast.Call(func=ast.Name(id=name)) if name in known.functions:
             return f"calls its own {name}"
+        case ast.Call(func=ast.Name(id=name)) if name in grammar.builtins - grammar.calls:
+            return f"calls {name}"
         case ast.Call(func=ast.Name() | ast.Attribute() | ast.Call()):
             return ""
         case ast.Call(func=func):
