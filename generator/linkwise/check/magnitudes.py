@@ -23,6 +23,7 @@ class _Sizes:
     """Of a frame: distance from the base; |ω|, |v|, |α|, |a − gravity| of its twist and its change.
 
     v and a are those of the point at the base's origin, moving with the frame.
+    lost: how many times more than numbers of size 1 the angles before it are rounded, with sine and cosine
     """
 
     reach: Array
@@ -30,6 +31,7 @@ class _Sizes:
     v: Array
     alpha: Array
     a: Array
+    lost: Array
 
 
 class Magnitudes:
@@ -68,6 +70,7 @@ class Magnitudes:
                 moment = moment + float(np.linalg.norm(body.inertia)) * turning
                 about = moment[:, None] + reaches[:, path] * force[:, None]
                 work = slopes[:, path] * np.where(turns, about, force[:, None]) * gathered(len(path))
+                work = work * frame.lost[:, None]
                 for k, column in zip(coordinates, work.T, strict=True):
                     tau[:, k, j, x] += column
         return tau
@@ -81,7 +84,7 @@ class Magnitudes:
             speed = frame.v + frame.omega * reach
             spin = float(np.linalg.norm(body.inertia)) * frame.omega**2
             mass = abs(body.mass)
-            sizes.append(0.5 * (mass * speed**2 + spin) + mass * self.gravity * reach)
+            sizes.append((0.5 * (mass * speed**2 + spin) + mass * self.gravity * reach) * frame.lost)
         return np.stack(sizes, -1)
 
     def poses(self, points: Points, q: Array) -> Array:
@@ -89,6 +92,7 @@ class Magnitudes:
         found = np.ones((len(q), len(points), 4, 4))
         for p, (frame, lever) in enumerate(self._carriers(points, q, 0.0 * q, 0.0 * q)):
             found[:, p, :3, 3] = (frame.reach + lever)[:, None]
+            found[:, p] *= frame.lost[:, None, None]
         return found
 
     def points(self, points: Points, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
@@ -98,14 +102,14 @@ class Magnitudes:
             reach, turning = frame.reach + lever, frame.alpha + frame.omega**2
             speed = frame.v + frame.omega * reach
             change = frame.a + frame.omega * frame.v + turning * reach
-            speeds.append(np.stack([frame.omega] * 3 + [speed] * 3, -1))
-            changes.append(np.stack([turning] * 3 + [change] * 3, -1))
+            speeds.append(np.stack([frame.omega] * 3 + [speed] * 3, -1) * frame.lost[:, None])
+            changes.append(np.stack([turning] * 3 + [change] * 3, -1) * frame.lost[:, None])
         return np.stack(speeds, 1), np.stack(changes, 1)
 
     def _carriers(self, points: Points, q: Array, qd: Array, qdd: Array) -> Iterator[tuple[_Sizes, float]]:
         """What carries each point, and how far it is from the origin of that."""
         frames, zero = self._frames(q, qd, qdd, 0.0), np.zeros(len(q))
-        ground = _Sizes(zero, zero, zero, zero, zero)
+        ground = _Sizes(zero, zero, zero, zero, zero, zero + 1.0)
         for body, place in points:
             yield ground if body is None else frames[body], float(np.linalg.norm(place))
 
@@ -115,7 +119,7 @@ class Magnitudes:
     def _frames(self, q: Array, qd: Array, qdd: Array, gravity: float) -> list[_Sizes]:
         frames: list[_Sizes] = []
         zero = np.zeros(len(q))
-        ground = _Sizes(zero, zero, zero, zero, zero + gravity)
+        ground = _Sizes(zero, zero, zero, zero, zero + gravity, zero + 1.0)
         for body in self.bodies:
             up = ground if body.parent is None else frames[body.parent]
             turn, slope, bend = (displacement_bound(body, q, derivative) for derivative in range(3))
@@ -136,6 +140,7 @@ def _carried(body: BodyEntry, up: _Sizes, turn: Array, rate: Array, change: Arra
         up.v + rate * s,
         up.alpha + change * z + rate * up.omega * z,
         up.a + change * s + rate * (up.omega * s + up.v * z),
+        up.lost if sliding else np.maximum(up.lost, turn / np.pi),
     )
 
 
