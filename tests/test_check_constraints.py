@@ -253,7 +253,62 @@ joint = [
   {name = "ja", parent = "a", child = "b", xyz = [3e-6, 0, 0], axis = [0, 1, 0]},
 ]
 """
+GEAR = f"""schema = 1
+name = "right"
+link = [
+  {{name = "arm", mass = 3.0, com = [0.15, 0, 0], {BODY}}},
+  {{name = "rotor", mass = 0.4, com = [0, 0, 0.01], inertia = {{xx = 4e-5, yy = 4e-5, zz = 6e-5}}}},
+]
+joint = [
+  {{name = "j", parent = "base", child = "arm", axis = [0, 1, 0]}},
+  {{name = "m", parent = "arm", child = "rotor", xyz = [0.3, 0, 0], mimic = {{joint = "j", multiplier = -160}}}},
+]
+"""
+DUMBBELL = """schema = 1
+name = "right"
+link = [
+  {name = "a", mass = 3, com = [0.1, 0.02, -0.03], inertia = {xx = 0.03, yy = 0.036, zz = 0.045}},
+  {name = "b", mass = 0.01, com = [0.1, 0.02, -0.03], inertia = {xx = 1e-4, yy = 1.2e-4, zz = 1.5e-4}},
+]
+joint = [
+  {name = "fa", type = "floating", parent = "base", child = "a"},
+  {name = "fb", type = "floating", parent = "base", child = "b"},
+]
+[[constraint]]
+name = "rod"
+type = "distance"
+first = {frame = "a", xyz = [0.1, 0.2, 0.3]}
+second = {frame = "b", xyz = [0, 0.1, 0]}
+length = 1.5
+"""
+
+
+def arm(size: float, *masses: float) -> str:
+    """Links of this length, each turned against the one before, with these masses."""
+    bodies, joints, parent = [], [], "base"
+    for k, mass in enumerate(masses):
+        x, y, z = (mass * size**2 * part for part in (1.0, 1.2, 1.5))
+        own = f"com = [{0.4 * size}, 0, {size}], inertia = {{xx = {x}, yy = {y}, zz = {z}}}"
+        place = f"xyz = [{size}, {0.3 * size}, 0], rpy = [1.2, 0.4, 0]"
+        bodies.append(f'{{name = "l{k}", mass = {mass}, {own}}}')
+        joints.append(f'{{name = "j{k}", parent = "{parent}", child = "l{k}", {place}}}')
+        parent = f"l{k}"
+    return f'schema = 1\nname = "right"\nlink = [{", ".join(bodies)}]\njoint = [{", ".join(joints)}]\n'
+
+
 RIGHT = {
+    "a rotor of 160 turns to one, whose angle is rounded by its size": (GEAR, "numpy", "auto"),
+    "two floating bodies and a rod, of which one is light": (DUMBBELL, "numpy", "auto"),
+    "an arm of ever lighter links": (
+        arm(1.0, *(1e9 / 10.0**at for at in (0, 4, 9, 13, 18))),
+        "numpy",
+        "auto",
+    ),
+    "an arm of micrometres, which a hold at its end leaves nothing": (
+        arm(1e-5, *[1e-12] * 6),
+        "numpy",
+        "auto",
+    ),
     "a floating robot of micrometres, whose slides move it by more than turns": (MICRO, "numpy", "auto"),
     "two cranks and a rod, which at zero is across to how they move": (PARALLEL, "numpy", "auto"),
     "a body that floats about its centre of mass, all in one point": (ONE_POINT, "numpy", "auto"),

@@ -12,8 +12,8 @@ import numpy as np
 
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.contact_equations import KINDS, ContactEquations
-from linkwise.check.loop_equations import RANK, LoopEquations, following
-from linkwise.check.loop_reference import condition_of, far_from_singular, held_motion, steady
+from linkwise.check.loop_equations import LoopEquations, following
+from linkwise.check.loop_reference import condition_of, far_from_singular, held_motion, steady, with_noise
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.rounding import measured
 from linkwise.check.states import States
@@ -54,10 +54,7 @@ class HeldContacts:
 
     def _leaves_freedom(self, kind: str) -> bool:
         """Whether joints can move under a contact of this kind."""
-        q = self.states.q
-        sizes = np.linalg.svd(self.equations(kind, self.tree).rows(q), compute_uv=False)
-        freedoms = q.shape[1] - (sizes > RANK * np.maximum(sizes[:, :1], 1.0)).sum(-1)
-        return bool(freedoms.min() > 0)
+        return bool(self.equations(kind, self.tree).freedoms(self.states.q).min() > 0)
 
     def _compared(self, model: Any, kind: str, contact: Callable[..., Any]) -> Iterator[Entries]:
         """Entries of one kind; none where it is far enough from singular positions at no state."""
@@ -80,7 +77,7 @@ class HeldContacts:
         if not clear.size:
             return None
         given = _Given(self.states.at(clear), list(own), rest)
-        condition = condition_of(rows[clear][..., rest])
+        condition = condition_of(rows[clear], rest)
 
         def answers(tree: RigidTree) -> dict[str, Array]:
             return _answers(self.equations(held.kind, tree), given)
@@ -134,7 +131,7 @@ def _answers(held: ContactEquations, given: _Given) -> dict[str, Array]:
         **_of_rows(held, rows, rates, forces),
         "velocity": qd,
         "acceleration": qdd,
-        "tau^": back @ torque,
+        "tau^": with_noise(held.recursion, back @ torque, back, torque),
         "qdd": moved,
     }
 

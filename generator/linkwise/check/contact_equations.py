@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwise.check.body_reference import COMPLEX_STEP
-from linkwise.check.loop_equations import LoopEquations
+from linkwise.check.loop_equations import RANK, LoopEquations
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.entries import FrameEntry
 from linkwise.package.load import Array
@@ -18,8 +19,10 @@ NORMAL = np.array([0.2, -0.1, 0.9])
 RADIUS = 0.07
 SPACIOUS = 20.0
 """Contacts are nearer on links that reach less than 1 / this, in m."""
-KINDS = {"held": 6, "hinged": 5, "point": 3, "rolling": 3}
-"""Number of rows of each."""
+TURNS_AND_SHIFTS = {"frame": (3, 3), "hinge": (2, 3), "point": (0, 3), "distance": (0, 1)}
+"""Rows of each kind of tie that hold turns, and of those behind them that hold shifts."""
+KINDS = {"held": "frame", "hinged": "hinge", "point": "point", "rolling": "point"}
+"""Kinds of contacts, and of ties that have as many rows."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,7 @@ class ContactEquations:
     def own(self, rows: Any) -> slice:
         """Where the contact's rows stand among all, which have those of couplings last."""
         end = rows.shape[1] - (0 if self.ties is None else len(self.ties.tree.couplings))
-        return slice(end - KINDS[self.kind], end)
+        return slice(end - sum(TURNS_AND_SHIFTS[KINDS[self.kind]]), end)
 
     def rows(self, q: Array) -> Array:
         """A, (samples, C, n)."""
@@ -55,6 +58,18 @@ class ContactEquations:
         rows = self.ties.rows(q)
         before = rows.shape[1] - len(self.ties.tree.couplings)
         return np.concatenate([rows[:, :before], own, rows[:, before:]], 1)
+
+    def freedoms(self, q: Array) -> NDArray[np.intp]:
+        """How many joints may move by themselves, (samples,): metres are measured in the robot's size."""
+        size, rows = self.recursion.reach or 1.0, self.rows(q)
+        kinds = [*(tie.kind for tie in (self.ties.tree.ties if self.ties else ())), KINDS[self.kind]]
+        units = [unit for kind in kinds for unit in np.repeat([1.0, size], TURNS_AND_SHIFTS[kind])]
+        units += [1.0] * (rows.shape[1] - len(units))
+        slides = [body.coordinate for body in self.recursion.bodies if body.kind == "prismatic"]
+        rows = rows / np.array(units)[:, None] * np.where(np.isin(np.arange(q.shape[1]), slides), size, 1.0)
+        sizes = np.linalg.svd(rows, compute_uv=False)
+        found: NDArray[np.intp] = q.shape[1] - (sizes > RANK * np.maximum(sizes[:, :1], 1.0)).sum(-1)
+        return found
 
     def rates(self, q: Array, qd: Array) -> Array:
         """dA/dt."""

@@ -11,6 +11,7 @@ and U^T dA/dt for U^T lambda, which are as good as all of them where loops close
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +27,14 @@ from linkwise.package.manifest import Manifest, RigidTree
 STATES = 12
 TRIED = 60
 FAR = 100.0
-"""What A moves at most, to what A_d, the dependent joints' columns, moves at least: below, a position is far
-from singular ones. The condition of A_d alone is 1 for a single joint, whatever it moves."""
+"""Of `condition_of`, below which a position is far from singular ones."""
 MOST = 1e6
 """The same, above which nothing is left to compare."""
 STEADY = 1e-2
 """Least eigenvalue of a mass matrix beside that of others."""
 REGULAR = 1e-8
 """Least eigenvalue of any, with ones on its diagonal: below, joints can move together without a mass."""
+REFINED = 3
 LEAST = 1e-300
 """In place of a singular value that is 0."""
 SMALL = 1e-7
@@ -68,7 +69,7 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     q = q[steady(equations.recursion, q, equations.velocity_map(q))][: min(STATES, len(states.q))]
     if not len(q):
         return None
-    condition = condition_of(equations.rows(q)[..., rest])
+    condition = condition_of(equations.rows(q), rest)
     yd, ydd = states.qd[: len(q), own], states.qdd[: len(q), own]
     tau = np.random.default_rng(5).uniform(-1.0, 1.0, q.shape)
 
@@ -80,17 +81,16 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     return LoopReference(equations, own, moved, tau, values, scales)
 
 
-def condition_of(rows: Array) -> Array:
-    """Condition number of A_d (samples, C, d), (samples,)."""
-    sizes = np.linalg.svd(rows, compute_uv=False)
-    condition: Array = sizes[:, 0] / np.maximum(sizes[:, -1], LEAST)
+def condition_of(rows: Array, rest: Sequence[int]) -> Array:
+    """What A (samples, C, n) moves at most, to what A_d, its columns `rest`, moves at least: (samples,)."""
+    most, sizes = (np.linalg.svd(part, compute_uv=False) for part in (rows, rows[..., rest]))
+    condition: Array = most[:, 0] / np.maximum(sizes[:, -1], LEAST)
     return condition
 
 
 def far_from_singular(rows: Array, rest: Sequence[int]) -> NDArray[np.intp]:
     """Which of A (samples, C, n) are, by columns `rest`: the best first if none is far enough."""
-    most, sizes = (np.linalg.svd(part, compute_uv=False) for part in (rows, rows[..., rest]))
-    condition = most[:, 0] / np.maximum(sizes[:, -1], LEAST)
+    condition = condition_of(rows, rest)
     found = np.flatnonzero(condition < FAR)
     return found if found.size else np.argsort(condition)[: np.count_nonzero(condition < MOST)]
 
@@ -207,6 +207,17 @@ class _Followed:
         return full
 
 
+def with_noise(recursion: NewtonEuler, product: Array, solution: Array, columns: Array) -> Array:
+    """A solution of least squares (samples, m, n) times columns, with its noise if there is any.
+
+    It is by singular vectors, of which every number is rounded by the size of the largest.
+    """
+    if not recursion.noise:
+        return product
+    size = np.abs(solution).max((1, 2))[:, None, None] * np.abs(columns).sum(1, keepdims=True)
+    return recursion.noise(product, np.broadcast_to(size, product.shape))
+
+
 def mass_matrix(recursion: NewtonEuler, q: Array) -> Array:
     """M (samples, n, n), column by column, all columns at once."""
     samples, n = q.shape
@@ -257,20 +268,41 @@ def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]
 def held_motion(
     recursion: NewtonEuler, states: States, rows: Array, rates: Array, tau: Array, own: Sequence[int]
 ) -> tuple[Array, Array]:
-    """qdd and lambda of torques under rows that do not follow from each other and leave `own` free."""
+    """qdd and lambda of torques under rows that do not follow from each other and leave `own` free.
+
+    Of M qdd - A^T lambda = tau - h and A qdd = -dA/dt qd as one system, in units of which each joint's mass
+    and each row's largest number are 1: a light link's motion is not lost beside a body's.
+    """
     q, qd, _ = states.motion
     mass = held_mass(recursion, q, rows, own)
     bias = recursion.torque(q, qd, 0.0 * q)
-    null = motions(mass, rows)
-    back = np.swapaxes(null, -1, -2)
-    moved = -np.linalg.pinv(rows, rcond=SMALL) @ (rates @ qd[..., None])
-    driven = back @ ((tau - bias)[..., None] - mass @ moved)
-    qdd = null @ np.linalg.solve(back @ mass @ null, driven) + moved
-    left = mass @ qdd + (bias - tau)[..., None]
+    size = unit_sizes(mass)
+    held = rows / size[:, None, :]
+    largest = np.abs(held).max(-1, keepdims=True)
+    held = held / largest
+    n, ties = q.shape[1], rows.shape[1]
+    system = np.zeros((len(q), n + ties, n + ties))
+    system[:, :n, :n] = mass / (size[:, :, None] * size[:, None, :])
+    system[:, n:, :n], system[:, :n, n:] = held, np.swapaxes(held, -1, -2)
+    force, change = tau - bias, rates @ qd[..., None]
     if recursion.noise:
-        left = recursion.noise(left, np.abs(mass) @ np.abs(qdd) + np.abs(bias - tau)[..., None])
-    forces = np.linalg.pinv(np.swapaxes(rows, -1, -2), rcond=SMALL) @ left
-    return qdd[..., 0], forces[..., 0]
+        change = recursion.noise(change, np.abs(rates) @ np.abs(qd)[..., None])
+        force = recursion.noise(force, np.abs(tau) + np.abs(bias))
+    given = np.concatenate([force[..., None] / size[..., None], -change / largest], 1)
+    found = _solved(system, given)
+    if recursion.noise:  # whoever solves it rounds what the equations sum up
+        found = _solved(system, recursion.noise(given, np.abs(system) @ np.abs(found)))
+    return found[:, :n, 0] / size, -found[:, n:, 0] / largest[..., 0]
+
+
+def _solved(system: Array, given: Array) -> Array:
+    """A solution that is off by no more than rounding of the equations' own sums: refined (Skeel 1980)."""
+    found: Any = np.linalg.solve(system, given)
+    for _ in range(REFINED):
+        left = given - system.astype(np.longdouble) @ found
+        found = found + np.linalg.solve(system, left.astype(float))
+    answer: Array = found
+    return answer
 
 
 def _shared(
@@ -280,5 +312,7 @@ def _shared(
     samples, _, n = rows.shape
     driven = np.broadcast_to(np.eye(n)[:, own], (samples, n, len(own)))
     both = np.concatenate([driven, np.swapaxes(rows, -1, -2)], -1)
-    found = np.linalg.pinv(both, rcond=SMALL) @ equations.recursion.partial_torque(*states.motion, gravity)
+    inverse = np.linalg.pinv(both, rcond=SMALL)
+    torque = equations.recursion.partial_torque(*states.motion, gravity)
+    found = with_noise(equations.recursion, inverse @ torque, inverse, torque)
     return found[:, : len(own)], found[:, len(own) :]

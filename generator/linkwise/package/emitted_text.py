@@ -170,7 +170,7 @@ def _python(grammar: Grammar, text: bytes) -> Iterator[str]:
     Of the bytes, as Python reads them: a comment in them may say in what encoding.
     """
     tree = ast.parse(text)
-    known = Known.of(tree, grammar)
+    known = ModuleNames.of(tree, grammar)
     own_c = {id(part) for node in ast.walk(tree) if _is_own_c(node) for part in ast.walk(node)}
     for node in ast.walk(tree):
         if (grammar is not LOADING or id(node) not in own_c) and (told := _beside(node, grammar, known)):
@@ -182,7 +182,7 @@ def _is_own_c(node: ast.AST) -> bool:
 
 
 @dataclass(frozen=True)
-class Known:
+class ModuleNames:
     """Names of a module: all that it may use, its functions and classes, those of numbers and text alone."""
 
     names: set[str]
@@ -190,7 +190,7 @@ class Known:
     fixed: set[str]
 
     @classmethod
-    def of(cls, tree: ast.Module, grammar: Grammar) -> "Known":
+    def of(cls, tree: ast.Module, grammar: Grammar) -> "ModuleNames":
         """Those of a module, whose statements are walked before those of its functions."""
         functions, fixed = set(), set[str]()
         for node in ast.walk(tree):
@@ -225,7 +225,7 @@ def _bound(tree: ast.Module) -> set[str]:
     return found
 
 
-def _beside(node: ast.AST, grammar: Grammar, known: Known) -> str:
+def _beside(node: ast.AST, grammar: Grammar, known: ModuleNames) -> str:
     """What is wrong with a node, in words; empty if nothing."""
     if not isinstance(node, grammar.nodes):
         return f"has {type(node).__name__}"
