@@ -15,6 +15,7 @@ from linkwise.analysis.loads import Load
 from linkwise.analysis.settings import Lowpass
 from linkwise.study import run_study
 from linkwise.study.comparisons import compared
+from linkwise.study.study_file import read_study
 from linkwise.study.study_plan import Comparison
 from linkwise.study.trial_summary import TrialSummary
 from scipy.interpolate import CubicSpline
@@ -234,6 +235,15 @@ def test_every_trial_is_read_whatever_it_is_called(tmp_path: Path) -> None:
     assert renamed.given == ["B-2"], "the folder of B has that name"
 
 
+def test_a_key_that_is_written_is_what_it_says_whatever_the_pattern_finds(tmp_path: Path) -> None:
+    file = write_study(tmp_path, HEAD, TRIALS, 'condition = "very {condition}"\n', subjects=1, trials=1)
+    trials = read_study(file).trials
+    assert [(one.name, one.label("condition")) for one in trials] == [
+        ("S1-fast-1", "very fast"),
+        ("S1-slow-1", "very slow"),
+    ]
+
+
 def test_damaged_trials_are_done_again_and_what_is_not_a_trial_stays(tmp_path: Path) -> None:
     file, trials = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS), tmp_path / "out/trials"
     run_study(file, tmp_path / "out", Here())
@@ -243,11 +253,14 @@ def test_damaged_trials_are_done_again_and_what_is_not_a_trial_stays(tmp_path: P
     shutil.rmtree(trials / "S2-slow-1")
     (trials / "S2-slow-1").mkdir()
     (trials / "S2-slow-1/thesis.txt").write_text("mine")
+    (trials / "notes").mkdir()
+    (trials / "notes/thesis.txt").write_text("mine, too")
     again = Here()
     found = run_study(file, tmp_path / "out", again)
     assert sorted(again.given) == ["S1-fast-1", "S1-fast-2", "S2-fast-1", "S2-slow-1"]
     assert [(one.name, "move it away" in one.reason) for one in found.broken] == [("S2-slow-1", True)]
     assert (trials / "S2-slow-1/thesis.txt").read_text() == "mine"
+    assert (trials / "notes/thesis.txt").read_text() == "mine, too", "no trial was ever called so"
 
 
 def test_files_that_a_study_no_longer_asks_for_go(tmp_path: Path) -> None:
