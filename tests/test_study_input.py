@@ -60,6 +60,10 @@ BAD: dict[str, tuple[tuple[str, ...], str]] = {
         (HEAD.replace("condition", "Time"), TRIALS),
         "factor 'Time' has a name that is taken",
     ),
+    "names that differ in case alone": (
+        (HEAD.replace('["condition"]', '["Speed", "speed"]'), TRIALS),
+        "factor 'Speed' has a name that is taken",
+    ),
     "no level": (
         (HEAD, '[[compare]]\nfactor = "condition"\nbetween = ["slow", "mad"]\ncolumns = ["tau/*"]\n', TRIALS),
         "no trial has the condition 'mad'; there are 'fast', 'slow'",
