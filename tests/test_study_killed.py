@@ -5,12 +5,14 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Generator, Sequence
 from pathlib import Path
 
 import pytest
 from linkwise import LinkwiseError
 from linkwise.study import ProcessPool, run_study
 from linkwise.study.study_folder import held_study
+from linkwise.study.trial_work import TrialOutcome, TrialTask
 from search_path import before
 from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 
@@ -176,6 +178,27 @@ def test_a_trial_whose_process_dies_is_tried_once_more(tmp_path: Path, deadly: s
     assert (tmp_path / "once").exists()
     assert said.startswith("2 trials done, 0 of them before, 0 broken")
     assert not list(out.rglob(".linkwise-*"))
+
+
+def test_a_trial_whose_process_died_is_tried_after_all_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where it was for want of memory, there may be enough by then."""
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1)
+    for name, value in killing(tmp_path, "once() and", "SIGKILL").items():
+        monkeypatch.setenv(name, value)
+    ended = list[str]()
+
+    class OneProcess:
+        """An engine of one process, which keeps the order in which trials end."""
+
+        def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
+            for outcome in ProcessPool(1).outcomes(tasks):
+                ended.append(outcome.name)
+                yield outcome
+
+    assert run_study(file, tmp_path / "out", OneProcess()).broken == ()
+    assert ended == ["S1-fast-2", "S1-slow-1", "S1-slow-2", "S1-fast-1"]
 
 
 def test_what_a_killed_study_left_among_passing_files_goes_with_the_next(tmp_path: Path) -> None:
