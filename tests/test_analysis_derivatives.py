@@ -66,6 +66,15 @@ def test_lowpass_is_sosfiltfilt(padding, order, rows):
     np.testing.assert_allclose(q, expected, atol=1e-13)
 
 
+@pytest.mark.parametrize("samples", [10, 30])
+def test_a_log_shorter_than_the_filter_remembers_is_padded_by_all_but_one_of_it(samples):
+    q = smooth(samples, 2)[:, 1:]
+    sos = signal.butter(2, 6.0, fs=100.0, output="sos")
+    expected = signal.sosfiltfilt(sos, q, axis=0, padlen=samples - 1)
+    lowpass(q, 100.0, Lowpass(6.0))
+    np.testing.assert_allclose(q, expected, atol=1e-13)
+
+
 @pytest.mark.parametrize(("cutoff", "rate"), [(6.0, 100.0), (6.0, 1000.0), (1.0, 60.0)])
 def test_a_straight_ramp_passes_to_its_ends(cutoff, rate):
     ramp = 1.3 * np.arange(601)[:, None] / rate
