@@ -142,11 +142,12 @@ def causes_of(result, i):
 
 def test_causes_in_each_phase_are_numpys_and_add_up(pushed):
     path, push, on = pushed
-    phases = ["stance/swing=push", "grip=grip", "half=0..1.995"]
+    phases = ["stance/swing=push", "grip=grip", "half=0..1.995", "ends=1..2"]
     result = analyze(path, PLANAR3, loads=[push], phases=phases)
     figure = result.figure("causes:joint2")
     rows, shown = bars(figure)
     masks = {"stance": on, "swing": ~on, "grip": on, "half": result.time < 1.996}
+    masks["ends"] = (result.time > 0.995) & (result.time < 2.005)
     curves = causes_of(result, 1)
     assert set(rows) == set(curves)
     assert list(shown) == list(masks)
