@@ -37,6 +37,13 @@ def test_a_spline_passes_its_points_smoothly_and_is_straight_beyond_them() -> No
     assert [SPLINE(x, 2) for x in (-3.0, 2.0)] == [0.0, 0.0]
 
 
+def test_a_spline_through_four_points_is_the_cubic_through_them() -> None:
+    cubic = np.polynomial.Polynomial([0.3, -1.2, 0.7, 0.9])
+    x = (-2.0, -0.5, 0.1, 1.0)
+    spline, within = simm_spline(x, [float(cubic(at)) for at in x]), np.linspace(-2.0, 1.0, 31)
+    np.testing.assert_allclose([spline(at) for at in within], cubic(within), rtol=0, atol=1e-13)
+
+
 def test_every_back_end_moves_joints_along_their_curves(directory_of: Callable[[str], Path]) -> None:
     failed = [result for result in check_package(directory_of(KNEE), samples=40) if result.failed]
     assert not failed
