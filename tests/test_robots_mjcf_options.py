@@ -24,6 +24,11 @@ ARM = """<mujoco model="arm"><compiler angle="radian"/>{option}<worldbody>
   <site name="wall" pos="1 0 0.5"/></worldbody>{more}</mujoco>"""
 FIXED = '<tendon><fixed name="t" {}><joint joint="a" coef="1"/><joint joint="b" coef="-1"/></fixed></tendon>'
 SPATIAL = '<tendon><spatial name="t" {}><site site="wall"/><site site="tip"/></spatial></tendon>'
+POST = '/><geom name="post" type="{}" size="0.1 1" pos="0.1 0 0" euler="1.57 0 0" mass="0" contype="0"'
+AROUND = """<worldbody><site name="floor" pos="-1 0 -0.5"/></worldbody>
+  <tendon><spatial name="t" stiffness="3"><site site="wall"/><geom geom="post"/><site site="floor"/></spatial>
+  </tendon>"""
+"""From world to world, and past a link by a shape of it alone."""
 MOTOR = '<actuator><motor name="m" {}/></actuator>'
 FLEX = """<worldbody><flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" pos="2 0 0"
   mass="1" radius="0.01"><contact contype="0" conaffinity="0" selfcollide="none"/>
@@ -74,6 +79,13 @@ CASES: dict[str, tuple[dict[str, str], str]] = {
         "tendon spring left out of the torques: t (3)",
     ),
     "spatial spring": ({"more": SPATIAL.format('stiffness="3"')}, "tendon spring left out of the torques: t"),
+    **{
+        f"spring around a {shape}": (
+            {"geom": POST.format(shape), "more": AROUND},
+            "tendon spring left out of the torques: t (3)",
+        )
+        for shape in ("sphere", "cylinder")
+    },
     "tendon damping": (
         {"more": FIXED.format('damping="2"')},
         "tendon damping left out of the torques: t (2)",
