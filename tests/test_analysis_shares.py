@@ -102,19 +102,24 @@ def columns(place: Path) -> Columns:
 
 @pytest.fixture(scope="module")
 def crowd(analysis: Analysis) -> Analysis:
-    """Of 14 joints, each loaded through two links that cancel, more or less."""
-    draw, count = np.random.default_rng(4), range(len(CROWD))
+    """Of 14 joints."""
+    return crowd_of(CROWD, analysis)
+
+
+def crowd_of(joints: tuple[str, ...], analysis: Analysis) -> Analysis:
+    """Joints, each loaded through two links that cancel, more or less."""
+    draw, count = np.random.default_rng(4), range(len(joints))
     pairs: list[tuple[Any, int, int | None]] = [("tau_gravity", i, None) for i in count]
     pairs += [(quantity, i, k) for quantity in ("tau_qdd", "tau_qd") for i in count for k in count]
     made, values = [Column("time", "time", "s")], [np.arange(400) / 100]
     for quantity, i, k in pairs:
         first = draw.uniform(0.1, 1.0) * draw.normal(size=400)
         for j, size in ((0, 1.0), (1, draw.uniform(-1.0, 0.5))):
-            parts = [quantity, CROWD[i], CROWD[j], *([] if k is None else [CROWD[k]])]
+            parts = [quantity, joints[i], joints[j], *([] if k is None else [joints[k]])]
             made.append(Column(quantity, "/".join(parts), "N·m", i, j, k))
             values.append(size * first)
-    robot = replace(analysis.robot, joints=CROWD, links=CROWD, units=("rad",) * len(CROWD), bodies=None)
-    none = np.zeros((len(CROWD), len(CROWD)))
+    robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * len(joints), bodies=None)
+    none = np.zeros((len(joints), len(joints)))
     totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
     about: Any = {"robot": robot, "totals": totals, "work": Work(none, none), "total": 400}
     return replace(analysis, columns=tuple(made), values=np.array(values), **about)
@@ -354,4 +359,19 @@ def test_the_table_of_many_causes_adds_up_the_smaller_ones(
     assert sorted(traces) == sorted(["gravity", *moved[:6], *["22 others, each smaller"] * 22])
     driver.execute_script("document.getElementById('every-number').click()")
     assert [name for name, *_ in driver.execute_script(rows)] == order
+    assert driver.get_log("browser") == []
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize(("count", "alone", "rest"), [(6, 6, 0), (7, 7, 0), (8, 6, 2)])
+def test_a_curve_of_others_is_never_of_one_motion_alone(
+    driver: Any, analysis: Analysis, tmp_path: Path, count: int, alone: int, rest: int
+) -> None:
+    page = report(crowd_of(CROWD[:count], analysis))
+    (tmp_path / "report.html").write_text(page, encoding="utf-8")
+    opened(driver, (tmp_path / "report.html").as_uri())
+    choose(driver, "motion", "together")
+    traces = driver.execute_script("return document.getElementById('curves').data.map((c) => c.name)")
+    assert sum(name.endswith(" motion") for name in traces) == alone
+    assert traces[alone + 1 :] == [f"{rest} others, each smaller"] * rest
     assert driver.get_log("browser") == []
