@@ -105,6 +105,18 @@ def test_a_trial_is_done_again_for_whatever_it_is_made_of(done: Path, what: str)
             path.write_bytes(content)
 
 
+def test_a_trial_of_another_built_in_robot_is_done_again(tmp_path: Path) -> None:
+    time = np.arange(0, 1.0, 0.01)
+    write_csv(tmp_path / "a.csv", np.column_stack([time, *np.sin([3 * time, time])]), ["joint1", "joint2"])
+    trial = '\n[[trial]]\nname = "a"\ncondition = "slow"\nlog = "a.csv"\nrobot = "planar1"\n'
+    file, out = tmp_path / "study.toml", tmp_path / "out"
+    file.write_text("".join((HEAD, QUICK, CHOICES, trial)))
+    assert [run_study(file, out, Here()).fresh for _ in range(2)] == [1, 0]
+    edit("planar1", "planar2")(tmp_path)
+    assert run_study(file, out, Here()).fresh == 1
+    assert run_study(file, out, Here()).fresh == 0
+
+
 def test_a_trial_is_done_again_by_another_linkwise(done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("linkwise.study.trial_key.fingerprint", lambda: "of another")
     assert still_done(done) == ""

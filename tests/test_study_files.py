@@ -27,3 +27,13 @@ def test_each_file_of_a_folder_counts(bag: Path) -> None:
     changed = trial_key(plan, trial, files).key
     (bag / "part/1.db3").write_text("")
     assert len({key, changed, trial_key(plan, trial, files).key}) == 3
+
+
+def test_how_a_file_is_read_counts_and_what_else_it_is_called_does_not(tmp_path: Path) -> None:
+    plan = StudyPlan("arms", tmp_path / "study.toml", ("subject",), (), pages=False, trust_python=False)
+    keys = []
+    for name in ("a.csv", "b.csv", "a.mot"):
+        (tmp_path / name).write_text("time")
+        trial = Trial("a", (("subject", "S1"),), str(tmp_path / name), "planar3", AnalysisChoices())
+        keys.append(trial_key(plan, trial, {}).key)
+    assert keys[0] == keys[1] != keys[2]

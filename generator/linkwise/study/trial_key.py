@@ -4,9 +4,11 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
+from pathlib import Path
 from typing import NamedTuple
 
 from linkwise.makers import fingerprint
+from linkwise.robot.read import is_built_in
 from linkwise.study.study_paths import opened_here, version_of
 from linkwise.study.study_plan import OF_FILES, StudyPlan, Trial
 from linkwise.study.trial_files import trial_files
@@ -43,12 +45,14 @@ def trial_key(
     told = [
         trial.name,
         trial.labels,
+        trial.robot if is_built_in(trial.robot) else "",  # which has no file that could tell it
         {**asdict(trial.choices), **{key: len(getattr(trial.choices, key)) for key in OF_FILES}},
         plan.options.request(),
         None if plan.cycles is None else {**asdict(plan.cycles), "table": bool(plan.cycles.table)},
         plan.columns,
         plan.pages,
-        [seen.sha256 for seen in files.values()],
+        # A file's ending says how it is read; the rest of its name is free.
+        [(Path(path).suffix.lower(), seen.sha256) for path, seen in files.items()],
         fingerprint(),
     ]
     return TrialKey(hashlib.sha256(json.dumps(told, default=str).encode()).hexdigest(), files)
