@@ -10,6 +10,7 @@ import pytest
 import urdf_text
 from linkwise import LinkwiseError
 from linkwise.study import run_study
+from linkwise.study.trial_patterns import expanded
 from motion_logs import JOINTS
 from studies import CHOICES, CYCLES, HEAD, QUICK, TRIALS, Here, write_study
 
@@ -73,6 +74,19 @@ def test_logs_loads_and_robots_are_read_where_they_lie(store: Any, tmp_path: Pat
     assert len(run_study(file, tmp_path / "out", again).done) == len(again.given) == 4
     assert not local.equals(pd.read_parquet(tmp_path / "out/trials"))
     assert run_study(file, tmp_path / "out", Here()).fresh == 0
+
+
+def test_a_pattern_finds_files_of_a_store_as_it_does_beside_the_study(store: Any, tmp_path: Path) -> None:
+    (tmp_path / "two").mkdir()
+    for name in ("xy", "xyz"):
+        (tmp_path / f"two/{name}.csv").touch()
+        store.pipe(f"lab/two/{name}.csv", b"")
+    for place in ("", "s3://lab/"):
+        entry = {"log": f"{place}two/{{a}}{{b}}.csv", "name": "{a} {b}"}
+        with pytest.raises(LinkwiseError, match=r"two/xyz\.csv fits the pattern in two ways, a=x, b=yz and"):
+            list(expanded(entry, tmp_path))
+        entry["log"] = f"{place}two/{{a}}{{b}}z.csv"
+        assert [one["name"] for one in expanded(entry, tmp_path)] == ["x y"]
 
 
 @pytest.mark.parametrize("log", ["gone.csv", "folder"])

@@ -8,6 +8,7 @@ from linkwise import LinkwiseError
 from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.study import run_study
 from linkwise.study.column_patterns import fitting
+from linkwise.study.path_fields import FieldedPath
 from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 
 BAD: dict[str, tuple[tuple[str, ...], str]] = {
@@ -256,4 +257,35 @@ def test_columns_that_a_pattern_fits_are_found_at_once(pattern: str, fits: list[
         assert in_own_process(found, limits) == fits
         return
     with pytest.raises(LinkwiseError, match=r"'columns' has '.*', which no column is called; nearest are"):
+        in_own_process(found, limits)
+
+
+A, MANY = "a" * 200, [f"f{number}" for number in range(200)]
+FITS: list[tuple[str, str, dict[str, str] | str]] = [
+    ("logs/{s}/{c}_{k}.csv", "logs/S1/slow_2.csv", {"s": "S1", "c": "slow", "k": "2"}),
+    ("logs/{s}/{c}_{k}.csv", "logs/S1/part/slow_2.csv", {}),
+    ("logs/{s}/{c}_{k}.csv", "logs/S1/_2.csv", {}),
+    ("logs/{s}/{s}_{k}.csv", "logs/S1/S1_2.csv", {"s": "S1", "k": "2"}),
+    ("logs/{s}/{s}_{k}.csv", "logs/S1/S2_2.csv", {}),
+    ("{a}{b}.csv", "xy.csv", {"a": "x", "b": "y"}),
+    ("{a}{b}.csv", "xyz.csv", "in two ways, a=x, b=yz and a=xy, b=z; put folders"),
+    ("{a}_{b}_{a}", "x_y_z_x_y", {"a": "x_y", "b": "z"}),
+    ("{a}{b}{c}{d}{e}{f}{g}x{h}.csv", f"x{A}.csv", {}),
+    ("".join(f"{{{name}}}" for name in MANY) + ".csv", f"{A}.csv", dict.fromkeys(MANY, "a")),
+    ("{a}{b}{c}{d}{a}{b}{c}{d}_{a}x", f"{A}_b{A}x", "in too many ways to try them; put folders"),
+]
+
+
+@pytest.mark.parametrize(("pattern", "path", "expected"), FITS, ids=map(str, range(len(FITS))))
+def test_fields_of_a_path_are_found_or_refused_at_once(
+    pattern: str, path: str, expected: dict[str, str] | str
+) -> None:
+    def found() -> dict[str, str]:
+        return FieldedPath(pattern).fields_of(path)
+
+    limits = ProcessLimits(seconds=2, memory=1 << 28)
+    if isinstance(expected, dict):
+        assert in_own_process(found, limits) == expected
+        return
+    with pytest.raises(LinkwiseError, match=expected):
         in_own_process(found, limits)

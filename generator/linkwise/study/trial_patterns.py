@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError
+from linkwise.study.path_fields import FIELD, FieldedPath
 from linkwise.study.study_paths import found_by_pattern, placed
-
-FIELD = re.compile(r"\{([A-Za-z_]\w*)\}")
 
 
 def expanded(entry: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]:
@@ -23,9 +22,9 @@ def expanded(entry: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]
     if not isinstance(log, str) or not fields:
         yield dict(entry)
         return
-    whole = placed(log, folder)
-    found = found_by_pattern(FIELD.split(whole)[::2])
-    matches = {path: values for path in found if (values := _fields(whole, path))}
+    pattern = FieldedPath(placed(log, folder))
+    found = found_by_pattern(pattern.texts)
+    matches = {path: values for path in found if (values := pattern.fields_of(path))}
     if not matches:
         raise LinkwiseError(f"no log is called {log}; correct the pattern")
     for path, values in matches.items():
@@ -33,34 +32,6 @@ def expanded(entry: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]
             "log": path,
             **{name: text for name, text in values.items() if name not in entry},
         }
-
-
-def _fields(pattern: str, path: str) -> dict[str, str]:
-    """Fields of a path that fits; none where it does not. Raises LinkwiseError where it fits in two ways."""
-    short, long = (_expression(pattern, sign).fullmatch(path) for sign in ("+?", "+"))
-    if short is None or long is None:
-        return {}
-    if short.groupdict() != long.groupdict():
-        ways = (", ".join(f"{k}={v}" for k, v in way.groupdict().items()) for way in (short, long))
-        raise LinkwiseError(
-            f"{path} fits the pattern in two ways, {' and '.join(ways)}; put folders, or signs that names do"
-            " not have, between the fields"
-        )
-    return short.groupdict()
-
-
-def _expression(pattern: str, much: str) -> re.Pattern[str]:
-    """What a path must be; a field that stands twice is the same text. `much` says how long fields are."""
-    parts, last, seen = [], 0, set[str]()
-    for match in FIELD.finditer(pattern):
-        name = match[1]
-        parts += [
-            re.escape(pattern[last : match.start()]),
-            f"(?P={name})" if name in seen else f"(?P<{name}>[^/]{much})",
-        ]
-        seen.add(name)
-        last = match.end()
-    return re.compile("".join([*parts, re.escape(pattern[last:])]))
 
 
 def _with(value: Any, fields: Mapping[str, str], key: str) -> Any:

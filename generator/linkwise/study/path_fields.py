@@ -1,0 +1,99 @@
+"""Fields of a path by a pattern: {FIELD} stands for anything in one part of the path, but for nothing."""
+
+import re
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
+
+from linkwise.errors import LinkwiseError
+
+FIELD = re.compile(r"\{([A-Za-z_]\w*)\}")
+MOST = 10_000
+"""Places where fields may end that are tried for a path; of ordinary ones each is the right one."""
+
+Way = list[tuple[int, int]]
+"""From where to where in the path each field goes."""
+
+
+class FieldedPath:
+    """Texts, and the fields between them; a field that stands twice is the same text."""
+
+    def __init__(self, pattern: str) -> None:
+        self.texts, self.names = FIELD.split(pattern)[::2], FIELD.findall(pattern)
+        at: dict[str, int] = {}
+        self._first = [at.setdefault(name, number) for number, name in enumerate(self.names)]
+
+    def fields_of(self, path: str) -> dict[str, str]:
+        """Fields of a path that fits; none where it does not.
+
+        Raises LinkwiseError where it fits in two ways, and where too many would have to be tried.
+        """
+        if not path.startswith(self.texts[0]) or not (ends := self._ends(path)):
+            return {}
+        short, long = (self._way(path, ends, is_long) for is_long in (False, True))
+        if short is None or long is None:
+            return {}
+        if short != long:
+            ways = (
+                ", ".join(f"{k}={v}" for k, v in self._values(path, way).items()) for way in (short, long)
+            )
+            raise _unclear(f"{path} fits the pattern in two ways, {' and '.join(ways)}")
+        return self._values(path, short)
+
+    def _values(self, path: str, way: Way) -> dict[str, str]:
+        return {name: path[start:end] for name, (start, end) in zip(self.names, way, strict=True)}
+
+    def _ends(self, path: str) -> list[list[int]]:
+        """Where each field may end, so that what follows fits to the path's end; nothing if it never does.
+
+        Goes along the pattern once, from its end, with all places at a time. A regular expression tries one
+        after the other, which takes for ever for a dozen fields. A field that stands twice is any text here.
+        """
+        ends = [len(path) - len(self.texts[-1])] if path.endswith(self.texts[-1]) else []
+        found = [ends]
+        for text in reversed(self.texts[1:-1]):
+            if not ends:
+                return []
+            starts = range(path.rfind("/", 0, ends[-1]) + 1, ends[-1])
+            ends = [at - len(text) for at in starts if path.endswith(text, 0, at)]
+            found.append(ends)
+        return found[::-1] if ends else []
+
+    def _way(self, path: str, ends: list[list[int]], is_long: bool) -> Way | None:
+        """The way whose fields, one after the other, are as short or as long as they can be."""
+        way: Way = []
+        tried = [self._tries(path, ends, way, is_long)]
+        for _ in range(MOST):
+            field = next(tried[-1], None)
+            if field is not None:
+                way.append(field)
+                if len(way) == len(ends):
+                    return way
+                tried.append(self._tries(path, ends, way, is_long))
+            elif way:
+                way.pop()
+                tried.pop()
+            else:
+                return None
+        raise _unclear(f"{path} may fit the pattern in too many ways to try them")
+
+    def _tries(
+        self, path: str, ends: list[list[int]], way: Sequence[tuple[int, int]], is_long: bool
+    ) -> Iterator[tuple[int, int]]:
+        """Where the field after those of a way may go."""
+        number = len(way)
+        start = (way[-1][1] if way else 0) + len(self.texts[number])
+        known = ends[number]
+        if (first := self._first[number]) < number:
+            text = path[slice(*way[first])]
+            end = start + len(text)
+            if path.startswith(text, start) and known[(at := bisect_left(known, end)) : at + 1] == [end]:
+                yield start, end
+            return
+        slash = path.find("/", start)
+        fits = range(bisect_right(known, start), bisect_right(known, slash if slash >= 0 else len(path)))
+        for at in reversed(fits) if is_long else fits:
+            yield start, known[at]
+
+
+def _unclear(what: str) -> LinkwiseError:
+    return LinkwiseError(f"{what}; put folders, or signs that names do not have, between the fields")
