@@ -286,6 +286,10 @@ BAD = {
         ('relative_to="hip"', 'relative_to="upper"'),
         "the pose of link 'upper' is relative to itself",
     ),
+    "attached in a circle": (
+        ('attached_to="upper"><pose>', 'attached_to="top"><pose relative_to="upper">'),
+        "joint 'slide': frame 'top' is attached to itself, in a circle",
+    ),
     "five numbers": (
         ("0 0.2 1 0 0 90", "0 0.2 1 0 90"),
         "joint 'hip': <pose> is '0 0.2 1 0 90'; it needs 6 numbers",
@@ -470,3 +474,15 @@ def test_poses_that_hang_on_one_another_in_a_long_chain_are_each_worked_out_once
     robot = in_own_process(lambda: read_robot(tmp_path / "a.sdf", Options(base="fixed")), limits)
     (hand,) = (frame for frame in robot.frames if frame.name == "l7998")
     assert hand.translation == (7998.0, 0, 0)
+
+
+def test_frames_that_hang_on_one_another_in_a_long_chain_find_their_link_at_once(tmp_path: Path) -> None:
+    frames = "".join(f'<frame name="f{k}" attached_to="f{k - 1}"/>' for k in range(1, 20_001))
+    (tmp_path / "a.sdf").write_text(
+        f'<sdf version="1.9"><model name="a"><link name="f0">{LOWER}</link>{frames}</model></sdf>'
+    )
+    limits = ProcessLimits(seconds=20, memory=1 << 30)
+    robot = in_own_process(lambda: read_robot(tmp_path / "a.sdf"), limits)
+    link = {frame.name: frame.link for frame in robot.frames}
+    assert link["f0"] is not None
+    assert {link[f"f{k}"] for k in range(20_001)} == {link["f0"]}

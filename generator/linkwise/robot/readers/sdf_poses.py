@@ -46,7 +46,8 @@ class ModelPoses:
     def __init__(self, model: Element, version: tuple[int, int]) -> None:
         """Raises LinkwiseError for two frames of one name, and for a canonical link that is not there."""
         self._model, self._named, self._whole = version >= (1, 7), dict[str, Element](), model
-        self._poses = dict[int, Pose]()  # of links that stand in chains, each of which many ask for
+        # Of links and frames that stand in chains, each of which many ask for.
+        self._poses, self._carriers = dict[int, Pose](), {WORLD: WORLD}
         for tag in PLACED:
             for element in model.findall(tag):
                 name = element.get("name", "")
@@ -95,21 +96,23 @@ class ModelPoses:
 
     def link_of(self, name: str, asked_by: str) -> str:
         """Link that carries a frame, the world's name for the world; raises LinkwiseError for none."""
-        seen = set[str]()
-        while True:
-            if name == WORLD or name in seen:
-                if name in seen:
-                    raise LinkwiseError(f"{asked_by}: frame {name!r} is attached to itself, in a circle")
-                return WORLD
-            seen.add(name)
+        way = set[str]()
+        while (carrier := self._carriers.get(name)) is None:
+            if name in way:
+                raise LinkwiseError(f"{asked_by}: frame {name!r} is attached to itself, in a circle")
+            way.add(name)
             element = self._found(name, asked_by)
             if element is None:
-                return self._canonical
-            if element.tag == "link":
-                return name
-            name = (
-                text_of(element, "child") if element.tag == "joint" else element.get("attached_to") or MODEL
-            )
+                carrier = self._canonical
+            elif element.tag == "link":
+                carrier = name
+            else:
+                is_joint = element.tag == "joint"
+                name = text_of(element, "child") if is_joint else element.get("attached_to") or MODEL
+                continue
+            break
+        self._carriers |= dict.fromkeys(way, carrier)
+        return carrier
 
     def _before(self, element: Element) -> Element | None:
         """What the pose of an element is relative to; None for the model."""
