@@ -14,6 +14,7 @@ from linkwise.robot.builtin.planar import planar
 from linkwise.robot.constrained import check_constraints
 from linkwise.robot.description import Description
 from linkwise.robot.parameters import numeric
+from linkwise.robot.readers import osim_document, toml_table
 from linkwise.robot.readers.mjcf import read_mjcf
 from linkwise.robot.readers.mjcf_files import mjcf_files
 from linkwise.robot.readers.osim import read_osim
@@ -21,7 +22,7 @@ from linkwise.robot.readers.sdf import read_sdf
 from linkwise.robot.readers.toml import read_toml
 from linkwise.robot.readers.toml_constraints import with_constraint_file
 from linkwise.robot.readers.urdf import read_urdf, root_tag
-from linkwise.robot.readers.xml_file import XACRO
+from linkwise.robot.readers.xml_file import LARGEST, XACRO
 from linkwise.robot.robot import Robot
 from linkwise.robot.size import MOST_JOINTS
 
@@ -44,6 +45,9 @@ READERS: dict[str, Reader] = {
     ".osim": read_osim,
 }
 """What reads a file, by the end of its name."""
+
+MOST_BYTES = {".toml": toml_table.LARGEST, ".osim": osim_document.LARGEST}
+"""Of a file that is read as no other XML, by the end of its name."""
 
 FILES = ("puma560", "torso")
 """Built-in robots that are TOML files beside `planar`."""
@@ -85,6 +89,11 @@ def reader_of(path: Path) -> Reader | None:
     """What reads a file; None for one that is none of a robot."""
     reader = READERS.get(path.suffix.lower())
     return XML.get(root_tag(path), read_urdf) if reader is read_xml else reader
+
+
+def most_bytes(path: str | Path) -> int:
+    """How many bytes of a file its reader takes at most."""
+    return MOST_BYTES.get(Path(path).suffix.lower(), LARGEST)
 
 
 def is_built_in(spec: str | Path) -> bool:

@@ -20,10 +20,13 @@ from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.input_file import require_file
 from linkwise.output import passing_folder
+from linkwise.robot.readers.bounded import too_large
 
 STORES = ("s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "oss", "http", "https")
 """Kinds of addresses that are read."""
 LOCAL = "file://"
+UNSAID = 1 << 30
+"""Bytes that are fetched at most of a file of which the store does not say how many there are."""
 CHAINED = "::"
 """Between addresses of which fsspec opens one inside the other."""
 MISSING = (HTTPStatus.NOT_FOUND, HTTPStatus.GONE)
@@ -97,9 +100,10 @@ def version_of(path: str) -> str:
 
 
 @contextmanager
-def opened_here(path: str) -> Iterator[Path]:
+def opened_here(path: str, most_of_robot: int | None = None) -> Iterator[Path]:
     """The file itself, or a copy that goes when the work is done.
 
+    most_of_robot: bytes that are fetched at most, of what describes a robot
     Raises LinkwiseError where there is none; what is raised of the copy is told of the address, which is all
     that anybody can look at afterwards.
     """
@@ -111,7 +115,7 @@ def opened_here(path: str) -> Iterator[Path]:
         raise LinkwiseError(f"{path}: an address of a folder; give one of a file")
     with passing_folder() as folder:
         copy = folder / name
-        copied_here(path, copy)
+        copied_here(path, copy, most_of_robot)
         try:
             yield copy
         except LinkwiseError as error:
@@ -123,11 +127,32 @@ def told_of(path: str, copy: Path, text: str) -> str:
     return text.replace(str(copy), path)
 
 
-def copied_here(address: str, copy: Path) -> None:
-    """Fetch a file; raises LinkwiseError, with the address, where that fails."""
+def copied_here(address: str, copy: Path, most_of_robot: int | None = None) -> None:
+    """Fetch a file; raises LinkwiseError, with the address, where that fails, and where too much comes.
+
+    That is more than the store says there is, or than a robot's description may have: a server may send
+    without an end, and fill the disk.
+    """
     files, name = _system(address)
     copy.parent.mkdir(parents=True, exist_ok=True)
-    _asked(address, lambda: files.get_file(name, str(copy)))
+
+    def fetch() -> None:
+        said = files.info(name).get("size")
+
+        def hold(size: int | None, fetched: int, **_: object) -> None:
+            if most_of_robot is not None and max(fetched, said or 0) > most_of_robot:
+                raise too_large(most_of_robot)
+            most = max(UNSAID if said is None else said, size or 0)
+            if fetched > most:
+                beyond = f"{most:,} bytes" + ("" if said is None else ", as the store says it has")
+                raise LinkwiseError(f"more comes than {beyond}; fetch it yourself, and name your copy")
+
+        hold(None, 0)
+        callback = extra("fsspec.callbacks").Callback(hooks={"bound": hold})  # after each part
+        files.get_file(name, str(copy), callback=callback)
+        hold(None, copy.stat().st_size)  # some stores call nothing back
+
+    _asked(address, fetch)
 
 
 def beside(address: str, name: str) -> str:

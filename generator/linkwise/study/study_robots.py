@@ -13,6 +13,7 @@ from linkwise.package_cache import KeptPackage, kept_package
 from linkwise.pipeline import PYTHON
 from linkwise.progress import Progress
 from linkwise.robot import is_description
+from linkwise.robot.read import most_bytes
 from linkwise.study.study_paths import is_address, opened_here, require_there, told_of, version_of
 from linkwise.study.study_plan import StudyPlan
 from linkwise.version import VERSION
@@ -58,7 +59,7 @@ def package_of(robot: str, plan: StudyPlan) -> KeptPackage:
     options = plan.options
     if is_description(robot) and not is_address(robot) and not Path(robot).exists():
         return kept_package(robot, options=options)
-    with opened_here(robot) as path:
+    with opened_here(robot, most_bytes(robot)) as path:
         if Path(path).is_dir() and not plan.trust_python:
             _refuse_unread(robot, Path(path))
         kept = kept_package(path, options=options)

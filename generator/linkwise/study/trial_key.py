@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from linkwise.makers import fingerprint
-from linkwise.robot.read import is_built_in
+from linkwise.robot.read import is_built_in, most_bytes
 from linkwise.study.study_paths import opened_here, version_of
 from linkwise.study.study_plan import OF_FILES, StudyPlan, Trial
 from linkwise.study.trial_files import trial_files
@@ -41,7 +41,9 @@ def trial_key(
     for path, copy in zip(trial_files(plan, trial), trial_files(plan, here or trial), strict=True):
         version = version_of(path)
         seen = known.get(path)
-        files[path] = seen if seen is not None and seen.version == version else SeenFile(version, _hash(copy))
+        files[path] = (
+            seen if seen is not None and seen.version == version else SeenFile(version, _hash(copy, trial))
+        )
     told = [
         trial.name,
         trial.labels,
@@ -58,9 +60,10 @@ def trial_key(
     return TrialKey(hashlib.sha256(json.dumps(told, default=str).encode()).hexdigest(), files)
 
 
-def _hash(path: str) -> str:
+def _hash(path: str, trial: Trial) -> str:
     digest = hashlib.sha256()
-    with opened_here(path) as file, file.open("rb") as content:
+    most = most_bytes(path) if path == trial.robot else None
+    with opened_here(path, most) as file, file.open("rb") as content:
         while chunk := content.read(CHUNK):
             digest.update(chunk)
     return digest.hexdigest()

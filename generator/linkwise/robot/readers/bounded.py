@@ -29,11 +29,16 @@ def content(path: Path, most: int) -> bytes:
     with path.open("rb") as file:
         data = file.read(most + 1)
     if len(data) > most:
-        raise LinkwiseError(
-            f"the file is larger than {most // MIB} MiB, which no robot's description is; "
-            "give one without meshes and data in it"
-        )
+        raise too_large(most)
     return data
+
+
+def too_large(most: int) -> LinkwiseError:
+    """What is raised of a robot's file of more than `most` bytes."""
+    return LinkwiseError(
+        f"the file is larger than {most // MIB} MiB, which no robot's description is; "
+        "give one without meshes and data in it"
+    )
 
 
 def check_toml_bounds(text: str) -> None:

@@ -12,11 +12,14 @@ from linkwise.robot.readers.formula import parse_formula
 from linkwise.robot.robot import Scalar, Vec3, unusable
 from linkwise.runtime.chosen_names import nearest_first
 
+LARGEST = MIB
+"""Bytes of a file."""
+
 
 def toml_data(path: Path) -> dict[str, Any]:
     """Return the data of a file; raises LinkwiseError for what is not TOML or not of schema 1."""
     try:
-        text = content(path, MIB).decode("utf-8-sig").replace("\r\n", "\n")
+        text = content(path, LARGEST).decode("utf-8-sig").replace("\r\n", "\n")
         check_toml_bounds(text)
         data = tomllib.loads(text)
     except LinkwiseError:
