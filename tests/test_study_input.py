@@ -1,5 +1,6 @@
 """Studies that cannot be: each is told in a line before any work begins."""
 
+import json
 import os
 from pathlib import Path
 
@@ -7,8 +8,6 @@ import pytest
 from linkwise import LinkwiseError
 from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.study import run_study
-from linkwise.study.column_patterns import fitting
-from linkwise.study.path_fields import FieldedPath
 from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 
 BAD: dict[str, tuple[tuple[str, ...], str]] = {
@@ -121,7 +120,12 @@ def test_a_folder_of_something_else_stays(tmp_path: Path) -> None:
 
 DAMAGED = {
     "no state": ('"state": "done"', '"state": 5', "state is not 'begun' or 'done'"),
-    "no name": ('"files": [', '"files": ["..", ', "'..' among 'files' is not a file's name"),
+    "no name": ('"files": [', '"files": ["..", ', "'..' among 'files' is not a name of a study's file"),
+    "not a file of a study": (
+        '"files": [',
+        '"files": ["trials", ',
+        "'trials' among 'files' is not a name of a study's file",
+    ),
     "cut": ('"state"', "", "Expecting property name"),
     "deep": ('"done"', "[" * 100_000, "nested too deeply"),
 }
@@ -147,6 +151,21 @@ def test_a_damaged_record_of_a_trial_has_it_done_again(tmp_path: Path) -> None:
     run_study(file, out, Here())
     (out / "trials/S1-fast-1/_record.json").write_text("[" * 100_000)
     assert run_study(file, out, Here()).fresh == 1
+
+
+@pytest.mark.parametrize(
+    ("entry", "value"),
+    [("samples", "many"), ("cycles", None), ("rate", "fast"), ("warnings", "none"), ("outputs", [])],
+)
+def test_a_record_whose_entries_are_of_other_types_has_the_trial_done_again(
+    entry: str, value: object, tmp_path: Path
+) -> None:
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
+    run_study(file, out, Here())
+    record = out / "trials/S1-fast-1/_record.json"
+    record.write_text(json.dumps(json.loads(record.read_text()) | {entry: value}))
+    assert run_study(file, out, Here()).fresh == 1
+    assert run_study(file, out, Here()).fresh == 0
 
 
 def put_instead(path: Path, kind: str) -> None:
@@ -193,6 +212,19 @@ def test_what_is_no_file_in_the_place_of_a_record_is_told_and_not_read(kind: str
     assert refused.endswith("; give another --out, or remove it")
 
 
+@pytest.mark.parametrize("name", ["summary.parquet", "tests.parquet"])
+def test_a_folder_in_the_place_of_a_studys_file_is_told_before_any_work(name: str, tmp_path: Path) -> None:
+    """Of one that is made again, and of one that a former run made and would now be removed."""
+    file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
+    run_study(file, out, Here())
+    mark = json.loads((out / "study.json").read_text())
+    (out / "study.json").write_text(json.dumps(mark | {"files": [*mark["files"], name], "key": ""}))
+    (out / name).unlink(missing_ok=True)
+    (out / name).mkdir()
+    refused = refusal(file, out)
+    assert refused.startswith(f"{out / name}: this is a directory; give another --out")
+
+
 @pytest.mark.parametrize("name", ["study.json", "trials/S1-fast-1/_record.json"])
 def test_a_file_far_larger_than_a_study_writes_is_not_read(name: str, tmp_path: Path) -> None:
     file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
@@ -228,64 +260,3 @@ def test_a_folder_of_another_study_stays(tmp_path: Path) -> None:
     with pytest.raises(LinkwiseError, match="is of the study 'arms', whose trials would go"):
         run_study(other, tmp_path / "out", Here())
     assert len(list((tmp_path / "out/trials").iterdir())) == 2
-
-
-NAMES = ["tau/knee", "tau/knee/foot", "q/knee", "a" * 60, "a/" * 30]
-
-
-@pytest.mark.parametrize(
-    ("pattern", "fits"),
-    [
-        ("tau/*", NAMES[:1]),
-        ("tau/**", NAMES[:2]),
-        ("*/k*e", [NAMES[0], NAMES[2]]),
-        ("**o*t", NAMES[1:2]),
-        ("***/knee", [NAMES[0], NAMES[2]]),
-        ("*a" * 30, NAMES[3:4]),
-        ("**a" * 30 + "*", NAMES[3:4]),
-        ("*a**" * 25 + "b", None),
-        ("**" * 400_000, NAMES),
-        ("*a" * 400_000, None),
-    ],
-)
-def test_columns_that_a_pattern_fits_are_found_at_once(pattern: str, fits: list[str] | None) -> None:
-    def found() -> list[str]:
-        return fitting("'columns'", NAMES, [pattern])
-
-    limits = ProcessLimits(seconds=2, memory=1 << 28)
-    if fits is not None:
-        assert in_own_process(found, limits) == fits
-        return
-    with pytest.raises(LinkwiseError, match=r"'columns' has '.*', which no column is called; nearest are"):
-        in_own_process(found, limits)
-
-
-A, MANY = "a" * 200, [f"f{number}" for number in range(200)]
-FITS: list[tuple[str, str, dict[str, str] | str]] = [
-    ("logs/{s}/{c}_{k}.csv", "logs/S1/slow_2.csv", {"s": "S1", "c": "slow", "k": "2"}),
-    ("logs/{s}/{c}_{k}.csv", "logs/S1/part/slow_2.csv", {}),
-    ("logs/{s}/{c}_{k}.csv", "logs/S1/_2.csv", {}),
-    ("logs/{s}/{s}_{k}.csv", "logs/S1/S1_2.csv", {"s": "S1", "k": "2"}),
-    ("logs/{s}/{s}_{k}.csv", "logs/S1/S2_2.csv", {}),
-    ("{a}{b}.csv", "xy.csv", {"a": "x", "b": "y"}),
-    ("{a}{b}.csv", "xyz.csv", "in two ways, a=x, b=yz and a=xy, b=z; put folders"),
-    ("{a}_{b}_{a}", "x_y_z_x_y", {"a": "x_y", "b": "z"}),
-    ("{a}{b}{c}{d}{e}{f}{g}x{h}.csv", f"x{A}.csv", {}),
-    ("".join(f"{{{name}}}" for name in MANY) + ".csv", f"{A}.csv", dict.fromkeys(MANY, "a")),
-    ("{a}{b}{c}{d}{a}{b}{c}{d}_{a}x", f"{A}_b{A}x", "in too many ways to try them; put folders"),
-]
-
-
-@pytest.mark.parametrize(("pattern", "path", "expected"), FITS, ids=map(str, range(len(FITS))))
-def test_fields_of_a_path_are_found_or_refused_at_once(
-    pattern: str, path: str, expected: dict[str, str] | str
-) -> None:
-    def found() -> dict[str, str]:
-        return FieldedPath(pattern).fields_of(path)
-
-    limits = ProcessLimits(seconds=2, memory=1 << 28)
-    if isinstance(expected, dict):
-        assert in_own_process(found, limits) == expected
-        return
-    with pytest.raises(LinkwiseError, match=expected):
-        in_own_process(found, limits)

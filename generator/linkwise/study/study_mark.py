@@ -1,6 +1,7 @@
 """`study.json`: what a study was asked, and what came of it."""
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,10 +11,27 @@ from linkwise.errors import LinkwiseError
 from linkwise.input_file import is_file
 from linkwise.package.decode import decoded, parsed, require
 from linkwise.package.manifest import is_inside
-from linkwise.study.study_paths import read_back
+from linkwise.study.band_figure import FORMATS
+from linkwise.study.study_paths import read_back, require_own
 from linkwise.study.study_plan import StudyPlan
 from linkwise.study.trial_ledger import MARK
 from linkwise.study.trial_work import TrialOutcome
+
+STUDY_PAGE = "study.html"
+SUMMARIES, GROUPS, MEAN_CURVES, TESTS = (
+    "summary.parquet",
+    "groups.parquet",
+    "curves.parquet",
+    "tests.parquet",
+)
+"""Names of what is in the folder beside trials and figures."""
+
+
+def is_of_study(name: str) -> bool:
+    """Whether a study calls one of its files so, or a figure."""
+    return name in (STUDY_PAGE, SUMMARIES, GROUPS, MEAN_CURVES, TESTS) or name.endswith(
+        tuple(f".{kind}" for kind in FORMATS)
+    )
 
 
 @dataclass(frozen=True)
@@ -48,14 +66,21 @@ class StudyMark:
 
     @classmethod
     def read(cls, out: Path) -> "StudyMark | None":
-        """That of a study's folder, None where there is none; raises LinkwiseError for a damaged one."""
+        """That of a study's folder, None where there is none.
+
+        Raises LinkwiseError for a damaged one, and for what is no regular file in the place of one of its
+        files: those that are not made again are removed.
+        """
         path = out / MARK
         if not is_file(path):
             return None
         try:
             mark: StudyMark = decoded(cls, parsed(read_back(path)), "")
             for name in mark.files:
-                require(is_inside(name) and "/" not in name, f"{name!r} among 'files'", "a file's name")
+                is_plain = is_inside(name) and "/" not in name
+                require(is_plain and is_of_study(name), f"{name!r} among 'files'", "a name of a study's file")
+                if os.path.lexists(out / name):
+                    require_own(out / name)
         except LinkwiseError:
             raise
         except (ValueError, RecursionError) as error:

@@ -9,13 +9,12 @@ from linkwise.errors import LinkwiseError
 from linkwise.progress import Progress
 from linkwise.study.band_figure import band_figures
 from linkwise.study.comparisons import Cluster, Compared, compared
+from linkwise.study.study_mark import GROUPS, MEAN_CURVES, STUDY_PAGE, SUMMARIES, TESTS
 from linkwise.study.study_page import study_page
 from linkwise.study.study_plan import StudyPlan
 from linkwise.study.study_tables import curve_rows, group_rows, parquet, summary_rows
 from linkwise.study.trial_summary import summaries
 from linkwise.study.trial_work import TrialOutcome
-
-STUDY_PAGE = "study.html"
 
 
 def study_files(
@@ -27,11 +26,11 @@ def study_files(
         return {}, ()
     progress("together", 0, 3)
     files = {
-        "summary.parquet": parquet(summary_rows(trials)),
-        "groups.parquet": parquet(group_rows(trials)),
+        SUMMARIES: parquet(summary_rows(trials)),
+        GROUPS: parquet(group_rows(trials)),
     }
     if plan.cycles is not None:
-        files["curves.parquet"] = parquet(curve_rows(trials, plan.cycles.points))
+        files[MEAN_CURVES] = parquet(curve_rows(trials, plan.cycles.points))
     progress("together", 1, 3)
     tests: list[Compared] = []
     told: list[str] = []
@@ -43,7 +42,7 @@ def study_files(
         tests += made
         told += lacking
     if tests:
-        files["tests.parquet"] = parquet(_rows(tests))
+        files[TESTS] = parquet(_rows(tests))
     progress("together", 2, 3)
     try:
         files |= dict(band_figures(plan.figures, trials, tests))

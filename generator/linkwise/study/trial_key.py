@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +16,8 @@ from linkwise.study.trial_files import trial_files
 CHUNK = 1 << 20
 
 
-class SeenFile(NamedTuple):
+@dataclass(frozen=True)
+class SeenFile:
     """A file as it was when it was hashed."""
 
     version: str

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from linkwise.errors import LinkwiseError
 from linkwise.input_file import is_file
+from linkwise.package.decode import decoded, parsed
 from linkwise.study.study_paths import read_back
 from linkwise.study.study_plan import StudyPlan, Trial
 from linkwise.study.trial_key import SeenFile, trial_key
@@ -30,13 +31,13 @@ class TrialRecord:
 
     name: str
     key: str
-    files: dict[str, SeenFile]
+    files: Mapping[str, SeenFile]
     samples: int
     cycles: int
     rate: float
     seconds: float
     warnings: tuple[str, ...]
-    outputs: dict[str, int]
+    outputs: Mapping[str, int]
     """Bytes of the other files of its folder, by name."""
 
     def text(self) -> str:
@@ -45,19 +46,18 @@ class TrialRecord:
 
     @classmethod
     def read(cls, folder: Path) -> "TrialRecord | None":
-        """That of a folder; None where there is none that can be read.
+        """That of a folder; None where there is none that can be read, or one of other types.
 
         Raises LinkwiseError for what is no file of a record's size.
         """
         try:
             if not (folder / RECORD).exists():
                 return None
-            data = json.loads(read_back(folder / RECORD))
-            files = {path: SeenFile(*seen) for path, seen in data.pop("files").items()}
-            return cls(files=files, **data | {"warnings": tuple(data["warnings"])})
+            record: TrialRecord = decoded(cls, parsed(read_back(folder / RECORD)), "")
+            return record
         except LinkwiseError:
             raise
-        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        except (OSError, ValueError, RecursionError):
             return None
 
 
