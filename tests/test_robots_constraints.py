@@ -10,6 +10,7 @@ import urdf_text
 from answers import relative_error
 from conftest import DATA
 from linkwise import LinkwiseError, Options, generate, read_robot, read_system, write_package
+from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.package.load import import_package
 from linkwise.robot import effects
 from linkwise.robot.robot import Robot
@@ -403,6 +404,33 @@ def test_constraint_that_cannot_be_is_named(case: str, tmp_path: Path) -> None:
     assert message in str(caught.value)
     assert str(caught.value).startswith(str(FOURBAR))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "pin",
+    [
+        'type = "point"\nfirst = {{ frame = "rod", xyz = [0.3, 0, {n}] }}\nsecond = {{ frame = "rocker" }}',
+        'type = "coupling"\nterms = {{ a = 1, b = [0, -2] }}',
+    ],
+    ids=["ties", "couplings"],
+)
+def test_far_more_constraints_than_could_hold_anything_are_refused_at_once(pin: str, tmp_path: Path) -> None:
+    """Which of them follow from others takes time and memory by the square of their number."""
+    tree = FOURBAR.read_text().partition("[[constraint]]")[0]
+
+    def refused(count: int) -> str:
+        pins = "".join(f'[[constraint]]\nname = "p{n}"\n{pin.format(n=n)}\n' for n in range(count))
+        try:
+            robot_of(written(tmp_path, "pins.toml", tree + pins))
+        except LinkwiseError as error:
+            return str(error)
+        return ""
+
+    limits = ProcessLimits(seconds=8, memory=1 << 28)
+    told = "joints that move are 3, and constraints 3,000, of which 30 are the most, as each is to hold what"
+    assert told in in_own_process(lambda: refused(3_000), limits)
+    assert "30 are the most" in refused(31)
+    assert "are the most" not in refused(30)
 
 
 def test_joints_that_others_do_not_follow_cannot_be_independent(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from linkwise.robot.description import Description
 from linkwise.robot.joint_types import expand
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import Coupling, Frame, Tie
+from linkwise.robot.size import check_constraint_count
 from linkwise.robot.ties import Ends, check_ties, tied
 from linkwise.runtime.chosen_names import nearest_first
 
@@ -56,11 +57,12 @@ def constrained(
     """Return what holds among the frames and coordinates that are left.
 
     independent: those of the command line, which go before the file's. Raises LinkwiseError for a constraint
-    of which a part was cut away, and for names that are not of coordinates.
+    of which a part was cut away, for far too many, and for names that are not of coordinates.
     """
     values = {sp.Symbol(name, real=True): value for name, value in description.parameters}
     ties, lost = tied(description.ties, ends, frames, values)
     couplings, uncoupled = coupled(description.couplings, movement.motion, lock, free_mimic)
+    check_constraint_count(len(ties) + len(couplings), len(movement.coordinates))
     wanted = independent or description.independent
     if not (ties or couplings):
         if independent:
