@@ -257,11 +257,11 @@ GEAR = f"""schema = 1
 name = "right"
 link = [
   {{name = "arm", mass = 3.0, com = [0.15, 0, 0], {BODY}}},
-  {{name = "rotor", mass = 0.4, com = [0, 0, 0.01], inertia = {{xx = 4e-5, yy = 4e-5, zz = 6e-5}}}},
+  {{name = "r", mass = 0.4, com = [0, 0, 0.01], inertia = {{xx = 4e-5, yy = 4e-5, zz = 6e-5}}}},
 ]
 joint = [
   {{name = "j", parent = "base", child = "arm", axis = [0, 1, 0]}},
-  {{name = "m", parent = "arm", child = "rotor", xyz = [0.3, 0, 0], mimic = {{joint = "j", multiplier = -160}}}},
+  {{name = "m", parent = "arm", child = "r", xyz = [0.3, 0, 0], mimic = {{joint = "j", multiplier = -160}}}},
 ]
 """
 DUMBBELL = """schema = 1
