@@ -101,3 +101,20 @@ def test_of_a_log_no_more_is_fetched_than_its_store_says(
 def test_a_file_of_the_size_that_is_said_is_fetched(flood: Flood) -> None:
     with opened_here(f"http://127.0.0.1:{flood.server_port}/{ALL}/a.csv") as copy:
         assert copy.stat().st_size == ALL
+
+
+class Silent:
+    """A store that calls nothing back while it sends."""
+
+    def info(self, _: str) -> dict[str, object]:
+        return {"type": "file", "size": 10}
+
+    def get_file(self, _: str, copy: str, **__: object) -> None:
+        Path(copy).write_bytes(bytes(11))
+
+
+def test_what_a_store_sends_without_a_word_is_counted_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study_paths, "_system", lambda path: (Silent(), path))
+    told = "more comes than 10 bytes, as the store says it has"
+    with pytest.raises(LinkwiseError, match=told), opened_here("s3://lab/a.csv"):
+        pass
