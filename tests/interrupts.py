@@ -96,6 +96,8 @@ def struck(
 
 
 def main() -> int:
+    # Who begins this in the background has it ignore interrupts, and so would the studies.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     generator, ends, longest, failures = random.Random(0), Counter[str](), 0.0, 0
     with tempfile.TemporaryDirectory() as folder:
         file = write_study(Path(folder), HEAD, QUICK, CHOICES, TRIALS, subjects=3)
