@@ -480,6 +480,19 @@ def test_want_of_memory_speaks_neither_for_a_package_nor_against_it(
     assert "FAIL" not in found.values()
 
 
+def test_an_error_that_quotes_such_words_from_a_package_is_its_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: Any) -> Any:
+        yield from ()
+        raise ValueError("joint 'allocate memory' does not close")
+
+    write_package(generate(read_system("planar1"), ["numpy"]), tmp_path / "arm")
+    monkeypatch.setattr(back_end_checks, "frame_calls", refused)
+    found = {result.name: result.mark for result in check_package(tmp_path / "arm", 3)}
+    assert found["numpy: frames"] == "FAIL"
+
+
 def test_where_nothing_is_compared_nothing_is_held() -> None:
     assert compare("nothing", []).mark == "skip"
     assert compare("no numbers", [Entries("c0", np.zeros((3, 0)), np.zeros((3, 0)), 1.0)]).mark == "ok"

@@ -345,6 +345,29 @@ def test_where_one_joint_cannot_follow_another_nothing_is_asked(tmp_path: Path) 
         }
 
 
+def test_no_motion_is_asked_of_rods_that_agree_only_where_it_starts(tmp_path: Path) -> None:
+    """Five rods on one regulus hold three freedoms; as soon as the platform moves, they hold five."""
+    turns = np.arange(5) * 2 * np.pi / 5
+    low = np.stack([0.2 * np.cos(turns), 0.2 * np.sin(turns), 0.1 + 0.0 * turns], -1)
+    high = np.stack([0.5 * np.cos(turns + 0.3), 0.5 * np.sin(turns + 0.3), 2.0 + 0.0 * turns], -1)
+    rods = [
+        f"""[[constraint]]
+        name = "rod{k}"
+        type = "distance"
+        length = 1.9
+        first = {{frame = "a", xyz = {low[k].tolist()}}}
+        second = {{frame = "base", xyz = {high[k].tolist()}}}
+        """
+        for k in range(5)
+    ]
+    (tmp_path / "hung.toml").write_text(ONE_POINT + "\n".join(rods))
+    write_package(generate(read_system(tmp_path / "hung.toml"), ["numpy"]), tmp_path / "hung")
+    found = {result.name: result for result in check_package(tmp_path / "hung")}
+    assert not [result for result in found.values() if result.failed]
+    assert found["numpy: a simulated motion"].detail.startswith("what holds a loop twice does not agree")
+    assert found["numpy: shares in closed loops against least squares"].held
+
+
 @pytest.mark.parametrize(("size", "most"), [(1.0, 0.3), (1e-3, 0.006)])
 def test_contacts_are_as_near_as_links_are_short(size: float, most: float, tmp_path: Path) -> None:
     """Of an arm of 0.3 m, and of one of 0.3 mm."""

@@ -232,10 +232,8 @@ def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[Com
     try:
         compiled = CompiledPackage(manifest.name, directory / "c", MANY * results)
     except (RuntimeError, LinkwiseError, OSError) as error:
-        # A compiler's words, LinkwiseError, quote the package's own text.
-        here = isinstance(error, RuntimeError) or (isinstance(error, OSError) and is_short_of_memory(error))
         told = " ".join(str(error).split())
-        if here:
+        if isinstance(error, RuntimeError) or is_short_of_memory(error):
             return None, skipped("c: not checked", told)
         return None, Result("c: compiles", False, None, told)
     wrong = wrong_header(manifest, compiled, directory, rows, prototypes(manifest, rows))

@@ -51,8 +51,13 @@ def skipped(name: str, reason: str) -> Result:
 
 
 def is_short_of_memory(error: Exception) -> bool:
-    """Whether there was too little of it for an array, for one of torch's or for a library."""
-    return isinstance(error, MemoryError) or any(words in str(error) for words in SHORT_OF_MEMORY)
+    """Whether there was too little of it for an array, for one of torch's or for a library.
+
+    These say so as RuntimeError, OSError and ImportError; any other may quote such words from a package.
+    """
+    if isinstance(error, RuntimeError | OSError | ImportError):
+        return any(words in str(error) for words in SHORT_OF_MEMORY)
+    return isinstance(error, MemoryError)
 
 
 @dataclass(frozen=True)

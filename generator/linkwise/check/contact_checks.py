@@ -12,8 +12,8 @@ import numpy as np
 
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.contact_equations import KINDS, ContactEquations
+from linkwise.check.held_motion import condition_of, far_from_singular, held_motion, steady, with_noise
 from linkwise.check.loop_equations import LoopEquations, following
-from linkwise.check.loop_reference import condition_of, far_from_singular, held_motion, steady, with_noise
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.rounding import measured
 from linkwise.check.states import States

@@ -135,8 +135,8 @@ class Subject:
         return HeldContacts(self.manifest, there(self.tree), there(self.closed))
 
     @cached_property
-    def simulated(self) -> SimulatedMotion | None:
-        """A short motion, if there is any."""
+    def simulated(self) -> SimulatedMotion | str:
+        """A short motion, or why there is none."""
         return simulated_motion(self.manifest, there(self.tree), there(self.closed))
 
     @cached_property
