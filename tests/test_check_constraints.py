@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from linkwise import Options, check_package, generate, read_system, write_package
+from linkwise.check import simulation_checks
 from linkwise.check.contact_checks import HeldContacts
 from linkwise.check.loop_checks import loop_calls
 from linkwise.check.loop_reference import LoopReference, loop_reference
@@ -366,6 +367,22 @@ def test_no_motion_is_asked_of_rods_that_agree_only_where_it_starts(tmp_path: Pa
     assert not [result for result in found.values() if result.failed]
     assert found["numpy: a simulated motion"].detail.startswith("what holds a loop twice does not agree")
     assert found["numpy: shares in closed loops against least squares"].held
+
+
+def test_ties_that_agree_no_more_where_they_are_closed_leave_no_motion_to_compare(
+    package: Package, reference: LoopReference, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are looked at first, and again once each state has been closed."""
+    first = iter([True])
+
+    def agree(rows: np.ndarray, _: np.ndarray) -> np.ndarray:
+        return np.full(len(rows), next(first, False))
+
+    monkeypatch.setattr(simulation_checks, "_agree", agree)
+    assert package.manifest.tree is not None
+    moved = simulated_motion(package.manifest, package.manifest.tree, reference.states)
+    (result,) = simulation_calls("numpy", package.load("numpy"), moved)
+    assert (result.mark, result.detail) == ("skip", simulation_checks.HELD_TWICE)
 
 
 @pytest.mark.parametrize(("size", "most"), [(1.0, 0.3), (1e-3, 0.006)])

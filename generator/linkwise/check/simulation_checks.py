@@ -28,6 +28,9 @@ CLOSED = 1e-12
 """Of such a step, in rad and m; what is left is about its square."""
 AGREED = 3e-5
 """Of numbers of rows, by how much some may disagree that follow from others: somewhat more than `RANK`."""
+SINGULAR = "no mass matrix can be inverted here"
+HELD_TWICE = "what holds a loop twice does not agree where it moves to"
+"""Why there is no motion to compare."""
 
 
 class SimulatedMotion(NamedTuple):
@@ -41,11 +44,8 @@ class SimulatedMotion(NamedTuple):
     energies: Magnitudes
 
 
-HELD_TWICE = "what holds a loop twice does not agree where it moves to"
-
-
 class _HeldTwiceError(Exception):
-    """A motion that leads there."""
+    """Ties that do not agree where a motion has led."""
 
 
 def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion | str:
@@ -53,6 +53,13 @@ def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Sim
 
     Torques are those of a modest acceleration: of any others a light link would be thrown away.
     """
+    try:
+        return _simulated_motion(manifest, tree, states)
+    except _HeldTwiceError:
+        return HELD_TWICE
+
+
+def _simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion | str:
     recursion, n = NewtonEuler(manifest, tree), states.q.shape[1]
     own = list(tree.independent) if tree.tied else list(range(n))
 
@@ -71,7 +78,7 @@ def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Sim
         tried, mapped = tried.at(agreed), mapped[agreed]
     tried = tried.at(steady(recursion, tried.q, mapped))
     if not len(tried.q):
-        return "no mass matrix can be inverted here"
+        return SINGULAR
     sizes = np.abs(motion(tree, np.ones(n) + 0.0 * tried.q)(tried.q, tried.qd[:, own])[2]).max(axis=-1)
     calm = np.array([int(np.where(np.isfinite(sizes), sizes, np.inf).argmin())])
     q, qd, _ = tried.at(calm).motion
@@ -82,11 +89,7 @@ def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Sim
         found = _integrated(motion(tree, tau), (q, qd[:, own], np.zeros(1)))
         return dict(zip(("q", "qd", "work"), found, strict=True))
 
-    try:
-        found = measured(ends, tree)
-    except _HeldTwiceError:
-        return HELD_TWICE
-    return SimulatedMotion(q, qd, tau, *found, Magnitudes(manifest, tree))
+    return SimulatedMotion(q, qd, tau, *measured(ends, tree), Magnitudes(manifest, tree))
 
 
 def simulation_calls(name: str, model: Model, expected: SimulatedMotion | str) -> Iterator[Result]:
