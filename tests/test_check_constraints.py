@@ -297,7 +297,49 @@ def arm(size: float, *masses: float) -> str:
     return f'schema = 1\nname = "right"\nlink = [{", ".join(bodies)}]\njoint = [{", ".join(joints)}]\n'
 
 
+TWO_BARS = f"""schema = 1
+name = "right"
+link = [
+  {{name = "a", mass = 1.0, com = [0.25, 0, 0], {BODY}}},
+  {{name = "b", mass = 0.6, com = [0.25, 0, 0], {BODY}}},
+]
+joint = [
+  {{name = "ja", parent = "base", child = "a", axis = [0, 0, 1]}},
+  {{name = "jb", parent = "base", child = "b", xyz = [0.3, 0, 0], axis = [0, 0, 1]}},
+]
+[[constraint]]
+name = "gap"
+type = "distance"
+first = {{frame = "a", xyz = [0.5, 0, 0]}}
+second = {{frame = "b", xyz = [0.5, 0, 0]}}
+"""
+MICRO_GEARS = f"""schema = 1
+name = "right"
+link = [
+  {{name = "a", mass = 1.0, com = [0.1, 0, 0], {BODY}}},
+  {{name = "b", mass = 0.3, com = [0.05, 0.02, 0], {BODY}}},
+]
+joint = [
+  {{name = "n", parent = "base", child = "a", axis = [0, 1, 0]}},
+  {{name = "s", type = "prismatic", parent = "a", child = "b", axis = [1, 0, 0]}},
+]
+[[constraint]]
+name = "g"
+type = "coupling"
+"""
 RIGHT = {
+    "tips of two bars that a rod of a millimetre ties, between dead points": (
+        TWO_BARS + "length = 1e-3",
+        "numpy",
+        "auto",
+    ),
+    "the same of a tenth, which a motion leads to one": (TWO_BARS + "length = 1e-4", "numpy", "auto"),
+    "a coupling that counts micrometres": (
+        MICRO_GEARS + "terms = {s = [0, 1e6], n = [0, -1]}",
+        "numpy",
+        "auto",
+    ),
+    "one of large factors": (MICRO_GEARS + "terms = {s = [0, 1e9], n = [0, -5e9]}", "numpy", "auto"),
     "a rotor of 160 turns to one, whose angle is rounded by its size": (GEAR, "numpy", "auto"),
     "two floating bodies and a rod, of which one is light": (DUMBBELL, "numpy", "auto"),
     "an arm of ever lighter links": (

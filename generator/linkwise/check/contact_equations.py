@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.check.body_reference import COMPLEX_STEP
-from linkwise.check.loop_equations import RANK, LoopEquations
+from linkwise.check.loop_equations import RANK, TURNS_AND_SHIFTS, LoopEquations
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.entries import FrameEntry
 from linkwise.package.load import Array
@@ -19,8 +19,6 @@ NORMAL = np.array([0.2, -0.1, 0.9])
 RADIUS = 0.07
 SPACIOUS = 20.0
 """Contacts are nearer on links that reach less than 1 / this, in m."""
-TURNS_AND_SHIFTS = {"frame": (3, 3), "hinge": (2, 3), "point": (0, 3), "distance": (0, 1)}
-"""Rows of each kind of tie that hold turns, and of those behind them that hold shifts."""
 KINDS = {"held": "frame", "hinged": "hinge", "point": "point", "rolling": "point"}
 """Kinds of contacts, and of ties that have as many rows."""
 

@@ -12,6 +12,10 @@ from linkwise.package.load import Array, Model
 TOLD = "in closed loops against least squares"
 PERTURBED = 1e-3
 """How far dependent joints are moved away before they are closed again, in rad and m."""
+CHANGED = 0.1
+"""By this part of itself A_d may change on that way; else they are moved half as far."""
+HALVED = 40
+"""So often at most."""
 SETTLED = 1e-11
 """How near loops are closed again, of positions of size 1."""
 
@@ -38,11 +42,9 @@ def _entries(reference: LoopReference, what: str, found: Any) -> Entries:
 def _velocities(model: Model, reference: LoopReference) -> Iterator[Entries]:
     (q, qd, qdd), own = reference.states.motion, list(reference.independent)
     constraints = model.constraints
-    away = np.random.default_rng(6).uniform(-PERTURBED, PERTURBED, q.shape)
-    away[:, own] = 0.0
     # Least steps end where they no longer matter: a position is as near as that, not as rounding allows.
     size = np.broadcast_to(1.0 + np.abs(q).max(-1, keepdims=True), q.shape)
-    yield Entries("closed", constraints.closed(q + away), q, size * SETTLED / np.finfo(float).eps)
+    yield Entries("closed", constraints.closed(q + _away(reference)), q, size * SETTLED / np.finfo(float).eps)
     found = {
         "violation": constraints.violation(q),
         "jacobian": constraints.jacobian(q),
@@ -53,6 +55,26 @@ def _velocities(model: Model, reference: LoopReference) -> Iterator[Entries]:
         "velocity_accelerations": constraints.velocity_accelerations(q, qd).sum(-1),
     }
     yield from (_entries(reference, what, value) for what, value in found.items())
+
+
+def _away(reference: LoopReference) -> Array:
+    """Where dependent joints are moved to (samples, n), so near that Newton's method leads back.
+
+    It does where A_d, on the way, changes by a part of itself alone (Kantorovich): next to a dead point
+    another position closes the loop too, however near.
+    """
+    q, rest = reference.states.q, [k for k in range(reference.tau.shape[1]) if k not in reference.independent]
+    away = np.zeros_like(q)
+    away[:, rest] = np.random.default_rng(6).uniform(-PERTURBED, PERTURBED, (len(q), len(rest)))
+    there = reference.equations.rows(q)[..., rest]
+    inverse = np.linalg.pinv(there)
+    for _ in range(HALVED):
+        change = reference.equations.rows(q + away)[..., rest] - there
+        far = np.linalg.norm(inverse @ change, 2, (1, 2)) > CHANGED
+        if not far.any():
+            break
+        away[far] /= 2.0
+    return away
 
 
 def _shares(model: Model, reference: LoopReference) -> Iterator[Entries]:

@@ -1,6 +1,8 @@
 """phi(q) = 0 of a package's ties and couplings, from the recursion's own frames, and where it holds.
 
 Rows of A are velocities of frames at one unit velocity after the other, and their complex step is dA/dt.
+A coupling's row is divided by the largest of its factors, `units`: what it is counted in is a file's choice,
+and beside it rows of ties would be lost, or its own.
 """
 
 from collections.abc import Sequence
@@ -14,6 +16,8 @@ from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.entries import FrameEntry, RigidTree
 from linkwise.package.load import Array
 
+TURNS_AND_SHIFTS = {"frame": (3, 3), "hinge": (2, 3), "point": (0, 3), "distance": (0, 1)}
+"""Rows of each kind of tie that hold turns, and of those behind them that hold shifts."""
 STEPS = 60
 LONGEST = 0.5
 """Of a step towards closing, in rad and m."""
@@ -36,6 +40,14 @@ class LoopEquations(NamedTuple):
     def _ends(self) -> list[FrameEntry]:
         """Frames of the ties, the first and the second of each."""
         return [self.tree.frames[f] for tie in self.tree.ties for f in (tie.first, tie.second)]
+
+    @property
+    def units(self) -> Array:
+        """What each row of phi and A is divided by, (C,)."""
+        ties = [1.0] * sum(sum(TURNS_AND_SHIFTS[tie.kind]) for tie in self.tree.ties)
+        factors = ([f for _, own in coupling.terms for f in own[1:]] for coupling in self.tree.couplings)
+        largest = (max(map(abs, own), default=0.0) or 1.0 for own in factors)
+        return np.array([*ties, *largest])
 
     def violation(self, q: Array) -> Array:
         """phi, (samples, C); of small turns about axes, the sines."""
@@ -63,7 +75,7 @@ class LoopEquations(NamedTuple):
             for k, factors in coupling.terms:
                 total += polyval(q[:, k], factors)
             found.append(total[:, None])
-        return np.concatenate(found, -1)
+        return np.concatenate(found, -1) / self.units
 
     def rows(self, q: Array) -> Array:
         """A, (samples, C, n)."""
@@ -96,7 +108,7 @@ class LoopEquations(NamedTuple):
             for k, factors in coupling.terms:
                 row[:, 0, k] += polyval(q[:, k], polyder(factors))
             found.append(row)
-        return np.concatenate(found, 1)
+        return np.concatenate(found, 1) / self.units[:, None]
 
     def velocity_map(self, q: Array) -> Array:
         """G (samples, n, m) of qd = G yd, y the tree's independent joints, by least squares."""
@@ -130,7 +142,7 @@ class LoopEquations(NamedTuple):
             step = -(np.linalg.pinv(self.rows(at), rcond=RANK) @ self.violation(at)[..., None])[..., 0]
             size[moving] = np.abs(step).max(-1)
             q[moving] += step * (LONGEST / np.maximum(size[moving], LONGEST))[:, None]
-        closed: Array = q[(np.abs(self.violation(q)).max(-1) < CLOSED) & (size < SETTLED)]
+        closed: Array = q[(np.abs(self.violation(q) * self.units).max(-1) < CLOSED) & (size < SETTLED)]
         return closed
 
 

@@ -103,10 +103,11 @@ def _answers(equations: LoopEquations, motion: tuple[Array, Array, Array], tau: 
     c2 = by_unit(lambda y, yd, ydd, e: share(0.0 * yd, e), of_own)
     # A quadratic form of yd, whose central difference is its derivative; the closing convention takes half.
     c1 = by_unit(lambda y, yd, ydd, e: (share(yd + e, 0.0 * yd) - share(yd - e, 0.0 * yd)) / 4.0, of_own)
+    units = equations.units[:, None]
     found = {
-        "violation": equations.violation(q),
-        "jacobian": rows,
-        "jacobian_rate": rates,
+        "violation": equations.violation(q) * equations.units,
+        "jacobian": rows * units,
+        "jacobian_rate": rates * units,
         "velocity_map": followed.map,
         "velocity": qd,
         "acceleration": qdd,
@@ -117,11 +118,11 @@ def _answers(equations: LoopEquations, motion: tuple[Array, Array, Array], tau: 
         "c2^": c2,
         "c1^": c1,
         "g^": share(0.0 * yd, 0.0 * yd, gravity=True),
-        "lambda of links": basis @ link_forces,
+        "lambda of links": basis @ link_forces / units,
         "qdd": accelerations,
-        "lambda": (basis @ forces[..., None])[..., 0],
+        "lambda": (basis @ forces[..., None] / units)[..., 0],
     }
-    return found | _induced(equations, States(q, qd, qd), (held, onto @ rates, basis), tau)
+    return found | _induced(equations, States(q, qd, qd), (held, onto @ rates, basis / units), tau)
 
 
 def _induced(

@@ -30,6 +30,7 @@ AGREED = 3e-5
 """Of numbers of rows, by how much some may disagree that follow from others: somewhat more than `RANK`."""
 SINGULAR = "no mass matrix can be inverted here"
 HELD_TWICE = "what holds a loop twice does not agree where it moves to"
+DEAD_POINT = "it moves to where no position near by closes a loop"
 """Why there is no motion to compare."""
 
 
@@ -44,8 +45,8 @@ class SimulatedMotion(NamedTuple):
     energies: Magnitudes
 
 
-class _HeldTwiceError(Exception):
-    """Ties that do not agree where a motion has led."""
+class _NoMotionError(Exception):
+    """Why there is none, where ties do not agree or cannot be closed."""
 
 
 def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion | str:
@@ -55,8 +56,8 @@ def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Sim
     """
     try:
         return _simulated_motion(manifest, tree, states)
-    except _HeldTwiceError:
-        return HELD_TWICE
+    except _NoMotionError as error:
+        return str(error)
 
 
 def _simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion | str:
@@ -153,9 +154,11 @@ def _tied(recursion: NewtonEuler, tree: RigidTree, tau: Array) -> Rates:
             if np.abs(step).max() < CLOSED:
                 break
             rows = ties.rows(q)
+        else:
+            raise _NoMotionError(DEAD_POINT)
         mapped = following(rows, own)
         if not _agree(rows, mapped).all():
-            raise _HeldTwiceError
+            raise _NoMotionError(HELD_TWICE)
         qd = (mapped @ v[..., None])[..., 0]
         onto = np.swapaxes(np.linalg.svd(rows[..., rest])[0][..., : len(rest)], -1, -2)
         moved = held_motion(recursion, States(q, qd, qd), onto @ rows, onto @ ties.rates(q, qd), tau, own)[0]
