@@ -29,7 +29,7 @@ from linkwise import (
     read_system,
     write_package,
 )
-from linkwise.check import back_end_checks, compiled_c
+from linkwise.check import back_end_checks, compiled_c, subject
 from linkwise.check.as_generated import check_made
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.package.load import load_package, open_package
@@ -478,6 +478,16 @@ def test_want_of_memory_speaks_neither_for_a_package_nor_against_it(
     found = {result.name: result.mark for result in check_package(tmp_path / "arm", 3)}
     assert (found["numpy: frames"], found["c: not checked"]) == ("skip", "skip")
     assert "FAIL" not in found.values()
+
+
+@needs_compiler
+def test_c_that_does_not_end_fails(copy_for: Copy, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(subject, "LEAST_SECONDS", 1)
+    monkeypatch.setattr(subject, "TIMES", 0)
+    package = copy_for("c")
+    change_file(package, "c/link_1.h", "        /* Inputs. */\n", "        for (;;) { }\n", 1)
+    (wrong,) = (result for result in check_package(package, 3) if result.failed)
+    assert (wrong.name, wrong.detail) == ("c: runs to its end", "it took more than 1 s")
 
 
 def test_an_error_that_quotes_such_words_from_a_package_is_its_fault(

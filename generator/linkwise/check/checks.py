@@ -21,7 +21,7 @@ from linkwise.check.packed_layout import IndexRows
 from linkwise.check.parametric_tree import changed_values, check_bodies
 from linkwise.check.reference import Reference
 from linkwise.check.states import affordable
-from linkwise.check.subject import Subject, Way
+from linkwise.check.subject import Subject, Way, long_enough
 from linkwise.own_process import Ended, begun
 from linkwise.package.load import Model, Package, load_package, staying
 from linkwise.package.manifest import Manifest
@@ -177,7 +177,7 @@ def _results(subject: Subject) -> Iterator[Result]:
         yield skipped(f"parts of the checks{label}", LARGE)
     functions, wrong = subject.functions, False
     # A wrong function of C may write anywhere: in a process of its own, beside the back ends but native.
-    calls = begun(_c_calls(functions, f"c{label}", subject)) if functions else list
+    calls = begun(_c_calls(functions, f"c{label}", subject), long_enough()) if functions else list
     for way, model in sorted(subject.loaded.items(), key=lambda item: item[0].backend == "native"):
         name = f"{way.label}{label}"
         if way.backend == "native":

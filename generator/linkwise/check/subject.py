@@ -1,5 +1,7 @@
 """A package for given values of its parameters, and what its numbers are held against."""
 
+import math
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,12 +25,17 @@ from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion
 from linkwise.check.states import States, random_states
 from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.torque_reference import states_of_torques, torque_reference
-from linkwise.own_process import in_own_process
+from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.package.entries import PassiveEntry, RigidTree
 from linkwise.package.load import Array, Model, Package
 from linkwise.package.manifest import Manifest
 
 T = TypeVar("T")
+LEAST_SECONDS = 300
+TIMES = 20
+"""C may take so much of the processor's time, and so many times what was done before it is called."""
+UNBOUNDED = 1 << 50
+"""Bytes of memory, which are not bounded."""
 
 
 class Way(NamedTuple):
@@ -41,6 +48,11 @@ class Way(NamedTuple):
     def label(self) -> str:
         """What results are told under: of two kernels, closed forms bear the name of the back end alone."""
         return f"{self.backend} by rule" if self.kernel == "rule" else self.backend
+
+
+def long_enough() -> ProcessLimits:
+    """Time in which C that ends at all has ended, of a robot of any size on any machine."""
+    return ProcessLimits(LEAST_SECONDS + TIMES * math.ceil(time.process_time()), UNBOUNDED)
 
 
 def there(what: T | None) -> T:
@@ -173,4 +185,4 @@ class Subject:
         functions = self.functions
         if functions is None:
             return None, 0
-        return in_own_process(lambda: of("c", functions.torque))
+        return in_own_process(lambda: of("c", functions.torque), long_enough())
