@@ -92,6 +92,18 @@ FOREIGN: dict[str, tuple[str, str, str, str]] = {
         "class Kind(metaclass=carried):\n    place = 1\n\n\nclass ",
         "has a class of another kind",
     ),
+    "a product of a list": (
+        "names.py",
+        "ROBOT = ",
+        "MANY = (1.0,) * 10\nROBOT = ",
+        "does what is no arithmetic",
+    ),
+    "more signs than Python reads": (
+        "names.py",
+        "ROBOT = ",
+        f"SIGNS = {'-' * 30_000}1.0\nROBOT = ",
+        "cannot be read (it is nested too deeply)",
+    ),
     "a part that is changed": ("names.py", "ROBOT = ", "PART = {}\nPART[0] = 1\nROBOT = ", "changes a part"),
     "another meaning of a builtin": ("__init__.py", "joint_names = ", "len = ", "gives len another meaning"),
     "a call in C": (

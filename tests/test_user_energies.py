@@ -249,6 +249,10 @@ FILES = {
         "running the file failed in line 5: TypeError: name should be",
     ),
     "raised without a word": (HEAD + "assert 0", "running the file failed in line 4: AssertionError"),
+    "raised with words that cannot be said": (
+        HEAD + "class Z(Exception):\n    def __str__(self):\n        raise ValueError('x')\nraise Z",
+        "running the file failed in line 7: Z",
+    ),
     "no Python": (HEAD + "x = = 1\n", "running the file failed in line 4: SyntaxError: invalid syntax"),
     "number": (GOOD + "coordinates = [Coordinate(3)]", "the coordinate name 3 is not a string"),
     "twice": (GOOD + "coordinates = [x, x]", "the coordinate name 'x' is used twice; give each its own"),

@@ -160,8 +160,8 @@ def foreign_text(path: str, text: bytes, source: Source) -> str | None:
         # That of the runtime is compiled with Python's headers.
         in_c = ending in ("h", "c") and not path.startswith("runtime/")
         return next(foreign_includes(text.decode(), source.files), None) if in_c else None
-    except (SyntaxError, ValueError, RecursionError) as error:
-        return f"cannot be read ({' '.join(str(error).split())})"
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:  # the last by Python's parser
+        return f"cannot be read ({' '.join(str(error).split()) or 'it is nested too deeply'})"
 
 
 def _python(grammar: Grammar, text: bytes) -> Iterator[str]:
@@ -258,8 +258,8 @@ def _beside(node: ast.AST, grammar: Grammar, known: ModuleNames) -> str:
         case ast.BinOp(op=ast.Div()) if grammar is LOADING:
             return "does what is no arithmetic"  # but for OWN_C: of a path, that leads elsewhere
         case ast.BinOp(op=operator):
-            of_text = not isinstance(operator, ast.Div) and (_is_text(node.left) or _is_text(node.right))
-            if of_text or not isinstance(operator, OPERATORS):
+            several = not isinstance(operator, ast.Div) and any(map(_is_several, (node.left, node.right)))
+            if several or not isinstance(operator, OPERATORS):
                 return "does what is no arithmetic"
             # Of numbers alone a power may be as long as memory; so may products of products, or text.
             if isinstance(operator, ast.Pow) and _named(node.left) <= known.fixed:
@@ -277,8 +277,11 @@ def _beside(node: ast.AST, grammar: Grammar, known: ModuleNames) -> str:
     return ""
 
 
-def _is_text(node: ast.AST) -> bool:
-    return isinstance(node, ast.Constant) and isinstance(node.value, str | bytes)
+def _is_several(node: ast.AST) -> bool:
+    """Whether it is text or a list, of which a product with a number may be as long as memory."""
+    if isinstance(node, ast.Constant):
+        return isinstance(node.value, str | bytes)
+    return isinstance(node, ast.Tuple | ast.List | ast.Dict | ast.JoinedStr)
 
 
 def _may_import(grammar: Grammar, module: str, name: str, level: int) -> bool:

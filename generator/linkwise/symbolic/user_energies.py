@@ -77,12 +77,19 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
 
 def _said(error: BaseException, path: str) -> str:
     """The last line of the user's file that an error passed through, and what the error is."""
-    said = str(error)
+    said = _text_of(error)
     lines = [at for frame, at in walk_tb(error.__traceback__) if frame.f_code.co_filename == path]
     if isinstance(error, SyntaxError) and error.filename == path:
         lines, said = [error.lineno] if error.lineno else [], error.msg
     place = f" in line {lines[-1]}" if lines else ""
     return f"{place}: {type(error).__name__}{': ' if said else ''}{said}"
+
+
+def _text_of(error: BaseException) -> str:
+    try:
+        return str(error)
+    except Exception:  # the user's own class may raise here, too
+        return ""
 
 
 def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[LinkEnergy, ...]) -> None:
