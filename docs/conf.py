@@ -6,7 +6,7 @@ from pathlib import Path
 
 import sphinxcontrib.typer
 from linkwise.cli.app import command_of
-from linkwise.version import VERSION
+from linkwise_runtime.version import VERSION
 from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for generated.planar3

@@ -11,12 +11,14 @@ import subprocess
 import sys
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy as sp
+from changed_code import change_code
 from conftest import DATA, needs_compiler
 from linkwise import (
     Coordinate,
@@ -35,7 +37,8 @@ from linkwise.check.compare import Entries, Result, compare
 from linkwise.package.load import load_package, open_package
 from linkwise.package.manifest import LARGEST, Manifest, is_too_large
 from linkwise.package.write import check_target
-from linkwise.version import VERSION
+from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.version import VERSION
 
 
 @pytest.fixture(scope="session")
@@ -549,11 +552,13 @@ def test_only_what_is_missing_here_is_left_out(
 
 
 @pytest.mark.usefixtures("unread")
-def test_a_package_that_cannot_be_imported_or_asked_fails(package: Path) -> None:
-    change_file(package, "runtime/dynamics.py", "class Dynamics", "def broken(:\nclass Dynamics")
+def test_a_package_that_cannot_be_imported_or_asked_fails(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    change_file(package, "names.py", "ROBOT = ", "def broken(:\nROBOT = ")
     assert marks(package) == {"hashes": "ok", "texts": "ok", "import": "FAIL"}
-    change_file(package, "runtime/dynamics.py", "def broken(:\n", "")
-    change_file(package, "runtime/dynamics.py", "def partial_torque", "def full_torque")
+    change_file(package, "names.py", "def broken(:\n", "")
+    monkeypatch.delattr(Dynamics, "partial_torque")
     assert marks(package)["numpy: coefficients and torques"] == "FAIL"
 
 
@@ -631,9 +636,11 @@ def test_a_lagrangian_that_is_not_the_one_that_a_user_wrote_fails(tmp_path: Path
     ],
     ids=["a wrong factor", "a part left out"],
 )
-def test_graphs_of_parts_are_run_against_the_recursion(old: str, new: str, copy_for: Copy) -> None:
-    package = copy_for("autograd")
-    change_file(package, "runtime/recorded/recorded_torques.py", old, new)
+def test_graphs_of_parts_are_run_against_the_recursion(
+    old: str, new: str, passing: Copy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = passing("autograd")
+    change_code(monkeypatch, import_module("linkwise_runtime.recorded.recorded_torques"), old, new)
     failing = {name for name, mark in marks(package).items() if mark == "FAIL"}
     assert failing == {"autograd: graphs of parts of tau_ij against Newton-Euler recursion"}
 
@@ -709,21 +716,31 @@ def test_what_is_right_for_the_parameters_own_values_alone_fails(
     assert marks(package)[failing] == "FAIL"
 
 
-def test_a_runtime_file_that_is_not_linkwises_own_fails(package: Path) -> None:
-    change_file(package, "runtime/arguments.py", "import ", "import  ", 1)
-    wrong = [result for result in check_package(package, 3) if result.failed]
+@pytest.fixture
+def standing_alone(tmp_path: Path) -> Path:
+    """A package that carries its runtime."""
+    package = tmp_path / "planar2"
+    write_package(generate(read_system("planar2"), ["numpy"], vendor_runtime=True), package)
+    assert not any(result.failed for result in check_package(package, 3))
+    return package
+
+
+def test_a_runtime_file_that_is_not_linkwises_own_fails(standing_alone: Path) -> None:
+    change_file(standing_alone, "linkwise_runtime/arguments.py", "import ", "import  ", 1)
+    wrong = [result for result in check_package(standing_alone, 3) if result.failed]
     assert [(result.name, result.detail.split(" is ")[0]) for result in wrong] == [
-        ("texts", "runtime/arguments.py")
+        ("texts", "linkwise_runtime/arguments.py")
     ]
 
 
-def test_a_listed_file_of_the_runtime_that_linkwise_does_not_have_fails(package: Path) -> None:
-    (package / "runtime/deep").mkdir()
-    (package / "runtime/deep/helper.py").touch()
+def test_a_listed_file_of_the_runtime_that_linkwise_does_not_have_fails(standing_alone: Path) -> None:
+    file, package = "linkwise_runtime/deep/helper.py", standing_alone
+    (package / file).parent.mkdir()
+    (package / file).touch()
     digest = hashlib.sha256(b"").hexdigest()
-    change_manifest(package, lambda data: data["files"].update({"runtime/deep/helper.py": digest}))
+    change_manifest(package, lambda data: data["files"].update({file: digest}))
     (wrong,) = (result for result in check_package(package, 3) if result.failed)
-    assert (wrong.name, wrong.detail.split(" is ")[0]) == ("texts", "runtime/deep/helper.py")
+    assert (wrong.name, wrong.detail.split(" is ")[0]) == ("texts", file)
 
 
 @pytest.mark.usefixtures("unread")
@@ -739,8 +756,8 @@ def test_a_listed_file_of_the_runtime_that_linkwise_does_not_have_fails(package:
         ("__init__.py", "m_LINK is a mass", 'm_LINK is"""\n    allow_unphysical = True\n    """'),
         (
             "names.py",
-            "from .runtime.structure import",
-            "from .runtime.arguments import *; from .runtime.structure import",
+            "from linkwise_runtime.structure import",
+            "from linkwise_runtime.arguments import *; from linkwise_runtime.structure import",
         ),
         ("names.py", "            lambda p: (", "            lambda p: 1 and ("),
         ("tree.py", "lambda xp, p: ", "lambda xp, p: 1.0 * "),
@@ -766,7 +783,9 @@ def test_of_another_version_it_is_said_what_was_not_checked(package: Path) -> No
     change_manifest(package, lambda data: data["checksums"].update(generator=digest))
     (made,) = (result for result in check_package(package, 3) if result.name == "made")
     assert made.mark == "skip"
-    assert made.detail.startswith("runtime/, __init__.py, names.py and tree.py were not checked")
+    assert made.detail.startswith(
+        "__init__.py, names.py, tree.py and what it carries of the runtime were not"
+    )
 
 
 def test_energies_that_are_defined_for_some_positions_only_are_checked_there(tmp_path: Path) -> None:
@@ -797,12 +816,12 @@ def test_c_alone_is_compiled_and_held_against_what_there_is(spec: str, tmp_path:
 
 
 @pytest.mark.usefixtures("unread")
-def test_off_the_path_not_even_rounding_passes(tmp_path: Path) -> None:
+def test_off_the_path_not_even_rounding_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "cart"
     write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["numpy"]), package)
     assert marks(package)["numpy: tau_ij = 0 off the path"] == "ok"
     zeros = "self._backend.zeros(values, 1)"
-    change_file(package, "runtime/dense.py", zeros, f"{zeros} + 1e-18")
+    change_code(monkeypatch, import_module("linkwise_runtime.dense"), zeros, f"{zeros} + 1e-18")
     assert marks(package)["numpy: tau_ij = 0 off the path"] == "FAIL"
 
 

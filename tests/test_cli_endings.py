@@ -14,7 +14,7 @@ from linkwise import progress
 from linkwise.cli import app
 from linkwise.errors import LinkwiseError
 from linkwise.extras import LEAST_ADDRESSES
-from linkwise.version import VERSION
+from linkwise_runtime.version import VERSION
 from motion_logs import PLANAR3, smooth, write_csv
 from test_names import chain
 

@@ -15,7 +15,7 @@ import pytest
 import urdf_text
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
-from linkwise.version import VERSION
+from linkwise_runtime.version import VERSION
 from needed import needs
 
 pytestmark = [pytest.mark.ship, needs("cmake", "cc", "c++")]
@@ -212,7 +212,7 @@ def test_a_file_of_the_package_that_is_gone_or_changed_by_hand_is_made_again(
     before = {path: path.read_bytes() for path in package.rglob("*") if path.is_file()}
     for name in ("arm.h", "mass.h", "arm.c"):
         (package / "c" / name).unlink()
-    (package / "c/tree.h").write_text("#error changed by hand\n")
+    (package / "c/linkwise/tree.h").write_text("#error changed by hand\n")
     assert "Generating the dynamics of arm" in project.make()
     assert {path: path.read_bytes() for path in package.rglob("*") if path.is_file()} == before
     said = project.make()

@@ -33,8 +33,8 @@ from linkwise.identification.pseudo_inertia import pseudo_inertia
 from linkwise.identification.urdf_file import urdf_text
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
-from linkwise.runtime.rule.joint_tree import Bodies
-from linkwise.runtime.rule.regressors import inertial_parameters
+from linkwise_runtime.rule.joint_tree import Bodies
+from linkwise_runtime.rule.regressors import inertial_parameters
 from motion_logs import write_csv
 from typer.testing import CliRunner
 from urdf_text import joint, link, robot

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
-from linkwise.runtime.quantity_axes import QUANTITIES
-from linkwise.runtime.units import inertial, written
+from linkwise_runtime.quantity_axes import QUANTITIES
+from linkwise_runtime.units import inertial, written
 
 xr = pytest.importorskip("xarray")
 

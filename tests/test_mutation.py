@@ -21,23 +21,24 @@ from mutation.verdicts import END, HEAD, MARK, Record, explained
 HOUSE = {
     "generator/linkwise/__init__.py": "",
     "generator/linkwise/errors.py": "def kept(a):\n    return a + 1\n\n\ndef lost(a):\n    return a * 3\n",
-    "generator/linkwise/runtime/units.py": "def copied(a):\n    return a - 2\n",
+    "generator/linkwise_runtime/__init__.py": "",
+    "generator/linkwise_runtime/units.py": "def copied(a):\n    return a - 2\n",
     "templates/a.txt.j2": "",
     "docs/trust.md": f"before\n{MARK}an older table\n{END}after\n",
     "tests/test_one.py": """
 import importlib.util, pathlib, shutil, subprocess, sys
-import linkwise
+import linkwise_runtime
 from linkwise.errors import kept, lost
-HERE = pathlib.Path(linkwise.__file__).parent
+HERE = pathlib.Path(linkwise_runtime.__file__).parent
 
 def test_program():
     program = "from linkwise.errors import kept; print(kept(1))"
     assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout == "2\\n"
 
 def test_copy(tmp_path):
-    (tmp_path / "runtime").mkdir()
-    shutil.copy(HERE / "runtime/units.py", tmp_path / "runtime/units.py")
-    spec = importlib.util.spec_from_file_location("copied", tmp_path / "runtime/units.py")
+    (tmp_path / "linkwise_runtime").mkdir()
+    shutil.copy(HERE / "units.py", tmp_path / "linkwise_runtime/units.py")
+    spec = importlib.util.spec_from_file_location("copied", tmp_path / "linkwise_runtime/units.py")
     spec.loader.exec_module(module := importlib.util.module_from_spec(spec))
     assert module.copied(5) == 3
 

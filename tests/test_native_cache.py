@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 from conftest import needs_compiler
 from linkwise.package.load import import_package
-from linkwise.runtime.native import native_build, native_cache, native_compiler, native_process
-from linkwise.runtime.native.native_build import Sources, library
-from linkwise.runtime.native.native_cache import cache_directory, is_whole, locked
-from linkwise.runtime.native.native_library import function
+from linkwise_runtime.native import native_build, native_cache, native_compiler, native_process
+from linkwise_runtime.native.native_build import Sources, library
+from linkwise_runtime.native.native_cache import cache_directory, is_whole, locked
+from linkwise_runtime.native.native_library import function
 
 pytestmark = needs_compiler
 

@@ -1,6 +1,5 @@
 """What the calls of a package take for a motion: every kind that leaves no doubt, and no other."""
 
-import ast
 import shutil
 from collections.abc import Callable
 from copy import deepcopy
@@ -8,10 +7,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import linkwise
 import numpy as np
 import pytest
 from conftest import needs_compiler
+from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
 
 torch = pytest.importorskip("torch")
@@ -299,61 +298,13 @@ def test_a_field_that_a_robot_has_none_of_is_empty_but_an_array(
 
 
 REST = np.zeros(3), np.zeros(3)
-RECORDS: dict[str, Callable[[Any, Any], Any]] = {
-    "a load": lambda robot, p: robot.induced_accelerations(*REST, REST[0], loads=p.AppliedLoad(2, [0, 1, 0])),
-    "loads": lambda robot, p: robot.induced_accelerations(
-        *REST, REST[0], loads=[[p.AppliedLoad(1, [0, 1, 0])], p.AppliedLoad("link3", [1, 0, 0])]
-    ),
-    "loads of labels": lambda robot, p: (
-        robot.labelled("induced_accelerations", *REST, REST[0], loads=[p.AppliedLoad(2, [0, 1, 0])]).loads
-    ),
-    "loads of a simulation": lambda robot, p: (
-        robot.simulate(*REST, [0.0, 0.01], loads=lambda t, q, qd: [p.AppliedLoad(2, [0, 1, 0])]).q
-    ),
-    "a contact": lambda robot, p: (
-        robot.constrained(
-            contacts=[p.Contact("link3", "point", (0.25, 0.0, 0.0))], at=[0.3, 0.5, 0.7]
-        ).independent
-    ),
-    "natural coefficients": lambda robot, p: robot.partial_impedance(
-        p.Natural(2.0), p.Natural(plus=3.0), 4.0
-    )(*REST, p.Target([0.1, 0.2, 0.3])),
-    "a frame": lambda robot, p: robot.partial_impedance(
-        frame=p.FrameImpedance("link3", p.Natural(plus=1.0), stiffness=2.0, rows=("x", "y"))
-    )(np.array([0.3, 0.5, 0.7]), REST[1], p.Target(pose=np.eye(4))),
-}
-
-
-@pytest.mark.parametrize("case", RECORDS)
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_records_of_another_package_are_taken(
-    backend: str, case: str, package_of: Callable[[str], ModuleType], planar3_again: ModuleType
-) -> None:
-    own, robot = package_of("planar3"), package_of("planar3").load(backend)
-    if case == "loads of labels":
-        pytest.importorskip("xarray")
-    assert planar3_again.AppliedLoad is not own.AppliedLoad
-    expected, found = (RECORDS[case](robot, package) for package in (own, planar3_again))
-    for one, other in zip(expected, found, strict=True):
-        np.testing.assert_array_equal(np.asarray(other), np.asarray(one))
-
-
-def test_bodies_and_graphs_of_another_package_are_taken(
-    package_of: Callable[[str], ModuleType], planar3_again: ModuleType
-) -> None:
-    own, other = package_of("planar3"), planar3_again
-    doubled = [p.Bodies(*(2.0 * np.asarray(a) for a in p.load().backend.rule.bodies())) for p in (own, other)]
-    torques = [own.load("numpy", bodies=bodies).partial_torque(*MOTION) for bodies in doubled]
-    np.testing.assert_array_equal(*torques)
-    part, same, another = (p.load("autograd").graph(0, j) for p, j in ((own, 2), (own, 1), (other, 1)))
-    assert part.shared_with(another) == part.shared_with(same) != ()
 
 
 @pytest.fixture(scope="module")
 def planar3_again(
     directory_of: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory
 ) -> ModuleType:
-    """The package of the same robot with a runtime of its own."""
+    """The same package in another place."""
     return import_package(
         shutil.copytree(directory_of("planar3"), tmp_path_factory.mktemp("again") / "planar3")
     )
@@ -379,24 +330,12 @@ def test_a_record_that_is_no_target_is_refused(package_of: Callable[[str], Modul
         controller(*REST, package.Natural())
 
 
-def test_the_runtime_asks_of_no_argument_whether_its_class_is_its_own(
-    package_of: Callable[[str], ModuleType],
-) -> None:
-    """Each package has classes of its own: `is_like` asks what an argument has."""
-    runtime = Path(linkwise.__file__).parent / "runtime"
-    found = vars(package_of("planar3")).values()
-    public = {one.__name__ for one in found if isinstance(one, type) and ".runtime." in one.__module__}
-    public |= {"Constraints", "TorqueGraph"}
-    assert {"AppliedLoad", "Contact", "Natural", "FrameImpedance", "Target", "Bodies"} <= public
-    asked = {
-        f"{path.name}: {name.id}"
-        for path in runtime.rglob("*.py")
-        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "isinstance"
-        for name in ast.walk(call.args[1])
-        if isinstance(name, ast.Name)
-    }
-    assert not {one for one in asked if one.split(": ")[1] in public}
+def test_of_each_class_there_is_one(package_of: Callable[[str], ModuleType], tmp_path: Path) -> None:
+    """Also in a package that carries its runtime, once linkwise has opened it: its copy is the library's."""
+    write_package(generate(read_system("planar2"), ["numpy"], vendor_runtime=True), tmp_path / "planar2")
+    packages = package_of("planar3"), package_of("torso"), import_package(tmp_path / "planar2")
+    for name in ("AppliedLoad", "Bodies", "Contact", "FrameImpedance", "Natural", "Target"):
+        assert len({getattr(package, name) for package in packages}) == 1, name
 
 
 @pytest.mark.parametrize("backend", [b for b in BACKENDS if b != "autograd"])

@@ -11,7 +11,7 @@ from answers import relative_error
 from conftest import DATA, PANDA, needs_compiler
 from linkwise import Coordinate, LinkEnergy, energy_system, generate, write_package
 from linkwise.package.load import import_package
-from linkwise.runtime.sums.inertia_solve import solved
+from linkwise_runtime.sums.inertia_solve import solved
 
 torch = pytest.importorskip("torch")
 
@@ -86,7 +86,7 @@ def test_christoffel_symbols_of_many_samples_are_slopes_of_the_mass_matrix(
 ) -> None:
     """In pieces of four samples, of which the last is short."""
     package = spherical if robot == "spherical" else package_of(robot)
-    model, summed = package.load("numpy"), import_module(f"{package.__name__}.runtime.sums.summed")
+    model, summed = package.load("numpy"), import_module("linkwise_runtime.sums.summed")
     monkeypatch.setattr(summed, "AT_ONCE", 4 * model.n * sum(model.structure.sizes))
     q = motion_of(model, 11)[0]
     found, steps = model.christoffel(q), 1e-5 * np.eye(model.n)

@@ -15,7 +15,7 @@ from linkwise.expression.expression_graph import FUNCTIONS as OF_GRAPHS
 from linkwise.package.emitted_text import FUNCTIONS, Source, foreign_text
 from linkwise.package.load import open_package
 from linkwise.package.manifest import FILE
-from linkwise.version import VERSION
+from linkwise_runtime.version import VERSION
 
 FOREIGN: dict[str, tuple[str, str, str, str]] = {
     "a call in closed forms": (
@@ -63,8 +63,8 @@ FOREIGN: dict[str, tuple[str, str, str, str]] = {
     "a part of the runtime that runs programs": (
         "energies/link_1.py",
         "from typing import Any",
-        "from typing import Any\nfrom ..runtime.native.native_process import run_all",
-        "imports run_all from ..runtime.native.native_process",
+        "from typing import Any\nfrom linkwise_runtime.native.native_process import run_all",
+        "imports run_all from linkwise_runtime.native.native_process",
     ),
     "a call between names": ("names.py", "ROBOT = ", "print()\nROBOT = ", "names print"),
     "a comprehension in the tree": ("tree.py", "TREE = ", "[0 for TREE in ()]\nTREE = ", "has ListComp"),
@@ -118,7 +118,12 @@ FOREIGN: dict[str, tuple[str, str, str, str]] = {
         "        real (*sine)(void) = abort; /* Inputs. */\n",
         "calls real",
     ),
-    "a header of C": ("c/planar2.c", '#include "sines.h"', "#include <stdlib.h>", "has #include <stdlib.h>"),
+    "a header of C": (
+        "c/planar2.c",
+        '#include "linkwise/sines.h"',
+        "#include <stdlib.h>",
+        "has #include <stdlib.h>",
+    ),
     "names pasted in C": (
         "c/planar2.c",
         "#define WANT_TORQUE\n",
@@ -217,7 +222,7 @@ FOREIGN: dict[str, tuple[str, str, str, str]] = {
         '#define WANT_TORQUE\n#include "math.h"\n',
         'has #include "math.h", which is not listed',
     ),
-    "a changed runtime": ("runtime/structure.py", "import ", "import  ", "is not that of linkwise"),
+    "a changed header": ("c/linkwise/rows.h", "real", "real ", "is not that of linkwise"),
 }
 
 

@@ -4,6 +4,8 @@ import json
 import os
 import re
 import shutil
+import subprocess
+import sys
 import tarfile
 import zipfile
 from pathlib import Path, PurePosixPath
@@ -12,12 +14,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from installation import ROOT, Environment, archive_of_sources, copied, empty_environment, wheel_of
-from linkwise.version import VERSION
+from linkwise import generate, read_system, write_package
+from linkwise_runtime.version import VERSION
 from needed import needs
 from pages import PAGES, blocks
 
 pytestmark = pytest.mark.ship
 CORE_MEGABYTES = 200
+RUNNING_MEGABYTES = 90
 HELP_SECONDS = 0.5
 MOTION = ([0.3, -0.7], [1.0, 0.5], [2.0, -3.0])
 
@@ -70,7 +74,8 @@ def test_the_wheel_has_the_generator_its_templates_and_licence_and_nothing_else(
         assert wheel.read(f"{record}/licenses/LICENSE") == (ROOT / "LICENSE").read_bytes()
         metadata = wheel.read(f"{record}/METADATA").decode()
     assert "License-Expression: Apache-2.0\n" in metadata
-    generator = {name for name in files_below(ROOT / "generator") if "__pycache__" not in name}
+    kept = {"linkwise_runtime/LICENSE", "linkwise_runtime/pyproject.toml"}  # of the runtime's own wheel
+    generator = {name for name in files_below(ROOT / "generator") if "__pycache__" not in name} - kept
     templates = {f"linkwise/templates/{name}" for name in files_below(ROOT / "templates")}
     assert parts == generator | templates
     assert {PurePosixPath(name).suffix for name in parts} == {
@@ -113,15 +118,53 @@ def test_help_comes_within_half_a_second(clean: Environment, tmp_path: Path) -> 
 
 
 def test_the_core_alone_is_small(clean: Environment) -> None:
-    held = 0
-    for folder, _, files in os.walk(clean.packages, followlinks=True):
-        # `python -O` leaves files of its own beside what pip compiles.
-        held += sum(os.stat(Path(folder, file)).st_size for file in files if ".opt-" not in file)
-    assert 20e6 < held <= CORE_MEGABYTES * 1e6
+    assert 20e6 < size_of(clean) <= CORE_MEGABYTES * 1e6
+
+
+def size_of(environment: Environment) -> int:
+    """Bytes of all that is installed; `python -O` leaves files of its own beside what pip compiles."""
+    return sum(
+        os.stat(Path(folder, file)).st_size
+        for folder, _, files in os.walk(environment.packages, followlinks=True)
+        for file in files
+        if ".opt-" not in file
+    )
+
+
+@pytest.mark.parametrize("carried", [False, True], ids=["the runtime's wheel", "a copy in the package"])
+def test_a_package_runs_where_there_is_numpy_and_its_runtime_alone(carried: bool, tmp_path: Path) -> None:
+    machine = empty_environment(tmp_path / "machine")
+    machine.link(["numpy"])
+    if not carried:
+        sources = copied(tmp_path / "checkout") / "generator/linkwise_runtime"
+        machine.install(wheel_of(sources, tmp_path / "wheel"))
+    robot = ROOT / "examples/setuptools/arm.urdf"
+    files = generate(read_system(robot), ["numpy"], "arm", vendor_runtime=carried)
+    write_package(files, tmp_path / "arm")
+    program = f"import arm; print(*arm.load('numpy').partial_torque(*{MOTION}).ravel())"
+    shares = np.array(machine.run("python", "-c", program, folder=tmp_path).split(), float)
+    assert shares == pytest.approx(torques_by_pinocchio(robot).ravel(), rel=1e-12)
+    asked = "from importlib.util import find_spec as f; print(*map(f, ('sympy', 'torch', 'linkwise')))"
+    assert machine.run("python", "-c", asked, folder=tmp_path).split() == ["None"] * 3
+    assert 20e6 < size_of(machine) <= RUNNING_MEGABYTES * 1e6
+
+
+def test_the_runtime_refuses_packages_of_another_version_in_one_line(tmp_path: Path) -> None:
+    files = generate(read_system("planar1"), ["numpy"], "arm")
+    files["__init__.py"] = files["__init__.py"].replace(f'require("{VERSION}")', 'require("9.1.0")')
+    write_package(files, tmp_path / "arm")
+    done = subprocess.run(
+        [sys.executable, "-c", "import arm"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    last = done.stderr.splitlines()[-1]
+    assert last == (
+        f"ImportError: this package is made for linkwise_runtime 9.1.0, but {VERSION} is installed: generate "
+        "it again, or install linkwise-runtime 9.1.0 or a later one of 9.1"
+    )
 
 
 def test_the_version_is_written_once(tmp_path: Path) -> None:
-    history = {"CHANGELOG.md", "docs/speed.md", "generator/linkwise/version.py"}
+    history = {"CHANGELOG.md", "docs/speed.md", "generator/linkwise_runtime/version.py"}
     literal = re.compile(rf"(?<![\d.]){re.escape(VERSION)}(?![\d.])".encode())
     folder = copied(tmp_path / "checkout")
     found = {name for name in files_below(folder) if literal.search((folder / name).read_bytes())}

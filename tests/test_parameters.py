@@ -15,7 +15,7 @@ from linkwise.cli.inspect import inspection, table
 from linkwise.package.load import import_package
 from linkwise.robot import mass
 from linkwise.robot.description import Body
-from linkwise.runtime import parameter_values
+from linkwise_runtime import parameter_values
 from urdf_text import chain, joint, link, robot
 
 torch = pytest.importorskip("torch")

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-HOUSE = Path(__file__).parents[1] / "generator/linkwise"
+ROOT = Path(__file__).parents[1]
+HOUSE = ROOT / "generator"
 
 ROOMS = (
     "cli",
@@ -29,7 +30,6 @@ ROOMS = (
     "robot",
     "output",
     "own_process",
-    "runtime",
     "plotstyle",
     "extras",
     "progress",
@@ -37,7 +37,7 @@ ROOMS = (
     "makers",
     "errors",
     "escape",
-    "version",
+    "linkwise_runtime",
 )
 """From the top of the house to its ground: a room imports from rooms below it only."""
 
@@ -55,8 +55,9 @@ RUNTIME = (
     "rule",
     "",
 )
-"""The rooms inside runtime, by the same rule; at the ground, what every package has."""
+"""The rooms inside linkwise_runtime, by the same rule; at the ground, what every package imports."""
 
+DISTRIBUTIONS = ("linkwise", "linkwise_runtime")
 FACE = {"__init__", "__main__"}
 """Public names and nothing else: they may look into every room."""
 
@@ -65,7 +66,7 @@ MODULES = sorted(path for path in HOUSE.rglob("*.py") if path.name != "__init__.
 
 def name_of(path: Path) -> str:
     parts = path.relative_to(HOUSE).with_suffix("").parts
-    return ".".join(("linkwise", *(part for part in parts if part != "__init__")))
+    return ".".join(part for part in parts if part != "__init__")
 
 
 def imports(path: Path) -> Iterator[str]:
@@ -73,19 +74,21 @@ def imports(path: Path) -> Iterator[str]:
     package = name_of(path).split(".")[: -1 if path.name != "__init__.py" else None]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name.split(".")[0] == "linkwise")
+            yield from (alias.name for alias in node.names if alias.name.split(".")[0] in DISTRIBUTIONS)
         elif isinstance(node, ast.ImportFrom):
             start = package[: len(package) - node.level + 1] if node.level else []
             source = ".".join([*start, *(node.module or "").split(".")]).rstrip(".")
-            if source.split(".")[0] == "linkwise":
+            if source.split(".")[0] in DISTRIBUTIONS:
                 for alias in node.names:
-                    inner = HOUSE.joinpath(*source.split(".")[1:], alias.name)
+                    inner = HOUSE.joinpath(*source.split("."), alias.name)
                     is_module = inner.with_suffix(".py").is_file() or inner.is_dir()
                     yield f"{source}.{alias.name}" if is_module else source
 
 
 def room_of(module: str) -> str:
-    return [*module.split("."), "__init__"][1]
+    return (
+        "linkwise_runtime" if module.startswith("linkwise_runtime") else [*module.split("."), "__init__"][1]
+    )
 
 
 def all_files() -> list[Path]:
@@ -97,17 +100,21 @@ def test_every_room_is_in_the_list() -> None:
 
 
 def test_the_page_shows_the_rooms_in_this_order() -> None:
-    page = (HOUSE.parents[1] / "docs/house.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/house.md").read_text(encoding="utf-8")
     table = [line.split("|") for line in page.splitlines() if line.startswith("| `") and "`make " not in line]
     rooms = {name.removesuffix(".py"): row[2] for row in table for name in re.findall(r"`([\w.]+)`", row[1])}
     assert tuple(rooms) == ROOMS
-    assert re.findall(r"`(\w+)`", rooms["runtime"]) == [*filter(None, RUNTIME), "c"]
+    assert re.findall(r"`(\w+)`", rooms["linkwise_runtime"]) == [*filter(None, RUNTIME)]
 
 
 def test_what_is_installed_has_every_room() -> None:
-    settings = tomllib.loads((HOUSE.parents[1] / "pyproject.toml").read_text(encoding="utf-8"))
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     folders = {name_of(path) for path in HOUSE.rglob("__init__.py")}
     assert set(settings["tool"]["setuptools"]["packages"]) == folders | {"linkwise.templates"}
+    own = tomllib.loads((HOUSE / "linkwise_runtime/pyproject.toml").read_text(encoding="utf-8"))
+    runtime = {name for name in folders if name.startswith("linkwise_runtime")}
+    assert set(own["tool"]["setuptools"]["packages"]) == runtime
+    assert (HOUSE / "linkwise_runtime/LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
 
 
 @pytest.mark.parametrize("path", all_files(), ids=name_of)
@@ -148,11 +155,11 @@ def test_every_class_name_is_used_once() -> None:
     assert not [name for name, count in counts.items() if count > 1]
 
 
-@pytest.mark.parametrize("path", sorted((HOUSE / "runtime").rglob("*.py")), ids=name_of)
+@pytest.mark.parametrize("path", sorted((HOUSE / "linkwise_runtime").rglob("*.py")), ids=name_of)
 def test_inside_the_runtime_too_imports_run_downwards_only(path: Path) -> None:
-    folder = HOUSE / "runtime"
+    folder = HOUSE / "linkwise_runtime"
     own = path.parent.relative_to(folder).as_posix().removeprefix(".")
     for module in imports(path):
-        inner = module.split(".")[2:]
+        inner = module.split(".")[1:]
         other = inner[0] if (folder / inner[0]).is_dir() else ""
         assert RUNTIME.index(other) >= RUNTIME.index(own), f"{name_of(path)} imports {module}"

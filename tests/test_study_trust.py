@@ -77,14 +77,15 @@ def test_python_beside_a_study_is_run_only_where_that_is_asked_for_and_then_told
 
 
 def test_a_package_of_another_version_is_not_run_by_a_study(tmp_path: Path) -> None:
-    """Its runtime is not at hand to compare with, and may do anything."""
+    """What it carries of its runtime is not at hand to compare with, and may do anything."""
     file, mark = with_program(tmp_path, "cart"), tmp_path / "was run"
-    write_package(generate(read_system(DATA / "cart_pendulum.py"), ["numpy"]), tmp_path / "cart")
-    runtime, manifest = tmp_path / "cart/runtime/structure.py", tmp_path / "cart/manifest.json"
+    made = generate(read_system(DATA / "cart_pendulum.py"), ["numpy"], vendor_runtime=True)
+    write_package(made, tmp_path / "cart")
+    runtime, manifest = tmp_path / "cart/linkwise_runtime/structure.py", tmp_path / "cart/manifest.json"
     runtime.write_text(f"{runtime.read_text()}\nopen({str(mark)!r}, 'w').close()\n")
     data = json.loads(manifest.read_text())
-    data["generator"]["linkwise"] = "0.0.9"
-    data["files"]["runtime/structure.py"] = hashlib.sha256(runtime.read_bytes()).hexdigest()
+    data["generator"]["linkwise"] = data["runtime"]["version"] = "0.0.9"
+    data["files"]["linkwise_runtime/structure.py"] = hashlib.sha256(runtime.read_bytes()).hexdigest()
     data["checksums"] = {
         key: hashlib.sha256(json.dumps(data[key], sort_keys=True).encode()).hexdigest()
         for key in data["checksums"]

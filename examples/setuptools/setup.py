@@ -15,7 +15,8 @@ class BuildWithRobot(build_py):
     def run(self) -> None:
         """Copy what is there, then generate."""
         super().run()
-        write_package(generate(read_system(ROBOT), ["numpy"]), self._package(), replace=True)
+        files = generate(read_system(ROBOT), ["numpy"], vendor_runtime=True)
+        write_package(files, self._package(), replace=True)
 
     def get_source_files(self) -> list[str]:
         """What goes into the archive of sources: the robot's file too."""

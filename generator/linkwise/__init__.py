@@ -7,8 +7,9 @@ files = linkwise.generate(system)               # {path: text} of an importable 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from linkwise_runtime.version import VERSION as __version__
+
 from linkwise.errors import LinkwiseError
-from linkwise.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from linkwise.analysis import (

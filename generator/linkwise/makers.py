@@ -13,7 +13,7 @@ from importlib import import_module, metadata
 from pathlib import Path
 
 SUFFIXES = (".py", ".j2", ".toml", ".h", ".c")
-HOMES = ("linkwise", "linkwise.templates")
+HOMES = ("linkwise", "linkwise.templates", "linkwise_runtime")
 MAKERS = ("linkwise", "sympy", "mujoco")
 
 

@@ -9,6 +9,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from linkwise_runtime.native.native_cache import ELSEWHERE, cache_directory, locked
+
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.makers import generator_files
@@ -18,7 +20,6 @@ from linkwise.pipeline import plan, read_system
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, is_description, robot_files
 from linkwise.robot.notes import effects
-from linkwise.runtime.native.native_cache import ELSEWHERE, cache_directory, locked
 
 USUAL = ("numpy", "native")
 """Back ends that an analysis asks for by itself."""

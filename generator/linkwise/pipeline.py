@@ -73,11 +73,12 @@ class PackagePlan:
     name: str
     derivation: Method
     request: Mapping[str, Any]
+    vendor_runtime: bool
 
     def files(self, progress: Progress = silent) -> dict[str, str]:
         """Files of the package, {path inside the package: text}."""
         kernels = derive(self.system, progress, self.derivation) if self.kernel == "straight" else ()
-        derivation = Derivation(self.system, kernels, self.name, self.request)
+        derivation = Derivation(self.system, kernels, self.name, self.request, self.vendor_runtime)
         return package_files(derivation, self.backends, progress)
 
 
@@ -87,6 +88,7 @@ def plan(
     name: str | None = None,
     kernel: str = "auto",
     derivation: Method = "rule",
+    vendor_runtime: bool = False,
 ) -> PackagePlan:
     """What `generate` does with the same arguments, before anything is derived; raises as it does."""
     asked = None if backends is None else (backends,) if isinstance(backends, str) else tuple(backends)
@@ -100,8 +102,10 @@ def plan(
         "backends": [backend.name for backend in chosen],
         "kernel": kernel,
         "derivation": derivation,
+        "vendor_runtime": vendor_runtime,
     }
-    return PackagePlan(system, kind, chosen, checked_identifier(name, system.name), derivation, request)
+    checked = checked_identifier(name, system.name)
+    return PackagePlan(system, kind, chosen, checked, derivation, request, vendor_runtime)
 
 
 def generate(
@@ -111,15 +115,17 @@ def generate(
     progress: Progress = silent,
     kernel: str = "auto",
     derivation: Method = "rule",
+    vendor_runtime: bool = False,
 ) -> dict[str, str]:
     """Files of a package, {path inside the package: text}.
 
     `backends`, several or one, are all that the robot can have if not given. `kernel` is straight, loops, or
     auto, which chooses by the robot's size; with loops no closed forms are derived, and `formulas` are not
     there. `derivation` says how those of rigid links are: rule, which is cheaper, or energy, by
-    Euler-Lagrange from SymPy energies.
+    Euler-Lagrange from SymPy energies. With `vendor_runtime` the package carries a copy of what it imports of
+    linkwise_runtime, and stands alone.
 
     The manifest keeps these arguments, and the options that the robot was read with: how to make the package
     again. Raises LinkwiseError for a name, back end or kernel that cannot be, before anything is derived.
     """
-    return plan(robot, backends, name, kernel, derivation).files(progress)
+    return plan(robot, backends, name, kernel, derivation, vendor_runtime).files(progress)

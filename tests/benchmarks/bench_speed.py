@@ -17,7 +17,7 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from linkwise.version import VERSION
+from linkwise_runtime.version import VERSION
 from speed import casadi_peer, control_steps, emitted, pinocchio_peer, python_calls
 from speed.cases import CASES, Case
 from speed.limits import Mix, limits, mix

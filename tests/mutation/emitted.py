@@ -29,7 +29,6 @@ FORMULAS = (
     *("forms/link_*.py", "energies/link_*.py", "names.py"),
     *("c/*.h", "c/*.c", "formulas.txt", "formulas.tex"),
 )
-SHARED = {"numbers.h", "sines.h", "rows.h", "stream.h"}
 BACKENDS = ("numpy", "autograd", "c", "formulas")
 SAMPLES = 20
 RULES = Rules(share=1e-6, names=True)
@@ -71,8 +70,7 @@ def formula_mutants(directory: Path) -> list[Mutant]:
     found: list[Mutant] = []
     for pattern in FORMULAS:
         for path in sorted(directory.glob(pattern)):
-            if path.name not in SHARED:
-                found += mutants(path.relative_to(directory).as_posix(), path.read_text(), RULES)
+            found += mutants(path.relative_to(directory).as_posix(), path.read_text(), RULES)
     planar = directory.name.startswith("planar")
     return [one for one in found if not _prose(one) and not (planar and _out_of_plane(one))]
 

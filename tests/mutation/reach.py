@@ -19,18 +19,18 @@ from typing import Any
 
 from mutation.tree import FORKING, ROOT, Tree, say
 
-HOUSE = "generator/linkwise"
+HOUSE = "generator"
 SLOW = 1800
 """Seconds of processor time for one file of tests."""
 SETTINGS = """[run]
 data_file = {folder}/reached
 parallel = true
 context = ${{PYTEST_CURRENT_TEST-}}
-include = {folder}/linkwise/*, */runtime/*
+include = {folder}/linkwise/*, */linkwise_runtime/*
 disable_warnings = couldnt-parse, no-data-collected, module-not-measured, already-imported, dynamic-conflict
 patch = _exit, fork
 """
-"""Of programs that tests start; runtime is also copied into packages, which are anywhere."""
+"""Of programs that tests start; the runtime is also copied into packages, which are anywhere."""
 
 
 @dataclass(frozen=True)
@@ -298,11 +298,11 @@ def _collected(
 
 def _source(measured: str, tree: Tree) -> str | None:
     """The project's file that this one is, or is a copy of."""
-    own = str(tree.folder / "linkwise") + "/"
+    own = f"{tree.folder}/linkwise/"
     inner = (
-        measured.removeprefix(own)
+        f"linkwise/{measured.removeprefix(own)}"
         if measured.startswith(own)
-        else "runtime/" + measured.rpartition("/runtime/")[2]
+        else "linkwise_runtime/" + measured.rpartition("/linkwise_runtime/")[2]
     )
     path = f"{HOUSE}/{inner}"
     return path if (ROOT / path).is_file() and path.endswith(".py") else None

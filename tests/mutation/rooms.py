@@ -15,6 +15,7 @@ from mutation.mutants import Mutant, mutants
 from mutation.tree import ROOT
 
 HOUSE = "generator/linkwise/"
+RUNTIME = "generator/linkwise_runtime/"
 LINES = 100
 """Of so many lines, one is changed at least."""
 LEAST = 20
@@ -66,20 +67,20 @@ ROOMS: dict[str, Room] = {
             f"{HOUSE}{name}.py"
             for name in (
                 *("__init__", "__main__", "package_cache", "pipeline", "plotstyle", "extras"),
-                *("progress", "input_file", "makers", "errors", "escape", "version", "own_process"),
+                *("progress", "input_file", "makers", "errors", "escape", "own_process"),
             )
         )
     ),
-    "runtime": _folder("runtime"),
-    "runtime/native": _folder("runtime/native", "tests/test_native_module.py", "tests/test_native.py"),
+    "runtime": Room((RUNTIME,)),
+    "runtime/native": Room((f"{RUNTIME}native/",), ("tests/test_native_module.py", "tests/test_native.py")),
     **{
-        f"runtime/{name}": _folder(f"runtime/{name}")
+        f"runtime/{name}": Room((f"{RUNTIME}{name}/",))
         for name in (
             *("lagrangians", "recorded", "arrays", "control", "simulation", "induced"),
             *("constraints", "kinematics", "sums", "rule"),
         )
     },
-    "runtime/c": _folder("runtime/c", *C),
+    "c": _folder("c", *C),
     "cmake": _folder("cmake", "tests/test_cmake.py"),
     "templates": Room(
         (
@@ -100,6 +101,9 @@ ROOMS: dict[str, Room] = {
 }
 LEFT_OUT = {
     f"{HOUSE}py.typed": "empty",
+    f"{RUNTIME}py.typed": "empty",
+    f"{RUNTIME}LICENSE": "the project's",
+    f"{RUNTIME}pyproject.toml": "what is packed, which tests/test_packaging.py looks at",
     "templates/analysis/report.css.j2": "how a page looks; that all of it can be read, tests of pages hold",
 }
 NOT_COUNTED = {
@@ -126,7 +130,10 @@ NOT_COUNTED = {
 def sources() -> list[str]:
     """Every source file, below the project's root."""
     paths = [
-        path for top in (HOUSE, "templates/") for path in sorted((ROOT / top).rglob("*")) if path.is_file()
+        path
+        for top in (HOUSE, RUNTIME, "templates/")
+        for path in sorted((ROOT / top).rglob("*"))
+        if path.is_file()
     ]
     names = [path.relative_to(ROOT).as_posix() for path in paths]
     return [n for n in names if "__pycache__" not in n and not n.startswith(f"{HOUSE}templates/")]

@@ -72,7 +72,8 @@ class Tree:
         self.folder = folder
         self.child = 0
         self.stopped = False
-        shutil.copytree(ROOT / "generator/linkwise", folder / "linkwise", ignore=_IGNORED)
+        for name in ("linkwise", "linkwise_runtime"):
+            shutil.copytree(ROOT / "generator" / name, folder / name, ignore=_IGNORED)
         shutil.copytree(
             ROOT / "templates", folder / "linkwise/templates", ignore=_IGNORED, dirs_exist_ok=True
         )
@@ -86,7 +87,8 @@ class Tree:
 
     def place(self, path: str) -> Path:
         """Where a file of the project is in this copy."""
-        return self.folder / "linkwise" / path.removeprefix("generator/linkwise/")
+        inner = path.removeprefix("generator/")
+        return self.folder / (inner if inner != path else f"linkwise/{path}")
 
     @contextmanager
     def changed(self, mutant: Mutant) -> Iterator[None]:

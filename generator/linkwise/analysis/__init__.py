@@ -1,11 +1,12 @@
 """From a recorded movement to who loads whom: torque analysis of motion logs."""
 
+from linkwise_runtime.robot_constraints import Contact
+
 from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.job import Analysis
 from linkwise.analysis.loads import Load
 from linkwise.analysis.run import analyze
 from linkwise.analysis.settings import Lowpass, Payload, Processing, Reading
-from linkwise.runtime.robot_constraints import Contact
 
 __all__ = [
     "Analysis",

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from linkwise_runtime.file_joints import Order
+
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.written_contacts import chosen_contacts
 from linkwise.analysis.job import Wanted
@@ -28,7 +30,6 @@ from linkwise.analysis.written_choices import (
     constant_loads,
     pairs,
 )
-from linkwise.runtime.file_joints import Order
 
 
 @dataclass(frozen=True)

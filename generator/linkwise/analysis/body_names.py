@@ -3,11 +3,12 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from linkwise_runtime.chosen_names import known_as, nearest_first
+
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.package.manifest import FrameEntry
-from linkwise.runtime.chosen_names import known_as, nearest_first
 
 
 def body_frame(what: str, body: str, robot: LoadedRobot) -> FrameEntry:

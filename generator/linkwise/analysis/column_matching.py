@@ -5,11 +5,12 @@ import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
+from linkwise_runtime.chosen_names import STATES, end_of_path, known_as, nearest_first
+
 from linkwise.analysis.logs import Log
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.runtime.chosen_names import STATES, end_of_path, known_as, nearest_first
 
 MOST_FOUND, LONGEST_FOUND = 6, 300
 """Names of columns that are offered in all, and letters of what is offered for one."""

@@ -10,10 +10,11 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.analysis.model_side import Rows, Side
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Following:
 class ConstrainedModel:
     """The calls of a model that an analysis makes; motion (S, n) is of all joints, in which ties close."""
 
-    open: Model
+    open: Dynamics
     """Of the tree without ties."""
     constraints: Any
     """The package's `Constraints`."""
@@ -37,7 +38,7 @@ class ConstrainedModel:
     layout: Side
 
     @classmethod
-    def of(cls, model: Model, tree: RigidTree) -> "ConstrainedModel":
+    def of(cls, model: Dynamics, tree: RigidTree) -> "ConstrainedModel":
         """The model with the ties of its own description."""
         constraints = model.constraints
         independent = tuple(list(model.joint_names).index(name) for name in constraints.independent)

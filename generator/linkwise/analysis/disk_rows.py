@@ -8,9 +8,9 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
+from linkwise_runtime.native.native_system import system_here
 
 from linkwise.package.load import Array
-from linkwise.runtime.native.native_system import system_here
 
 AT_ONCE = 1 << 18
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from linkwise_runtime.chosen_names import end_of_path
 from numpy.polynomial import polynomial
 
 from linkwise.analysis.column_matching import SPEED
 from linkwise.package.entries import CurveEntry
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
-from linkwise.runtime.chosen_names import end_of_path
 
 CLOSE = {"rad": 0.01, "m": 0.001}
 """How far a column may be from what its joint does: logs are rounded, and joints have play."""

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.induced.responses import FreeResponse, Response, TiedResponse
 
 from linkwise.analysis.contacts.ground_contacts import Standing
 from linkwise.analysis.contacts.standing_response import StandingResponse
@@ -32,7 +33,6 @@ from linkwise.analysis.verify import Closure, worst_of
 from linkwise.errors import LinkwiseError
 from linkwise.escape import column_part
 from linkwise.package.load import Array
-from linkwise.runtime.induced.responses import FreeResponse, Response, TiedResponse
 
 AT_ONCE = 1 << 21
 """Numbers of the sources' forces computed at once."""

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
+from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.file_joints import FileJoint, Order
+from linkwise_runtime.qpos_motion import Qpos
+
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.contacts.ground_contacts import GroundContacts
 from linkwise.analysis.follower_columns import FollowingJoint
@@ -14,11 +18,9 @@ from linkwise.analysis.settings import Payload
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
 from linkwise.escape import without_ending
-from linkwise.package.load import Model, Package, open_package
+from linkwise.package.load import Package, open_package
 from linkwise.package.manifest import FILE, BodyEntry, PassiveEntry
 from linkwise.package.potential_word import potential_word
-from linkwise.runtime.file_joints import FileJoint, Order
-from linkwise.runtime.qpos_motion import Qpos
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class LoadedRobot:
     """One for each joint, "rad" or "m"."""
     links: tuple[str, ...]
     backend: str
-    model: Model
+    model: Dynamics
     bodies: tuple[BodyEntry, ...] | None
     """Rigid bodies, parents before children; None where the energies were written by hand."""
     up: tuple[float, float, float]
@@ -155,7 +157,7 @@ def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
         tuple(model.joint_units),
         tuple(model.link_names),
         chosen,
-        model if tied is None else cast(Model, tied),
+        model if tied is None else cast(Dynamics, tied),
         tree.bodies if tree is not None else None,
         _up(tree.gravity if tree is not None else None),
         hashlib.sha256((directory / FILE).read_bytes()).hexdigest(),
@@ -173,7 +175,7 @@ def _up(gravity: Sequence[float] | None) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _load(package: Package, backends: Sequence[str]) -> tuple[str, Model]:
+def _load(package: Package, backends: Sequence[str]) -> tuple[str, Dynamics]:
     reasons = []
     for backend in backends:
         try:

@@ -11,7 +11,7 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """What `PackedLayout` lists and packed values hold, by the same names."""
+    """What `Layout` lists and packed values hold, by the same names."""
 
     acceleration: Any
     velocity: Any

@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping
 
+from linkwise_runtime.quantity_axes import ARRAYS, PASSIVE, POWER, PROPAGATION, TORQUE, Quantity
+
 from linkwise.analysis.result_quantities import MEANING
 from linkwise.analysis.result_quantities import Quantity as Kind
-from linkwise.runtime.quantity_axes import ARRAYS, PASSIVE, POWER, PROPAGATION, TORQUE, Quantity
 
 FORCE = "torque:constraint"
 """Unit of what a row of the constraints bears."""

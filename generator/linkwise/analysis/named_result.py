@@ -5,15 +5,15 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
+from linkwise_runtime.named_arrays import Part, dataset
+from linkwise_runtime.robot_axes import NamedAxis, axes_of
+from linkwise_runtime.version import VERSION
 
 from linkwise.analysis.named_quantities import COLUMNS, WORKS
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import Column, force_unit
 from linkwise.extras import extra
 from linkwise.package.load import Array
-from linkwise.runtime.named_arrays import Part, dataset
-from linkwise.runtime.robot_axes import NamedAxis, axes_of
-from linkwise.version import VERSION
 
 BASE = {"N·m": "rad", "N": "m"}
 """In which a row of the constraints is open, by what it bears; no unit for a coupling."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.analysis.body_names import body_frame, told_apart
 from linkwise.analysis.constrained_model import ConstrainedModel
@@ -13,7 +14,7 @@ from linkwise.analysis.payload_model import PayloadModel
 from linkwise.analysis.settings import Payload
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
-from linkwise.package.load import Model, Package
+from linkwise.package.load import Package
 from linkwise.package.manifest import BodyEntry, FrameEntry, LinkEntry, RigidTree
 
 UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -50,7 +51,7 @@ def carrying(robot: LoadedRobot, payloads: Sequence[Payload]) -> LoadedRobot:
     return replace(
         robot,
         links=(*robot.links, *(payload.title for payload in payloads)),
-        model=cast(Model, PayloadModel.of(robot.model, _models(robot.package, tree, placed))),
+        model=cast(Dynamics, PayloadModel.of(robot.model, _models(robot.package, tree, placed))),
         bodies=loaded.bodies,
         recursion=_recursion(robot.package, loaded, placed),
         payloads=tuple(payloads),
@@ -72,7 +73,7 @@ def _placed(robot: LoadedRobot, tree: RigidTree, payload: Payload) -> _Placed:
     return _Placed(payload, robot.links.index(link), body, (float(x), float(y), float(z)))
 
 
-def _models(package: Package, tree: RigidTree, placed: Sequence[_Placed]) -> list[tuple[int, Model]]:
+def _models(package: Package, tree: RigidTree, placed: Sequence[_Placed]) -> list[tuple[int, Dynamics]]:
     """For each payload its link, and the package with nothing but that payload on that link."""
     backend = next((name for name in ("numpy", "torch") if name in package.backends), None)
     if backend is None:
@@ -88,7 +89,7 @@ def _models(package: Package, tree: RigidTree, placed: Sequence[_Placed]) -> lis
         bodies = own._replace(masses=masses, centres=centres, inertias=np.zeros(own.inertias.shape))
         model = package.load(backend, bodies=bodies)
         if tree.tied:
-            model = cast(Model, ConstrainedModel.of(model, tree))
+            model = cast(Dynamics, ConstrainedModel.of(model, tree))
         models.append((at.link, model))
     return models
 

@@ -5,16 +5,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.analysis.model_side import NAMES, Side
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 
 
 @dataclass(frozen=True)
 class _Part:
     """A payload's model, its link there, its number among all links, and where its values stand."""
 
-    model: Model
+    model: Dynamics
     link: int
     number: int
     columns: Side
@@ -24,12 +25,12 @@ class _Part:
 class PayloadModel:
     """The calls of a model that an analysis makes, of the links and the payloads together."""
 
-    own: Model
+    own: Dynamics
     parts: tuple[_Part, ...]
     layout: Side
 
     @classmethod
-    def of(cls, own: Model, payloads: Sequence[tuple[int, Model]]) -> "PayloadModel":
+    def of(cls, own: Dynamics, payloads: Sequence[tuple[int, Dynamics]]) -> "PayloadModel":
         """payloads: of each, the link that it hangs on, and the package with that alone."""
         parts = []
         for number, (link, model) in enumerate(payloads, len(own.link_names)):
@@ -73,7 +74,7 @@ class PayloadModel:
         torque: Array = np.sum([model.inverse_dynamics(q, qd, qdd) for model in models], axis=0)
         return torque
 
-    def propagation(self, q: Array, qd: Array, qdd: Array, convention: str = "closing") -> Side:
+    def propagation(self, q: Array, qd: Array, qdd: Array, convention: Any = "closing") -> Side:
         """τp_ij(q̈_k) and τp_ij(q̇_k) (S, n, N, n), and g_ij (S, n, N)."""
         joined = list(self.own.propagation(q, qd, qdd, convention=convention))
         for part in self.parts:

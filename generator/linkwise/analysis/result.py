@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.contact_times import ContactTimes
@@ -20,7 +21,6 @@ from linkwise.analysis.work import Work
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, printable
 from linkwise.package.load import Array
-from linkwise.runtime.chosen_names import nearest_first
 
 PART_BYTES, LEAST = 4 << 20, 256
 """Size of a part of a result, about, and its fewest samples."""

@@ -1,12 +1,12 @@
 """An analysis as a notebook shows it: each joint's torque and work, and what loads it most."""
 
 import numpy as np
+from linkwise_runtime.html_tables import page_part, remark, table
 
 from linkwise.analysis.joint_causes import are_motions_whole, causes_of, sizes
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_columns import load_unit
 from linkwise.analysis.work import Work
-from linkwise.runtime.html_tables import page_part, remark, table
 
 HEAD = ("joint", "peak |τ|", "mean |τ|", "largest cause", "its share", "gave", "took back")
 

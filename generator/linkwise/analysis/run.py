@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
+from linkwise_runtime.robot_constraints import Contact
+
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing_robot import standing_on
 from linkwise.analysis.disk_rows import EverySample
@@ -24,7 +26,6 @@ from linkwise.output import whole_directory
 from linkwise.package.load import Array
 from linkwise.package.write import refuse_inside_package
 from linkwise.progress import Progress, silent
-from linkwise.runtime.robot_constraints import Contact
 
 NO_LOADS = Loads()
 NO_CONTACTS = Contacts()

@@ -5,8 +5,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from linkwise_runtime.file_joints import Order
+
 from linkwise.errors import LinkwiseError
-from linkwise.runtime.file_joints import Order
 
 Units = Literal["rad", "deg"]
 Derivative = Literal["five-point", "savitzky-golay"]

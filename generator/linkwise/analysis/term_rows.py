@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from linkwise.package.load import PackedLayout
+from linkwise_runtime.structure import Layout
 
 
 class TermRows(NamedTuple):
@@ -17,7 +17,7 @@ class TermRows(NamedTuple):
     torque: tuple[tuple[int, ...], ...]
 
 
-def term_rows(layout: PackedLayout) -> TermRows:
+def term_rows(layout: Layout) -> TermRows:
     """All terms of a layout."""
 
     def numbered(rows: list[list[int]]) -> tuple[tuple[int, ...], ...]:
@@ -31,7 +31,7 @@ def term_rows(layout: PackedLayout) -> TermRows:
     )
 
 
-def mirrored(layout: PackedLayout) -> list[tuple[int, int, int, int]]:
+def mirrored(layout: Layout) -> list[tuple[int, int, int, int]]:
     """All (i, j, k, source) of c2, sorted: only i ≤ k is stored, and c2 is symmetric in i and k."""
     rows = set()
     for source, (i, j, k) in enumerate(layout.acceleration.tolist()):

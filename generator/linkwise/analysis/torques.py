@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -115,7 +116,8 @@ class Decomposer:
                     f"between {time[0]:.6g} and {time[-1]:.6g} s: {reason_of(error)}; mend the log, or filter"
                     " it less where a filter carries joints out of reach"
                 ) from None
-        packed, standing = self.robot.model.packed(q, qd, qdd), self._standing(time, q)
+        packed: Any = self.robot.model.packed(q, qd, qdd)
+        standing = self._standing(time, q)
         unborne, free = packed, self.robot.model.inverse_dynamics(q, qd, qdd)
         partial = self._dense(packed.torque, q.shape[1])
         if standing is not None and self.terms is not None:

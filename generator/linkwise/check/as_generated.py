@@ -4,6 +4,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from linkwise_runtime.version import VERSION
+
 from linkwise.check.compare import Result, skipped
 from linkwise.emit.backend import backends_of
 from linkwise.emit.shared_texts import BodyText, init_text, names_text
@@ -14,7 +16,7 @@ from linkwise.package.contents import added, changed
 from linkwise.package.emitted_text import foreign
 from linkwise.package.load import Package
 from linkwise.package.manifest import Manifest, altered_entries
-from linkwise.version import VERSION
+from linkwise.package.runtime_imports import of_copy
 
 TOLD = 3
 """Faults that one line tells."""
@@ -67,7 +69,7 @@ def check_made(package: Package) -> Result:
     """Hold the files that linkwise makes alike of every manifest, where this version wrote it."""
     version = package.manifest.generator.get("linkwise")
     if version != VERSION:
-        unchecked = "runtime/, __init__.py, names.py and tree.py were not checked"
+        unchecked = "__init__.py, names.py, tree.py and what it carries of the runtime were not checked"
         return skipped("made", f"{unchecked}: of linkwise {version}, which is not at hand to compare with")
     wrong = [
         f"{path} is not what linkwise {VERSION} makes of the manifest" for path in _made_otherwise(package)
@@ -84,7 +86,12 @@ def _made_otherwise(package: Package) -> Iterator[str]:
     directory, manifest, robot = package.directory, package.manifest, package.module.ROBOT
     chosen = [backend for name, backend in backends_of(manifest.kernel).items() if name in package.backends]
     rigid = manifest.tree is not None
+
+    def written(path: str, text: str) -> str:
+        return of_copy(path, text) if manifest.runtime.vendored else text
+
     init = init_text(manifest.name, chosen, manifest.parameters, [MARK], rigid, manifest.kernel)
+    init = written("__init__.py", init)
     head, mark, tail = init.partition(f"    {MARK}\n")
     found = (directory / "__init__.py").read_bytes().decode()
     about = found[len(head) : len(found) - len(tail)]
@@ -98,11 +105,12 @@ def _made_otherwise(package: Package) -> Iterator[str]:
     links = {link.name: link.path for link in manifest.links}
     passive = manifest.tree.passive if manifest.tree else ()
     numbers = links, robot.linear, manifest.parameters, bodies, passive
-    if names_text(manifest.name, manifest.joints, *numbers, manifest.file_joints) != found:
+    names = names_text(manifest.name, manifest.joints, *numbers, manifest.file_joints)
+    if written("names.py", names) != found:
         yield "names.py"
     if "tree.py" in manifest.files and manifest.tree is not None:
         text = tree_text(manifest.tree, list(links), list(manifest.parameters))
-        if text != (directory / "tree.py").read_bytes().decode():
+        if written("tree.py", text) != (directory / "tree.py").read_bytes().decode():
             yield "tree.py"
 
 

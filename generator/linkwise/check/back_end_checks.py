@@ -3,6 +3,8 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from linkwise_runtime.dynamics import Dynamics
+
 from linkwise.check.compare import Result
 from linkwise.check.frame_reference import frame_calls
 from linkwise.check.impedance_checks import impedance_calls
@@ -15,7 +17,6 @@ from linkwise.check.regressor_reference import regressor_calls
 from linkwise.check.simulation_checks import simulation_calls
 from linkwise.check.subject import Subject, Way, there
 from linkwise.check.sum_checks import sums_against_reference
-from linkwise.package.load import Model
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Check:
     """
 
     title: str
-    run: Callable[[Subject, str, Model], Iterator[Result]]
+    run: Callable[[Subject, str, Dynamics], Iterator[Result]]
     by_rule: bool = False
     composed: bool = True
     of: Callable[[Subject, Way], bool] = lambda subject, way: True

@@ -10,6 +10,9 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.native.native_build import PARTS, Sources, library
+from linkwise_runtime.native.native_system import system_here
 
 from linkwise.check.as_generated import check_files, check_made, check_manifest, check_texts
 from linkwise.check.back_end_checks import CHECKS
@@ -23,10 +26,8 @@ from linkwise.check.reference import Reference
 from linkwise.check.states import affordable
 from linkwise.check.subject import Subject, Way, long_enough
 from linkwise.own_process import Ended, begun
-from linkwise.package.load import Model, Package, load_package, staying
+from linkwise.package.load import Package, load_package, staying
 from linkwise.package.manifest import Manifest
-from linkwise.runtime.native.native_build import PARTS, Sources, library
-from linkwise.runtime.native.native_system import system_here
 
 OPTIONAL = ("torch",)
 """Libraries that a package's back ends may need beside NumPy."""
@@ -85,10 +86,10 @@ def _compile(package: Package) -> None:
             library(sources, real, what)
 
 
-def _load(package: Package) -> tuple[dict[Way, Model], list[Result]]:
+def _load(package: Package) -> tuple[dict[Way, Dynamics], list[Result]]:
     if not package.backends:
         return {}, [skipped("back ends", "nothing to load: C and formulas only")]
-    loaded: dict[Way, Model] = {}
+    loaded: dict[Way, Dynamics] = {}
     missing: list[Result] = []
     for name in package.backends:
         try:
@@ -132,7 +133,7 @@ def _lacks(error: Exception) -> bool:
     return isinstance(error, RuntimeError) and here and " failed: " not in str(error)
 
 
-def _numbers(package: Package, loaded: Mapping[Way, Model], samples: int) -> Iterator[Result]:
+def _numbers(package: Package, loaded: Mapping[Way, Dynamics], samples: int) -> Iterator[Result]:
     """Everything for the parameters as generated, and, where there are some, for others too."""
     manifest = package.manifest
     rows = IndexRows.of_paths([link.path for link in manifest.links], package.module.ROBOT.linear)

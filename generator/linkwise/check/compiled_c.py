@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.native.native_build import require_stack
+from linkwise_runtime.native.native_compiler import Compiler, find_compiler
+from linkwise_runtime.native.native_process import run_all
+from linkwise_runtime.native.native_system import system_here
 from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError
-from linkwise.runtime.native.native_build import require_stack
-from linkwise.runtime.native.native_compiler import Compiler, find_compiler
-from linkwise.runtime.native.native_process import run_all
-from linkwise.runtime.native.native_system import system_here
 
 Numbers = NDArray[Any]
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.contact_equations import KINDS, ContactEquations
@@ -18,7 +19,7 @@ from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.rounding import measured
 from linkwise.check.states import States
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 STATES = 2
@@ -34,7 +35,7 @@ class HeldContacts:
         self.states = states.at(slice(0, TRIED))
         self._kept: dict[tuple[str, tuple[int, ...]], _Expected | None] = {}
 
-    def calls(self, name: str, model: Model, contact: Callable[..., Any]) -> Iterator[Result]:
+    def calls(self, name: str, model: Dynamics, contact: Callable[..., Any]) -> Iterator[Result]:
         """One result of a back end for all kinds; contact: the package's own record."""
         kinds = [kind for kind in KINDS if self._leaves_freedom(kind)]
         entries = [entry for kind in kinds for entry in self._compared(model, kind, contact)]

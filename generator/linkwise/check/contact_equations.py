@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.robot_constraints import Contact
 from numpy.typing import NDArray
 
 from linkwise.check.body_reference import COMPLEX_STEP
@@ -11,7 +12,6 @@ from linkwise.check.loop_equations import RANK, TURNS_AND_SHIFTS, LoopEquations
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.package.entries import FrameEntry
 from linkwise.package.load import Array
-from linkwise.runtime.robot_constraints import Contact
 
 POINT = np.array([0.1, -0.2, 0.15])
 AXIS = np.array([0.3, 0.5, -0.8])

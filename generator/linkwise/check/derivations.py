@@ -6,10 +6,12 @@ Each is held against the recursion by itself; here they are held together, two a
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 
+from linkwise_runtime.dynamics import Dynamics
+
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.check.packed_layout import IndexRows
 from linkwise.check.reference import Reference
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 
 NAMES = {
     "closed forms": ("numpy", "torch"),
@@ -20,7 +22,7 @@ NAMES = {
 
 
 def derivations(
-    loaded: Mapping[str, Model], rows: IndexRows, reference: Reference, how: str, label: str
+    loaded: Mapping[str, Dynamics], rows: IndexRows, reference: Reference, how: str, label: str
 ) -> Iterator[Result]:
     """Hold every two derivations that are there together; `how` closed forms were found goes into the name.
 
@@ -45,7 +47,7 @@ def derivations(
         yield compare(f"derivations{label}: {one} against {other}", entries, reference.tolerance)
 
 
-def _answers(model: Model, rows: IndexRows, reference: Reference) -> dict[str, tuple[Array, Array]]:
+def _answers(model: Dynamics, rows: IndexRows, reference: Reference) -> dict[str, tuple[Array, Array]]:
     """Packed values and slopes by position, each beside its scale."""
     few = slice(-2, None) if reference.is_large else slice(None)
     motion = reference.states.at(few).motion

@@ -6,6 +6,7 @@ from itertools import zip_longest
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.version import VERSION
 
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.latex_reader import LatexReader, Unreadable
@@ -16,7 +17,6 @@ from linkwise.emit.formula_page import Row, formula_page
 from linkwise.emit.formula_symbols import MOTION, motion_symbol, parameter_symbols
 from linkwise.package.load import Array, Package
 from linkwise.package.manifest import Manifest
-from linkwise.version import VERSION
 
 Formula = Callable[[Mapping[str, Any]], Any]
 """Value for given values of the symbols; raises Unreadable."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.check.body_reference import COMPLEX_STEP
@@ -17,7 +18,7 @@ from linkwise.check.magnitudes import Magnitudes
 from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.reference import TOLERANCE
 from linkwise.check.states import States
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest, RigidTree
 
 STATES = 12
@@ -118,7 +119,7 @@ def _centre(
     return (centre, *_columns(velocity, bounds, states))
 
 
-def frame_calls(name: str, model: Model, reference: FrameReference) -> Iterator[Result]:
+def frame_calls(name: str, model: Dynamics, reference: FrameReference) -> Iterator[Result]:
     """Each call of a back end's kinematics."""
     states, told = reference.states, "against Newton-Euler recursion"
     kinematics: Any = model.kinematics

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.passive_reference import passive_reference
@@ -11,7 +12,7 @@ from linkwise.check.reference import Reference
 from linkwise.check.states import States
 from linkwise.check.sum_checks import is_tied, regular
 from linkwise.package.entries import PassiveEntry, RigidTree
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 
 WIDTH = 0.5
 """Of the friction that is compensated."""
@@ -19,7 +20,7 @@ WIDTH = 0.5
 
 def impedance_calls(
     name: str,
-    model: Model,
+    model: Dynamics,
     tree: RigidTree | None,
     reference: Reference,
     natural: Callable[..., Any],
@@ -53,7 +54,7 @@ def _are_masses(tree: RigidTree | None) -> bool:
 
 
 def _shaped(
-    model: Model,
+    model: Dynamics,
     joints: Sequence[PassiveEntry],
     reference: Reference,
     rows: Any,
@@ -111,7 +112,7 @@ def _eliminated(inertia: Array) -> Array:
     return entries
 
 
-def _cancelled(model: Model, joints: Sequence[PassiveEntry], reference: Reference, rows: Any) -> Entries:
+def _cancelled(model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference, rows: Any) -> Entries:
     """Velocity torques of the last link on the first joint that moves it; no inertia is changed."""
     q, qd, task = reference.states.at(rows).motion
     moving = np.flatnonzero(np.abs(reference.values["c2"]).sum((0, 1, 3)))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.check.compare import Entries, Result, compare, skipped
@@ -15,7 +16,7 @@ from linkwise.check.reference import Reference
 from linkwise.check.states import States
 from linkwise.check.sum_checks import SINGLE, regular
 from linkwise.package.entries import PassiveEntry
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 
 Quantity = tuple[Array, Array]
 """Values (samples, n, ...) and their scales."""
@@ -52,7 +53,7 @@ class _Sources:
 
 def induced_calls(
     name: str,
-    model: Model,
+    model: Dynamics,
     joints: Sequence[PassiveEntry],
     reference: Reference,
     frames: FrameReference | None,
@@ -81,7 +82,7 @@ def induced_calls(
 
 
 def _given(
-    model: Model,
+    model: Dynamics,
     joints: Sequence[PassiveEntry],
     reference: Reference,
     rows: NDArray[np.intp],
@@ -90,12 +91,13 @@ def _given(
     """Of torques, with what joints have of their own."""
     sources = _sources(reference, rows, joints)
     motion: list[Any] = [a.astype(kind) for a in sources.states.motion]
-    found: Any = model.induced_accelerations(*motion, constraints=False)
+    calls: Any = model
+    found = calls.induced_accelerations(*motion, constraints=False)
     for source, (value, scale) in sources.accelerations().items():
         yield Entries(source, getattr(found, source), value, scale)
 
 
-def _asked(model: Model, reference: Reference, rows: NDArray[np.intp]) -> Iterator[Entries]:
+def _asked(model: Dynamics, reference: Reference, rows: NDArray[np.intp]) -> Iterator[Entries]:
     """Of the actuators that give a motion."""
     states = reference.states.at(rows)
     torque, size = (a["tau"][rows].sum(-1) for a in (reference.values, reference.scales))
@@ -106,7 +108,7 @@ def _asked(model: Model, reference: Reference, rows: NDArray[np.intp]) -> Iterat
 
 
 def _of_a_point(
-    model: Model,
+    model: Dynamics,
     reference: Reference,
     rows: NDArray[np.intp],
     frames: FrameReference,

@@ -4,10 +4,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.check.loop_reference import LoopReference
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 
 TOLD = "in closed loops against least squares"
 PERTURBED = 1e-3
@@ -20,7 +21,7 @@ SETTLED = 1e-11
 """How near loops are closed again, of positions of size 1."""
 
 
-def loop_calls(name: str, model: Model, reference: LoopReference) -> Iterator[Result]:
+def loop_calls(name: str, model: Dynamics, reference: LoopReference) -> Iterator[Result]:
     """The answers of one back end."""
     yield compare(f"{name}: velocities {TOLD}", _velocities(model, reference))
     yield compare(f"{name}: shares {TOLD}", _shares(model, reference))
@@ -39,7 +40,7 @@ def _entries(reference: LoopReference, what: str, found: Any) -> Entries:
     return Entries(what, found, reference.values[what], reference.scales[what])
 
 
-def _velocities(model: Model, reference: LoopReference) -> Iterator[Entries]:
+def _velocities(model: Dynamics, reference: LoopReference) -> Iterator[Entries]:
     (q, qd, qdd), own = reference.states.motion, list(reference.independent)
     constraints = model.constraints
     # Least steps end where they no longer matter: a position is as near as that, not as rounding allows.
@@ -77,7 +78,7 @@ def _away(reference: LoopReference) -> Array:
     return away
 
 
-def _shares(model: Model, reference: LoopReference) -> Iterator[Entries]:
+def _shares(model: Dynamics, reference: LoopReference) -> Iterator[Entries]:
     constraints, motion = model.constraints, reference.states.motion
     (q, qd, qdd), own = motion, list(reference.independent)
     yield _entries(reference, "tau^", constraints.partial_torque(*motion))
@@ -91,7 +92,7 @@ def _shares(model: Model, reference: LoopReference) -> Iterator[Entries]:
     yield _entries(reference, "projected", constraints.projected(q, reference.tau))
 
 
-def _forces(model: Model, reference: LoopReference) -> Iterator[Entries]:
+def _forces(model: Dynamics, reference: LoopReference) -> Iterator[Entries]:
     constraints, (q, qd, qdd) = model.constraints, reference.states.motion
     yield _entries(reference, "lambda of links", constraints.forces(q, qd, qdd))
     found = constraints.forward_dynamics(q, qd, reference.tau, passive=False)

@@ -1,16 +1,17 @@
 """Every public call of a back end against the reference."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.check.compare import Entries, Result, compare, dense, skipped
 from linkwise.check.packed_layout import IndexRows, Rows, packed
 from linkwise.check.reference import Reference
 from linkwise.check.states import States
 from linkwise.extras import extra
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 FLOAT32 = {"tolerance": 1e-5, "epsilon": 2.0**-23}
@@ -23,7 +24,7 @@ class Named(NamedTuple):
     """A back end's name and model, the packed layout that its package must have, and the reference."""
 
     name: str
-    model: Model
+    model: Dynamics
     rows: IndexRows
     reference: Reference
 
@@ -81,8 +82,9 @@ def _calls(checked: Named) -> Iterator[Entries]:
         yield dense(what, value, reference)
     most = [np.abs(x) for x in (q, qd, qdd)]
     slopes = {"closing": values["c1"], "gradient": 2 * values["c1"] - values["h1"]}
+    calls: Any = model
     for convention, c1 in slopes.items():
-        parts = model.propagation(q, qd, qdd, convention=convention)
+        parts = calls.propagation(q, qd, qdd, convention=convention)
         yield Entries("c2 qdd", parts[0], values["c2"] * _over(qdd), scales["c2"] * _over(most[2]))
         scale = 2 * scales["c1"] * _over(most[1])
         yield Entries(f"c1 qd ({convention})", parts[1], c1 * _over(qd), scale)
@@ -157,7 +159,8 @@ def _energies(checked: Named) -> Iterator[Result]:
 def _links(checked: Named) -> Iterator[Entries]:
     """What each module gives of its own link; of a large robot the first ones, which fewer joints carry."""
     torch, reference = extra("torch"), checked.reference
-    modules = list(checked.model.backend.modules)[: FEW_LINKS if reference.is_large else None]
+    backend: Any = checked.model.backend
+    modules = list(backend.modules)[: FEW_LINKS if reference.is_large else None]
     motion = [torch.from_numpy(x) for x in reference.states.motion]
     parts = [module.coefficients(*motion[:2]) for module in modules]
     values = dict(zip(("c2", "c1", "g"), zip(*parts, strict=True), strict=True))
@@ -167,10 +170,10 @@ def _links(checked: Named) -> Iterator[Entries]:
         yield Entries(what, found, value, scale)
 
 
-def _lagrangians(model: Model, states: States) -> Array:
-    torch = extra("torch")
+def _lagrangians(model: Dynamics, states: States) -> Array:
+    torch, backend = extra("torch"), cast(Any, model.backend)
     motion = [torch.from_numpy(x) for x in (states.q, states.qd)]
-    return np.stack([module(*motion).detach().numpy() for module in model.backend.modules], -1)
+    return np.stack([module(*motion).detach().numpy() for module in backend.modules], -1)
 
 
 def _structure(checked: Named, manifest: Manifest) -> Iterator[Result]:

@@ -6,12 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.parameter_values import ParametricBody, faults
 
 from linkwise.check.compare import Result
 from linkwise.check.text_reader import TextFormula, parameter_values
 from linkwise.package.entries import PLACE, BodyEntry, RigidTree
 from linkwise.package.load import Array
-from linkwise.runtime.parameter_values import ParametricBody, faults
 
 MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 VARIED = ("translation", "mass", "com", "inertia")

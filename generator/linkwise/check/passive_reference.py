@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.check.compare import Entries, Result, compare, skipped
@@ -12,13 +13,13 @@ from linkwise.check.reference import Reference
 from linkwise.check.states import States
 from linkwise.check.sum_checks import is_tied, regular
 from linkwise.package.entries import PassiveEntry
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 
 SHARES = ("spring", "damping", "friction", "armature")
 
 
 def passive_calls(
-    name: str, model: Model, joints: Sequence[PassiveEntry], reference: Reference
+    name: str, model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference
 ) -> Iterator[Result]:
     """The call for many states, for one, and in single precision; all zeros where no joint has anything."""
     states = reference.states
@@ -50,7 +51,7 @@ def passive_calls(
 
 
 def _torques_of_accelerations(
-    model: Model, joints: Sequence[PassiveEntry], reference: Reference, at: NDArray[np.bool_]
+    model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference, at: NDArray[np.bool_]
 ) -> Entries:
     """Torques that forward dynamics was given, against those that its accelerations take.
 

@@ -1,6 +1,7 @@
 """Graphs that autograd records, run part by part, against the reference."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -39,8 +40,9 @@ def _parts(checked: Named) -> Iterator[Entries]:
     most = max(CARRIERS, carriers.min()) if reference.is_large else carriers.max()
     near = checked.rows.tau[carriers[checked.rows.tau[:, 1]] <= most]
     pairs = generator.permutation(near)[:PAIRS].tolist()
+    backend: Any = checked.model.backend
     for i, j in pairs:
-        graphs = {(part.coordinate, part.order): part for part in checked.model.backend.graph_parts(i, j)}
+        graphs = {(part.coordinate, part.order): part for part in backend.graph_parts(i, j)}
         own = 0
         for k, m in (asked[at] for at in generator.permutation(len(asked))):
             found, graph = np.zeros(len(few.q)), graphs.get((None if k is None else joints[k], m))

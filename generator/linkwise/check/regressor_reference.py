@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.check.body_reference import by_unit
 from linkwise.check.compare import Entries, Result, compare
@@ -16,7 +17,7 @@ from linkwise.check.packed_layout import Rows
 from linkwise.check.reference import TOLERANCE, Reference
 from linkwise.check.states import NUMBERS, States
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 MOST = 12
@@ -37,7 +38,7 @@ def regressor_reference(manifest: Manifest, tree: RigidTree, states: States) -> 
     return Reference("Newton-Euler recursion", TOLERANCE, few, values, scales)
 
 
-def regressor_calls(name: str, model: Model, reference: Reference) -> Iterator[Result]:
+def regressor_calls(name: str, model: Dynamics, reference: Reference) -> Iterator[Result]:
     """Both calls of a back end, of all states, of one and of none, and in single precision."""
     states, every = reference.states, np.arange(len(reference.states.q))
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.check.compare import Entries, Result, compare, skipped
@@ -14,7 +15,7 @@ from linkwise.check.newton_euler import NewtonEuler
 from linkwise.check.rounding import measured
 from linkwise.check.states import States
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 TRIED = 8
@@ -93,7 +94,7 @@ def _simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Si
     return SimulatedMotion(q, qd, tau, *measured(ends, tree), Magnitudes(manifest, tree))
 
 
-def simulation_calls(name: str, model: Model, expected: SimulatedMotion | str) -> Iterator[Result]:
+def simulation_calls(name: str, model: Dynamics, expected: SimulatedMotion | str) -> Iterator[Result]:
     """The motion of one back end."""
     if isinstance(expected, str):
         yield skipped(f"{name}: a simulated motion", expected)

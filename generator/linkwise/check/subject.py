@@ -8,6 +8,8 @@ from functools import cached_property
 from importlib.util import find_spec
 from typing import NamedTuple, TypeVar
 
+from linkwise_runtime.dynamics import Dynamics
+
 from linkwise.check.body_reference import body_reference
 from linkwise.check.c_functions import CFunctions
 from linkwise.check.compiled_c import CompiledPackage
@@ -27,7 +29,7 @@ from linkwise.check.text_lagrangian import TextLagrangian
 from linkwise.check.torque_reference import states_of_torques, torque_reference
 from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.package.entries import PassiveEntry, RigidTree
-from linkwise.package.load import Array, Model, Package
+from linkwise.package.load import Array, Package
 from linkwise.package.manifest import Manifest
 
 T = TypeVar("T")
@@ -71,7 +73,7 @@ class Subject:
     package: Package
     label: str
     parameters: Mapping[str, float]
-    loaded: Mapping[Way, Model]
+    loaded: Mapping[Way, Dynamics]
     rows: IndexRows
     compiled: CompiledPackage | None
     count: tuple[int, int]

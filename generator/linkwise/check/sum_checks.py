@@ -4,13 +4,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.model_calls import FLOAT32, TOO_LARGE
 from linkwise.check.reference import Reference
 from linkwise.check.states import NUMBERS
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 
 REGULAR = 1e-8
 """Least eigenvalue of a mass matrix, with ones on its diagonal, from which accelerations are looked at."""
@@ -26,7 +27,7 @@ LARGEST = 1 << 27
 Samples = NDArray[np.intp]
 
 
-def sums_against_reference(name: str, model: Model, reference: Reference) -> Iterator[Result]:
+def sums_against_reference(name: str, model: Dynamics, reference: Reference) -> Iterator[Result]:
     """Every call, of all states, of none and of one, and in single precision."""
     every = np.arange(len(reference.states.q))
     few = [every[:0], *([every[0], every[:1, None]] if len(every) else [])]
@@ -49,7 +50,7 @@ def sums_against_reference(name: str, model: Model, reference: Reference) -> Ite
         yield skipped(f"{name}: sums in single precision", TOO_LARGE)
 
 
-def _sums(model: Model, reference: Reference, at: Any, kind: Any = float) -> Iterator[Entries]:
+def _sums(model: Dynamics, reference: Reference, at: Any, kind: Any = float) -> Iterator[Entries]:
     """Matrices and gravity of some samples, whole and link by link."""
     q, qd, _ = (a.astype(kind) for a in reference.states.at(at).motion)
     for by_link in (False, True):
@@ -68,7 +69,7 @@ def _summed(what: str, value: Array, shares: tuple[Array, Array], at: Any, by_li
     return _flat(f"{what}{' by link' * by_link}", value, source, scale, at.ndim)
 
 
-def _symbols(name: str, model: Model, reference: Reference) -> Iterator[Result]:
+def _symbols(name: str, model: Dynamics, reference: Reference) -> Iterator[Result]:
     """Christoffel symbols are right if they make the Coriolis matrix of velocities at random.
 
     That is but for what terms of energies linear in the velocities have in it.
@@ -98,7 +99,7 @@ def _symbols(name: str, model: Model, reference: Reference) -> Iterator[Result]:
         yield skipped(f"{name} by link", f"one sample of {n} joints and {links} links takes {size:.1f} GiB")
 
 
-def _power(model: Model, reference: Reference) -> Iterator[Entries]:
+def _power(model: Dynamics, reference: Reference) -> Iterator[Entries]:
     """Each part, and their sum for each link."""
     q, qd, qdd = reference.states.motion
     values, scales, power = reference.values, reference.scales, model.power(q, qd, qdd)
@@ -115,7 +116,7 @@ def _power(model: Model, reference: Reference) -> Iterator[Entries]:
         yield Entries("power", power.total.sum(1), reference.power, scale)
 
 
-def _energies(model: Model, reference: Reference, at: Any) -> Iterator[Entries]:
+def _energies(model: Dynamics, reference: Reference, at: Any) -> Iterator[Entries]:
     states = reference.states.at(at)
     for (what, (value, scale)), found in zip(
         reference.energies.items(), model.energy(*states.motion[:2]), strict=True
@@ -123,7 +124,7 @@ def _energies(model: Model, reference: Reference, at: Any) -> Iterator[Entries]:
         yield _flat(f"{what} energy", found, value[at], scale[at], np.ndim(at))
 
 
-def _forward_dynamics(name: str, model: Model, reference: Reference) -> Result:
+def _forward_dynamics(name: str, model: Dynamics, reference: Reference) -> Result:
     """Whether it undoes inverse dynamics, of all states and of one."""
     invertible = np.flatnonzero(regular(reference))
     if not invertible.size:
@@ -132,14 +133,14 @@ def _forward_dynamics(name: str, model: Model, reference: Reference) -> Result:
     return compare(f"{name}: forward dynamics undoes inverse dynamics", moved, reference.tolerance)
 
 
-def _accelerations(model: Model, reference: Reference, at: Any) -> Iterator[Entries]:
+def _accelerations(model: Dynamics, reference: Reference, at: Any) -> Iterator[Entries]:
     """Of the reference's torques: rounding of these and of M qdd moves qdd by |M^-1| times as much."""
     q, qd, qdd = reference.states.at(at).motion
     found = model.forward_dynamics(q, qd, reference.values["tau"][at].sum(-1), passive=False)
     yield _flat("qdd", found, qdd, acceleration_scales(reference, at), np.ndim(at))
 
 
-def is_tied(model: Model) -> bool:
+def is_tied(model: Dynamics) -> bool:
     """Whether ties or couplings close loops of the open tree."""
     tree = model.backend.tree
     return tree is not None and tree.tied

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from linkwise_runtime.version import VERSION
 from typer.core import TyperGroup
 
 from linkwise.cli import tell
 from linkwise.cli.endings import CLOSED_PIPE, FAULT, INTERRUPTED, MISTAKE, TRACEBACK, ended_in_one_line
 from linkwise.errors import LinkwiseError, LinkwiseWarning
 from linkwise.extras import spare_addresses
-from linkwise.version import VERSION
 
 COMMANDS = {
     "generate": "Write the packages of robots.",

@@ -45,6 +45,7 @@ class Choices:
     backends: tuple[str, ...]
     kernel: str
     derivation: Method
+    vendor_runtime: bool
     replace: bool
 
 
@@ -84,6 +85,13 @@ def generate(
             "in SymPy by Euler-Lagrange, which costs more"
         ),
     ] = "rule",
+    vendor_runtime: Annotated[
+        bool,
+        typer.Option(
+            "--vendor-runtime",
+            help="Copy what the package imports of linkwise_runtime into it, so that it stands alone",
+        ),
+    ] = False,
     details: Details = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Say what was written, as on a terminal, elsewhere too")
@@ -127,7 +135,7 @@ def generate(
         raise LinkwiseError("--name is for one robot; generate each with a name of its own in its own call")
     if not (check or list_outputs):
         sweep(out)  # also where this one is refused: an earlier one may have died in its exchange
-    asked = Choices(options, out, name, tuple(backend or ()), kernel, derivation, replace)
+    asked = Choices(options, out, name, tuple(backend or ()), kernel, derivation, vendor_runtime, replace)
     orders = [_order(spec, asked) for spec in robot]
     tell_run(*robot)
     _check_places(orders)
@@ -171,7 +179,9 @@ def _check_flags(list_outputs: bool, check: bool, depfile: Path | None, stamp: P
 def _order(robot: str, asked: Choices) -> Order:
     """Read a robot; raises LinkwiseError, before anything is derived, where its package cannot be made."""
     system = pipeline.read_system(robot, asked.options)
-    made = pipeline.plan(system, asked.backends or None, asked.name, asked.kernel, asked.derivation)
+    made = pipeline.plan(
+        system, asked.backends or None, asked.name, asked.kernel, asked.derivation, asked.vendor_runtime
+    )
     directory = asked.out / made.name
     check_target(directory, None if asked.replace else system.name)
     return Order(robot, made, directory)

@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from linkwise_runtime.file_joints import Order
 
 from linkwise.analysis.settings import Derivative, Edges, Padding, Units
-from linkwise.runtime.file_joints import Order
 
 UNITS = {
     "reading": "B",

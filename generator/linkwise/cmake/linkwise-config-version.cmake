@@ -1,6 +1,6 @@
 # The version of this installation, from where linkwise itself has it; any that is asked for must be this one or older,
 # of the same first number.
-file(STRINGS "${CMAKE_CURRENT_LIST_DIR}/../version.py" _linkwise_version REGEX "^VERSION = ")
+file(STRINGS "${CMAKE_CURRENT_LIST_DIR}/../../linkwise_runtime/version.py" _linkwise_version REGEX "^VERSION = ")
 string(REGEX REPLACE ".*\"(.*)\".*" "\\1" PACKAGE_VERSION "${_linkwise_version}")
 string(REGEX MATCH "^[0-9]+" _linkwise_major "${PACKAGE_VERSION}")
 if("${PACKAGE_FIND_VERSION}" STREQUAL "" OR

@@ -5,12 +5,10 @@ import keyword
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from importlib import resources
-from pathlib import Path
 
 import sympy as sp
+from linkwise_runtime.version import VERSION
 
-from linkwise import runtime
 from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
@@ -26,53 +24,19 @@ from linkwise.emit.definition import (
 )
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.shared_texts import init_text, names_text
+from linkwise.emit.vendored_runtime import with_runtime
 from linkwise.errors import LinkwiseError
-from linkwise.package.manifest import FILE, LinkEntry, Manifest
+from linkwise.package.manifest import FILE, LinkEntry, Manifest, RuntimeEntry
+from linkwise.package.runtime_imports import RUNTIME
 from linkwise.progress import Progress, silent
 from linkwise.symbolic.system import RigidSystem
-from linkwise.version import VERSION
 
 LONGEST_NAME = 60
-SHARED_RUNTIME = (
-    "__init__.py",
-    "answers.py",
-    "arguments.py",
-    "chosen_names.py",
-    "composed.py",
-    "controller_calls.py",
-    "controllers.py",
-    "dense.py",
-    "dynamics.py",
-    "euler_angles.py",
-    "file_joints.py",
-    "html_tables.py",
-    "interface.py",
-    "labelled.py",
-    "motion_calls.py",
-    "motion_quantities.py",
-    "named_arguments.py",
-    "named_arrays.py",
-    "outputs.py",
-    "parameter_values.py",
-    "passive_joints.py",
-    "qpos_motion.py",
-    "quantities.py",
-    "quantity_axes.py",
-    "robot_axes.py",
-    "robot_constraints.py",
-    "robot_kinematics.py",
-    "robot_table.py",
-    "structure.py",
-    "sum_calls.py",
-    "units.py",
-)
-"""Files of linkwise/runtime that every package has."""
 DEVICES = {"aux", "con", "nul", "prn", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 """What no file of Windows may be called, whatever follows behind a dot."""
-HEADERS = {Path(file.name).stem for file in resources.files("linkwise.runtime.c").iterdir()}
 LINK_HEADER = re.compile(r"link_\d+")
 """Headers beside that of a package's own name."""
-TAKEN = {"numpy", "torch", "linkwise", *sys.stdlib_module_names, *DEVICES, *HEADERS}
+TAKEN = {"numpy", "torch", "linkwise", RUNTIME, *sys.stdlib_module_names, *DEVICES}
 
 
 def package_files(
@@ -86,6 +50,8 @@ def package_files(
         files.update(emitter(derivation))
     progress("emit", len(emitters), len(emitters))
     files.update(shared_files(derivation, backends))
+    if derivation.vendor_runtime:
+        files = with_runtime(files)
     files[FILE] = manifest(derivation, files).text()
     return files
 
@@ -133,7 +99,7 @@ def _is_taken(name: str) -> bool:
 
 
 def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iterator[tuple[str, str]]:
-    """Files that serve every back end, and the runtime files of those `chosen`, which `load` is to know."""
+    """Files that serve every back end; `load` is to know those `chosen`."""
     system, bodies = derivation.system, body_texts(derivation.system)
     parameters = {s.name: float(v) for s, v in system.parameters.items()}
     loadable = [backend for backend in chosen if backend.loading]
@@ -158,18 +124,6 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
         ),
     )
     yield "py.typed", ""
-    copied = {name for backend in loadable for place in backend.runtime for name in _files_at(place)}
-    for name in sorted(copied.union(SHARED_RUNTIME)):
-        yield f"runtime/{name}", resources.files(runtime).joinpath(name).read_text(encoding="utf-8")
-
-
-def _files_at(place: str) -> Iterator[str]:
-    """A file of linkwise/runtime, or all files of a folder there."""
-    found = resources.files(runtime).joinpath(place)
-    if found.is_file():
-        yield place
-        return
-    yield from (f"{place}/{file.name}" for file in found.iterdir() if file.name.endswith((".py", ".c")))
 
 
 def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
@@ -180,6 +134,7 @@ def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
         derivation.package,
         system.name,
         {"linkwise": VERSION, "sympy": sp.__version__},
+        RuntimeEntry(VERSION, derivation.vendor_runtime),
         dict(derivation.request),
         derivation.kernel,
         joint_entries(system),

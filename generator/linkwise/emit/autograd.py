@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 
+from linkwise_runtime.version import VERSION
+
 from linkwise.dynamics.kernel import lowering
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.render import render
@@ -9,7 +11,6 @@ from linkwise.emit.rigid_energy import rigid_energy
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal
 from linkwise.symbolic.system import EnergySystem, System
-from linkwise.version import VERSION
 
 Lines = tuple[str, ...]
 

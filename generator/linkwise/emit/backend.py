@@ -44,10 +44,10 @@ def _too_large_for_loops(system: System) -> str:
 
 @dataclass(frozen=True)
 class Loading:
-    """How the package's `load` makes the back end: the class in runtime/, and what it is made of."""
+    """How the package's `load` makes the back end: the class in linkwise_runtime, and what it is made of."""
 
     module: str
-    """Module in runtime/ that holds the class."""
+    """Module of linkwise_runtime that holds the class."""
     made: str
     """Expression over the imported names, ROBOT, and `values` of the parameters."""
     imports: tuple[str, ...]
@@ -74,8 +74,6 @@ class BackendFiles:
     doc: str
     emits: tuple[Emitter, ...]
     """What is written for the robot; two back ends with one emitter share its files."""
-    runtime: tuple[str, ...] = ()
-    """Files and whole folders copied from linkwise/runtime, beside the files of every package."""
     loading: Loading | None = None
     """None where nothing loads."""
     needs: tuple[str, ...] = ()
@@ -107,15 +105,17 @@ def _energies(d: Derivation) -> Iterator[tuple[str, str]]:
 
 
 def _c(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.c.shared_headers import with_headers
     from linkwise.emit.c.sources import c_files
 
-    return c_files(d)
+    return with_headers(c_files(d))
 
 
 def _loops(d: Derivation) -> Iterator[tuple[str, str]]:
     from linkwise.emit.c.loops import loop_files
+    from linkwise.emit.c.shared_headers import with_headers
 
-    return loop_files(d)
+    return with_headers(loop_files(d))
 
 
 def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
@@ -124,23 +124,6 @@ def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
     return formula_files(d)
 
 
-TORCH = ("arrays/call_module.py", "arrays/run_time_values.py", "arrays/torch_backend.py")
-"""Of linkwise/runtime: what computes with tensors."""
-
-RULE = (
-    "arrays/__init__.py",
-    "arrays/array_backend.py",
-    "arrays/array_kernels.py",
-    "constraints",
-    "control",
-    "induced",
-    "kinematics",
-    "rule",
-    "simulation",
-    "sums",
-)
-"""Of linkwise/runtime: the vectorised rule, and what is composed of it."""
-
 BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend
     for backend in (
@@ -148,7 +131,6 @@ BACKENDS: dict[str, BackendFiles] = {
             "numpy",
             "closed forms, or the vectorised rule, on NumPy arrays",
             emits=(_forms, _tree),
-            runtime=("arrays/numpy_backend.py", *RULE),
             loading=Loading(
                 "arrays.numpy_backend",
                 "NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
@@ -163,7 +145,6 @@ BACKENDS: dict[str, BackendFiles] = {
             "torch",
             "closed forms, or the vectorised rule, on torch tensors",
             emits=(_forms, _tree),
-            runtime=(*TORCH, *RULE),
             loading=Loading(
                 "arrays.torch_backend",
                 "TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
@@ -178,7 +159,6 @@ BACKENDS: dict[str, BackendFiles] = {
             "autograd",
             "each link's Lagrangian, differentiated by torch",
             emits=(_energies, _tree),
-            runtime=(*TORCH, "lagrangians", "recorded", *RULE),
             loading=Loading(
                 "lagrangians.dynamics_module",
                 "backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad, RULE)",
@@ -193,7 +173,6 @@ BACKENDS: dict[str, BackendFiles] = {
             "native",
             "the C code, compiled by this system's compiler",
             emits=(_tree,),
-            runtime=("arrays/numpy_backend.py", *TORCH, "native", *RULE),
             loading=Loading(
                 "native.native_backend",
                 'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values, RULE)',

@@ -5,6 +5,7 @@ from textwrap import wrap
 
 import numpy as np
 import sympy as sp
+from linkwise_runtime.parameter_values import faults
 
 from linkwise.emit.printer import PythonPrinter, Text
 from linkwise.emit.shared_texts import BodyText
@@ -12,7 +13,6 @@ from linkwise.escape import python_docstring, python_literal
 from linkwise.expression.expression_graph import Graph, Node, operands, reachable
 from linkwise.expression.from_sympy import Lowering
 from linkwise.robot.robot import Link, Scalar
-from linkwise.runtime.parameter_values import faults
 from linkwise.symbolic.system import RigidSystem, System
 
 NAMES = (

@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from linkwise_runtime.version import VERSION
+
 from linkwise.dynamics.coefficients import LinkForms
 from linkwise.dynamics.kernel import Kernel
 from linkwise.emit.printer import PythonPrinter
@@ -12,7 +14,6 @@ from linkwise.escape import python_literal
 from linkwise.expression.count import count_operations, in_words
 from linkwise.expression.expression_graph import Node
 from linkwise.symbolic.system import System
-from linkwise.version import VERSION
 
 Rows = Sequence[tuple[str, Node]]
 """Labels of outputs, such as c2(1, 3, 2) for joint, link and coordinate, and their nodes."""

@@ -4,13 +4,14 @@ import shlex
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+from linkwise_runtime.constraints.independent_joints import chosen_independent, rank_of, redundant_names
+
 from linkwise.emit.definition import rigid_tree
 from linkwise.emit.loop_closing import Array, closed_loops
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note
 from linkwise.robot.robot import Coupling, Robot, Tie
-from linkwise.runtime.constraints.independent_joints import chosen_independent, rank_of, redundant_names
 from linkwise.symbolic.system import RigidSystem, System
 
 

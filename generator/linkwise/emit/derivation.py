@@ -20,6 +20,8 @@ class Derivation:
     kernels: tuple[Kernel, ...]
     package: str
     request: Mapping[str, Any]
+    vendor_runtime: bool = False
+    """Whether the package carries a copy of what it imports of linkwise_runtime."""
 
     @property
     def linear(self) -> frozenset[int]:

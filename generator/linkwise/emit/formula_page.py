@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 
+from linkwise_runtime.version import VERSION
+
 from linkwise.emit.formula_symbols import FormulaSymbol, parameter_symbols
 from linkwise.emit.render import render
 from linkwise.escape import latex_symbol, python_literal
-from linkwise.version import VERSION
 
 KINDS = {"txt": "text", "tex": "latex"}
 """Which of a symbol's notations each kind of file has."""

@@ -4,20 +4,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-
-from linkwise.errors import LinkwiseError
-from linkwise.package.entries import RigidTree
-from linkwise.runtime.constraints.closing_search import (
+from linkwise_runtime.constraints.closing_search import (
     TRIES,
     Closing,
     TieEquations,
     best_closing,
     random_starts,
 )
-from linkwise.runtime.constraints.held_frames import held_by
-from linkwise.runtime.constraints.singular_positions import open_by
-from linkwise.runtime.rule.joint_tree import (
+from linkwise_runtime.constraints.held_frames import held_by
+from linkwise_runtime.constraints.singular_positions import open_by
+from linkwise_runtime.rule.joint_tree import (
     JointTree,
     TreeCoupling,
     TreeCurve,
@@ -26,6 +22,10 @@ from linkwise.runtime.rule.joint_tree import (
     TreeLink,
     TreeTie,
 )
+from numpy.typing import NDArray
+
+from linkwise.errors import LinkwiseError
+from linkwise.package.entries import RigidTree
 
 Array = NDArray[np.float64]
 FAR = 0.3

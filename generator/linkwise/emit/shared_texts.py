@@ -6,12 +6,13 @@ They are made of what a manifest has too, so that `linkwise check` makes them ag
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
+from linkwise_runtime.structure import JointLimits
+from linkwise_runtime.version import VERSION
+
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.emit.render import render
 from linkwise.escape import python_docstring, python_literal
 from linkwise.package.entries import FileJointEntry, JointEntry, KernelKind, PassiveEntry
-from linkwise.runtime.structure import JointLimits
-from linkwise.version import VERSION
 
 LINE = 100
 
@@ -40,12 +41,12 @@ class Maker:
 
     @classmethod
     def of(cls, backend: BackendFiles, loading: Loading, rigid: bool, kernel: KernelKind) -> "Maker":
-        """Its class comes from runtime/, and is the first word of the expression."""
+        """Its class comes from linkwise_runtime, and is the first word of the expression."""
         made = loading.made.partition("(")[0]
         imports = [*loading.imports]
         if loading.uses_forms and kernel == "straight":
             imports.append("from .forms import LINKS")
-        imports.append(f"from .runtime.{loading.module} import {made}")
+        imports.append(f"from linkwise_runtime.{loading.module} import {made}")
         if loading.uses_rule:
             imports.append("from .tree import RULE" if rigid else "RULE = None")
         if loading.uses_forms and kernel == "loops":
@@ -67,12 +68,14 @@ def init_text(
     about: lines on the parameters; rigid: whether the links are rigid bodies; kernel: the package's
     """
     loadable = {backend: backend.loading for backend in chosen if backend.loading}
+    if not loadable:
+        return render("package/face.py.j2", {"version": VERSION})
     fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
     makers = [Maker.of(backend, loading, rigid, kernel) for backend, loading in loadable.items()]
     view = {
         "version": VERSION,
         "package": package,
-        "default": next((backend.name for backend in loadable), ""),
+        "default": next(backend.name for backend in loadable),
         "makers": makers,
         "own_faces": [maker for maker in makers if maker.face != "Dynamics"],
         "choosing": [backend.name for backend, loading in loadable.items() if loading.chooses],

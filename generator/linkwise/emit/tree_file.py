@@ -4,6 +4,8 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from linkwise_runtime.version import VERSION
+
 from linkwise.emit.formula_symbols import parameter_symbols
 from linkwise.emit.render import render
 from linkwise.escape import python_literal
@@ -16,7 +18,6 @@ from linkwise.package.entries import (
     RigidTree,
     TieEntry,
 )
-from linkwise.version import VERSION
 
 WORD = re.compile(r"\b([A-Za-z_]\w*)(\(?)")
 """A name in a formula, and the parenthesis behind that of a function."""

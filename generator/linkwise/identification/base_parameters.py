@@ -16,10 +16,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.identification.random_motions import Motion, random_motion
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 
 NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Mass, first moment, and inertia about the origin of the link's frame, in the order of the regressor."""
@@ -69,13 +70,13 @@ class BaseParameters:
         return [combination_text(self.links, row, own) for row, own in rows]
 
 
-def samples_needed(model: Model, torques: int) -> int:
+def samples_needed(model: Dynamics, torques: int) -> int:
     """How long random motions of a robot must be that has so many torques."""
     return -(-ROWS * len(NAMES) * len(model.link_names) // torques) + ROWS
 
 
 def base_parameters(
-    model: Model, measured: Sequence[int] | None = None, motion: Motion | None = None
+    model: Dynamics, measured: Sequence[int] | None = None, motion: Motion | None = None
 ) -> BaseParameters:
     """Base parameters of a robot, by random motions of up to SPEED; raises as its `regressor` does.
 

@@ -8,12 +8,12 @@ from that of others: so much of it as needs another column is then fitted, the i
 from dataclasses import dataclass
 
 import numpy as np
+from linkwise_runtime.constraints.independent_joints import loose_base
 from numpy.typing import NDArray
 
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.identification.random_motions import SPEED, Motion
 from linkwise.package.load import Array
-from linkwise.runtime.constraints.independent_joints import loose_base
 
 RANK = 1e-6
 """Of a column: what is left of it across others is rounding where it is smaller."""

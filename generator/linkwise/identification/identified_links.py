@@ -5,6 +5,8 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import Bodies
+from linkwise_runtime.rule.regressors import inertial_parameters
 
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.analysis.settings import Processing, Reading
@@ -20,8 +22,6 @@ from linkwise.identification.random_motions import Motion, random_closed_motion,
 from linkwise.identification.torque_log import TorqueLog, read_torque_log
 from linkwise.package.load import Array
 from linkwise.progress import Progress, silent
-from linkwise.runtime.rule.joint_tree import Bodies
-from linkwise.runtime.rule.regressors import inertial_parameters
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,11 @@ loops stay closed in the way in which they do there.
 """
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.analysis.constrained_model import ConstrainedModel
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 
 SPEED = 3.0
 """rad/s and rad/s^2, m/s and m/s^2."""
@@ -30,7 +31,7 @@ LEVER = 10.0
 Motion = tuple[Array, Array, Array]
 
 
-def random_motion(model: Model, samples: int) -> Motion:
+def random_motion(model: Dynamics, samples: int) -> Motion:
     """q, qd and qdd (samples, n) of joints that are free."""
     generator, n = np.random.default_rng(0), len(model.joint_names)
     q = generator.uniform(-np.pi, np.pi, (samples, n))

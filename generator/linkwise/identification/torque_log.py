@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples
 from linkwise.analysis.column_matching import TIMES, with_columns, with_nearest
@@ -20,7 +21,6 @@ from linkwise.escape import listed
 from linkwise.identification.position_noise import position_noise
 from linkwise.package.load import Array
 from linkwise.progress import Progress
-from linkwise.runtime.chosen_names import nearest_first
 
 SPELLINGS = ("tau/{}", "tau_{}", "{}_moment", "{}_force", "{}_torque", "{}/effort", "{}_effort")
 """How logs name the torque of a joint: `analyze`, scripts, OpenSim's inverse dynamics, ROS."""

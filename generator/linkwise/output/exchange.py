@@ -9,8 +9,9 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
+from linkwise_runtime.native.native_system import system_here
+
 from linkwise.output.workplace import OLD, REST
-from linkwise.runtime.native.native_system import system_here
 
 AT_CWD = -100  # AT_FDCWD of Linux
 SWAP = ctypes.c_uint(2)  # RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS

@@ -13,11 +13,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from linkwise_runtime.native.native_system import system_here
+
 from linkwise.errors import LinkwiseError
 from linkwise.input_file import kind_of
 from linkwise.output.exchange import exchange, flush, put
 from linkwise.output.workplace import ENDING, NEW, REST, sweep, workplace
-from linkwise.runtime.native.native_system import system_here
 
 ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:(?=/|$)")
 """s3://bucket as a path has it; a drive of Windows is one letter."""

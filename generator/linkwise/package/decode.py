@@ -73,6 +73,9 @@ def _scalar(kind: Any, data: Any, place: str) -> Any:
     if kind is int:
         require(type(data) is int and data >= 0, place, "a whole number")
         return data
+    if kind is bool:
+        require(isinstance(data, bool), place, "true or false")
+        return data
     require(isinstance(data, str), place, "a string")
     require(not any("\ud800" <= letter <= "\udfff" for letter in data), place, "a string of whole letters")
     return data

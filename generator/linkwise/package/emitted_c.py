@@ -52,11 +52,11 @@ JINJA = re.compile(r"\{[{%#].*?[}%#]\}", re.DOTALL)
 TAKEN = frozenset(("asm", "goto"))
 
 
-def foreign_includes(text: str, listed: frozenset[str]) -> Iterator[str]:
-    """What a C file of a package includes beside listed files and headers of the standard."""
+def foreign_includes(text: str, folder: str, listed: frozenset[str]) -> Iterator[str]:
+    """What a C file in a folder of a package includes beside listed files and headers of the standard."""
     for found in INCLUDE.finditer(_blanked(text, "comment")[0]):
         quote, file = found[1], found[2].strip()
-        own = file.endswith((".h", ".c")) and f"c/{file}" in listed
+        own = file.endswith((".h", ".c")) and f"{folder}/{file}" in listed
         if not (file in HEADERS if quote == "<" else quote == '"' and own):
             yield f"line {_line(text, found.start())} has {' '.join(found[0].split())}, which is not listed"
 
@@ -160,7 +160,7 @@ class Vocabulary(NamedTuple):
 @cache
 def _vocabulary() -> Vocabulary:
     plain = []
-    for folder in (files(place).joinpath("c") for place in ("linkwise.runtime", "linkwise.templates")):
+    for folder in (files(place).joinpath("c") for place in ("linkwise", "linkwise.templates")):
         own = (file for file in folder.iterdir() if file.name.endswith((".h", ".j2")))
         text = JINJA.sub(" ", "\n".join(file.read_text(encoding="utf-8") for file in own))
         plain.append(re.sub(r"/\*.*?\*/|//[^\n]*", " ", text, flags=re.DOTALL))

@@ -14,18 +14,19 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from linkwise_runtime.version import VERSION
+
 from linkwise.package.emitted_c import FUNCTIONS, ORDINARY, foreign_c, foreign_includes
 from linkwise.package.manifest import Manifest
 from linkwise.package.own_files import own_text
-from linkwise.version import VERSION
 
-RUNTIME = "runtime."
-"""Of a package, as relative imports name it."""
+RUNTIME = "linkwise_runtime."
+"""What packages import of the library, or of their own copy."""
 
 
 def _table(lines: str) -> Mapping[str, frozenset[str]]:
     """Modules, each followed by the names that may be imported from it."""
-    pairs = (line.split(": ") for line in lines.split(";"))
+    pairs = (line.replace("RUN.", RUNTIME).split(": ") for line in lines.split(";"))
     return {module: frozenset(names.split()) for module, names in pairs}
 
 
@@ -33,7 +34,7 @@ def _table(lines: str) -> Mapping[str, frozenset[str]]:
 class Grammar:
     """What a Python file of a package may hold beside names that it gives something to itself.
 
-    imports: names by module, those of the package's own after "runtime."; whole: libraries, under which name
+    imports: names by module, RUN before those of linkwise_runtime; whole: libraries, under which name
     builtins, attributes: which may be named and asked for; calls: of the builtins those that may be called,
     for types make others; nodes: of the syntax
     """
@@ -54,16 +55,16 @@ PLAIN = (
 )
 ARITHMETIC = Grammar(
     imports=_table(
-        "math: inf;typing: Any;collections.abc: Mapping;runtime.interface: ClosedForms"
-        ";runtime.lagrangians.energy_interface: Parameters Values"
-        ";runtime.lagrangians.partial_lagrangian: PartialLagrangian"
-        ";runtime.lagrangians.frame_motion: GROUND Axes along_z potential_at velocity_at"
-        ";runtime.lagrangians.joint_curve: JointCurve;runtime.lagrangians.lanes: carried"
-        ";runtime.lagrangians.rigid_body: kinetic_energy"
-        ";runtime.lagrangians.rigid_lagrangian: RigidLagrangian;runtime.file_joints: FileJoint"
-        ";runtime.parameter_values: ParametricBody;runtime.passive_joints: PassiveJoint"
-        ";runtime.structure: JointLimits Structure;runtime.rule.rule_calls: RigidRule"
-        ";runtime.rule.joint_tree: JointTree TreeCoupling TreeCurve TreeFrame TreeJoint TreeLink TreeTie"
+        "math: inf;typing: Any;collections.abc: Mapping;RUN.interface: ClosedForms"
+        ";RUN.lagrangians.energy_interface: Parameters Values"
+        ";RUN.lagrangians.partial_lagrangian: PartialLagrangian"
+        ";RUN.lagrangians.frame_motion: GROUND Axes along_z potential_at velocity_at"
+        ";RUN.lagrangians.joint_curve: JointCurve;RUN.lagrangians.lanes: carried"
+        ";RUN.lagrangians.rigid_body: kinetic_energy"
+        ";RUN.lagrangians.rigid_lagrangian: RigidLagrangian;RUN.file_joints: FileJoint"
+        ";RUN.parameter_values: ParametricBody;RUN.passive_joints: PassiveJoint"
+        ";RUN.structure: JointLimits Structure;RUN.rule.rule_calls: RigidRule"
+        ";RUN.rule.joint_tree: JointTree TreeCoupling TreeCurve TreeFrame TreeJoint TreeLink TreeTie"
     ),
     whole={"torch": "torch", "numpy": "np"},
     builtins=frozenset(("tuple", "type", "int", "float", "str", "dict")),
@@ -81,15 +82,15 @@ LOADING = Grammar(
     imports=_table(
         "typing: TYPE_CHECKING Any Literal overload;collections.abc: Callable Iterable Mapping"
         ";pathlib: Path;names: ROBOT;tree: RULE;forms: LINKS;energies: LAGRANGIANS"
-        ";runtime.controllers: FrameImpedance Natural Target;runtime.dynamics: Dynamics"
-        ";runtime.interface: Backend;runtime.structure: Layout;runtime.rule.joint_tree: Bodies"
-        ";runtime.motion_quantities: AppliedLoad InducedAccelerations Trajectory"
-        ";runtime.quantities: Coefficients GradientPropagation Packed PassiveTorque Propagation"
-        ";runtime.robot_constraints: Contact;runtime.rule.regressors: inertial_parameters"
-        ";runtime.lagrangians.dynamics_module: DynamicsModule backend_of_links"
-        ";runtime.arrays.array_kernels: refuse_choice refuse_learning"
-        ";runtime.arrays.numpy_backend: NumpyBackend;runtime.arrays.torch_backend: TorchBackend"
-        ";runtime.native.native_backend: NativeBackend"
+        ";RUN.version: require;RUN.controllers: FrameImpedance Natural Target;RUN.dynamics: Dynamics"
+        ";RUN.interface: Backend;RUN.structure: Layout;RUN.rule.joint_tree: Bodies"
+        ";RUN.motion_quantities: AppliedLoad InducedAccelerations Trajectory"
+        ";RUN.quantities: Coefficients GradientPropagation Packed PassiveTorque Propagation"
+        ";RUN.robot_constraints: Contact;RUN.rule.regressors: inertial_parameters"
+        ";RUN.lagrangians.dynamics_module: DynamicsModule backend_of_links"
+        ";RUN.arrays.array_kernels: refuse_choice refuse_learning"
+        ";RUN.arrays.numpy_backend: NumpyBackend;RUN.arrays.torch_backend: TorchBackend"
+        ";RUN.native.native_backend: NativeBackend"
     ),
     whole={},
     builtins=frozenset(("tuple", "type", "bool", "str", "dict", "ValueError")),
@@ -148,7 +149,7 @@ def foreign_text(path: str, text: bytes, source: Source) -> str | None:
     """The same of one file, what is wrong with it alone; None if nothing."""
     own, ending = own_text(path), path.rpartition(".")[2]
     try:
-        if own is not None or path.startswith("runtime/"):
+        if own is not None or path.startswith("linkwise_runtime/"):
             if source.version == VERSION and own != text:
                 return f"is not that of linkwise {VERSION}"
         elif ending == "py":
@@ -158,8 +159,9 @@ def foreign_text(path: str, text: bytes, source: Source) -> str | None:
         elif told := next(foreign_c(text.decode(), source.name), None):
             return told
         # That of the runtime is compiled with Python's headers.
-        in_c = ending in ("h", "c") and not path.startswith("runtime/")
-        return next(foreign_includes(text.decode(), source.files), None) if in_c else None
+        in_c = ending in ("h", "c") and not path.startswith("linkwise_runtime/")
+        folder = path.rpartition("/")[0]
+        return next(foreign_includes(text.decode(), folder, source.files), None) if in_c else None
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:  # the last by Python's parser
         return f"cannot be read ({' '.join(str(error).split()) or 'it is nested too deeply'})"
 
@@ -287,5 +289,6 @@ def _is_several(node: ast.AST) -> bool:
 def _may_import(grammar: Grammar, module: str, name: str, level: int) -> bool:
     if level and not module:
         return re.fullmatch(r"link_\d+", name) is not None
-    inside = module.startswith(RUNTIME) or module in ("names", "tree", "forms", "energies")
-    return name in grammar.imports.get(module, ()) and (level > 0) == inside
+    own = module in ("names", "tree", "forms", "energies")
+    right = module.startswith(RUNTIME) or (level > 0) == own
+    return name in grammar.imports.get(module, ()) and right

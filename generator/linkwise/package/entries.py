@@ -40,6 +40,14 @@ class LinkEntry:
 
 
 @dataclass(frozen=True)
+class RuntimeEntry:
+    """The version of linkwise_runtime that a package was made for, and whether it carries a copy."""
+
+    version: str
+    vendored: bool
+
+
+@dataclass(frozen=True)
 class CodeSize:
     """Bytes of code and constants of a package's C on a microcontroller, in double and float: an estimate."""
 

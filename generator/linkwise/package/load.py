@@ -1,14 +1,16 @@
 """A generated package, imported from its folder, and its back ends with NumPy arrays in and out."""
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any, cast
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.version import VERSION
 from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError, LinkwiseWarning
@@ -18,99 +20,8 @@ from linkwise.package.contents import changed
 from linkwise.package.emitted_text import foreign
 from linkwise.package.importer import import_listed
 from linkwise.package.manifest import Manifest, altered_entries
-from linkwise.version import VERSION
 
 Array = NDArray[np.float64]
-
-
-class PackedLayout(Protocol):
-    """Index rows of packed values: (i, j, k) joint, link, cause; or (i, j)."""
-
-    acceleration: NDArray[np.intp]
-    velocity: NDArray[np.intp]
-    gravity: NDArray[np.intp]
-    torque: NDArray[np.intp]
-
-
-class Model(Protocol):
-    """A robot on one of its back ends; arrays (..., n) of float64 in, arrays out."""
-
-    joint_names: Sequence[str]
-    joint_units: Sequence[str]
-    link_names: Sequence[str]
-    layout: PackedLayout
-    backend: Any
-
-    @property
-    def kinematics(self) -> Any:
-        """Poses and Jacobians of frames, for rigid links."""
-
-    @property
-    def constraints(self) -> Any:
-        """What ties leave of its motion, for rigid links with ties."""
-
-    def partial_impedance(self, **targets: Any) -> Any:
-        """A controller under which shares of the impedance are as asked."""
-
-    def cancel(self, entries: Any) -> Any:
-        """A controller that cancels motion propagation torques."""
-
-    def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """τ_ij (..., n, N)."""
-
-    def packed_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """τ_ij on the paths only (..., count)."""
-
-    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """τ_i (..., n)."""
-
-    def coefficients(self, q: Array, qd: Array) -> Any:
-        """c2, c1 (..., n, N, n) and g (..., n, N)."""
-
-    def propagation(self, q: Array, qd: Array, qdd: Array, convention: str = "closing") -> Any:
-        """Each coefficient times its motion."""
-
-    def packed(self, q: Array, qd: Array, qdd: Array) -> Any:
-        """All coefficients that are not identically 0, and τ_ij."""
-
-    def position_gradient(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """c0 (..., n, N, n)."""
-
-    def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Y_ij (..., n, N, 10), for rigid links."""
-
-    def coefficient_regressors(self, q: Array, qd: Array) -> Any:
-        """Y of c2, c1 (..., n, N, n, 10) and g (..., n, N, 10)."""
-
-    def mass_matrix(self, q: Array, by_link: bool = False) -> Array:
-        """M (..., n, n), or by link (..., n, N, n)."""
-
-    def coriolis_matrix(self, q: Array, qd: Array, by_link: bool = False) -> Array:
-        """C, likewise."""
-
-    def gravity_torque(self, q: Array, by_link: bool = False) -> Array:
-        """g (..., n), or by link (..., n, N)."""
-
-    def forward_dynamics(self, q: Array, qd: Array, tau: Array, passive: bool = True) -> Array:
-        """qdd (..., n)."""
-
-    def induced_accelerations(self, q: Array, qd: Array, tau: Array | None = None, **how: Any) -> Any:
-        """Shares of an acceleration by source."""
-
-    def christoffel(self, q: Array, by_link: bool = False) -> Array:
-        """Gamma (..., n, n, n), or by link (..., n, N, n, n)."""
-
-    def energy(self, q: Array, qd: Array) -> Any:
-        """Kinetic and potential energies (..., N)."""
-
-    def power(self, q: Array, qd: Array, qdd: Array) -> Any:
-        """P_ij by cause and order (..., n, N, n) twice, of gravity (..., n, N)."""
-
-    def passive_torque(self, q: Array, qd: Array, qdd: Array) -> Any:
-        """Spring, damping, friction and armature of the joints (..., n) each."""
-
-    def masked(self, q: Array, qd: Array, qdd: Array, mask: Array) -> Array:
-        """Chosen terms of the decomposition (..., n, N)."""
 
 
 @dataclass(frozen=True)
@@ -137,15 +48,14 @@ class Package:
         parameters: Mapping[str, float] | None = None,
         kernel: str = "auto",
         bodies: Any = None,
-    ) -> Model:
+    ) -> Dynamics:
         """Model on a back end, for any parameters and bodies; passes on what the package raises."""
         # A package made before there were kernels to choose from loads as it always did.
         chosen: dict[str, Any] = {} if kernel == "auto" else {"kernel": kernel}
         chosen |= {} if bodies is None else {"bodies": bodies}
         with staying():
-            dynamics = self.module.load(backend, parameters, allow_unphysical=True, **chosen)
-        model: Model = TensorModel(dynamics) if dynamics.backend.takes_tensors else dynamics
-        return model
+            dynamics: Dynamics = self.module.load(backend, parameters, allow_unphysical=True, **chosen)
+        return cast(Dynamics, TensorModel(dynamics)) if dynamics.backend.takes_tensors else dynamics
 
 
 @contextmanager

@@ -26,10 +26,11 @@ from linkwise.package.entries import (
     LinkEntry,
     PassiveEntry,
     RigidTree,
+    RuntimeEntry,
     TieEntry,
 )
 
-SCHEMA = 12
+SCHEMA = 13
 LARGEST = 1 << 28
 """Bytes of a manifest, or of any file of a package; of a robot of 1000 joints a manifest takes some 2 MB."""
 __all__ = [
@@ -44,6 +45,7 @@ __all__ = [
     "Manifest",
     "PassiveEntry",
     "RigidTree",
+    "RuntimeEntry",
     "TieEntry",
     "altered_entries",
     "is_inside",
@@ -82,6 +84,7 @@ class Manifest:
     name: str
     robot: str
     generator: Mapping[str, str]
+    runtime: RuntimeEntry
     request: Mapping[str, Any]
     kernel: KernelKind
     joints: tuple[JointEntry, ...]

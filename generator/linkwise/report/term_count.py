@@ -4,11 +4,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from linkwise_runtime.chosen_names import known_as, nearest_first
+
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.report.expand import Variables
 from linkwise.report.laurent import DIGIT, Laurent, add, exponents, lifted
-from linkwise.runtime.chosen_names import known_as, nearest_first
 
 ORDERS = ("gravity", "velocity", "acceleration")
 

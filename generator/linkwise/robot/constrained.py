@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
+from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
@@ -16,7 +17,6 @@ from linkwise.robot.notes import Note
 from linkwise.robot.robot import Coupling, Frame, Tie
 from linkwise.robot.size import check_constraint_count
 from linkwise.robot.ties import Ends, check_ties, tied
-from linkwise.runtime.chosen_names import nearest_first
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from linkwise_runtime.chosen_names import nearest_first
+
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.curve import Curve
@@ -11,7 +13,6 @@ from linkwise.robot.description import Connection, Mimic
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.notes import UNCOUPLED, Note
 from linkwise.robot.robot import Coordinate, unusable
-from linkwise.runtime.chosen_names import nearest_first
 
 
 @dataclass(frozen=True)

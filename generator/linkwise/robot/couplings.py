@@ -2,13 +2,14 @@
 
 from collections.abc import Collection, Iterable, Mapping
 
+from linkwise_runtime.chosen_names import nearest_first
+
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.coordinates import AxisRule
 from linkwise.robot.description import JointCoupling
 from linkwise.robot.notes import UNCOUPLED, Note
 from linkwise.robot.robot import Coupling, unusable
-from linkwise.runtime.chosen_names import nearest_first
 
 CLOSE = 1e-9
 """In rad and m, by which joints that stand still may miss what a coupling asks of them."""

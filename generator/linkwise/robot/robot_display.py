@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import astuple
 from typing import Any
 
-from linkwise.runtime.html_tables import page_part, table
-from linkwise.runtime.robot_table import joint_table
+from linkwise_runtime.html_tables import page_part, table
+from linkwise_runtime.robot_table import joint_table
 
 SHOWN = 30
 """Letters of a formula."""

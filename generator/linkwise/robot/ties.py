@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import sympy as sp
+from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
@@ -11,7 +12,6 @@ from linkwise.robot import transforms
 from linkwise.robot.description import Anchor, AnchoredTie, Body, Description, Site
 from linkwise.robot.notes import LEFT_OUT, Note
 from linkwise.robot.robot import Frame, Scalar, Tie, unusable
-from linkwise.runtime.chosen_names import nearest_first
 
 CLOSE = 1e-6
 """In m, by which ends that move as one may miss a tie without a word."""

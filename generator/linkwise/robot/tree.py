@@ -4,12 +4,13 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 
+from linkwise_runtime.chosen_names import nearest_first
+
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.description import Connection, Description, Loop
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import unusable
-from linkwise.runtime.chosen_names import nearest_first
 
 
 def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:

@@ -3,9 +3,10 @@
 import re
 from collections.abc import Iterable, Sequence
 
+from linkwise_runtime.chosen_names import nearest_first
+
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, short
-from linkwise.runtime.chosen_names import nearest_first
 
 WILD = re.compile(r"(\*+)")
 LONGEST = 200

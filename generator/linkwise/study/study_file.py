@@ -6,13 +6,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from linkwise_runtime.chosen_names import nearest_first
+
 from linkwise.analysis.analysis_choices import AnalysisChoices
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.robot import Options
 from linkwise.robot.readers.toml_table import tables, toml_data
-from linkwise.runtime.chosen_names import nearest_first
 from linkwise.study.cycles import written_cycles
 from linkwise.study.running_moments import STATISTICS
 from linkwise.study.study_paths import require_there, resolved

@@ -7,10 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import gettempdir
 
+from linkwise_runtime.native.native_system import system_here
+
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names
 from linkwise.output import sweep
-from linkwise.runtime.native.native_system import system_here
 from linkwise.study.study_mark import StudyMark
 from linkwise.study.study_paths import removed, require_own
 from linkwise.study.study_plan import StudyPlan

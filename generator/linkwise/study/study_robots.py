@@ -5,6 +5,8 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
+from linkwise_runtime.version import VERSION
+
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
@@ -16,7 +18,6 @@ from linkwise.robot import is_description
 from linkwise.robot.read import most_bytes
 from linkwise.study.study_paths import is_address, opened_here, require_there, told_of, version_of
 from linkwise.study.study_plan import StudyPlan
-from linkwise.version import VERSION
 
 ROBOTS = 4
 """Robots that a worker keeps in memory: trials of one subject follow one another."""

@@ -4,9 +4,10 @@ from collections.abc import Iterable, Mapping
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from linkwise_runtime.chosen_names import nearest_first
+
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.runtime.chosen_names import nearest_first
 
 T = TypeVar("T")
 

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping
 from typing import TypeGuard
 
 import sympy as sp
+from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.errors import LinkwiseError
-from linkwise.runtime.chosen_names import nearest_first
 
 READ = ("coordinates", "links", "parameters", "name")
 """What linkwise reads of a file."""

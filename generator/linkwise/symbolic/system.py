@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import sympy as sp
+from linkwise_runtime.html_tables import page_part, table
+from linkwise_runtime.robot_table import joint_table
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import Coordinate, Joint, Mat3, Robot, Scalar, Vec3
-from linkwise.runtime.html_tables import page_part, table
-from linkwise.runtime.robot_table import joint_table
 
 
 @dataclass(frozen=True)

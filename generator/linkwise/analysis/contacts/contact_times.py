@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.chosen_names import nearest_first
+from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.analysis.column_matching import time_column
@@ -20,9 +22,8 @@ from linkwise.analysis.samples import finite_blocks
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 from linkwise.progress import Progress
-from linkwise.runtime.chosen_names import nearest_first
 
 FLOOR = 1e-3
 """Of the largest measured force, that a contact which is on has at least: a plate may be missed."""
@@ -75,7 +76,7 @@ class ContactTimes:
         force = [np.linalg.norm(load.table[:, FORCE], axis=1).max() for load in self.measured[number]]
         return f"the loads on its body are {sum(force):.4g} N at most"
 
-    def shares(self, model: Model, time: Array, q: Array) -> Array:
+    def shares(self, model: Dynamics, time: Array, q: Array) -> Array:
         """Of what contacts could bear in several ways, (S, contacts): 0 of those that are off, 1 in all.
 
         At instants (S,) with the robot at q (S, n). In proportion to the measured forces where all contacts
@@ -101,17 +102,17 @@ class ContactTimes:
         is_on: NDArray[np.bool_] = force > self.least_force
         return is_on
 
-    def _force(self, number: int, model: Model, time: Array, q: Array) -> Array:
+    def _force(self, number: int, model: Dynamics, time: Array, q: Array) -> Array:
         """Size of what was measured of a contact, (S,)."""
         pushes = [wrench.force for wrench in _wrenches(self.measured[number], model, time, q)]
         size: Array = np.linalg.norm(sum(pushes, np.zeros((len(time), 3))), axis=1)
         return size
 
-    def torque(self, model: Model, time: Array, q: Array) -> Array:
+    def torque(self, model: Dynamics, time: Array, q: Array) -> Array:
         """What joints would take to bear the measured loads, (S, n)."""
         return sum((load.torque(model, time, q) for load in self.loads), np.zeros_like(q))
 
-    def wrench(self, number: int, model: Model, time: Array, q: Array, place: Array) -> Array:
+    def wrench(self, number: int, model: Dynamics, time: Array, q: Array, place: Array) -> Array:
         """What was measured of a contact: moment about a place (S, 3) in the world, and force, (S, 6)."""
         out = np.zeros((len(time), 6))
         for load in _wrenches(self.measured[number], model, time, q):
@@ -120,7 +121,7 @@ class ContactTimes:
         return out
 
 
-def _wrenches(loads: Sequence[PlacedLoad], model: Model, time: Array, q: Array) -> list[Wrench]:
+def _wrenches(loads: Sequence[PlacedLoad], model: Dynamics, time: Array, q: Array) -> list[Wrench]:
     return [load.wrench(time, q, model_pose(model)) for load in loads]
 
 

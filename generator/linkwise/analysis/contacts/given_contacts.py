@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from linkwise_runtime.robot_constraints import Contact
+
 from linkwise.analysis.loads import Load, Loads
 from linkwise.errors import LinkwiseError
-from linkwise.runtime.arguments import is_like
-from linkwise.runtime.robot_constraints import Contact
 
 THRESHOLD = 20.0
 """N; of a force plate's reading below it nothing stands there."""
@@ -63,10 +63,10 @@ class Contacts:
             raise LinkwiseError(f"--contact-threshold {self.threshold:g}: give a force in N, 0 or more")
 
     def _check_kinds(self) -> None:
-        if not isinstance(self.given, list | tuple) or is_like(self.given, Contact):
+        if not isinstance(self.given, list | tuple) or isinstance(self.given, Contact):
             raise LinkwiseError("contacts: give a list of Contact, or Contacts")
         for one in self.given:
-            if not is_like(one, Contact):
+            if not isinstance(one, Contact):
                 raise LinkwiseError(f"contacts: {str(one)[:60]!r} is not a Contact")
         for name, column in self.columns.items():
             if not isinstance(column, WhileColumn):

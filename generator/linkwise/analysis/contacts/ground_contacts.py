@@ -20,11 +20,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.constraints.held_frames import axes_around
+from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.robot_constraints import Contact
 
 from linkwise.analysis.constrained_model import ConstrainedModel
-from linkwise.package.load import Array, Model
-from linkwise.runtime.constraints.held_frames import axes_around
-from linkwise.runtime.robot_constraints import Contact
+from linkwise.package.load import Array
 
 WRENCH = ("moment_x", "moment_y", "moment_z", "force_x", "force_y", "force_z")
 BLIND = 1e-4
@@ -73,7 +74,7 @@ class GroundContacts:
             for turns, part in zip(held, parts, strict=True)
         )
 
-    def wrench(self, number: int, model: Model, q: Array, forces: Array) -> Array:
+    def wrench(self, number: int, model: Dynamics, q: Array, forces: Array) -> Array:
         """What a contact puts on its body, (S, 6): moment about its point, and force, in the world's axes.
 
         forces: of all rows, (S, C)
@@ -120,7 +121,7 @@ class GroundContacts:
         ]
         return {"held": held, "unactuated": [joints[i] for i in self.unactuated]}
 
-    def places(self, model: Model, q: Array) -> list[Array]:
+    def places(self, model: Dynamics, q: Array) -> list[Array]:
         """Where in the world the point of each contact is, (S, 3), in m."""
         found = []
         for contact in self.contacts:
@@ -128,7 +129,7 @@ class GroundContacts:
             found.append(pose[:, :3, :3] @ np.array(contact.point) + pose[:, :3, 3])
         return found
 
-    def blind(self, model: Model, q: Array) -> int | None:
+    def blind(self, model: Dynamics, q: Array) -> int | None:
         """The first sample at which torques of the unactuated joints do not tell all that they ask for.
 
         A base's turns lose one where two of its joints turn about one axis: pitched by 90 degrees.

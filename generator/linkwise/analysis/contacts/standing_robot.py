@@ -4,6 +4,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from linkwise_runtime.chosen_names import nearest_first
+from linkwise_runtime.constraints.held_frames import ground_normal
+from linkwise_runtime.constraints.independent_joints import loose_base
+from linkwise_runtime.robot_constraints import Contact
+
 from linkwise.analysis.body_names import body_frame
 from linkwise.analysis.contacts.given_contacts import Contacts
 from linkwise.analysis.contacts.ground_contacts import GroundContacts
@@ -11,10 +16,6 @@ from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import moving_joints
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.runtime.chosen_names import nearest_first
-from linkwise.runtime.constraints.held_frames import ground_normal
-from linkwise.runtime.constraints.independent_joints import loose_base
-from linkwise.runtime.robot_constraints import Contact
 
 
 def standing_on(robot: LoadedRobot, contacts: Contacts) -> LoadedRobot:

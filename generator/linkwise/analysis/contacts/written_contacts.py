@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from linkwise_runtime.robot_constraints import Contact
+
 from linkwise.analysis.body_names import named_body
 from linkwise.analysis.contacts.given_contacts import Contacts, WhileColumn
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.errors import LinkwiseError
-from linkwise.runtime.robot_constraints import Contact
 
 NUMBERS = {"held": (), "point": (), "hinged": ("AX", "AY", "AZ"), "rolling": ("RADIUS",)}
 """What stands behind a kind."""

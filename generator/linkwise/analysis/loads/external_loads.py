@@ -6,6 +6,8 @@ from itertools import zip_longest
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from linkwise_runtime.chosen_names import nearest_first
+
 from linkwise.analysis.column_matching import time_column
 from linkwise.analysis.loads.given_loads import WORLD
 from linkwise.analysis.loads.load_columns import LoadColumns
@@ -14,7 +16,6 @@ from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
-from linkwise.runtime.chosen_names import nearest_first
 
 GROUND = "ground"
 LOADS, FORCE = "ExternalLoads", "ExternalForce"

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from linkwise_runtime.chosen_names import end_of_path
+
 from linkwise.analysis.body_names import named_body
 from linkwise.analysis.column_matching import time_column, with_nearest
 from linkwise.analysis.loaded_robot import LoadedRobot
@@ -12,7 +14,6 @@ from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.runtime.chosen_names import end_of_path
 
 PARTS = {"force": FORCE, "moment": MOMENT, "point": POINT}
 NAMED = re.compile(r"(?P<load>.+)/(?P<part>force|moment|point)_(?P<axis>[xyz])")

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.analysis.body_names import body_frame
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.errors import LinkwiseError
-from linkwise.package.load import Array, Model
+from linkwise.package.load import Array
 from linkwise.package.manifest import FrameEntry, RigidTree
 
 Pose = Callable[[FrameEntry, Array], Array]
@@ -75,7 +76,7 @@ class PlacedLoad:
             point = np.einsum("sab,sb->sa", at[:, :3, :3], point) + at[:, :3, 3]
         return Wrench(force, moment, point)
 
-    def torque(self, model: Model, time: Array, q: Array) -> Array:
+    def torque(self, model: Dynamics, time: Array, q: Array) -> Array:
         """What it asks of each joint, τ_ie (S, n) in N·m or N."""
         force, moment, place = self.wrench(time, q, model_pose(model))
         found: Any = model.kinematics.load_torque(q, self.seat.frame.name, force, moment, at=place)
@@ -96,7 +97,7 @@ class PlacedLoad:
         return np.stack([np.interp(time, some[:, 0], column) for column in some.T], axis=1)
 
 
-def model_pose(model: Model) -> Pose:
+def model_pose(model: Dynamics) -> Pose:
     """Poses as a model has them."""
     return lambda frame, q: np.asarray(model.kinematics.pose(q, frame.name))
 

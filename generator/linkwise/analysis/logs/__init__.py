@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
 
+from linkwise_runtime.file_joints import FileJoint
+
 from linkwise.analysis.logs.array_log import ArrayFile, ArrayLog
 from linkwise.analysis.logs.bag import BagLog
 from linkwise.analysis.logs.hdf5 import Hdf5Arrays
@@ -17,7 +19,6 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.package.load import Array
-from linkwise.runtime.file_joints import FileJoint
 
 AS_IT_IS = Reading()
 DELIMITED, STORAGE = (".csv", ".tsv", ".txt"), (".mot", ".sto")

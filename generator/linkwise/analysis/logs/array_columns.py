@@ -9,9 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from linkwise_runtime.file_joints import FileJoint, why_wider
+
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.runtime.file_joints import FileJoint, why_wider
 
 NAMES = ("joint_names", "joints", "names", "name", "columns")
 """What an array of texts is called, or an attribute, that names joints."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from linkwise_runtime.file_joints import FileJoint
 
 from linkwise.analysis.logs.array_columns import WORDS, ArrayColumns, Place, StoredArray, array_columns
 from linkwise.analysis.logs.named_once import named_once
@@ -15,7 +16,6 @@ from linkwise.analysis.settings import Reading
 from linkwise.errors import within
 from linkwise.escape import listed
 from linkwise.package.load import Array
-from linkwise.runtime.file_joints import FileJoint
 
 
 class ArrayFile(Protocol):

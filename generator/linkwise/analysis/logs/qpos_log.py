@@ -6,6 +6,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from linkwise_runtime.file_joints import Order
+from linkwise_runtime.qpos_motion import Earlier, Qpos, QposMotion
 
 from linkwise.analysis.logs.array_columns import (
     ENDING_OF,
@@ -20,8 +22,6 @@ from linkwise.analysis.logs.finite import require_finite
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.package.load import Array
-from linkwise.runtime.file_joints import Order
-from linkwise.runtime.qpos_motion import Earlier, Qpos, QposMotion
 
 QposOf = Callable[[Order, Sequence[str] | None], Qpos]
 """How positions of an order become a robot's, with the names of its file's joints where they have another."""

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from linkwise_runtime.chosen_names import nearest_first
+
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.causes_figure import causes
@@ -14,7 +16,6 @@ from linkwise.analysis.show.shares_figure import shares
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.plotstyle import saved, styled
-from linkwise.runtime.chosen_names import nearest_first
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

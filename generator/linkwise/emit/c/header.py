@@ -3,11 +3,12 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from linkwise_runtime.native.native_compiler import FLAGS, TUNING
+
 from linkwise.emit.c.sizes import Span
 from linkwise.emit.constrained_system import constraints_of
 from linkwise.emit.definition import joint_entries
 from linkwise.escape import c_comment, identifiers
-from linkwise.runtime.native.native_compiler import FLAGS, TUNING
 from linkwise.symbolic.system import RigidSystem, System
 
 BLOCK = {"double": 8, "float": 16}

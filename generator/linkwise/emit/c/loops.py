@@ -1,8 +1,9 @@
 """A kernel in loops in C: the robot in tables, and fixed files that go by them."""
 
 from collections.abc import Iterator, Sequence
-from importlib.resources import files
 from typing import Any
+
+from linkwise_runtime.version import VERSION
 
 from linkwise.dynamics.kernel import parameter_names
 from linkwise.emit.c import header
@@ -15,45 +16,6 @@ from linkwise.emit.c.stack import loops_stack, small_stack
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.symbolic.system import RigidSystem
-from linkwise.version import VERSION
-
-FIXED = (
-    "curves.h",
-    "arrays.h",
-    "block_rows.h",
-    "blocks.h",
-    "calls.h",
-    "dense.h",
-    "dense_rows.h",
-    "destinations.h",
-    "elimination.h",
-    "forward_dynamics.h",
-    "frame_impedance.h",
-    "frame_rotation.h",
-    "frames.h",
-    "gradient.h",
-    "impedance.h",
-    "lanes.h",
-    "loops.h",
-    "mass.h",
-    "moving_links.h",
-    "numbers.h",
-    "one_by_one.h",
-    "one_motion.h",
-    "one_sample.h",
-    "packed_rows.h",
-    "passive.h",
-    "regressors.h",
-    "rows.h",
-    "rule.h",
-    "shares.h",
-    "sines.h",
-    "small_cubes.h",
-    "stream.h",
-    "tree.h",
-    "vectors.h",
-)
-"""Files that are the same in every package with a kernel in loops."""
 
 
 def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
@@ -80,8 +42,6 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     yield f"c/{name}.h", render("c/robot.h.j2", names | header_view(system, links, name) | costs)
     tables = {"tables": list(header.index_tables(system, links))}
     yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)
-    for file in FIXED:
-        yield f"c/{file}", files("linkwise.runtime").joinpath("c", file).read_text(encoding="utf-8")
 
 
 def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:

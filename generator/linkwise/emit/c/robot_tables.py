@@ -6,6 +6,7 @@ from itertools import accumulate
 from typing import Any
 
 import sympy as sp
+from linkwise_runtime.passive_joints import PassiveJoint, passive_sums
 
 from linkwise.dynamics.kernel import lowering, parameter_names
 from linkwise.emit.c.sizes import EntryCounts, Span
@@ -13,7 +14,6 @@ from linkwise.emit.printer import CPrinter
 from linkwise.emit.straight_line import straight_line
 from linkwise.escape import c_comment
 from linkwise.robot.robot import Scalar
-from linkwise.runtime.passive_joints import PassiveJoint, passive_sums
 from linkwise.symbolic.system import RigidSystem
 
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))

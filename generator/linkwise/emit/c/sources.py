@@ -5,8 +5,9 @@ one text serves one sample and many, float and double, and a link's file stays t
 """
 
 from collections.abc import Iterator, Mapping
-from importlib.resources import files
 from typing import Any
+
+from linkwise_runtime.version import VERSION
 
 from linkwise.dynamics.kernel import Kernel
 from linkwise.emit.c import header
@@ -24,46 +25,6 @@ from linkwise.emit.derivation import Derivation
 from linkwise.emit.render import render
 from linkwise.escape import c_comment
 from linkwise.symbolic.system import RigidSystem, System
-from linkwise.version import VERSION
-
-FIXED = (
-    "arrays.h",
-    "calls.h",
-    "dense.h",
-    "dense_rows.h",
-    "destinations.h",
-    "elimination.h",
-    "impedance.h",
-    "numbers.h",
-    "one_by_one.h",
-    "passive.h",
-    "rows.h",
-    "sines.h",
-    "small_cubes.h",
-    "stream.h",
-)
-"""Files that are the same in every package."""
-
-FIXED_OF_RIGID = (
-    "curves.h",
-    "blocks.h",
-    "forward_dynamics.h",
-    "frame_impedance.h",
-    "frame_rotation.h",
-    "frames.h",
-    "lanes.h",
-    "mass.h",
-    "moving_links.h",
-    "one_motion.h",
-    "regressors.h",
-    "rule.h",
-    "tree.h",
-    "vectors.h",
-)
-"""Those beside them in every package of rigid links, of which some functions are in loops."""
-
-FIXED_OF_ENERGIES = ("packed_links.h",)
-"""Those beside them in every other."""
 
 
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
@@ -85,14 +46,8 @@ def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     yield f"c/{name}.h", render("c/robot.h.j2", names | about)
     tables = {"tables": list(header.index_tables(system, links))}
     yield f"c/{name}_index.h", render("c/index.h.j2", names | tables)
-    fixed: tuple[str, ...] = FIXED
     if isinstance(system, RigidSystem):
         yield f"c/{name}_tree.h", render("c/tree.h.j2", common | table_view(system))
-        fixed += FIXED_OF_RIGID
-    else:
-        fixed += FIXED_OF_ENERGIES
-    for file in fixed:
-        yield f"c/{file}", files("linkwise.runtime").joinpath("c", file).read_text(encoding="utf-8")
 
 
 def _link_kernels(system: System, kernel: Kernel, number: int) -> LinkKernels:

@@ -8,12 +8,13 @@ import math
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
+from linkwise_runtime.chosen_names import nearest_first
+
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.description import IDENTITY, ZERO3
 from linkwise.robot.robot import Rotation, Vec3
-from linkwise.runtime.chosen_names import nearest_first
 
 MODEL, WORLD = "__model__", "world"
 PLACED = ("link", "joint", "frame")

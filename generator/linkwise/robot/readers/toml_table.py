@@ -5,12 +5,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from linkwise_runtime.chosen_names import nearest_first
+
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.robot.readers.bounded import MIB, check_toml_bounds, content
 from linkwise.robot.readers.formula import parse_formula
 from linkwise.robot.robot import Scalar, Vec3, unusable
-from linkwise.runtime.chosen_names import nearest_first
 
 LARGEST = MIB
 """Bytes of a file."""

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import is_like
 from ..chosen_names import short
 from ..controllers import ROWS, FrameImpedance, Natural
 from ..kinematics.named_frames import frame_index
@@ -68,7 +67,7 @@ class FrameTargets:
 
     def __init__(self, robot: Any, asked: FrameImpedance) -> None:
         """Raises ValueError and TypeError as `Dynamics.partial_impedance` does."""
-        if not is_like(asked, FrameImpedance):
+        if not isinstance(asked, FrameImpedance):
             raise TypeError(f"frame is {short(asked)}; give FrameImpedance({short(asked)}, ...)")
         self._robot, self.rows, self.names = robot, _chosen(asked.rows), tuple(asked.rows)
         self.frame, self.point = asked.frame, _point(asked.point)
@@ -203,7 +202,7 @@ class FrameTargets:
         return xp.concat([theta, moved], -1)[..., rows], turning[..., rows, :][..., rows]
 
     def _part(self, name: str, given: Any, definite: bool) -> FramePart:
-        if is_like(given, Natural):
+        if isinstance(given, Natural):
             if isinstance(given.scale, bool) or not isinstance(given.scale, int | float) or given.scale < 0.0:
                 raise ValueError(f"{name}.scale is {given.scale!r}; give a number, 0 or above")
             if given.plus is None:

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import is_like
 from ..chosen_names import short
 from ..kinematics.named_frames import frame_index
 from ..robot_constraints import Contact
@@ -58,7 +57,7 @@ class Held(NamedTuple):
 
 def held_by(tree: JointTree, contacts: Any) -> list[Held]:
     """Ties of the tree, then contacts; raises as `Dynamics.constrained` does."""
-    if is_like(contacts, Contact) or not isinstance(contacts, list | tuple):
+    if isinstance(contacts, Contact) or not isinstance(contacts, list | tuple):
         raise TypeError(f"contacts is {short(contacts)}; give a list of Contact")
     ties = [
         Held(tie.name, tie.kind, tie.first, tie.second, np.eye(3), length=tie.length) for tie in tree.ties
@@ -67,7 +66,7 @@ def held_by(tree: JointTree, contacts: Any) -> list[Held]:
     taken = {tie.name for tie in tree.ties} | {coupling.name for coupling in tree.couplings}
     for number, contact in enumerate(contacts):
         where = f"contacts[{number}]"
-        if not is_like(contact, Contact):
+        if not isinstance(contact, Contact):
             raise TypeError(f"{where} is {short(contact)}; give a Contact")
         made = _held(contact, where, frames, tree.gravity)
         if tree.frames[made.first].joint is None:

@@ -24,14 +24,6 @@ REAL = ("bool", "int", "uint", "float", "bfloat")
 """How names of dtypes of real numbers begin."""
 
 
-def is_like(given: Any, kind: type) -> bool:
-    """Whether an argument has all that a public class has: it is of that class, or of another package's own.
-
-    Each package has a runtime of its own, whose classes are alike and not the same.
-    """
-    return all(hasattr(type(given), name) for name in vars(kind) if not name.startswith("_"))
-
-
 def has_tensors(values: Iterable[Any]) -> bool:
     """Whether one of the values is a torch tensor; torch isn't imported to find out."""
     torch = sys.modules.get("torch")

@@ -9,7 +9,6 @@ from typing import Any, NoReturn
 import torch
 from torch import Tensor
 
-from ..arguments import is_like
 from ..recorded.operation_recorder import Leaf, Operation, Ref, mapped
 from ..recorded.recorded_torques import LinkEnergies, Part, RecordedParts, record
 from ..structure import Structure
@@ -76,7 +75,7 @@ class TorqueGraph:
     def shared_with(self, *others: "TorqueGraph") -> tuple[Operation, ...]:
         """Operations that are in each of the others too."""
         for other in others:
-            if not is_like(other, TorqueGraph):
+            if not isinstance(other, TorqueGraph):
                 raise TypeError(
                     f"shared_with takes other graphs, as graph(i, j, k, m) gives them, and got {other!r}"
                 )

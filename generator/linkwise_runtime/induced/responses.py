@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import is_like
 from ..chosen_names import short
 from ..robot_constraints import Constraints
 from ..sums.inertia_solve import solved_columns
@@ -93,7 +92,7 @@ def constraints_of(robot: Any, given: Any) -> Any:
     if given is False:
         return None
     if given is not None:
-        if not is_like(given, Constraints):
+        if not isinstance(given, Constraints):
             raise TypeError(
                 f"constraints is {short(given)}; give what robot.constrained(...) makes, or False"
             )

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import check_numbers, is_like
+from ..arguments import check_numbers
 from ..chosen_names import short
 from ..controllers import FrameImpedance, Target
 from ..dense import Dense
@@ -161,7 +161,7 @@ class ControlAnswers:
 
     def _given(self, q: Any, qd: Any, target: Any, external: Any) -> tuple[Target, dict[str, Any]]:
         """Target and motion, as they were given and of one shape; positions alone are a target."""
-        read = target if is_like(target, Target) else Target(q=target)
+        read = target if isinstance(target, Target) else Target(q=target)
         if hasattr(read.q, "_fields"):
             raise TypeError(f"target is {short(read.q)}; give positions (..., n), or Target(q, qd, ...)")
         if read.q is None and self._joints.targets.stiffness is not None:

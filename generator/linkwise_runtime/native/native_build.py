@@ -143,10 +143,11 @@ def digest_of(directory: Path) -> str:
     """Hash of the names and the bytes of all files; raises RuntimeError where they cannot be read."""
     digest = hashlib.sha256()
     try:
-        for path in sorted(directory.iterdir()):
+        for path in sorted(path for path in directory.rglob("*") if not path.is_dir()):
             if not path.is_file():  # a pipe, say, whose end would be waited for
                 raise RuntimeError(f"{path} is no file; generate it again")
-            digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+            name = path.relative_to(directory).as_posix()
+            digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     except OSError as error:
         raise RuntimeError(f"cannot read {error.filename}: {error.strerror}; generate it again") from None
     return digest.hexdigest()

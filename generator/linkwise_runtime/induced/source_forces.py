@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import is_like
 from ..motion_quantities import AppliedLoad
 from ..sums.namespace import namespace
 
@@ -69,7 +68,7 @@ def beside(parts: Sequence[Any]) -> Any:
 
 def listed(loads: Any) -> list[Any]:
     """Loads as a list, of which one alone may be given; raises TypeError for what is neither."""
-    if is_like(loads, AppliedLoad):
+    if isinstance(loads, AppliedLoad):
         return [loads]
     if not isinstance(loads, list | tuple):
         raise TypeError(f"loads is a {type(loads).__name__}; give a list of AppliedLoad(frame, force, ...)")
@@ -80,8 +79,8 @@ def load_torques(robot: Any, q: Any, loads: Sequence[Any]) -> list[Any]:
     """What each load adds to the torques that joints need, (..., n); errors tell which load is meant."""
     found = []
     for e, load in enumerate(loads):
-        several = [load] if is_like(load, AppliedLoad) else load
-        if not isinstance(several, list | tuple) or not all(is_like(a, AppliedLoad) for a in several):
+        several = [load] if isinstance(load, AppliedLoad) else load
+        if not isinstance(several, list | tuple) or not all(isinstance(a, AppliedLoad) for a in several):
             raise TypeError(
                 f"loads[{e}] is a {type(load).__name__}; give AppliedLoad(frame, force, ...), or a list of "
                 "them that counts as one load"

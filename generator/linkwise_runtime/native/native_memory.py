@@ -7,9 +7,7 @@ it is, and only then is the block free again. Meanwhile the system may take its 
 """
 
 import mmap
-import sys
 from contextlib import suppress
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -25,12 +23,8 @@ APART: dict[str, Any] = (
 )
 """Has a fork have memory of its own, where there are forks."""
 
-_shared = sys.modules.setdefault(
-    "_linkwise_blocks", ModuleType("_linkwise_blocks", "Blocks of all packages.")
-)
-_free: dict[int, list[mmap.mmap]] = vars(_shared).setdefault("free", {})
-"""Free blocks by size, those of all packages in this process. Nothing is locked, as a lease may end anywhere:
-lists give and take in one step."""
+_free: dict[int, list[mmap.mmap]] = {}
+"""Free blocks by size. Nothing is locked, as a lease may end anywhere: lists give and take in one step."""
 
 
 class Lease:

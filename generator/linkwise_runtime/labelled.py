@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import has_tensors, is_like
+from .arguments import has_tensors
 from .chosen_names import choice, short
 from .motion_quantities import AppliedLoad
 from .named_arguments import SampleAxes, samples_along, taken
@@ -98,8 +98,8 @@ def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict
 def _names_of(loads: Any, robot: Any) -> tuple[str, ...]:
     """Names of loads: those of their frames, numbered where one has several."""
     names: list[str] = []
-    for load in [loads] if is_like(loads, AppliedLoad) else loads:
-        several: Iterable[Any] = [load] if is_like(load, AppliedLoad) else load
+    for load in [loads] if isinstance(loads, AppliedLoad) else loads:
+        several: Iterable[Any] = [load] if isinstance(load, AppliedLoad) else load
         frames = [
             one.frame if isinstance(one.frame, str) else robot.kinematics.frames[one.frame] for one in several
         ]

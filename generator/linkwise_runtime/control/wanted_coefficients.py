@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import has_tensors, is_like
+from ..arguments import has_tensors
 from ..chosen_names import short
 from ..controllers import Natural
 from ..structure import Structure
@@ -52,7 +52,7 @@ def wanted(name: str, given: Any, structure: Structure, definite: bool) -> Wante
     definite: whether a sum that is given must be positive definite and symmetric, as inertia must
     """
     names = structure.joint_names
-    if is_like(given, Natural):
+    if isinstance(given, Natural):
         plus = f"{name}.plus"
         added = None if given.plus is None else Gain(plus, given.plus, names, symmetric=definite)
         return WantedShares(*_scaled(f"{name}.scale", given.scale, structure), added, False, True)
@@ -69,7 +69,7 @@ def stiffness_of(given: Any, structure: Structure) -> Gain | None:
     """K*, None for none; raises ValueError for what is not symmetric or not positive."""
     if isinstance(given, Mapping):
         given = entries_apart("stiffness", given, structure)[1]
-    elif is_like(given, Natural):
+    elif isinstance(given, Natural):
         raise TypeError(
             "stiffness is Natural, but a position loads nothing by itself, and gravity, as any potential, is "
             "compensated; give numbers in N m/rad or N/m"
