@@ -10,19 +10,24 @@ See `load` for the back ends, `Dynamics` for all calls and `names.py` for the ro
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, overload
 
+from linkwise_runtime.version import require
+
+require("0.1.0")
+
+from linkwise_runtime.controllers import FrameImpedance, Natural, Target
+from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.interface import Backend
+from linkwise_runtime.motion_quantities import AppliedLoad, InducedAccelerations, Trajectory
+from linkwise_runtime.rule.joint_tree import Bodies
+from linkwise_runtime.quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
+from linkwise_runtime.robot_constraints import Contact
+from linkwise_runtime.rule.regressors import inertial_parameters
+from linkwise_runtime.structure import Layout
+
 from .names import ROBOT
-from .runtime.controllers import FrameImpedance, Natural, Target
-from .runtime.dynamics import Dynamics
-from .runtime.interface import Backend
-from .runtime.motion_quantities import AppliedLoad, InducedAccelerations, Trajectory
-from .runtime.rule.joint_tree import Bodies
-from .runtime.quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
-from .runtime.robot_constraints import Contact
-from .runtime.rule.regressors import inertial_parameters
-from .runtime.structure import Layout
 
 if TYPE_CHECKING:
-    from .runtime.lagrangians.dynamics_module import DynamicsModule
+    from linkwise_runtime.lagrangians.dynamics_module import DynamicsModule
 
 joint_names = ROBOT.joint_names
 link_names = ROBOT.link_names
@@ -96,8 +101,6 @@ def load(
 
     Raises ValueError for a back end or a parameter that this package doesn't have.
     """
-    if not BACKENDS:
-        raise ValueError("this package has no back end to load; generate it with --backend numpy, say")
     if backend not in BACKENDS:
         raise ValueError(f"no back end {backend!r} in this package; choose one of {', '.join(BACKENDS)}")
     made = _MAKERS[backend](ROBOT.values(parameters, allow_unphysical), kernel, bodies, requires_grad)
@@ -115,9 +118,9 @@ def bodies() -> Bodies[Any]:
 
 def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from .forms import LINKS
-    from .runtime.arrays.numpy_backend import NumpyBackend
+    from linkwise_runtime.arrays.numpy_backend import NumpyBackend
     from .tree import RULE
-    from .runtime.arrays.array_kernels import refuse_learning
+    from linkwise_runtime.arrays.array_kernels import refuse_learning
 
     refuse_learning("numpy", requires_grad)
     return NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
@@ -125,9 +128,9 @@ def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: A
 
 def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from .forms import LINKS
-    from .runtime.arrays.torch_backend import TorchBackend
+    from linkwise_runtime.arrays.torch_backend import TorchBackend
     from .tree import RULE
-    from .runtime.arrays.array_kernels import refuse_learning
+    from linkwise_runtime.arrays.array_kernels import refuse_learning
 
     refuse_learning("torch", requires_grad)
     return TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
@@ -135,9 +138,9 @@ def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: A
 
 def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from .energies import LAGRANGIANS
-    from .runtime.lagrangians.dynamics_module import backend_of_links
+    from linkwise_runtime.lagrangians.dynamics_module import backend_of_links
     from .tree import RULE
-    from .runtime.arrays.array_kernels import refuse_choice
+    from linkwise_runtime.arrays.array_kernels import refuse_choice
 
     refuse_choice("autograd", kernel, bodies)
     return backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad, RULE)
@@ -146,10 +149,10 @@ def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad
 def _native(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
     from pathlib import Path
     from .forms import LINKS
-    from .runtime.native.native_backend import NativeBackend
+    from linkwise_runtime.native.native_backend import NativeBackend
     from .tree import RULE
-    from .runtime.arrays.array_kernels import refuse_choice
-    from .runtime.arrays.array_kernels import refuse_learning
+    from linkwise_runtime.arrays.array_kernels import refuse_choice
+    from linkwise_runtime.arrays.array_kernels import refuse_learning
 
     refuse_choice("native", kernel, bodies)
     refuse_learning("native", requires_grad)

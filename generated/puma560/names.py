@@ -2,7 +2,7 @@
 
 from math import inf
 
-from .runtime.structure import JointLimits, Structure
+from linkwise_runtime.structure import JointLimits, Structure
 
 ROBOT = Structure(
     name='puma560',

@@ -17,7 +17,7 @@ manifest describes. For energies of your own that all back ends follow and `link
 Python file, as linkwise's documentation shows, and generate a package from it: linkwise generate FILE.py.
 """
 
-from ..runtime.lagrangians.partial_lagrangian import PartialLagrangian
+from linkwise_runtime.lagrangians.partial_lagrangian import PartialLagrangian
 from . import link_1
 from . import link_2
 from . import link_3

@@ -4,8 +4,8 @@
    The arithmetic is in the kernels of link_1.h to link_6.h. Here they become functions of one sample,
    of blocks of samples, and of rows of samples, which pass through blocks. */
 #define API(function) F(puma560_##function)
-#include "numbers.h"
-#include "sines.h"
+#include "linkwise/numbers.h"
+#include "linkwise/sines.h"
 
 #include "puma560.h"
 
@@ -61,7 +61,7 @@ SHARED void API(dense_torque_one)(const real *q, const real *qd, const real *qdd
 #define W 1
 #define SIZED(name) name##_one
 #define KERNEL(name) static void SIZED(name)
-#include "dense.h"
+#include "linkwise/dense.h"
 #define WANT_DECOMPOSITION
 #define WANT_TORQUE
 #include "link_1.h"
@@ -202,7 +202,7 @@ SHARED void API(dense_one)(const real *q, const real *qd, const real *qdd, const
 
 /* ---- Blocks of samples, and rows, which pass through blocks ---- */
 #if PART(BLOCKS) || PART(POSITION_GRADIENT)
-#include "rows.h"
+#include "linkwise/rows.h"
 
 /* Blocks in a tile: each kernel works on all of them before the next one does, so that its code stays in the cache. */
 #ifdef LINKWISE_SMALL
@@ -211,16 +211,16 @@ enum { TILE = 1 };
 #define W 1
 #define SIZED(name) name##_one
 #define KERNEL(name) static void SIZED(name)
-#include "small_cubes.h"
+#include "linkwise/small_cubes.h"
 #else
 enum { TILE = 8 };
 
 #define W BLOCK
 #define SIZED(name) name##_block
 #define KERNEL(name) APART void SIZED(name)
-#include "dense.h"
-#include "stream.h"
-#include "dense_rows.h"
+#include "linkwise/dense.h"
+#include "linkwise/stream.h"
+#include "linkwise/dense_rows.h"
 #endif
 
 struct block {
@@ -261,7 +261,7 @@ static size_t load(size_t count, const real *q, const real *qd, const real *qdd,
 #endif
 
 #ifdef LINKWISE_SMALL
-#include "one_by_one.h"
+#include "linkwise/one_by_one.h"
 #elif PART(BLOCKS)
 #define WANT_DECOMPOSITION
 #define WANT_TORQUE
@@ -532,7 +532,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 }
 #endif
 
-#include "calls.h"
+#include "linkwise/calls.h"
 
 /* ---- In loops over links and joints: regressors of rows; of one sample, frames and the mass matrix ---- */
 #undef W
@@ -544,12 +544,12 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 #include "puma560_tree.h"
 #endif
 #if PART(REGRESSORS)
-#include "regressors.h"
+#include "linkwise/regressors.h"
 #endif
 #if PART(CONTROL)
-#include "frames.h"
-#include "moving_links.h"
-#include "passive.h"
-#include "forward_dynamics.h"
-#include "frame_impedance.h"
+#include "linkwise/frames.h"
+#include "linkwise/moving_links.h"
+#include "linkwise/passive.h"
+#include "linkwise/forward_dynamics.h"
+#include "linkwise/frame_impedance.h"
 #endif

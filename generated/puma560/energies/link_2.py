@@ -7,11 +7,11 @@ link's own axes; `height` gravity a and the potential per mass u of the origin. 
 
 from typing import Any
 
-from ..runtime.lagrangians.energy_interface import Parameters, Values
-from ..runtime.lagrangians.frame_motion import Axes, along_z, potential_at, velocity_at
-from ..runtime.lagrangians.lanes import carried
-from ..runtime.lagrangians.rigid_body import kinetic_energy
-from ..runtime.lagrangians.rigid_lagrangian import RigidLagrangian
+from linkwise_runtime.lagrangians.energy_interface import Parameters, Values
+from linkwise_runtime.lagrangians.frame_motion import Axes, along_z, potential_at, velocity_at
+from linkwise_runtime.lagrangians.lanes import carried
+from linkwise_runtime.lagrangians.rigid_body import kinetic_energy
+from linkwise_runtime.lagrangians.rigid_lagrangian import RigidLagrangian
 from . import link_1
 
 LINK = 'link2'

@@ -21,7 +21,7 @@ follows another one is times its ratio. Where a file says that lengths are times
 s, v, u and gravity, and the forces f are divided by that root.
 """
 
-from ..runtime.interface import ClosedForms
+from linkwise_runtime.interface import ClosedForms
 from . import link_1
 from . import link_2
 from . import link_3

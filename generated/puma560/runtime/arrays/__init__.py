@@ -1,1 +1,0 @@
-"""Back ends that compute with arrays: NumPy, torch."""
