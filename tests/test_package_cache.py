@@ -82,6 +82,7 @@ def test_a_package_tells_how_it_was_asked_for_whoever_makes_it(tmp_path: Path) -
         "backends": ["numpy"],
         "kernel": "auto",
         "derivation": "rule",
+        "vendor_runtime": False,
     }
     assert not [result for result in check_package(kept, 5) if result.mark == "FAIL"]
 

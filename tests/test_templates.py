@@ -41,6 +41,7 @@ def views() -> dict[str, list[set[str]]]:
         for robot, options in ROBOTS:
             generate(read_system(robot, options))
         generate(read_system("planar2", Options("symbolic")), kernel="loops")
+        generate(read_system("planar2"), ["c"])
     return seen
 
 

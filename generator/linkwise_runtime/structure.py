@@ -61,9 +61,12 @@ NO_LIMITS = JointLimits((), (), (), ())
 """Of a structure that was made without any."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Structure:
-    """A robot in names and numbers: n joint coordinates that move N links."""
+    """A robot in names and numbers: n joint coordinates that move N links.
+
+    Each is like itself alone: a package that was generated anew, and imported anew, is another robot.
+    """
 
     name: str
     """Name of the package."""

@@ -9,11 +9,12 @@ import hashlib
 import platform
 import re
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from ..structure import Structure
 from .native_cache import ELSEWHERE, cache_directory, is_whole, keep, locked
 from .native_compiler import Compiler, find_compiler, processor
 from .native_process import Tell, run_all, told
@@ -52,9 +53,9 @@ class Sources:
 
 
 @cache
-def loaded(name: str, directory: Path) -> Sources:
+def loaded(structure: Structure, directory: Path) -> Sources:
     """A robot's C as it is at first: what is generated anew later does not go with the Python that runs."""
-    return Sources(name, directory, digest_of(directory))
+    return Sources(structure.name, directory, digest_of(directory))
 
 
 def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
@@ -143,7 +144,7 @@ def digest_of(directory: Path) -> str:
     """Hash of the names and the bytes of all files; raises RuntimeError where they cannot be read."""
     digest = hashlib.sha256()
     try:
-        for path in sorted(path for path in directory.rglob("*") if not path.is_dir()):
+        for path in _inside(directory):
             if not path.is_file():  # a pipe, say, whose end would be waited for
                 raise RuntimeError(f"{path} is no file; generate it again")
             name = path.relative_to(directory).as_posix()
@@ -151,6 +152,15 @@ def digest_of(directory: Path) -> str:
     except OSError as error:
         raise RuntimeError(f"cannot read {error.filename}: {error.strerror}; generate it again") from None
     return digest.hexdigest()
+
+
+def _inside(directory: Path) -> Iterator[Path]:
+    """What a folder and its own folders hold, in order."""
+    for path in sorted(directory.iterdir()):
+        if path.is_dir() and not path.is_symlink():
+            yield from _inside(path)
+        else:
+            yield path
 
 
 def _fingerprint(digest: str, compiler: Compiler) -> str:

@@ -79,7 +79,7 @@ class NativeCalls:
         threads: as many as there are cores unless given
         """
         self.structure, self.parameters = structure, dict(parameters)
-        self.sources = loaded(structure.name, sources)
+        self.sources = loaded(structure, sources)
         self.threads_set, self._cores = threads, os.cpu_count() or 1
         self.shapes = answer_shapes(structure)
         self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
