@@ -95,7 +95,7 @@ def test_as_cpp_it_converts_nothing_by_accident(
 
 def test_no_header_but_of_freestanding_c_and_math_is_included(directory_of: Callable[[str], Path]) -> None:
     for robot in KINDS.values():
-        for path in (directory_of(robot) / "c").iterdir():
+        for path in (directory_of(robot) / "c").rglob("*.[ch]"):
             found = set(re.findall(r"#include <(.*)>", path.read_text(encoding="utf-8")))
             assert found <= {"math.h", "stddef.h", "float.h"}, path
 
