@@ -733,6 +733,24 @@ def test_a_runtime_file_that_is_not_linkwises_own_fails(standing_alone: Path) ->
     ]
 
 
+def test_a_file_of_the_runtime_that_a_package_needs_and_has_not_fails(standing_alone: Path) -> None:
+    (standing_alone / "linkwise_runtime/units.py").unlink()
+    change_manifest(standing_alone, lambda data: data["files"].pop("linkwise_runtime/units.py"))
+    (wrong,) = (result for result in check_package(standing_alone, 3) if result.failed)
+    assert (wrong.name, wrong.detail) == ("made", "linkwise_runtime/units.py is missing")
+
+
+@pytest.mark.parametrize("file", ["c/extra.h", "c/linkwise/extra.h"])
+def test_a_header_that_nothing_includes_fails(file: str, tmp_path: Path) -> None:
+    package = tmp_path / "planar2"
+    write_package(generate(read_system("planar2"), ["c"]), package)
+    (package / file).write_text("static int x;\n")
+    digest = hashlib.sha256((package / file).read_bytes()).hexdigest()
+    change_manifest(package, lambda data: data["files"].update({file: digest}))
+    (wrong,) = (result for result in check_package(package, 3) if result.failed)
+    assert (wrong.name, wrong.detail) == ("made", f"{file} is needed by nothing")
+
+
 def test_a_listed_file_of_the_runtime_that_linkwise_does_not_have_fails(standing_alone: Path) -> None:
     file, package = "linkwise_runtime/deep/helper.py", standing_alone
     (package / file).parent.mkdir()

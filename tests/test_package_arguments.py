@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable
 from copy import deepcopy
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -336,6 +337,32 @@ def test_of_each_class_there_is_one(package_of: Callable[[str], ModuleType], tmp
     packages = package_of("planar3"), package_of("torso"), import_package(tmp_path / "planar2")
     for name in ("AppliedLoad", "Bodies", "Contact", "FrameImpedance", "Natural", "Target"):
         assert len({getattr(package, name) for package in packages}) == 1, name
+
+
+def test_what_another_copy_of_the_runtime_made_is_told_apart(
+    package_of: Callable[[str], ModuleType], tmp_path: Path
+) -> None:
+    write_package(generate(read_system("planar2"), ["numpy"], vendor_runtime=True), tmp_path / "alone")
+    with pytest.MonkeyPatch.context() as patch:  # by Python itself, which knows of no library
+        patch.syspath_prepend(tmp_path)
+        other = import_module("alone")
+    package = package_of("planar3")
+    robot, told = (
+        package.load("numpy"),
+        r"of alone, which is another copy of the runtime than this robot's; give",
+    )
+    load, contact = other.AppliedLoad(0, [0, 0, 1.0]), other.Contact(0)
+    for loads, place in ((load, "loads"), ([load], r"loads\[0\]"), ([[load]], r"loads\[0\]")):
+        with pytest.raises(TypeError, match=rf"^{place} is the AppliedLoad {told}"):
+            robot.induced_accelerations(*REST, REST[0], loads=loads)
+    with pytest.raises(TypeError, match=rf"^contacts\[0\] is the Contact {told}"):
+        robot.constrained(contacts=[contact])
+    with pytest.raises(TypeError, match=rf"^frame is the FrameImpedance {told}"):
+        robot.partial_impedance(frame=other.FrameImpedance(0))
+    with pytest.raises(TypeError, match=r"^inertia is the Natural of alone, which is another copy"):
+        robot.partial_impedance(inertia=other.Natural(2.0))
+    with pytest.raises(TypeError, match=rf"^target is the Target {told}"):
+        robot.partial_impedance()(*REST, other.Target(q=REST[0]))
 
 
 @pytest.mark.parametrize("backend", [b for b in BACKENDS if b != "autograd"])

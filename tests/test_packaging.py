@@ -27,10 +27,17 @@ MOTION = ([0.3, -0.7], [1.0, 0.5], [2.0, -3.0])
 
 
 @pytest.fixture(scope="session")
-def archives(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """The archive of sources, made in a clean copy, and the wheel that is built from it."""
+def runtime(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of the runtime alone, beside the copy of the checkout in which it is built."""
     folder = tmp_path_factory.mktemp("archives")
-    sources = archive_of_sources(copied(folder / "checkout"), folder / "sources")
+    return wheel_of(copied(folder / "checkout") / "generator/linkwise_runtime", folder / "runtime")
+
+
+@pytest.fixture(scope="session")
+def archives(runtime: Path) -> tuple[Path, Path]:
+    """The archive of sources, made where the runtime's wheel was, and the wheel that is built from it."""
+    folder = runtime.parents[1]
+    sources = archive_of_sources(folder / "checkout", folder / "sources")
     return sources, wheel_of(sources, folder / "wheel")
 
 
@@ -132,12 +139,13 @@ def size_of(environment: Environment) -> int:
 
 
 @pytest.mark.parametrize("carried", [False, True], ids=["the runtime's wheel", "a copy in the package"])
-def test_a_package_runs_where_there_is_numpy_and_its_runtime_alone(carried: bool, tmp_path: Path) -> None:
+def test_a_package_runs_where_there_is_numpy_and_its_runtime_alone(
+    carried: bool, runtime: Path, tmp_path: Path
+) -> None:
     machine = empty_environment(tmp_path / "machine")
     machine.link(["numpy"])
     if not carried:
-        sources = copied(tmp_path / "checkout") / "generator/linkwise_runtime"
-        machine.install(wheel_of(sources, tmp_path / "wheel"))
+        machine.install(runtime)
     robot = ROOT / "examples/setuptools/arm.urdf"
     files = generate(read_system(robot), ["numpy"], "arm", vendor_runtime=carried)
     write_package(files, tmp_path / "arm")
@@ -147,6 +155,25 @@ def test_a_package_runs_where_there_is_numpy_and_its_runtime_alone(carried: bool
     asked = "from importlib.util import find_spec as f; print(*map(f, ('sympy', 'torch', 'linkwise')))"
     assert machine.run("python", "-c", asked, folder=tmp_path).split() == ["None"] * 3
     assert 20e6 < size_of(machine) <= RUNNING_MEGABYTES * 1e6
+
+
+def test_linkwise_says_so_where_another_runtime_took_the_place_of_its_own_or_it_is_gone(
+    archives: tuple[Path, Path], tmp_path: Path
+) -> None:
+    machine = empty_environment(tmp_path / "machine")
+    machine.link(["linkwise"])
+    machine.install(archives[1])
+    version = machine.packages / "linkwise_runtime/version.py"
+    version.write_text(version.read_text().replace(VERSION, "9.1.0"))
+    mend = "install linkwise again, with --force-reinstall, and no linkwise-runtime beside it"
+    for told in (f"linkwise {VERSION} finds linkwise_runtime 9.1.0 in its place", "linkwise_runtime, which"):
+        done = subprocess.run(
+            [machine.python.with_name("linkwise"), "list"], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"linkwise: error: {told}")
+        assert done.stderr.endswith(f"{mend}\n")
+        shutil.rmtree(machine.packages / "linkwise_runtime", ignore_errors=True)
 
 
 def test_the_runtime_refuses_packages_of_another_version_in_one_line(tmp_path: Path) -> None:
@@ -159,7 +186,7 @@ def test_the_runtime_refuses_packages_of_another_version_in_one_line(tmp_path: P
     last = done.stderr.splitlines()[-1]
     assert last == (
         f"ImportError: this package is made for linkwise_runtime 9.1.0, but {VERSION} is installed: generate "
-        "it again, or install linkwise-runtime 9.1.0 or a later one of 9.1"
+        "it again, or install linkwise 9.1.0, or linkwise-runtime 9.1.0 where linkwise is not"
     )
 
 

@@ -35,6 +35,7 @@ ROOMS = (
     "progress",
     "input_file",
     "makers",
+    "own_runtime",
     "errors",
     "escape",
     "linkwise_runtime",

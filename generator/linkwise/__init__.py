@@ -7,11 +7,11 @@ files = linkwise.generate(system)               # {path: text} of an importable 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from linkwise_runtime.version import VERSION as __version__
-
 from linkwise.errors import LinkwiseError
+from linkwise.own_runtime import require_own_runtime
 
 if TYPE_CHECKING:
+    __version__: str
     from linkwise.analysis import (
         Analysis,
         Contact,
@@ -109,6 +109,9 @@ def __dir__() -> list[str]:
 if not TYPE_CHECKING:  # for a type checker, any name would be one of linkwise's
 
     def __getattr__(name: str) -> object:
-        if name not in _ROOM_OF:
+        if name not in {*_ROOM_OF, "__version__"}:
             raise AttributeError(f"module 'linkwise' has no attribute {name!r}")
+        version = require_own_runtime()
+        if name == "__version__":
+            return version
         return getattr(import_module(f"linkwise.{_ROOM_OF[name]}"), name)

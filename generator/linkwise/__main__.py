@@ -6,6 +6,8 @@ import sys
 import time
 from types import FrameType
 
+from linkwise.own_runtime import require_own_runtime
+
 OVERDUE = 10.0
 """Seconds after which an interrupted command should have ended, also where others use the machine."""
 
@@ -14,6 +16,11 @@ def main() -> None:
     """Run the command line; an interrupt while it is being imported ends it as a later one does."""
     _open_closed()
     _heed_one_interrupt()
+    try:
+        require_own_runtime()
+    except ImportError as error:
+        print(f"linkwise: error: {error}", file=sys.stderr)
+        sys.exit(2)
     try:
         from linkwise.cli.app import main as run
     except KeyboardInterrupt:

@@ -14,6 +14,8 @@ from pathlib import Path
 
 SUFFIXES = (".py", ".j2", ".toml", ".h", ".c")
 HOMES = ("linkwise", "linkwise.templates", "linkwise_runtime")
+BUILT = "build"
+"""Where building the runtime's own wheel leaves a copy of it."""
 MAKERS = ("linkwise", "sympy", "mujoco")
 
 
@@ -29,7 +31,12 @@ def fingerprint() -> str:
 @cache
 def _own_files() -> tuple[Path, ...]:
     folders = [Path(str(import_module(home).__file__)).parent for home in HOMES]
-    return tuple(path for folder in folders for path in sorted(folder.rglob("*")) if path.suffix in SUFFIXES)
+    return tuple(
+        path
+        for folder in folders
+        for path in sorted(folder.rglob("*"))
+        if path.suffix in SUFFIXES and path.relative_to(folder).parts[0] != BUILT
+    )
 
 
 def generator_files() -> Iterator[str]:

@@ -44,6 +44,16 @@ def nearest_first(given: Any, names: Iterable[str]) -> list[str]:
     return sorted(names, key=likeness, reverse=True)
 
 
+def known_kind(given: object, kind: type) -> str:
+    """How errors call what is not of a kind, and whose it is where another copy of the runtime has it."""
+    found = type(given)
+    package, copied, _ = found.__module__.partition(".linkwise_runtime.")
+    if found.__name__ == kind.__name__ and (copied or ".linkwise_runtime." in kind.__module__):
+        whose = package if copied else "linkwise_runtime"
+        return f"the {kind.__name__} of {whose}, which is another copy of the runtime than this robot's"
+    return short(given)
+
+
 def position_of(given: Any, names: Sequence[str], kind: str, argument: str) -> int:
     """Position from 0 of what is given by number or by name; raises ValueError, which names the argument.
 

@@ -1,17 +1,24 @@
 """The version of this runtime, which is that of linkwise too, and the packages that it runs."""
 
+import re
+
 VERSION = "0.1.0"
 
 
 def require(version: str) -> None:
     """Raise ImportError unless this runtime runs packages that linkwise `version` generated.
 
-    It runs those of its own minor version, up to its own patch.
+    It runs those of its own minor version, up to its own patch; what is no such version is not run.
     """
-    own, asked = (tuple(map(int, text.split("."))) for text in (VERSION, version))
-    if own[:2] != asked[:2] or own < asked:
-        minor = ".".join(version.split(".")[:2])
+    own, asked = (_numbers(text) for text in (VERSION, version))
+    is_later = own is not None and asked is not None and own[:2] == asked[:2] and own > asked
+    if not (version == VERSION or is_later):
         raise ImportError(
             f"this package is made for linkwise_runtime {version}, but {VERSION} is installed: generate it "
-            f"again, or install linkwise-runtime {version} or a later one of {minor}"
+            f"again, or install linkwise {version}, or linkwise-runtime {version} where linkwise is not"
         )
+
+
+def _numbers(version: str) -> tuple[int, ...] | None:
+    found = re.fullmatch(r"(\d+)\.(\d+)\.(\d+)", version)
+    return tuple(map(int, found.groups())) if found else None

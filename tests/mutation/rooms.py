@@ -67,7 +67,7 @@ ROOMS: dict[str, Room] = {
             f"{HOUSE}{name}.py"
             for name in (
                 *("__init__", "__main__", "package_cache", "pipeline", "plotstyle", "extras"),
-                *("progress", "input_file", "makers", "errors", "escape", "own_process"),
+                *("progress", "input_file", "makers", "errors", "escape", "own_process", "own_runtime"),
             )
         )
     ),

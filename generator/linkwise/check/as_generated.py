@@ -8,15 +8,18 @@ from linkwise_runtime.version import VERSION
 
 from linkwise.check.compare import Result, skipped
 from linkwise.emit.backend import backends_of
+from linkwise.emit.c.shared_headers import with_headers
 from linkwise.emit.shared_texts import BodyText, init_text, names_text
 from linkwise.emit.tree_file import tree_text
+from linkwise.emit.vendored_runtime import with_runtime
 from linkwise.package.agreement import disagreements, miscounted
 from linkwise.package.bytecode import caches, is_compiled_from_source
 from linkwise.package.contents import added, changed
 from linkwise.package.emitted_text import foreign
 from linkwise.package.load import Package
 from linkwise.package.manifest import Manifest, altered_entries
-from linkwise.package.runtime_imports import of_copy
+from linkwise.package.own_files import own_folder
+from linkwise.package.runtime_imports import of_copy, of_library
 
 TOLD = 3
 """Faults that one line tells."""
@@ -26,6 +29,10 @@ BODY = re.compile(
     re.MULTILINE,
 )
 """Link, parameters and values of a body in names.py."""
+
+
+INCLUDED = re.compile(r'^#include "(\w+\.h)"', re.MULTILINE)
+"""Of the robot's own headers."""
 
 
 def check_files(directory: Path, manifest: Manifest) -> list[Result]:
@@ -52,6 +59,10 @@ def check_files(directory: Path, manifest: Manifest) -> list[Result]:
 def check_texts(directory: Path, manifest: Manifest) -> Result:
     """Read every file that could run as text: nothing is imported or compiled that linkwise doesn't write."""
     wrong = foreign(directory, manifest)
+    version = manifest.generator.get("linkwise")
+    if not wrong and manifest.runtime.vendored and version != VERSION:
+        unread = f"the runtime that it carries is of linkwise {version}, which is not at hand to compare with"
+        return skipped("texts", f"{unread}: its code runs as it is")
     return _result("texts", wrong, "hold arithmetic and calls of the runtime alone, read before they run")
 
 
@@ -74,7 +85,26 @@ def check_made(package: Package) -> Result:
     wrong = [
         f"{path} is not what linkwise {VERSION} makes of the manifest" for path in _made_otherwise(package)
     ]
+    wrong += _added_or_missing(package.directory, package.manifest)
     return _result("made", wrong, "__init__.py, names.py and tree.py are what linkwise makes of the manifest")
+
+
+def _added_or_missing(directory: Path, manifest: Manifest) -> Iterator[str]:
+    """Files of linkwise's own that a package must have and has not, or has and need not have."""
+    own = {
+        path: of_library(path, (directory / path).read_text(encoding="utf-8"))
+        for path in manifest.files
+        if path.endswith((".py", ".h", ".c")) and own_folder(path) is None
+    }
+    in_c = {path: text for path, text in own.items() if path.startswith("c/")}
+    needed = {*dict(with_headers(in_c.items()))} - own.keys()
+    needed |= {*with_runtime(own)} - own.keys() if manifest.runtime.vendored else set()
+    there = {path for path in manifest.files if own_folder(path) is not None}
+    yield from (f"{path} is missing" for path in sorted(needed - there))
+    included = {f"c/{name}" for text in in_c.values() for name in INCLUDED.findall(text)}
+    public = {f"c/{manifest.name}.h", f"c/{manifest.name}_index.h"}
+    there |= {path for path in in_c if path.endswith(".h")} - public - included
+    yield from (f"{path} is needed by nothing" for path in sorted(there - needed))
 
 
 def _made_otherwise(package: Package) -> Iterator[str]:

@@ -3,12 +3,22 @@
 from functools import cache
 from importlib.resources import files
 
+FOLDERS = ("linkwise_runtime/", "c/linkwise/")
+"""Where in a package they are."""
+
+
+def own_folder(path: str) -> str | None:
+    """Which of these folders a path is in; None for a file of the robot's."""
+    return next((folder for folder in FOLDERS if path.startswith(folder)), None)
+
 
 @cache
 def own_text(path: str) -> bytes | None:
     """The file of linkwise that a package has a copy of at this path; None where that is no copy."""
-    places = {"linkwise_runtime/": files("linkwise_runtime"), "c/linkwise/": files("linkwise").joinpath("c")}
-    for start, folder in places.items():
-        if path.startswith(start) and (file := folder.joinpath(path.removeprefix(start))).is_file():
-            return file.read_text(encoding="utf-8").encode()  # as it was written, whatever ends lines here
-    return None
+    start = own_folder(path)
+    if start is None:
+        return None
+    folder = files("linkwise_runtime") if start == FOLDERS[0] else files("linkwise").joinpath("c")
+    file = folder.joinpath(path.removeprefix(start))
+    # as it was written, whatever ends lines here
+    return file.read_text(encoding="utf-8").encode() if file.is_file() else None

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chosen_names import short
+from ..chosen_names import known_kind, short
 from ..kinematics.named_frames import frame_index
 from ..robot_constraints import Contact
 from ..rule.joint_tree import JointTree, Triple
@@ -58,7 +58,7 @@ class Held(NamedTuple):
 def held_by(tree: JointTree, contacts: Any) -> list[Held]:
     """Ties of the tree, then contacts; raises as `Dynamics.constrained` does."""
     if isinstance(contacts, Contact) or not isinstance(contacts, list | tuple):
-        raise TypeError(f"contacts is {short(contacts)}; give a list of Contact")
+        raise TypeError(f"contacts is {known_kind(contacts, Contact)}; give a list of Contact")
     ties = [
         Held(tie.name, tie.kind, tie.first, tie.second, np.eye(3), length=tie.length) for tie in tree.ties
     ]
@@ -67,7 +67,7 @@ def held_by(tree: JointTree, contacts: Any) -> list[Held]:
     for number, contact in enumerate(contacts):
         where = f"contacts[{number}]"
         if not isinstance(contact, Contact):
-            raise TypeError(f"{where} is {short(contact)}; give a Contact")
+            raise TypeError(f"{where} is {known_kind(contact, Contact)}; give a Contact")
         made = _held(contact, where, frames, tree.gravity)
         if tree.frames[made.first].joint is None:
             raise ValueError(f"{where}.frame is {short(contact.frame)}, which stands on the ground anyway")

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import check_numbers
-from ..chosen_names import short
+from ..chosen_names import known_kind, short
 from ..controllers import FrameImpedance, Target
 from ..dense import Dense
 from ..quantities import NaturalImpedance
@@ -163,7 +163,9 @@ class ControlAnswers:
         """Target and motion, as they were given and of one shape; positions alone are a target."""
         read = target if isinstance(target, Target) else Target(q=target)
         if hasattr(read.q, "_fields"):
-            raise TypeError(f"target is {short(read.q)}; give positions (..., n), or Target(q, qd, ...)")
+            raise TypeError(
+                f"target is {known_kind(read.q, Target)}; give positions (..., n), or Target(q, qd, ...)"
+            )
         if read.q is None and self._joints.targets.stiffness is not None:
             raise ValueError("the joints are stiff, but target has no q; give positions, (..., n)")
         if self._frame is None and any(a is not None for a in read[3:]):

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chosen_names import short
+from ..chosen_names import known_kind, short
 from ..controllers import ROWS, FrameImpedance, Natural
 from ..kinematics.named_frames import frame_index
 from ..sums.known_digits import Told
@@ -68,7 +68,10 @@ class FrameTargets:
     def __init__(self, robot: Any, asked: FrameImpedance) -> None:
         """Raises ValueError and TypeError as `Dynamics.partial_impedance` does."""
         if not isinstance(asked, FrameImpedance):
-            raise TypeError(f"frame is {short(asked)}; give FrameImpedance({short(asked)}, ...)")
+            frame = short(asked) if isinstance(asked, str | int) else "frame"
+            raise TypeError(
+                f"frame is {known_kind(asked, FrameImpedance)}; give FrameImpedance({frame}, ...)"
+            )
         self._robot, self.rows, self.names = robot, _chosen(asked.rows), tuple(asked.rows)
         self.frame, self.point = asked.frame, _point(asked.point)
         self._check_movable(frame_index(asked.frame, robot.kinematics.frames))

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import as_weights, has_tensors
-from ..chosen_names import short
+from ..chosen_names import known_kind
+from ..controllers import Natural
 from ..sums.namespace import hidden
 
 FORMS = "a number, ({0},) for a diagonal, or ({0}, {0})"
@@ -80,7 +81,7 @@ class Gain:
 def numbers_of(name: str, given: Any) -> Any:
     """A tensor, or an array; raises TypeError and ValueError for what is no numbers."""
     if isinstance(given, Mapping) or hasattr(given, "_fields") or isinstance(given, type | str | complex):
-        raise TypeError(f"{name} is {short(given)}, which cannot be taken here; give numbers")
+        raise TypeError(f"{name} is {known_kind(given, Natural)}, which cannot be taken here; give numbers")
     return as_weights(name, given)
 
 

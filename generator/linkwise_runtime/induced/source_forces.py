@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..chosen_names import known_kind
 from ..motion_quantities import AppliedLoad
 from ..sums.namespace import namespace
 
@@ -70,9 +71,16 @@ def listed(loads: Any) -> list[Any]:
     """Loads as a list, of which one alone may be given; raises TypeError for what is neither."""
     if isinstance(loads, AppliedLoad):
         return [loads]
-    if not isinstance(loads, list | tuple):
-        raise TypeError(f"loads is a {type(loads).__name__}; give a list of AppliedLoad(frame, force, ...)")
+    if not isinstance(loads, list | tuple) or hasattr(loads, "_fields"):
+        raise TypeError(f"loads is {_kind(loads)}; give a list of AppliedLoad(frame, force, ...)")
     return list(loads)
+
+
+def _kind(given: object) -> str:
+    """How an error calls what is no load: one of another copy of the runtime, also in a list, by its own."""
+    among = given if isinstance(given, list) else [given]
+    alike = [one for one in among if type(one).__name__ == AppliedLoad.__name__]
+    return known_kind(alike[0], AppliedLoad) if alike else f"a {type(given).__name__}"
 
 
 def load_torques(robot: Any, q: Any, loads: Sequence[Any]) -> list[Any]:
@@ -82,7 +90,7 @@ def load_torques(robot: Any, q: Any, loads: Sequence[Any]) -> list[Any]:
         several = [load] if isinstance(load, AppliedLoad) else load
         if not isinstance(several, list | tuple) or not all(isinstance(a, AppliedLoad) for a in several):
             raise TypeError(
-                f"loads[{e}] is a {type(load).__name__}; give AppliedLoad(frame, force, ...), or a list of "
+                f"loads[{e}] is {_kind(load)}; give AppliedLoad(frame, force, ...), or a list of "
                 "them that counts as one load"
             )
         try:
