@@ -164,11 +164,11 @@ def test_linkwise_says_so_where_another_runtime_took_the_place_of_its_own_or_it_
     machine.link(["linkwise"])
     machine.install(archives[1])
     version = machine.packages / "linkwise_runtime/version.py"
-    version.write_text(version.read_text().replace(VERSION, "9.1.0"))
+    version.write_text(version.read_text().replace(VERSION, "10.1.0"))
     mend = "install linkwise again, with --force-reinstall, and no linkwise-runtime beside it"
-    for told in (f"linkwise {VERSION} finds linkwise_runtime 9.1.0 in its place", "linkwise_runtime, which"):
+    for told in (f"linkwise {VERSION} finds linkwise_runtime 10.1.0 in its place", "linkwise_runtime, which"):
         done = subprocess.run(
-            [machine.python.with_name("linkwise"), "list"], capture_output=True, text=True, check=False
+            [machine.python.with_name("linkwise"), "--version"], capture_output=True, text=True, check=False
         )
         assert done.returncode == 2
         assert done.stderr.startswith(f"linkwise: error: {told}")
