@@ -283,6 +283,7 @@ BAD_ARGUMENTS = {
     "empty name": (("planar2", "--name", ""), "'' is not a usable module name, as it is empty; use up to 60"),
     "digit": (("planar2", "--name", "7dof"), "as it begins with the digit '7'; use up to 60 letters"),
     "header of a link": (("planar2", "--name", "Link_1"), "or the name of a module or of a header of C; use"),
+    "header of every robot": (("planar2", "--name", "Tree"), "or the name of a module or of a header of C"),
     "underscore": (("planar2", "--name", "_arm"), "as it begins or ends with '_'; use up to 60 letters"),
     "keyword": (
         ("planar2", "--name", "class"),

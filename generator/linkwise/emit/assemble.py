@@ -5,6 +5,8 @@ import keyword
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
 
 import sympy as sp
 from linkwise_runtime.version import VERSION
@@ -36,7 +38,9 @@ DEVICES = {"aux", "con", "nul", "prn", *(f"{port}{n}" for port in ("com", "lpt")
 """What no file of Windows may be called, whatever follows behind a dot."""
 LINK_HEADER = re.compile(r"link_\d+")
 """Headers beside that of a package's own name."""
-TAKEN = {"numpy", "torch", "linkwise", RUNTIME, *sys.stdlib_module_names, *DEVICES}
+HEADERS = {Path(file.name).stem for file in resources.files("linkwise").joinpath("c").iterdir()}
+"""Of every robot: their include guards and functions begin with their names, as a package's own do."""
+TAKEN = {"numpy", "torch", "linkwise", RUNTIME, *sys.stdlib_module_names, *DEVICES, *HEADERS}
 
 
 def package_files(
