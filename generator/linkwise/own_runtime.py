@@ -1,8 +1,10 @@
 """The runtime that linkwise brings along, and works with: its own, and no other."""
 
 from contextlib import suppress
+from functools import cache
 
 
+@cache
 def require_own_runtime() -> str:
     """Return the version of linkwise and its runtime; raise ImportError where that is not its own.
 

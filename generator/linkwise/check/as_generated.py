@@ -8,7 +8,7 @@ from linkwise_runtime.version import VERSION
 
 from linkwise.check.compare import Result, skipped
 from linkwise.emit.backend import backends_of
-from linkwise.emit.c.shared_headers import with_headers
+from linkwise.emit.c.shared_headers import INNER, with_headers
 from linkwise.emit.shared_texts import BodyText, init_text, names_text
 from linkwise.emit.tree_file import tree_text
 from linkwise.emit.vendored_runtime import with_runtime
@@ -29,10 +29,6 @@ BODY = re.compile(
     re.MULTILINE,
 )
 """Link, parameters and values of a body in names.py."""
-
-
-INCLUDED = re.compile(r'^#include "(\w+\.h)"', re.MULTILINE)
-"""Of the robot's own headers."""
 
 
 def check_files(directory: Path, manifest: Manifest) -> list[Result]:
@@ -101,7 +97,7 @@ def _added_or_missing(directory: Path, manifest: Manifest) -> Iterator[str]:
     needed |= {*with_runtime(own)} - own.keys() if manifest.runtime.vendored else set()
     there = {path for path in manifest.files if own_folder(path) is not None}
     yield from (f"{path} is missing" for path in sorted(needed - there))
-    included = {f"c/{name}" for text in in_c.values() for name in INCLUDED.findall(text)}
+    included = {f"c/{name}" for text in in_c.values() for name in INNER.findall(text)}
     public = {f"c/{manifest.name}.h", f"c/{manifest.name}_index.h"}
     there |= {path for path in in_c if path.endswith(".h")} - public - included
     yield from (f"{path} is needed by nothing" for path in sorted(there - needed))

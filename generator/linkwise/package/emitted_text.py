@@ -19,14 +19,12 @@ from linkwise_runtime.version import VERSION
 from linkwise.package.emitted_c import FUNCTIONS, ORDINARY, foreign_c, foreign_includes
 from linkwise.package.manifest import Manifest
 from linkwise.package.own_files import own_text
-
-RUNTIME = "linkwise_runtime."
-"""What packages import of the library, or of their own copy."""
+from linkwise.package.runtime_imports import RUNTIME, is_copied
 
 
 def _table(lines: str) -> Mapping[str, frozenset[str]]:
     """Modules, each followed by the names that may be imported from it."""
-    pairs = (line.replace("RUN.", RUNTIME).split(": ") for line in lines.split(";"))
+    pairs = (line.replace("RUN.", f"{RUNTIME}.").split(": ") for line in lines.split(";"))
     return {module: frozenset(names.split()) for module, names in pairs}
 
 
@@ -149,7 +147,7 @@ def foreign_text(path: str, text: bytes, source: Source) -> str | None:
     """The same of one file, what is wrong with it alone; None if nothing."""
     own, ending = own_text(path), path.rpartition(".")[2]
     try:
-        if own is not None or path.startswith("linkwise_runtime/"):
+        if own is not None or is_copied(path):
             if source.version == VERSION and own != text:
                 return f"is not that of linkwise {VERSION}"
         elif ending == "py":
@@ -159,7 +157,7 @@ def foreign_text(path: str, text: bytes, source: Source) -> str | None:
         elif told := next(foreign_c(text.decode(), source.name), None):
             return told
         # That of the runtime is compiled with Python's headers.
-        in_c = ending in ("h", "c") and not path.startswith("linkwise_runtime/")
+        in_c = ending in ("h", "c") and not is_copied(path)
         folder = path.rpartition("/")[0]
         return next(foreign_includes(text.decode(), folder, source.files), None) if in_c else None
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:  # the last by Python's parser
@@ -290,5 +288,5 @@ def _may_import(grammar: Grammar, module: str, name: str, level: int) -> bool:
     if level and not module:
         return re.fullmatch(r"link_\d+", name) is not None
     own = module in ("names", "tree", "forms", "energies")
-    right = module.startswith(RUNTIME) or (level > 0) == own
+    right = module.startswith(f"{RUNTIME}.") or (level > 0) == own
     return name in grammar.imports.get(module, ()) and right

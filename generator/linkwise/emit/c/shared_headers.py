@@ -8,6 +8,7 @@ FOLDER = "linkwise"
 """Of a package's C."""
 INCLUDED = re.compile(rf'^#include "{FOLDER}/(\w+\.h)"', re.MULTILINE)
 INNER = re.compile(r'^#include "(\w+\.h)"', re.MULTILINE)
+"""Of headers beside the file that includes them: of each other, and of a robot's own."""
 
 
 def with_headers(files: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
