@@ -21,3 +21,9 @@ def test_every_package_is_listed_as_its_metadata_say(extra: str) -> None:
 def test_users_are_brought_no_licence_that_binds_their_own_programs() -> None:
     assert not [name for name in packages_of(USERS) if re.search(r"\bA?GPL", LISTED[name])]
     assert not {"spm1d"} & set(packages_of(["all"])), "whose metadata do not say that it is under the GPL"
+
+
+def test_every_package_is_pinned_so_that_the_page_is_right_tomorrow_too() -> None:
+    lines = (PAGE.parents[1] / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pinned = {re.sub(r"[-_.]+", "-", line.partition("==")[0]).lower() for line in lines}
+    assert not set(packages_of([*USERS, *BINDING, *DEVELOPERS])) - pinned
