@@ -640,7 +640,7 @@ def test_graphs_of_parts_are_run_against_the_recursion(
     old: str, new: str, passing: Copy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = passing("autograd")
-    change_code(monkeypatch, import_module("linkwise_runtime.recorded.recorded_torques"), old, new)
+    change_code(monkeypatch, import_module("linkwise_runtime.lagrangians.recorded_torques"), old, new)
     failing = {name for name, mark in marks(package).items() if mark == "FAIL"}
     assert failing == {"autograd: graphs of parts of tau_ij against Newton-Euler recursion"}
 
@@ -734,10 +734,10 @@ def test_a_runtime_file_that_is_not_linkwises_own_fails(standing_alone: Path) ->
 
 
 def test_a_file_of_the_runtime_that_a_package_needs_and_has_not_fails(standing_alone: Path) -> None:
-    (standing_alone / "linkwise_runtime/units.py").unlink()
-    change_manifest(standing_alone, lambda data: data["files"].pop("linkwise_runtime/units.py"))
+    (standing_alone / "linkwise_runtime/robot_axes.py").unlink()
+    change_manifest(standing_alone, lambda data: data["files"].pop("linkwise_runtime/robot_axes.py"))
     (wrong,) = (result for result in check_package(standing_alone, 3) if result.failed)
-    assert (wrong.name, wrong.detail) == ("made", "linkwise_runtime/units.py is missing")
+    assert (wrong.name, wrong.detail) == ("made", "linkwise_runtime/robot_axes.py is missing")
 
 
 @pytest.mark.parametrize("file", ["c/extra.h", "c/linkwise/extra.h"])
@@ -838,8 +838,9 @@ def test_off_the_path_not_even_rounding_passes(tmp_path: Path, monkeypatch: pyte
     package = tmp_path / "cart"
     write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["numpy"]), package)
     assert marks(package)["numpy: tau_ij = 0 off the path"] == "ok"
-    zeros = "self._backend.zeros(values, 1)"
-    change_code(monkeypatch, import_module("linkwise_runtime.dense"), zeros, f"{zeros} + 1e-18")
+    zeros = "np.zeros((*batch, values.shape[-1] + 1), values.dtype)"
+    tables = import_module("linkwise_runtime.answers.packed_tables")
+    change_code(monkeypatch, tables, zeros, f"{zeros} + 1e-18")
     assert marks(package)["numpy: tau_ij = 0 off the path"] == "FAIL"
 
 

@@ -17,7 +17,7 @@ from conftest import DATA, needs_compiler
 from linkwise import Options, generate, read_system, write_package
 from linkwise.check.compiled_c import declared
 from linkwise.package.load import import_package
-from linkwise_runtime.controllers import ROWS
+from linkwise_runtime.targets import ROWS
 from test_emitted_c import COMPILERS, strict
 from test_passive_torque import HAND
 from urdf_text import joint, link, robot

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
-from linkwise_runtime.quantity_axes import QUANTITIES
-from linkwise_runtime.units import inertial, written
+from linkwise_runtime.call_table import CALLS
+from linkwise_runtime.robot_axes import inertial, written
 
 xr = pytest.importorskip("xarray")
 
@@ -173,8 +173,7 @@ def test_units_are_those_in_which_every_number_of_every_call_is(packages: tuple[
         for larger, small in told:
             assert same(small, larger), (name, larger.name)
         seen.add(name)
-    variants = {name for name in QUANTITIES if name.endswith(("_by_link", "_of_links"))}
-    assert QUANTITIES.keys() - variants - seen == {"gradient_propagation", "forward_dynamics"}
+    assert {row.name for row in CALLS.values() if row.is_named} - seen == {"forward_dynamics"}
 
 
 @pytest.mark.parametrize(
@@ -229,6 +228,22 @@ def test_arguments_with_names_may_have_them_in_any_order(packages: tuple[Any, An
         robot.labelled("partial_torque", renamed, qd, qdd)
     with pytest.raises(ValueError, match="q, qd, qdd are of different samples: "):
         robot.labelled("partial_torque", q[:2], qd, qdd)
+
+
+def test_joints_are_named_once_and_independent_ones_may_stand_alone(packages: tuple[Any, Any]) -> None:
+    robot = packages[0].load("numpy")
+    q = xr.DataArray(Q[0], dims="joint", coords={"joint": [*robot.joint_names]})
+    twice = q.isel(joint=[0, 1, 2, 3, 1])
+    with pytest.raises(ValueError, match=r"^q has the joint 'knee' 2 times$"):
+        robot.labelled("mass_matrix", twice)
+    own = q.sel(joint=["crank"])
+    closed = robot.labelled("constraints.closed", own)
+    np.testing.assert_array_equal(closed, robot.constraints.closed(own.values))
+    assert robot.labelled("mass_matrix", Q, by_link=2).dims == ("sample", "joint", "link", "cause")
+    moved = robot.labelled("simulate", own, own, [0.0, 0.01])
+    np.testing.assert_array_equal(moved.q, robot.simulate(own.values, own.values, [0.0, 0.01]).q)
+    with pytest.raises(ValueError, match="'time' is an axis of the samples twice"):
+        robot.labelled("simulate", Q, QD, [0.0, 0.01], along="time")
 
 
 def test_what_has_no_names_is_refused_in_one_line(packages: tuple[Any, Any]) -> None:

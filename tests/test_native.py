@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy, deepcopy
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -18,6 +19,9 @@ import pytest
 import torch
 from answers import relative_error
 from conftest import needs_compiler
+from linkwise import generate, read_system, write_package
+from linkwise.package.load import import_package
+from urdf_text import chain, joint
 
 pytestmark = needs_compiler
 
@@ -284,6 +288,34 @@ def test_tensors_without_gradient_are_answered_by_every_call_as_arrays_are(
             np.testing.assert_allclose(ours.numpy(), expected, rtol=0, atol=1e-5, err_msg=name)
 
 
+def test_what_hangs_on_no_input_has_a_gradient_of_zeros(tmp_path: Path) -> None:
+    """Inertia, weight and stiffness of a slide are constants."""
+    file = tmp_path / "slide.urdf"
+    file.write_text(chain(joint("slide", "a", "b", type="prismatic")), encoding="utf-8")
+    write_package(generate(read_system(file)), tmp_path / "slide")
+    robot = import_package(tmp_path / "slide").load("native")
+    q, qd, qdd = torch.ones(3, 4, 1, dtype=torch.float64).requires_grad_()
+    for answer in (robot.position_gradient(q, qd, qdd), robot.mass_matrix(q)):
+        (slope,) = torch.autograd.grad(answer.sum(), q)
+        assert slope.shape == q.shape
+        assert not slope.any()
+
+
+@pytest.mark.parametrize("as_given", [np.array, torch.tensor, np.float32])
+def test_a_parameter_of_no_axes_is_one_number_for_all_samples(
+    planar3_symbolic: ModuleType, as_given: Callable[[float], Any]
+) -> None:
+    native, arrays = (planar3_symbolic.load(name, {"m_1": as_given(0.75)}) for name in ("native", "numpy"))
+    for batch in ((), (5,)):
+        q, qd = np.random.default_rng(8).uniform(-1, 1, (2, *batch, 3))
+        expected = arrays.energy(q, qd)
+        for answer in (native.energy(q, qd), native.energy(*map(torch.from_numpy, (q, qd)))):
+            assert relative_error(np.stack(answer), np.stack(expected)) <= 1e-13
+        assert relative_error(native.mass_matrix(q), arrays.mass_matrix(q)) <= 1e-13
+    with pytest.raises(ValueError, match="parameter 'm_1' must be one number here"):
+        planar3_symbolic.load("native", {"m_1": np.full(5, 0.75)})
+
+
 def test_an_interrupted_call_lets_nobody_write_to_its_memory_any_more(
     package_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -350,8 +382,8 @@ def test_c_answers_one_sample_of_what_control_needs(
     def none(*asked: Any) -> None:
         pytest.fail("arrays were asked")
 
-    monkeypatch.setattr(type(arrays.kinematics._answers), "_asked", none)
-    monkeypatch.setattr(type(native._answers), "_parts", none)
+    monkeypatch.setattr(type(native.backend), "tree_numbers", none)
+    monkeypatch.setattr(type(native.backend), "decomposition", none)
     for given in (motion, motion[:, None], motion.tolist()):
         for what, answer in for_control(native, *given).items():
             value = expected[what]

@@ -279,6 +279,21 @@ def test_repr_tells_the_robot(backend: str, package_of: Callable[[str], ModuleTy
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
+def test_whether_numbers_are_looked_at_may_be_set(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot = package_of("planar3").load(backend)
+    gap, rest = np.full(3, np.nan), np.ones(3)
+    for _ in range(2):
+        assert np.isnan(np.asarray(robot.partial_torque(gap, rest, rest))).any()
+        robot.check_finite = True
+        for one in (robot, deepcopy(robot)):
+            with pytest.raises(ValueError, match="q is nan"):
+                one.partial_torque(gap, rest, rest)
+        robot.check_finite = False
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_a_copied_robot_still_looks_for_nan(backend: str, package_of: Callable[[str], ModuleType]) -> None:
     robot = deepcopy(package_of("planar3").load(backend, check_finite=True))
     with pytest.raises(ValueError, match="q is nan"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
 from linkwise.package.load import import_package
-from linkwise_runtime.robot_constraints import Contact
+from linkwise_runtime.quantities import Contact
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -1,5 +1,6 @@
 """`robot.constraints`: back ends, gradients, choices, contacts, and what is refused in one line."""
 
+import pickle
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -155,6 +156,40 @@ def test_causes_of_accelerations_sum_to_what_velocities_do(one: Any) -> None:
     np.testing.assert_allclose(causes.sum(-1), one.constraints.acceleration(q, qd, np.zeros(1)), atol=1e-12)
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_copies_are_those_of_the_copied_robot(backend: str, fourbar: ModuleType) -> None:
+    robot = fourbar.load(backend)
+    chosen = robot.constrained(["knee"], tolerance=1e-3)
+    for made in (robot.constraints, chosen):
+        copied, other = pickle.loads(pickle.dumps((made, robot)))
+        assert copied.are_of(other)
+        assert copied.independent == made.independent
+        np.testing.assert_array_equal(copied.closed_position, made.closed_position)
+    with pytest.raises(ValueError, match="start") as info:
+        robot.constraints.closed([0.0, 0.0, 0.0])
+    told = pickle.loads(pickle.dumps(info.value))
+    assert (type(told), str(told)) == (type(info.value), str(info.value))
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_samples_that_do_not_go_together_are_told_by_name(backend: str, fourbar: ModuleType) -> None:
+    ties = fourbar.load(backend).constraints
+    held = np.tile(ties.closed_position, (5, 1))
+    told = "the shapes do not go together: q (3, 1), start (3,), held_at (5, 3); before the last axis"
+    refused(lambda: ties.closed(ties.closed_position[:1] + np.zeros((3, 1)), held), told)
+
+
+def test_numbers_of_independent_joints_and_torques_are_looked_at_too(fourbar: ModuleType) -> None:
+    ties = fourbar.load("numpy", check_finite=True).constraints
+    q, gap = ties.closed_position, float("nan")
+    refused(lambda: ties.velocity(q, [gap]), "yd is nan for joint 'crank'")
+    refused(lambda: ties.acceleration(q, q, [gap]), "ydd is nan for joint 'crank'")
+    refused(lambda: ties.projected(q, [0.0, gap, 0.0]), "torque is nan for joint 'knee'")
+    refused(lambda: ties.forces_of(q, [[0.0], [0.0], [gap]], by_link=True), "torque is nan")
+    refused(lambda: ties.closed(q[:1], start=[0.0, gap, 0.0]), "start is nan for joint 'knee'")
+    refused(lambda: ties.violation(q, [gap, 0.0, 0.0]), "held_at is nan for joint 'crank'")
+
+
 def test_any_joint_that_the_others_follow_may_be_independent(one: Any) -> None:
     q, qd, qdd = motion(one)
     full = one.constraints.velocity(q, qd[..., [0]])
@@ -183,6 +218,47 @@ def test_a_coupling_is_a_gear_by_hand(tmp_path: Path) -> None:
     assert constraints.inverse_dynamics(*state) == pytest.approx([0.4 * change + slope * push])
     assert constraints.forces(*state).sum(-1) == pytest.approx([push])
     assert constraints.rows == ("rack",)
+
+
+@pytest.mark.parametrize("backend", ["numpy", "torch"])
+@pytest.mark.parametrize("loop", [False, True], ids=["alone", "beside a loop"])
+def test_a_coupling_is_the_same_in_whatever_it_counts(loop: bool, backend: str, tmp_path: Path) -> None:
+    """s + s^4 = t / 4, in rad and in billionths: what is open counts in rad and m of the joints."""
+    follower, mover = ("geared", "crank") if loop else ("x", "turn")
+    gear = '{name = "geared", parent = "base", child = "d", xyz = [0, 0.3, 0]},'
+    wheel = '{name = "d", mass = 0.5, inertia = {xx = 0.01, yy = 0.01, zz = 0.02}},'
+    geared = FOURBAR.replace("joint = [", f"joint = [{gear}").replace("link = [", f"link = [{wheel}")
+    made = []
+    for name, unit in (("plain", 1.0), ("fine", 1e9)):
+        terms = f"{follower} = [0, {unit}, 0, 0, {unit}], {mover} = [0, {-0.25 * unit}]"
+        coupling = f'[[constraint]]\nname = "own"\ntype = "coupling"\nterms = {{{terms}}}\n'
+        made.append(
+            package(tmp_path / name, (geared if loop else GEARS) + coupling, (backend,)).load(backend)
+        )
+    plain, fine = (robot.constrained(independent=[mover]) for robot in made)
+    like = torch.as_tensor if backend == "torch" else np.asarray
+    asked = like(
+        np.array([[0.2, *NEAR], [0.1, 0.9, -0.4, 1.1]]) if loop else np.array([[0.2, 0.9], [0.3, 1.4]])
+    )
+    at, qd = plain.closed(asked), 0.0 * asked + 0.3
+    (q,), (same,) = values(at), values(fine.closed(asked))
+    np.testing.assert_allclose(same, q, atol=1e-12)
+    np.testing.assert_allclose(*(values(one.velocity_map(at))[0] for one in (fine, plain)), atol=1e-12)
+    for call in ("acceleration", "inverse_dynamics"):
+        given = (at, qd, qd[..., :1]) if call == "acceleration" else (at, qd, qd)
+        np.testing.assert_allclose(
+            *(values(getattr(one, call)(*given))[0] for one in (fine, plain)), atol=1e-9
+        )
+    forces = [values(one.forces(at, qd, qd))[0] for one in (fine, plain)]
+    forces[0][:, -1] *= 1e9
+    np.testing.assert_allclose(*forces, atol=1e-9)
+    column = made[0].joint_names.index(follower)
+    for one in (plain, fine):
+        off = at + 0.0
+        off[1, column] += 5e-7
+        one.velocity_map(off)
+        off[1, column] += 5e-6
+        refused(lambda one=one, off=off: one.velocity_map(off), "own is open by 5.")
 
 
 def test_a_wheel_rolls_along_the_ground_without_slip(cart: ModuleType) -> None:

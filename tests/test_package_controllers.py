@@ -187,7 +187,7 @@ def test_c_pulls_a_frame_of_one_sample(package_of: Packages, monkeypatch: pytest
     target = package.Target(pose=pose, velocity=np.ones(6), acceleration=np.ones(6))
     expected = package.load("numpy").partial_impedance(frame=frame)(q, q, target)
     control = robot.partial_impedance(frame=frame)
-    monkeypatch.setattr(type(control._answers), "_followed", lambda *asked: pytest.fail("arrays were asked"))
+    monkeypatch.setattr(type(control), "_followed", lambda *asked: pytest.fail("arrays were asked"))
     assert relative_error(control(q, q, target), expected) <= 1e-9
 
 
@@ -322,6 +322,11 @@ def test_targets_that_cannot_be_are_refused_in_one_line(package_of: Packages) ->
     for given, message in numberless:
         with pytest.raises(TypeError, match=message):
             robot.partial_impedance(**given)
+    point = torch.zeros(3, requires_grad=True)
+    with pytest.raises(TypeError, match=r"^frame\.point requires a gradient, which nothing carries"):
+        robot.partial_impedance(frame=package.FrameImpedance("link3", point=point))
+    with pytest.raises(TypeError, match=r"^contacts\[0\]\.point requires a gradient, which nothing carries"):
+        robot.constrained(contacts=[package.Contact("link3", "point", point=point)])
     with pytest.raises(TypeError, match="give a set of"):
         robot.cancel("joint1")
     cancelled = (
@@ -334,6 +339,16 @@ def test_targets_that_cannot_be_are_refused_in_one_line(package_of: Packages) ->
     for entries, message in cancelled:
         with pytest.raises(ValueError, match=message):
             robot.cancel(entries)
+
+
+@needs_compiler
+def test_c_takes_no_pose_for_one_sample_that_arrays_refuse(package_of: Packages) -> None:
+    package = package_of("planar3")
+    robot = package.load("native")
+    turned = robot.partial_impedance(frame=package.FrameImpedance("link3", stiffness=1.0, rows=("rz",)))
+    for pose in (2.0 * np.eye(4), np.zeros((4, 4)), np.diag([1.0, 1.0, -1.0, 1.0])):
+        with pytest.raises(ValueError, match=r"target\.pose is no rotation"):
+            turned(np.zeros(3), np.zeros(3), package.Target(pose=pose))
 
 
 def test_states_that_cannot_be_controlled_are_refused_with_the_sample(package_of: Packages) -> None:
@@ -358,6 +373,8 @@ def test_states_that_cannot_be_controlled_are_refused_with_the_sample(package_of
         turned(q[0], rest, package.Target(pose=pose))
     with pytest.raises(ValueError, match=r"target\.pose is no rotation"):
         turned(q[0], rest, package.Target(pose=2.0 * np.eye(4)))
+    with pytest.raises(ValueError, match=r"target\.pose is no rotation, but mirrors"):
+        turned(q[0], rest, package.Target(pose=np.diag([1.0, 1.0, -1.0, 1.0])))
     with pytest.raises(ValueError, match=r"target.velocity has shape \(1,\); its last axis must be 6"):
         turned(q[0], rest, package.Target(pose=np.eye(4), velocity=[0.0]))
     assert not turned.dissipative  # the angle about z changes by other turns, too

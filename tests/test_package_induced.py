@@ -25,6 +25,23 @@ def as_array(value: Any) -> Any:
     return value.detach().numpy() if torch.is_tensor(value) else value
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_loads_and_points_may_be_of_more_samples_than_the_state(backend: str, package_of: Packages) -> None:
+    package = package_of(CRANE)
+    robot = package.load(backend)
+    q, qd, tau = motion_of(robot)
+    frame, points = robot.kinematics.frames[-1], np.random.default_rng(1).normal(size=(4, 3))
+    many = [package.AppliedLoad(robot.link_names[-1], points)]
+    shares = robot.induced_accelerations(q, qd, tau, loads=many, frame=frame, point=points)
+    for k, point in enumerate(points):
+        load = package.AppliedLoad(robot.link_names[-1], point)
+        one = robot.induced_accelerations(q, qd, tau, loads=[load], frame=frame, point=point)
+        for share, expected in zip(shares, one, strict=True):
+            np.testing.assert_allclose(as_array(share)[k], as_array(expected), rtol=1e-11, atol=1e-11)
+    with pytest.raises(ValueError, match=r"^loads\[0\] is of samples \(4,\), and motions are of \(\)"):
+        robot.simulate(q, qd, [0.0, 0.01], loads=many)
+
+
 @pytest.mark.parametrize("batch", [(), (2, 3), (0,)])
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_shares_sum_to_what_forward_dynamics_and_kinematics_say(

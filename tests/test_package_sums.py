@@ -11,7 +11,7 @@ from answers import relative_error
 from conftest import DATA, PANDA, needs_compiler
 from linkwise import Coordinate, LinkEnergy, energy_system, generate, write_package
 from linkwise.package.load import import_package
-from linkwise_runtime.sums.inertia_solve import solved
+from linkwise_runtime.answers.inertia_solve import solved
 
 torch = pytest.importorskip("torch")
 
@@ -50,6 +50,20 @@ def calls_of(robot: Any, q: Any, qd: Any, tau: Any) -> dict[str, Callable[..., A
     }
 
 
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd"])
+def test_christoffel_symbols_are_those_of_each_samples_parameters(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    package = package_of("planar3 symbolic")
+    name, value = next((k, v) for k, v in package.parameters.items() if v)
+    values = value * np.array([1.0, 1.1, 1.3])  # as many as there are joints, too
+    q = np.random.default_rng(2).normal(size=(2, 3, 3))
+    many = package.load(backend, {name: values}).christoffel(q)
+    for k, one in enumerate(values):
+        alone = package.load(backend, {name: float(one)}).christoffel(q[:, k])
+        assert relative_error(many[:, k], alone) <= 1e-12
+
+
 @pytest.mark.parametrize("robot", [TREE, str(DATA / "turntable.py")])
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_sums_are_those_of_the_shares(backend: str, robot: str, package_of: Packages) -> None:
@@ -86,8 +100,8 @@ def test_christoffel_symbols_of_many_samples_are_slopes_of_the_mass_matrix(
 ) -> None:
     """In pieces of four samples, of which the last is short."""
     package = spherical if robot == "spherical" else package_of(robot)
-    model, summed = package.load("numpy"), import_module("linkwise_runtime.sums.summed")
-    monkeypatch.setattr(summed, "AT_ONCE", 4 * model.n * sum(model.structure.sizes))
+    model, answers = package.load("numpy"), import_module("linkwise_runtime.answers.answers")
+    monkeypatch.setattr(answers, "AT_ONCE", 4 * model.n * sum(model.structure.sizes))
     q = motion_of(model, 11)[0]
     found, steps = model.christoffel(q), 1e-5 * np.eye(model.n)
     slope = np.stack([model.mass_matrix(q + s) - model.mass_matrix(q - s) for s in steps], -1) / 2e-5

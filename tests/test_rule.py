@@ -260,11 +260,12 @@ def test_auto_takes_what_the_table_says(
     backend: str, package_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = package_of("planar3")
-    robot = package.load(backend)
-    module = __import__(type(robot.backend).__module__, fromlist=["CROSSINGS"])
-    operations = sum(link.OPERATIONS["torque"] for link in robot.backend.links)
+    kind = type(package.load(backend).backend)
+    module = __import__(kind.__module__, fromlist=["CROSSINGS"])
+    operations = sum(link.OPERATIONS["torque"] for link in package.load(backend).backend.links)
     rows = ((10, 0), (operations, 4), (operations + 1, 99))
     monkeypatch.setattr(module, "CROSSINGS", {"torque": Crossing(operations, rows)})
+    robot = package.load(backend)
     taken: list[int] = []
 
     def counted(self: Any, space: Any, motion: Any, p: Any, bodies: Any) -> Any:
@@ -277,7 +278,7 @@ def test_auto_takes_what_the_table_says(
     assert taken == [3, 4]
     robot.packed_torque(*motion_of(backend, 3))
     monkeypatch.setattr(module, "CROSSINGS", {"torque": Crossing(operations + 1, rows)})
-    robot.packed_torque(*motion_of(backend, 3))
+    package.load(backend).packed_torque(*motion_of(backend, 3))
     assert taken == [3, 4, 3], "one sample without an axis of samples has a row of its own"
     assert [largest_batch(rows, size) for size in (9, 10, operations, 9999)] == [0, 0, 4, 99]
 
@@ -305,8 +306,8 @@ def test_gradients_of_native_need_no_closed_forms(
     made = package.load("native").backend
     bare = type(made)(package.ROBOT, directory_of("planar3") / "c", None, {}, made.rule)
     motion = [a.requires_grad_() for a in motion_of("torch", 3)]
-    bare.on_torch().operators = dict(made.on_torch().operators)
-    assert torch.autograd.gradcheck(bare.torque, motion)
+    bare.on_torch.operators = dict(made.on_torch.operators)
+    assert torch.autograd.gradcheck(bare.on_torch.torque, motion)
 
 
 @pytest.mark.filterwarnings("ignore:.torch.jit:DeprecationWarning")

@@ -14,15 +14,23 @@ from linkwise_runtime.version import require
 
 require("0.1.0")
 
-from linkwise_runtime.controllers import FrameImpedance, Natural, Target
+from linkwise_runtime.arrays.array_backend import ArrayBackend
 from linkwise_runtime.dynamics import Dynamics
-from linkwise_runtime.interface import Backend
-from linkwise_runtime.motion_quantities import AppliedLoad, InducedAccelerations, Trajectory
+from linkwise_runtime.quantities import (
+    AppliedLoad,
+    Coefficients,
+    Contact,
+    GradientPropagation,
+    InducedAccelerations,
+    Packed,
+    PassiveTorque,
+    Propagation,
+    Trajectory,
+)
 from linkwise_runtime.rule.joint_tree import Bodies
-from linkwise_runtime.quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
-from linkwise_runtime.robot_constraints import Contact
 from linkwise_runtime.rule.regressors import inertial_parameters
 from linkwise_runtime.structure import Layout
+from linkwise_runtime.targets import FrameImpedance, Natural, Target
 
 from .names import ROBOT
 
@@ -116,7 +124,7 @@ def bodies() -> Bodies[Any]:
     return RULE.bodies()
 
 
-def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
+def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> ArrayBackend:
     from .forms import LINKS
     from linkwise_runtime.arrays.numpy_backend import NumpyBackend
     from .tree import RULE
@@ -126,7 +134,7 @@ def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: A
     return NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
 
 
-def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
+def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> ArrayBackend:
     from .forms import LINKS
     from linkwise_runtime.arrays.torch_backend import TorchBackend
     from .tree import RULE
@@ -136,7 +144,7 @@ def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: A
     return TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
 
 
-def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
+def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> ArrayBackend:
     from .energies import LAGRANGIANS
     from linkwise_runtime.lagrangians.dynamics_module import backend_of_links
     from .tree import RULE
@@ -146,7 +154,7 @@ def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad
     return backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad, RULE)
 
 
-def _native(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> Backend[Any]:
+def _native(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> ArrayBackend:
     from pathlib import Path
     from .forms import LINKS
     from linkwise_runtime.native.native_backend import NativeBackend
@@ -160,7 +168,7 @@ def _native(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: 
 
 
 # Libraries are imported, and C is compiled, for the back end that is loaded.
-_MAKERS: dict[str, Callable[[Mapping[str, Any], str, Any, Any], Backend[Any]]] = {
+_MAKERS: dict[str, Callable[[Mapping[str, Any], str, Any, Any], ArrayBackend]] = {
     "numpy": _numpy,
     "torch": _torch,
     "autograd": _autograd,

@@ -11,12 +11,16 @@ different devices.
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .file_joints import FileJoint, why_wider
+from .interface import Numbers
+
+if TYPE_CHECKING:
+    from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
 
 FLOATS = ("float32", "float64")
 INTEGERS = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
@@ -24,16 +28,16 @@ REAL = ("bool", "int", "uint", "float", "bfloat")
 """How names of dtypes of real numbers begin."""
 
 
-def has_tensors(values: Iterable[Any]) -> bool:
+def has_tensors(values: Iterable[object]) -> bool:
     """Whether one of the values is a torch tensor; torch isn't imported to find out."""
     torch = sys.modules.get("torch")
     return torch is not None and any(isinstance(v, torch.Tensor) for v in values)
 
 
-def as_array(name: str, value: Any) -> NDArray[Any]:
+def as_array(name: str, value: object) -> NDArray[Any]:
     """Anything that reads as an array; raises TypeError or ValueError for what does not, or not wholly."""
     if has_tensors([value]):
-        return _array_of_tensor(name, value)
+        return _array_of_tensor(name, cast("Tensor", value))
     if value is None:
         raise TypeError(f"{name} is None; give an array, a tensor or a list of shape (..., n), n joints")
     if isinstance(value, np.ma.MaskedArray):
@@ -46,18 +50,24 @@ def as_array(name: str, value: Any) -> NDArray[Any]:
         raise ValueError(f"{name} does not read as an array: {_first_line(error)}") from None
 
 
-def shape_of(value: Any) -> tuple[int, ...]:
+def refuse_gradient(name: str, value: object) -> None:
+    """Raise TypeError for a tensor whose gradient would be lost where numbers are settled once."""
+    if getattr(value, "requires_grad", False):
+        raise TypeError(f"{name} requires a gradient, which nothing carries from there; give {name}.detach()")
+
+
+def shape_of(value: object) -> tuple[int, ...]:
     """Shape of what will be read as an array or a tensor; none where that is not clear yet."""
     try:
-        return tuple(value.shape) if hasattr(value, "shape") else np.shape(value)
+        return tuple(value.shape) if hasattr(value, "shape") else np.shape(cast(ArrayLike, value))
     except (TypeError, ValueError, RuntimeError):
         return ()
 
 
-def as_weights(name: str, value: Any) -> Any:
+def as_weights(name: str, value: object) -> Numbers:
     """A tensor as it is, or an array, of real numbers or truth values; raises as `as_array` does."""
     if has_tensors([value]):
-        weights = value
+        weights = cast(Numbers, value)
     elif value is None:
         raise TypeError(f"{name} is None; give an array, a tensor or a list")
     else:
@@ -67,7 +77,7 @@ def as_weights(name: str, value: Any) -> Any:
     return weights
 
 
-def precision(given: Mapping[str, Any], read: Mapping[str, Any]) -> str:
+def precision(given: Mapping[str, object], read: Mapping[str, Numbers]) -> str:
     """float32 or float64: what to compute in, for values as they were given, and as arrays or tensors."""
     for name, a in read.items():
         if _dtype(a) not in (*FLOATS, *INTEGERS):
@@ -76,17 +86,18 @@ def precision(given: Mapping[str, Any], read: Mapping[str, Any]) -> str:
     return "float32" if own.intersection(FLOATS) == {"float32"} else "float64"
 
 
-def check_dense(values: Mapping[str, Any]) -> None:
+def check_dense(values: Mapping[str, object]) -> None:
     """Raise TypeError, which names the argument, for a tensor that is sparse, nested or the like."""
     for name, value in values.items():
         if has_tensors([value]):
-            if value.is_nested:
+            tensor = cast("Tensor", value)
+            if tensor.is_nested:
                 raise TypeError(f"{name} is a nested tensor; join its parts with torch.stack or torch.cat")
-            if value.layout is not sys.modules["torch"].strided:
-                raise TypeError(f"{name} has the layout {value.layout}; pass {name}.to_dense()")
+            if tensor.layout is not sys.modules["torch"].strided:
+                raise TypeError(f"{name} has the layout {tensor.layout}; pass {name}.to_dense()")
 
 
-def check_axes(arrays: Mapping[str, Any], n: int, joints: Sequence[FileJoint] = ()) -> None:
+def check_axes(arrays: Mapping[str, Numbers], n: int, joints: Sequence[FileJoint] = ()) -> None:
     """Raise ValueError, which names the argument, where a last axis is not n.
 
     joints: those of the file, by which positions of simulators have more numbers
@@ -100,7 +111,7 @@ def check_axes(arrays: Mapping[str, Any], n: int, joints: Sequence[FileJoint] = 
             )
 
 
-def no_common_shape(arrays: Mapping[str, Any], n: int) -> ValueError:
+def no_common_shape(arrays: Mapping[str, Numbers], n: int) -> ValueError:
     """What to raise for arrays (..., n) that do not broadcast."""
     shapes = ", ".join(f"{name} {tuple(a.shape)}" for name, a in arrays.items())
     return ValueError(
@@ -109,7 +120,7 @@ def no_common_shape(arrays: Mapping[str, Any], n: int) -> ValueError:
     )
 
 
-def too_many_axes(arrays: Mapping[str, Any], n: int) -> ValueError:
+def too_many_axes(arrays: Mapping[str, Numbers], n: int) -> ValueError:
     """What to raise where NumPy has no room for the axes of arrays (..., n), or of answers to them."""
     most = max(a.ndim for a in arrays.values())
     names = [name for name, a in arrays.items() if a.ndim == most]
@@ -119,10 +130,10 @@ def too_many_axes(arrays: Mapping[str, Any], n: int) -> ValueError:
     )
 
 
-def check_numbers(given: Mapping[str, Any], joint_names: Sequence[str]) -> None:
+def check_numbers(given: Mapping[str, object], joint_names: Sequence[str]) -> None:
     """Raise ValueError, which names argument, sample and joint, for the first NaN or infinity."""
     for name, value in given.items():
-        seen = as_array(name, value.detach().cpu() if has_tensors([value]) else value)
+        seen = as_array(name, cast("Tensor", value).detach().cpu() if has_tensors([value]) else value)
         wrong = np.argwhere(~np.isfinite(seen))
         if len(wrong):
             *sample, joint = wrong[0].tolist()
@@ -130,7 +141,7 @@ def check_numbers(given: Mapping[str, Any], joint_names: Sequence[str]) -> None:
             raise ValueError(f"{name} is {seen[tuple(wrong[0])]:g} {where}for joint {joint_names[joint]!r}")
 
 
-def _array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
+def _array_of_tensor(name: str, tensor: "Tensor") -> NDArray[Any]:
     check_dense({name: tensor})
     if tensor.requires_grad and sys.modules["torch"].is_grad_enabled():
         raise TypeError(
@@ -152,7 +163,7 @@ def _array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
     return array
 
 
-def _dtype(a: Any) -> str:
+def _dtype(a: Numbers) -> str:
     """Name of an array's or a tensor's dtype, whatever its byte order."""
     return a.dtype.name if isinstance(a, np.ndarray) else str(a.dtype).removeprefix("torch.")
 

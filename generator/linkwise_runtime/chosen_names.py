@@ -31,7 +31,7 @@ def end_of_path(given: str) -> str:
     return parts[-2] if state else parts[-1]
 
 
-def nearest_first(given: Any, names: Iterable[str]) -> list[str]:
+def nearest_first(given: object, names: Iterable[str]) -> list[str]:
     """The names, those first whose letters and digits are most like those of a text that is given."""
     if not isinstance(given, str):
         return list(names)
@@ -54,7 +54,7 @@ def known_kind(given: object, kind: type) -> str:
     return short(given)
 
 
-def position_of(given: Any, names: Sequence[str], kind: str, argument: str) -> int:
+def position_of(given: object, names: Sequence[str], kind: str, argument: str) -> int:
     """Position from 0 of what is given by number or by name; raises ValueError, which names the argument.
 
     kind: what there are names of, such as joint; joint_names then lists them
@@ -82,7 +82,7 @@ def _letters(name: str) -> str:
     return "".join(c for c in end_of_path(name).casefold() if c.isalnum())
 
 
-def choice(given: Any, names: Iterable[str], whole: str) -> str:
+def choice(given: object, names: Iterable[str], whole: str) -> str:
     """The names, those nearest the given one first; of many these alone, and where all of them are."""
     known = nearest_first(given, names)
     near = ", ".join(map(plain, known[:MOST_NAMES]))
@@ -107,7 +107,7 @@ def sample_of(place: Sequence[int]) -> str:
     return f" at sample {', '.join(map(str, place))}" if len(place) else ""
 
 
-def short(value: Any) -> str:
+def short(value: object) -> str:
     """Any value in one line."""
     text = repr(value).replace("\n", " ")
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."

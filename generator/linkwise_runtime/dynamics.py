@@ -6,9 +6,11 @@ k the coordinate that moves.
     tau_ij = sum_k c2_ijk qdd_k + sum_k c1_ijk qd_k + g_ij
 
 tau_ij is zero off the path of link j, so results are kept packed, beside a list of their indices; dense
-tensors are a view that is built on request.
+tensors are a view that is built on request. What a call takes of a robot, and what it answers, is a row of
+`call_table.CALLS`.
 """
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from types import MethodType
@@ -16,19 +18,36 @@ from typing import Any, Literal, overload
 
 from numpy.typing import ArrayLike
 
-from .controller_calls import ControllerCalls
-from .interface import Array, Backend
+from .arrays.array_backend import ArrayBackend
+from .call_table import CALLS
+from .constraints.robot_constraints import Constraints, constraints_of
+from .control.controllers import Cancellation, PartialImpedance, cancellation, partial_impedance
+from .door import Door, accepted
+from .file_joints import Order
+from .html_tables import robot_table
+from .interface import Array, Numbers
+from .kinematics.robot_kinematics import Kinematics
 from .labelled import labelled
-from .motion_calls import MotionCalls
-from .quantities import Coefficients, GradientPropagation, Packed, PassiveTorque, Propagation
-from .robot_constraints import Constraints, Contact
-from .robot_kinematics import Kinematics
-from .robot_table import robot_table
+from .motion.induced_accelerations import Driven, induced_accelerations, induced_reactions
+from .motion.simulated import Simulated, simulated
+from .quantities import (
+    Coefficients,
+    Contact,
+    Energy,
+    GradientPropagation,
+    InducedAccelerations,
+    NaturalImpedance,
+    Packed,
+    PassiveTorque,
+    Power,
+    Propagation,
+    Trajectory,
+)
 from .structure import JointLimits, Layout, Structure
-from .sum_calls import SumCalls
+from .targets import FrameImpedance, Natural
 
 
-class Dynamics(SumCalls, MotionCalls, ControllerCalls):
+class Dynamics:
     """Partial torques of a robot on one back end; made by the package's `load`.
 
     The robot is the open tree of its joints: of one with ties, which close loops, or with contacts, calls are
@@ -67,30 +86,49 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
     """Indices that packed values belong to."""
     structure: Structure
     """Names, paths and parameters, as the package's names.py has them."""
-    backend: Backend[Any]
+    backend: ArrayBackend
     """What computes; of the native one `threads` may be set."""
-    check_finite: bool
-    """Whether every call looks for NaN and infinity in the motion first."""
+    door: Door[ArrayBackend]
+    """Where the motion of every call comes in."""
 
     def __init__(
         self,
         structure: Structure,
-        backend: Backend[Any],
+        backend: ArrayBackend,
         load: Callable[..., "Dynamics"],
         asked: tuple[Any, ...],
         check_finite: bool = False,
     ) -> None:
         """`load` makes this robot again from the arguments that it was `asked` with."""
-        self.name, self.check_finite = structure.name, check_finite
-        self.n, self.N = structure.n, structure.N
+        self.name, self.n, self.N = structure.name, structure.n, structure.N
         self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
         self.joint_limits = structure.joint_limits
         self.link_names, self.layout = structure.link_names, structure.layout
         self.structure, self.backend = structure, backend
         self._load, self._asked = load, asked
-        self._answers = backend.answers(check_finite)
-        # They stand before the methods of the class, which they pass on to what is no plain array.
-        vars(self).update({name: MethodType(call, self) for name, call in self._answers.direct.items()})
+        self.door = Door(structure, backend, check_finite)
+        self._bind()
+
+    def _bind(self) -> None:
+        """Have calls go at once to functions that the back end has: these pass on what they do not take.
+
+        They stand before the methods of the class, and look at no numbers.
+        """
+        for name, call in self.backend.direct.items():
+            if self.door.check_finite:
+                vars(self).pop(name, None)
+            else:
+                vars(self)[name] = MethodType(call, self)
+
+    @property
+    def check_finite(self) -> bool:
+        """Whether every call looks for NaN and infinity in the motion first; it may be set."""
+        return self.door.check_finite
+
+    @check_finite.setter
+    def check_finite(self, wanted: bool) -> None:
+        self.door.check_finite = bool(wanted)
+        self._bind()
 
     def __dir__(self) -> Iterable[str]:
         """Names of what this robot has: torch.jit reads each of them, whose values may not raise."""
@@ -101,13 +139,12 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
     @property
     def parameters(self) -> Mapping[str, Any]:
         """Values of the run-time parameters."""
-        values: Mapping[str, Any] = self.backend.parameters
-        return values
+        return self.backend.parameters
 
     @cached_property
     def kinematics(self) -> Kinematics[Any]:
         """Poses, Jacobians and their rates of the robot's frames; raises ValueError for links of energies."""
-        return Kinematics(self.backend.kinematics(self.check_finite, self._answers.read_beside_motion))
+        return Kinematics(self.door, self.backend.frames.names)
 
     @cached_property
     def constraints(self) -> Constraints[Any]:
@@ -115,7 +152,7 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
 
         Raises ValueError for a robot without any, and for links of energies.
         """
-        return Constraints(self.backend.constraints(self, None, (), None, None))
+        return constraints_of(self, None, (), None, None)
 
     def constrained(
         self,
@@ -136,7 +173,7 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         Raises ValueError for what is not there, for joints on which the others do not hang at `at`, and
         where nothing is left to move.
         """
-        return Constraints(self.backend.constraints(self, independent, contacts, at, tolerance))
+        return constraints_of(self, independent, contacts, at, tolerance)
 
     def module(self, call: str, **fixed: Any) -> Any:
         """One call as a torch.nn.Module, such as torch.export, ONNX and containers take.
@@ -179,32 +216,33 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         return f"<{self.name} on {self.backend.name}: {', '.join(parts)}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled, copied or sent to another process, it is loaded again there; threads set here stay."""
-        return self._load, self._asked, getattr(self.backend, "threads_set", None)
+        """Pickled, copied or sent to another process, it is loaded again there; what was set here stays."""
+        return self._load, self._asked, (self.backend.threads_set, self.check_finite)
 
-    def __setstate__(self, threads: int) -> None:
-        """Set threads as they were set of the robot that this one is a copy of."""
-        backend: Any = self.backend
-        backend.threads = threads
+    def __setstate__(self, state: tuple[int | None, bool]) -> None:
+        """Set what was set of the robot that this one is a copy of."""
+        threads, self.check_finite = state
+        if threads is not None:
+            self.backend.threads_set = threads
 
     def packed(self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None) -> Packed[Array]:
         """Full decomposition without the zeros: c2, c1 (closing), g, tau, h1, (..., count) each."""
-        answer: Packed[Array] = self._answers.packed(q, qd, qdd, out)
+        answer: Packed[Array] = self._call("packed", (q, qd, qdd), out)
         return answer
 
     def packed_torque(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_ij on the paths only, (..., count); its indices are `layout.torque`."""
-        tau: Array = self._answers.packed_torque(q, qd, qdd, out)
+        tau: Array = self._call("packed_torque", (q, qd, qdd), out)
         return tau
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_ij, the torque on joint i through link j, shape (..., n, N)."""
-        tau: Array = self._answers.partial_torque(q, qd, qdd, out)
+        tau: Array = self._call("partial_torque", (q, qd, qdd), out)
         return tau
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """tau_i = sum_j tau_ij, shape (..., n): of the links, without what `passive_torque` has."""
-        tau: Array = self._answers.inverse_dynamics(q, qd, qdd, out)
+        tau: Array = self._call("inverse_dynamics", (q, qd, qdd), out)
         return tau
 
     def passive_torque(
@@ -215,12 +253,12 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         No tau_ij holds it: actuators give inverse_dynamics(q, qd, qdd) + passive_torque(q, qd, qdd).total.
         Zeros where the robot's description has none.
         """
-        answer: PassiveTorque[Array] = self._answers.passive_torque(q, qd, qdd, out)
+        answer: PassiveTorque[Array] = self._call("passive_torque", (q, qd, qdd), out)
         return answer
 
     def coefficients(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Coefficients[Array]:
         """c2, c1 (..., n, N, n) and g (..., n, N) of the closing convention."""
-        answer: Coefficients[Array] = self._answers.coefficients(q, qd, out)
+        answer: Coefficients[Array] = self._call("coefficients", (q, qd), out)
         return answer
 
     @overload
@@ -256,12 +294,15 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         raises ValueError.
         """
         answer: Propagation[Array] | GradientPropagation[Array]
-        answer = self._answers.propagation(q, qd, qdd, convention, out)
+        if convention not in ("closing", "gradient"):
+            raise ValueError(f"no convention {convention!r}; choose closing or gradient")
+        key = "propagation" if convention == "closing" else "gradient_propagation"
+        answer = self._call(key, (q, qd, qdd), out)
         return answer
 
     def position_gradient(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
-        c0: Array = self._answers.position_gradient(q, qd, qdd, out)
+        c0: Array = self._call("position_gradient", (q, qd, qdd), out)
         return c0
 
     def regressor(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
@@ -272,7 +313,7 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         package's inertial_parameters(bodies()) are. For numpy, torch and native, and for rigid links; raises
         ValueError for others.
         """
-        rows: Array = self._answers.regressor(q, qd, qdd, out)
+        rows: Array = self._call("regressor", (q, qd, qdd), out)
         return rows
 
     def coefficient_regressors(
@@ -282,7 +323,7 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
 
         c2_ijk = Y_ijk . pi_j, c1_ijk and g_ij likewise. Raises as `regressor` does.
         """
-        answer: Coefficients[Array] = self._answers.coefficient_regressors(q, qd, out)
+        answer: Coefficients[Array] = self._call("coefficient_regressors", (q, qd), out)
         return answer
 
     def masked(
@@ -293,7 +334,13 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         mask: shape (3, n), zeros and ones, or weights between; row m is the order: 0 position, 1 velocity,
         2 acceleration. Gravity is in no row: a mask of ones in rows 1 and 2 gives tau_ij - g_ij.
         """
-        torque: Array = self._answers.masked(q, qd, qdd, mask, out)
+        engine, motion = self.door.read({"q": q, "qd": qd, "qdd": qdd})
+        weights = engine.weights("the mask", mask, motion[0])
+        if tuple(weights.shape) != (3, self.n):
+            raise ValueError(
+                f"the mask has shape {tuple(weights.shape)}; it must be (3, {self.n}): order, coordinate"
+            )
+        torque: Array = self._answer("masked", engine, motion, out, (weights,))
         return torque
 
     def graph(self, i: Any, j: Any = None, k: Any = None, m: int | None = None) -> Any:
@@ -319,3 +366,306 @@ class Dynamics(SumCalls, MotionCalls, ControllerCalls):
         if found is None:
             raise TypeError(f"{self.backend.name} records no operations; load autograd for graphs")
         return found
+
+    def joint_index(self, joint: int | str) -> int:
+        """Index i or k of a joint by number from 0 or by name; raises ValueError for what is neither."""
+        return self.structure.joint_index(joint)
+
+    def link_index(self, link: int | str) -> int:
+        """Index j of a link by number from 0 or by name; raises ValueError for what is neither."""
+        return self.structure.link_index(link)
+
+    def mass_matrix(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
+        """M_ik = sum_j c2_ijk, shape (..., n, n); by link c2_ijk, (..., n, N, n).
+
+        In kg m^2, kg m or kg, where none, one or both of i and k are prismatic.
+        """
+        mass: Array = self._call("mass_matrix_by_link" if by_link else "mass_matrix", (q,), out)
+        return mass
+
+    def coriolis_matrix(self, q: Array, qd: Array, by_link: bool = False, out: Array | None = None) -> Array:
+        """C_ik = sum_j c1_ijk of the closing convention, shape (..., n, n); by link c1_ijk, (..., n, N, n).
+
+        C qd is the velocity force. Of rigid links it is the matrix of Christoffel symbols: dM/dt - 2 C is
+        skew-symmetric.
+        """
+        coriolis: Array = self._call(
+            "coriolis_matrix_by_link" if by_link else "coriolis_matrix", (q, qd), out
+        )
+        return coriolis
+
+    def gravity_torque(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
+        """g_i = sum_j g_ij, the torque of gravity and other potentials, (..., n); by link (..., n, N)."""
+        gravity: Array = self._call("gravity_torque_by_link" if by_link else "gravity_torque", (q,), out)
+        return gravity
+
+    def forward_dynamics(
+        self, q: Array, qd: Array, tau: Array, passive: bool = True, out: Array | None = None
+    ) -> Array:
+        """qdd of M qdd + C qd + g + p = tau, shape (..., n), in rad/s^2 or m/s^2; tau (..., n) in N m or N.
+
+        p is the total of `passive_torque`, which has armature times qdd in it.
+
+        passive: whether joints have their springs, damping, friction and armature; False leaves p away: tau
+        is then for the links alone, and this the inverse of `inverse_dynamics`
+
+        Raises ValueError for a robot with ties, whose joints move as `constraints.forward_dynamics` says, and
+        for a singular mass matrix, with the sample and the joints that can move without moving any mass;
+        inside torch.func and torch.compile, qdd is then not finite. Warns where rounding leaves fewer than
+        half of the digits of M^-1, as near 90 degrees of a floating base's pitch, and how many are left.
+        """
+        if self.backend.ties_joints:
+            raise ValueError(
+                f"the joints of {self.structure.name} are tied, which its open tree does not know; call "
+                "constraints.forward_dynamics(q, qd, tau)"
+            )
+        key = "forward_dynamics" if passive else "forward_dynamics_of_links"
+        qdd: Array = self._call(key, (q, qd, tau), out)
+        return qdd
+
+    def energy(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Energy[Array]:
+        """Kinetic and potential energy of each link in J, (..., N) each.
+
+        The potential energy of rigid links is zero at the world's origin; hand-written energies are as they
+        were written.
+        """
+        answer: Energy[Array] = self._call("energy", (q, qd), out)
+        return answer
+
+    def power(self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None) -> Power[Array]:
+        """P_ij = tau_ij qd_i, the power in W that joint i sends into link j, by whose motion, of which order.
+
+        Shapes (..., n, N, n) twice and (..., n, N); `.total` is P_ij. sum_i P_ij is the rate of link j's
+        energy, sum_j P_ij what actuator i gives.
+        """
+        answer: Power[Array] = self._call("power", (q, qd, qdd), out)
+        return answer
+
+    def christoffel(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
+        """Gamma_ikl, the velocity share of every pair of motions, (..., n, n, n); by link (..., n, N, n, n).
+
+        sum_kl Gamma_ikl qd_k qd_l is the velocity force: Gamma_ikk qd_k^2 comes of joint k's motion alone,
+        (Gamma_ikl + Gamma_ilk) qd_k qd_l of the motions of k and l together. Symmetric in k and l. Terms of
+        energies linear in the velocities, as on a moving base, are no part of it.
+        """
+        symbols: Array = self._call("christoffel_by_link" if by_link else "christoffel", (q,), out)
+        return symbols
+
+    def from_qpos(
+        self,
+        qpos: ArrayLike,
+        qvel: ArrayLike | None = None,
+        qacc: ArrayLike | None = None,
+        tau: ArrayLike | None = None,
+        order: Order = "mujoco",
+        joints: Sequence[str] | None = None,
+    ) -> Any:
+        """q of positions as MuJoCo or Pinocchio has them, and qd, qdd and torques of what else is given.
+
+        qpos: (..., nq), in which a joint that turns in space has a quaternion: MuJoCo's w, x, y, z, or
+        Pinocchio's x, y, z, w, which has a cosine and a sine besides for an angle without ends
+        qvel, qacc, tau: (..., n), for which a tuple (q, qd), (q, qd, qdd), ... is the answer: velocities,
+        accelerations and generalized forces of that simulator. Angular velocities are along the body's axes,
+        a floating body's linear one along the world's with MuJoCo, along its own with Pinocchio
+        order: whose numbers these are; joints stand as the file's order has them, or Pinocchio's own
+        joints: their names in the order of qpos, where it is another: list(model.names)[1:], say
+
+        Joints that are locked or follow others have no numbers here. Angles go on without leaps along the
+        samples, the last axis but one: whole turns are added, and beyond a pitch of 90 degrees it grows on.
+        Arrays of float64 in, or what becomes such, and out; gradients are not carried.
+
+        Raises ValueError for a quaternion whose length is not 1 within 0.01, for velocities at a pitch of
+        90 degrees, and for a wrong shape, with what stands where; warns next to such a pitch.
+        """
+        found = self.structure.qpos(order, joints).motion(qpos, qvel, qacc, tau)
+        for told in found.warnings:
+            warnings.warn(told, stacklevel=2)
+        motion = tuple(values for values in found[:4] if values is not None)
+        return motion if len(motion) > 1 else motion[0]
+
+    def induced_accelerations(
+        self,
+        q: Array,
+        qd: Array,
+        tau: Array | None = None,
+        qdd: Array | None = None,
+        loads: Any = (),
+        passive: bool = True,
+        frame: str | int | None = None,
+        point: Array | None = None,
+        constraints: Any = None,
+    ) -> InducedAccelerations[Array]:
+        """What each source accelerates, the others away: shares that sum to the acceleration.
+
+        tau: what the actuators give, (..., n); or in its place
+        qdd: a motion's acceleration: the actuators then give what it asks of them, less what loads do
+        loads: what acts from outside, each an `AppliedLoad`, or a list of them for one source, such as a
+        muscle's two ends
+        passive: as in `forward_dynamics`
+        frame: what accelerates: the coordinates unless given, or a frame, with its `point`, as
+        `robot.kinematics` takes them, or "centre of mass"
+        constraints: what the motion keeps, the file's ties unless given, else what `robot.constrained`
+        makes, or False for the open tree; q, qd are then as `Constraints` has them, and the actuators that a
+        qdd asks for are those of the independent joints
+
+        The frame's own dJ/dt qd is the share `kinematic`. Sources of acceleration are forces: what gravity
+        accelerates at rest is there even where it is held, and an actuator's share cancels it.
+
+        Raises as forward_dynamics does, and names the load that is wrong.
+        """
+        asked = Driven(q, qd, tau, qdd, loads, passive, constraints)
+        shares: InducedAccelerations[Array] = induced_accelerations(self, asked, frame, point)
+        return shares
+
+    def simulate(
+        self,
+        q: Array,
+        qd: Array,
+        time: Any,
+        tau: Any = None,
+        loads: Any = (),
+        passive: bool = True,
+        step: float | None = None,
+        method: str = "RK4",
+        rtol: float = 1e-9,
+        atol: float = 1e-12,
+        constraints: Any = None,
+    ) -> Trajectory[Array]:
+        """How the robot moves from q and qd on, (..., n), at the instants `time`, (T,), in s.
+
+        tau: what the actuators give: nothing unless given; (..., n), or a function of (t, q, qd) that is
+        called wherever the method evaluates, also between steps
+        loads: as in `induced_accelerations`, or a function of (t, q, qd) that gives them
+        passive: as in `forward_dynamics`
+        step: of RK4 the longest, in s; from instant to instant unless given; of the others a bound
+        method: "RK4", of fixed steps, order 4, through which gradients flow; or one of SciPy's solve_ivp,
+        RK45, DOP853, Radau, ..., whose steps keep rtol and atol, and with which all starts step together
+        constraints: as in `induced_accelerations`; q is closed first, and q and qd may be (..., m), of the
+        independent joints alone, as `Constraints.closed` takes them. Independent joints are integrated; the
+        others are closed by Newton's method at each evaluation and after each step, and follow with G yd
+
+        The answer's energy_drift is the energy that the integration made or lost. Raises ValueError where the
+        motion ceases to be finite, and as forward_dynamics and `Constraints` do; ImportError without SciPy.
+        """
+        given = Simulated(q, qd, time, tau, loads, passive, step, method, rtol, atol, constraints)
+        trajectory: Trajectory[Array] = simulated(self, given)
+        return trajectory
+
+    def induced_reactions(
+        self,
+        q: Array,
+        qd: Array,
+        tau: Array | None = None,
+        qdd: Array | None = None,
+        loads: Any = (),
+        passive: bool = True,
+        constraints: Any = None,
+    ) -> InducedAccelerations[Array]:
+        """What each source puts on the constraints: shares of lambda, (..., C, ...), by their rows.
+
+        Arguments are those of `induced_accelerations`. Raises ValueError without constraints.
+        """
+        asked = Driven(q, qd, tau, qdd, loads, passive, constraints)
+        shares: InducedAccelerations[Array] = induced_reactions(self, asked)
+        return shares
+
+    def natural_impedance(
+        self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None
+    ) -> NaturalImpedance[Array]:
+        """How each tau_ij changes with the motion of k: c2_ijk, 2 c1_ijk - h1_ijk and c0_ijk, (..., n, N, n).
+
+        d(tau_ij) = sum_k c2_ijk d(qdd_k) + (2 c1_ijk - h1_ijk) d(qd_k) + c0_ijk d(q_k), h1 being the part of
+        c1 that comes of energies linear in the velocities.
+        """
+        answer: NaturalImpedance[Array] = self._call("natural_impedance", (q, qd, qdd), out)
+        return answer
+
+    def partial_impedance(
+        self,
+        inertia: Any = Natural(),  # noqa: B008 - a tuple of numbers
+        damping: Any = Natural(),  # noqa: B008
+        stiffness: Any = 0.0,
+        frame: FrameImpedance | None = None,
+        passive: bool = True,
+        friction_width: float | None = None,
+    ) -> PartialImpedance[Array]:
+        """A controller under which shares of inertia, damping and stiffness are as asked.
+
+        inertia, damping, stiffness: targets, each one of
+            Natural(scale, plus)            c2_ijk or c1_ijk as they are, or scaled by alpha_ij, and more
+            {(joint, link, coordinate): x}  these entries in place of the natural ones, by name or number
+            (n, N, n)                       all entries
+            (n, n), (n,) or a number        their sum over the links; a diagonal; the same at every joint
+        in kg m^2, N m s/rad and N m/rad, or as prismatic joints have them. Stiffness has no natural part:
+        positions meet gravity, which is compensated.
+        frame: what a frame is to feel like; the joints' targets are then for what it leaves free
+        passive: whether the joints' own springs and damping are compensated, and their armature kept as part
+        of the inertia, beside the links; else they are as if not there, which is right only where the
+        description has none. An inertia that is given as a sum is the whole, armature included.
+        friction_width: None, and the joints' Coulomb friction is not compensated: it jumps at rest, and so
+        would torques, with the noise of a sensor. Else a velocity w in rad/s or m/s: friction tanh(qd / w)
+        is, 0.76 of the friction at w and 0.999 of it at 3.8 w.
+
+        Tensors among the targets are taken anew at each call, so that gains can be learned, and are refused
+        there where they are positive no more.
+
+        Raises ValueError for names or shapes that are not there, and for a target that is not positive: an
+        inertia that is not positive definite or not symmetric, a stiffness or a damping that gives energy
+        away; and for robots with ties, whose joints are not free.
+        """
+        return partial_impedance(self, inertia, damping, stiffness, frame, passive, friction_width)
+
+    def cancel(
+        self, entries: Iterable[Any], passive: bool = True, friction_width: float | None = None
+    ) -> Cancellation[Array]:
+        """A controller that cancels chosen motion propagation torques and no others, gravity apart.
+
+        entries: (joint, link, coordinate, order): c2_ijk qdd_k for the order 2 and c1_ijk qd_k for 1 (closing
+        convention), by name or number; None in a place is all that there are. "What link 3's motion does to
+        the root": {("joint1", "link3", None, None)}.
+        passive, friction_width: as in `partial_impedance`
+
+        Raises ValueError for what is not there, such as a joint that is not on the path of the link, or what
+        is named twice. Calls raise it where what is left has no regular mass matrix, and warn where rounding
+        leaves fewer than half of the digits of what follows from it, unless they are given qdd.
+        """
+        return cancellation(self, entries, passive, friction_width)
+
+    def _call(self, key: str, given: tuple[object, ...], out: object) -> Any:
+        """Answer to motion as it was given, by the row of the table with this key."""
+        row = CALLS[key]
+        if out is None:
+            at_once = self.backend.at_once
+            if at_once is not None and not self.door.check_finite:
+                values = at_once(key, given)
+                if values is not None:
+                    return row.record(*values) if row.record else values[0]
+            engine, motion = self.door.read(dict(zip(row.motion, given)))  # noqa: B905 - rows are as long
+            if row.rigid:
+                engine.answers.check_regresses()
+            values = getattr(engine.answers, key)(*motion)
+            return row.record(*values) if row.record else values[0]
+        engine, motion = self.door.read(dict(zip(row.motion, given, strict=True)))
+        return self._answer(key, engine, motion, out)
+
+    def _answer(
+        self,
+        key: str,
+        engine: ArrayBackend,
+        motion: Sequence[Numbers],
+        out: object,
+        beside: Sequence[Numbers] = (),
+    ) -> Any:
+        """The same for motion that has been read, and what the row is given beside it."""
+        row, answers = CALLS[key], engine.answers
+        if row.rigid:
+            answers.check_regresses()
+        if out is None:
+            values = getattr(answers, key)(*motion, *beside)
+            return row.record(*values) if row.record else values[0]
+        fields: Sequence[str] = getattr(row.record, "_fields", ())
+        named = dict(zip(row.motion, motion, strict=True))
+        read = engine.read_beside_motion()
+        into = accepted(out, fields, answers.shapes[key], named, [*read, *beside], answers.contiguous)
+        answers.compute_into(key, [*motion, *beside], into)
+        return row.record(*into) if row.record else out

@@ -1,7 +1,9 @@
 """What the parts of a package say to each other: arrays, closed forms, back ends."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
+# ruff: noqa: D102 - functions that NumPy and torch document
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,126 @@ if TYPE_CHECKING:
 Array = TypeVar("Array", NDArray[np.float64], NDArray[np.float32], NDArray[Any], "Tensor")
 """NumPy array or torch tensor, of float32 or float64; answers are what the motion is, device included."""
 
-Kind = TypeVar("Kind")
+
+class Dtype(Protocol):
+    """That of an array or a tensor."""
+
+    @property
+    def itemsize(self) -> int:
+        """Bytes of a number."""
+
+
+class Numbers(Protocol):
+    """An array or a tensor, as all code computes with it that does not ask which of the two it is."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    @property
+    def ndim(self) -> int: ...
+    @property
+    def dtype(self) -> Dtype: ...
+    @property
+    def itemsize(self) -> int: ...
+    @property
+    def mT(self) -> "Numbers": ...
+    @property
+    def reshape(self) -> Callable[..., Any]: ...
+    def __getitem__(self, key: Any, /) -> "Numbers": ...
+    def __setitem__(self, key: Any, value: Any, /) -> None: ...
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Iterator["Numbers"]: ...
+    def __bool__(self) -> bool: ...
+    def __float__(self) -> float: ...
+    def __neg__(self) -> "Numbers": ...
+    def __abs__(self) -> "Numbers": ...
+    def __add__(self, other: Any, /) -> "Numbers": ...
+    def __radd__(self, other: Any, /) -> "Numbers": ...
+    def __sub__(self, other: Any, /) -> "Numbers": ...
+    def __rsub__(self, other: Any, /) -> "Numbers": ...
+    def __mul__(self, other: Any, /) -> "Numbers": ...
+    def __rmul__(self, other: Any, /) -> "Numbers": ...
+    def __truediv__(self, other: Any, /) -> "Numbers": ...
+    def __rtruediv__(self, other: Any, /) -> "Numbers": ...
+    def __pow__(self, other: Any, /) -> "Numbers": ...
+    def __matmul__(self, other: Any, /) -> "Numbers": ...
+    def __rmatmul__(self, other: Any, /) -> "Numbers": ...
+    def __lt__(self, other: Any, /) -> Any: ...
+    def __le__(self, other: Any, /) -> Any: ...
+    def __gt__(self, other: Any, /) -> Any: ...
+    def __ge__(self, other: Any, /) -> Any: ...
+    def sum(self, axis: Any, /) -> "Numbers": ...
+    def any(self, axis: Any = ..., /) -> Any: ...
+    def all(self, axis: Any = ..., /) -> Any: ...
+    def max(self) -> Any: ...
+    def min(self) -> Any: ...
+    def argmin(self, axis: Any = ..., /) -> Any: ...
+    def diagonal(self, offset: int = ..., first: int = ..., second: int = ..., /) -> "Numbers": ...
+    def tolist(self) -> Any: ...
+
+
+class Namespace(Protocol):
+    """What NumPy and torch have under one name: `xp` wherever it is passed on."""
+
+    __name__: str
+    linalg: Any
+
+    def concat(self, parts: Sequence[Numbers], axis: int = ..., /) -> Numbers: ...
+    def stack(self, parts: Sequence[Numbers], axis: int = ..., /) -> Numbers: ...
+    def where(self, condition: Numbers, a: Numbers, b: Numbers, /) -> Numbers: ...
+    def swapaxes(self, a: Numbers, one: int, other: int, /) -> Numbers: ...
+    def moveaxis(self, a: Numbers, one: int, other: int, /) -> Numbers: ...
+    def broadcast_to(self, a: Numbers, shape: tuple[int, ...], /) -> Numbers: ...
+    def broadcast_shapes(self, *shapes: tuple[int, ...]) -> tuple[int, ...]: ...
+    def zeros_like(self, a: Numbers, /) -> Numbers: ...
+    def ones_like(self, a: Numbers, /) -> Numbers: ...
+    def empty(self, shape: tuple[int, ...], /, *, dtype: Dtype) -> Numbers: ...
+    def zeros(self, shape: tuple[int, ...], /, **kind: object) -> Numbers: ...
+    def eye(self, size: int, /, **kind: object) -> Numbers: ...
+    def amax(self, a: Numbers, axis: int, /) -> Numbers: ...
+    def diag(self, a: Numbers, /) -> Numbers: ...
+    def isfinite(self, a: Numbers, /) -> Numbers: ...
+    def maximum(self, a: Numbers, b: Numbers, /) -> Numbers: ...
+    def sign(self, a: Numbers, /) -> Numbers: ...
+    def sin(self, a: Numbers, /) -> Numbers: ...
+    def cos(self, a: Numbers, /) -> Numbers: ...
+    def tan(self, a: Numbers, /) -> Numbers: ...
+    def tanh(self, a: Numbers, /) -> Numbers: ...
+    def arctan(self, a: Numbers, /) -> Numbers: ...
+    def arctan2(self, a: Numbers, b: Numbers, /) -> Numbers: ...
+
+
+class Library(Protocol):
+    """NumPy or torch, as a call computes with it: chosen once, where its motion comes in."""
+
+    @property
+    def xp(self) -> Namespace:
+        """Its functions."""
+
+    @property
+    def fuses(self) -> bool:
+        """Whether a compiler makes one loop of many operations, to which a matrix product is a wall."""
+
+    def constant(self, values: Any, like: Numbers) -> Numbers:
+        """A table of numbers, to compute with `like`."""
+
+    def index(self, values: Any, like: Numbers) -> Numbers:
+        """A table of positions, to take from `like`."""
+
+    def weights(self, name: str, value: Any, like: Numbers) -> Numbers:
+        """Real numbers in anything array-like, of the kind and dtype of `like`; errors name the argument."""
+
+    def zeros(self, like: Numbers, count: int) -> Numbers:
+        """Zeros of shape (..., count) for `like` of shape (..., m)."""
+
+    def concatenate(self, parts: Iterable[Numbers]) -> Numbers:
+        """The parts joined along the last axis."""
+
+    def few(self, samples: int, links: int) -> bool:
+        """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
+
+    def chunk(self, motion: Sequence[Numbers], most: int) -> int | None:
+        """Samples to compute at once, of which so many stay in the cache; None for all."""
+
 
 Entries = tuple[Any, ...]
 """Packed values one by one: each an array of the batch's shape (...), or a number that all samples share."""
@@ -44,81 +165,3 @@ class EnergyForms(ClosedForms, Protocol):
 
     def energy(self, xp: Any, q: Any, qd: Any, p: Mapping[str, Any]) -> Entries:
         """Kinetic and potential energy in J."""
-
-
-class Backend(Protocol[Kind]):
-    """What computes: packed values (..., count) in the order of `Layout`, and a few operations on arrays."""
-
-    name: ClassVar[str]
-    takes_tensors: ClassVar[bool]
-    """Whether motion is given as torch tensors only."""
-    examples: tuple[Any, ...]
-    """Empty arrays of kinds that tables are made for in advance: no compiler traces how they are made."""
-    face: ClassVar[Any]
-    """Class of the robots that compute with it; None for `Dynamics`."""
-    parameters: Any
-    """Values of the run-time parameters by name."""
-    rule: Any
-    """The vectorised rule of rigid links, None without it."""
-    tree: Any
-    """Joints, links and frames of rigid links; None for energies."""
-
-    def arrays(self, named: Mapping[str, Kind], n: int) -> Sequence[Kind]:
-        """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
-
-    def side(self, like: Kind) -> Any:
-        """What computes with `like`, an array or a tensor: it has `constant`, and its namespace as `xp`."""
-
-    def decomposition(self, q: Kind, qd: Kind, qdd: Kind) -> Sequence[Kind]:
-        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
-
-    def torque(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
-        """tau (..., count) in the order of `Layout.torque`."""
-
-    def position_gradient(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
-        """c0 (..., count) in the order of `Layout.velocity`."""
-
-    def energies(self, q: Kind, qd: Kind) -> tuple[Kind, Kind]:
-        """Kinetic and potential energies of the links in J, (..., N) each."""
-
-    def regressor(self, q: Kind, qd: Kind, qdd: Kind) -> Kind:
-        """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
-
-    def coefficient_regressors(self, q: Kind, qd: Kind, qdd: Kind) -> Sequence[Kind]:
-        """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
-
-    def answers(self, check_finite: bool) -> Any:
-        """The calls of `Dynamics` on this back end: an `Answers`."""
-
-    def kinematics(self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]) -> Any:
-        """The calls of `Kinematics`, a `KinematicAnswers`; raises ValueError without a tree."""
-
-    def induced(self, robot: Any) -> Any:
-        """The calls for induced accelerations of a robot on this back end, an `InducedAnswers`."""
-
-    def controls(self, robot: Any) -> Any:
-        """What makes controllers of a robot on this back end, a `Controls`."""
-
-    def constraints(self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any) -> Any:
-        """The calls of `Constraints` on a robot with this back end; raises as `Dynamics.constrained` does."""
-
-    def module(self, robot: Any, call: str, fixed: Mapping[str, Any]) -> Any:
-        """One call of a robot on this back end as a torch module; raises as `Dynamics.module` does."""
-
-    def simulated(self, robot: Any, *given: Any) -> Any:
-        """The motion of a robot on this back end over time, a `Trajectory`."""
-
-    def constant(self, values: NDArray[Any], like: Kind) -> Kind:
-        """A table of numbers, to compute with `like`."""
-
-    def index(self, values: NDArray[np.intp], like: Kind) -> Kind:
-        """A table of positions, to take from `like`."""
-
-    def weights(self, name: str, value: Any, like: Kind) -> Kind:
-        """Real numbers in anything array-like, of the kind and dtype of `like`; errors name the argument."""
-
-    def zeros(self, like: Kind, count: int) -> Kind:
-        """Zeros of shape (..., count) for `like` of shape (..., m)."""
-
-    def concatenate(self, parts: Iterable[Kind]) -> Kind:
-        """The parts joined along the last axis."""

@@ -1,7 +1,7 @@
 """Any call of a robot, answered with names along the axes."""
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from operator import attrgetter
 from typing import Any
 
@@ -9,32 +9,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arguments import has_tensors
+from .call_table import CALLS, Call
 from .chosen_names import choice, short
-from .motion_quantities import AppliedLoad
-from .named_arguments import SampleAxes, samples_along, taken
-from .named_arrays import Part, alone, dataset, xarray
-from .quantity_axes import CONSTRAINTS, QUANTITIES
+from .named_arrays import Part, SampleAxes, alone, dataset, samples_along, taken, xarray
+from .quantities import AppliedLoad
 from .robot_axes import NamedAxis, axes_of, tied_axes
 
-VARIANTS = ("_by_link", "_of_links")
-"""Ends of names of what the arguments of a call choose."""
 TIED = "constraints."
+ALONE = ("constraints.closed", "simulate")
+"""Calls that take the independent joints alone in place of all."""
 
 
 def labelled(
-    robot: Any, ties: Any, call: str, given: Sequence[Any], named: Mapping[str, Any], along: Any
+    robot: Any, ties: Any, call: str, given: Sequence[object], named: Mapping[str, object], along: Any
 ) -> Any:
     """See `Dynamics.labelled`; ties: constraints whose calls are meant, None for those of the robot."""
     xarray()
-    function, key = _found(robot, ties, call)
-    arguments = dict(inspect.signature(function).bind(*given, **named).arguments)
+    rows = _rows(ties is not None, call)
+    function = attrgetter(call)(robot if ties is None else ties)
+    arguments: dict[str, object] = dict(inspect.signature(function).bind(*given, **named).arguments)
     if arguments.pop("out", None) is not None:
         raise TypeError("labelled makes arrays of its own; leave out away")
-    if key.startswith(TIED) or key == "induced_reactions":
-        ties = ties or arguments.get("constraints") or robot.constraints
-    arguments, samples = taken(arguments, robot.joint_names, ties.independent if ties else ())
+    key = rows[0].name
+    asked = arguments.get("constraints")
+    is_kept = key == "simulate" and asked is not False and robot.backend.ties_joints
+    if asked or is_kept or key.startswith(TIED) or key == "induced_reactions":
+        ties = ties or asked or robot.constraints
+    arguments, samples = taken(
+        arguments, robot.joint_names, ties.independent if ties else (), key in ALONE and bool(ties)
+    )
     answer = function(**arguments)
-    parts = _parts(f"{key}_by_link" if arguments.get("by_link") else key, answer)
+    row = _chosen(rows, arguments)
+    values = answer if isinstance(answer, tuple) else (answer,)
+    parts = list(zip(row.answers, map(_array, values), strict=True))
     instants = parts.pop(0)[1] if key == "simulate" else None
     before = _before(parts[-1], instants, samples, along)
     about = {"robot": robot.name, "backend": robot.backend.name, "call": call}
@@ -42,26 +49,32 @@ def labelled(
     return alone(dataset(parts, _axes(robot, ties, key, arguments), *before, about))
 
 
-def _found(robot: Any, ties: Any, call: Any) -> tuple[Callable[..., Any], str]:
-    """A call by its name, and its key among `QUANTITIES`; raises ValueError for one that is not there."""
-    known = (
-        {name: name for name in QUANTITIES}
-        if ties is None
-        else {k.removeprefix(TIED): k for k in CONSTRAINTS}
-    )
-    names = [name for name in known if not name.endswith(VARIANTS) and name != "gradient_propagation"]
-    if call not in names:
+def _rows(of_ties: bool, call: str) -> list[Call]:
+    """What a call may be, by what is chosen of it; raises ValueError for one that is not there."""
+    known: dict[str, list[Call]] = {}
+    for row in CALLS.values():
+        if row.is_named and (not of_ties or row.key.startswith(TIED)):
+            known.setdefault(row.name.removeprefix(TIED) if of_ties else row.name, []).append(row)
+    if call not in known:
         raise ValueError(
             f"{short(call)} answers with no array whose axes have names; choose a call: "
-            f"{choice(call, names, 'runtime.quantity_axes.QUANTITIES')}"
+            f"{choice(call, known, 'linkwise_runtime.call_table.CALLS')}"
         )
-    return attrgetter(call)(robot if ties is None else ties), known[call]
+    return known[call]
 
 
-def _parts(key: str, answer: Any) -> list[Part]:
-    """The quantities of an answer, and their values in arrays."""
-    values = answer if isinstance(answer, tuple) else (answer,)
-    return list(zip(QUANTITIES[key], map(_array, values), strict=True))
+def _chosen(rows: Sequence[Call], arguments: Mapping[str, object]) -> Call:
+    """The row that arguments choose; the first has what counts unless they do."""
+    for row in rows[1:]:
+        if all(_is_so(arguments, name, value) for name, value in row.chosen.items()):
+            return row
+    return rows[0]
+
+
+def _is_so(arguments: Mapping[str, object], name: str, value: object) -> bool:
+    """Whether an option is chosen, as the call sees it: any true value for True."""
+    given = arguments.get(name, not value)
+    return bool(given) == value if isinstance(value, bool) else given == value
 
 
 def _before(

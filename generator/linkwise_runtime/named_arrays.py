@@ -1,22 +1,69 @@
-"""Arrays with names along their axes: xarray's Dataset, made of quantities and their values."""
+"""Arrays with names along their axes, as xarray has them: answers become such, arguments may be such.
+
+Answers are a Dataset, made of quantities and their values. Of arguments the joints are brought into the
+robot's order, and the axes of their samples are those of the answer.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from itertools import product as every
-from typing import Any
+from types import ModuleType
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .quantity_axes import ORDER, Quantity
-from .robot_axes import NamedAxis
-from .units import Unit, inertial, measured, product, written
+from .call_table import ORDER, Quantity
+from .chosen_names import choice
+from .robot_axes import NamedAxis, Unit, inertial, measured, product, written
 
-Part = tuple[Quantity, Any]
+Values = NDArray[np.generic]
+Part = tuple[Quantity, Values]
 """A quantity, and its values (..., *axes) in an array."""
+Texts = NDArray[np.object_]
+Variable = tuple[Sequence[str], Values, dict[str, str]]
+"""Dimensions, values and what is told of them, as xarray takes it."""
+LAST = ("joint", "component", "axis")
+"""Dimensions that are none of the samples."""
+OTHER_UNITS = ("deg", "\u00b0", "mm", "cm")
+"""How units begin that are none of SI."""
+OF_INDEPENDENT = ("yd", "ydd")
+"""Arguments of constraints that are of the independent joints."""
 
 
-def xarray() -> Any:
+class NamedArray(Protocol):
+    """A DataArray as far as arguments are asked: the runtime imports no xarray, not even for types."""
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of its axes."""
+
+    @property
+    def coords(self) -> Mapping[str, "NamedArray"]:
+        """What stands along these."""
+
+    @property
+    def attrs(self) -> Mapping[str, object]:
+        """What is told of it, such as its units."""
+
+    def isel(self, *, joint: Sequence[int]) -> "NamedArray":
+        """The joints at these places."""
+
+    def transpose(self, *dims: object) -> "NamedArray":
+        """The same with its axes in this order."""
+
+    def to_numpy(self) -> NDArray[np.generic]:
+        """Its values."""
+
+
+class SampleAxes(NamedTuple):
+    """Dimensions before those of a quantity, and what stands along them, as xarray takes it."""
+
+    dimensions: Sequence[str]
+    coordinates: dict[str, object]
+
+
+def xarray() -> ModuleType:
     """The library; raises ImportError that says how to install it."""
     try:
         return import_module("xarray")
@@ -31,8 +78,8 @@ def dataset(
     parts: Sequence[Part],
     axes: Mapping[str, NamedAxis],
     before: Sequence[str],
-    coordinates: Mapping[str, Any],
-    attributes: Mapping[str, Any],
+    coordinates: Mapping[str, object],
+    attributes: Mapping[str, object],
 ) -> Any:
     """A Dataset of all quantities; entries of one stand side by side along an axis behind the others.
 
@@ -42,10 +89,13 @@ def dataset(
     coordinate that has it, which quantities of the same units share.
     """
     taken = [axes[axis].dimension for quantity, _ in parts for axis in quantity.axes]
+    if len(set(before)) < len(before):
+        name = next(name for name in before if before.count(name) > 1)
+        raise ValueError(f"{name!r} is an axis of the samples twice; name it otherwise by along")
     if twice := set(before) & {*taken, ORDER}:
         raise ValueError(f"the samples' axis {twice.pop()!r} is one of the answer too; name it otherwise")
-    variables: dict[str, Any] = {}
-    along: dict[str, Any] = dict(coordinates)
+    variables: dict[str, Variable] = {}
+    along: dict[str, object] = dict(coordinates)
     for name, given in _by_name(parts).items():
         quantity, values = given[0][0], given[0][1]
         dimensions = [*before, *(axes[axis].dimension for axis in quantity.axes)]
@@ -59,11 +109,11 @@ def dataset(
 
 
 def _with_units(
-    parts: Sequence[Part], axes: Mapping[str, NamedAxis], variables: Mapping[str, Any]
-) -> dict[str, Any]:
+    parts: Sequence[Part], axes: Mapping[str, NamedAxis], variables: Mapping[str, Variable]
+) -> dict[str, object]:
     """Coordinates of units that hang on the entry; the others are put among what the variables say."""
-    shared: dict[Any, str] = {}
-    found: dict[str, Any] = {}
+    shared: dict[tuple[tuple[object, ...], ...], str] = {}
+    found: dict[str, object] = {}
     for name, given in _by_name(parts).items():
         over, units = units_of([quantity for quantity, _ in given], axes)
         told = variables[name][2]
@@ -76,12 +126,12 @@ def _with_units(
     return found
 
 
-def names_array(names: Iterable[str]) -> NDArray[Any]:
+def names_array(names: Iterable[str]) -> Texts:
     """Names along an axis, such as files hold: text of one width is none of Zarr's types."""
     return np.array(list(names), dtype=object)
 
 
-def units_of(entries: Sequence[Quantity], axes: Mapping[str, NamedAxis]) -> tuple[list[str], NDArray[Any]]:
+def units_of(entries: Sequence[Quantity], axes: Mapping[str, NamedAxis]) -> tuple[list[str], Texts]:
     """Dimensions along which the unit of a quantity changes, and how it is written along these."""
     factors = [_factors(entry.unit) for entry in entries]
     named = {axis for some in factors for _, axis, _ in some if axis}
@@ -129,3 +179,111 @@ def alone(made: Any) -> Any:
         return made
     (name,) = made.data_vars
     return made[name].assign_attrs(made.attrs)
+
+
+def taken(
+    arguments: Mapping[str, object], joints: Sequence[str], independent: Sequence[str], alone: bool = False
+) -> tuple[dict[str, object], SampleAxes | None]:
+    """The arguments as arrays, joints in the robot's order; and their samples, where some have names.
+
+    alone: whether an argument of all joints may have the independent ones alone
+
+    Raises ValueError for a joint that an argument lacks, and where arguments are of other samples.
+    """
+    xr = xarray()
+    arguments = {name: _of_frame(a, xr) for name, a in arguments.items()}
+    named: dict[str, NamedArray] = {name: a for name, a in arguments.items() if isinstance(a, xr.DataArray)}
+    if not named:
+        return arguments, None
+    for name, array in named.items():
+        _check_named(name, array)
+
+    def wanted(name: str, array: NamedArray) -> Sequence[str]:
+        is_own = name in OF_INDEPENDENT or (alone and set(_joints_of(array)) == set(independent))
+        return independent if is_own else joints
+
+    ordered = [_in_order(name, array, wanted(name, array)) for name, array in named.items()]
+    try:
+        aligned = xr.align(*ordered, join="exact", exclude=LAST)
+    except ValueError as error:
+        raise ValueError(f"{', '.join(named)} are of different samples: {error}") from None
+    alike: Sequence[NamedArray] = xr.broadcast(*aligned, exclude=LAST)
+    dimensions = [d for d in alike[0].dims if d not in LAST]
+    along: dict[str, object] = {
+        name: coordinate
+        for array in alike
+        for name, coordinate in array.coords.items()
+        if set(coordinate.dims) <= set(dimensions)
+    }
+    values = [array.transpose(*dimensions, ...).to_numpy() for array in alike]
+    return arguments | dict(zip(named, values, strict=True)), SampleAxes(dimensions, along)
+
+
+def _of_frame(value: object, xr: ModuleType) -> object:
+    """A table or row of pandas or polars as an array with its columns' names; any other value itself."""
+    if not hasattr(value, "to_numpy") or isinstance(value, xr.DataArray):
+        return value
+    index = getattr(value, "index", None)
+    if hasattr(value, "columns"):
+        name = getattr(index, "name", None)
+        samples = "sample" if name is None else str(name)
+        names = names_array(str(column) for column in value.columns)
+        along = {"joint": names} if index is None else {"joint": names, samples: index.to_numpy()}
+        return xr.DataArray(value.to_numpy(), dims=(samples, "joint"), coords=along)
+    if index is not None and hasattr(index, "to_numpy"):
+        names = names_array(str(name) for name in index)
+        return xr.DataArray(value.to_numpy(), dims=("joint",), coords={"joint": names})
+    return value
+
+
+def _check_named(name: str, array: NamedArray) -> None:
+    """Raise ValueError for an array in other units, or without an axis of joints, components or axes."""
+    units = str(array.attrs.get("units", ""))
+    if units.casefold().startswith(OTHER_UNITS):
+        raise ValueError(f"{name} is in {units}; give it in rad and m")
+    if not set(array.dims) & set(LAST):
+        there = ", ".join(map(str, array.dims))
+        raise ValueError(f"{name} has the dimensions ({there}); call that of the joints 'joint'")
+
+
+def samples_along(along: str | Iterable[str] | None, count: int) -> SampleAxes:
+    """The axes of samples without names, of which there are so many, as `along` names them.
+
+    Raises ValueError where it names more or fewer.
+    """
+    if along is None:
+        return SampleAxes(["sample"] if count == 1 else [f"sample_{at}" for at in range(count)], {})
+    names = [along] if isinstance(along, str) else list(along)
+    if len(names) != count:
+        raise ValueError(f"along has {len(names)} names, {names}; the samples have {count} axes")
+    if not isinstance(along, Mapping):
+        return SampleAxes(names, {})
+    return SampleAxes(names, {name: _along(name, values) for name, values in along.items()})
+
+
+def _along(name: str, values: object) -> tuple[str, object, dict[str, str]]:
+    if isinstance(values, list | tuple) and all(isinstance(value, str) for value in values):
+        values = names_array(values)
+    return name, values, ({"units": "s"} if name == "time" else {})
+
+
+def _joints_of(array: NamedArray) -> list[str]:
+    """Names of an array's joints; none where they have none."""
+    if "joint" not in array.dims or "joint" not in array.coords:
+        return []
+    return [str(name) for name in array.coords["joint"].to_numpy()]
+
+
+def _in_order(argument: str, array: NamedArray, joints: Sequence[str]) -> NamedArray:
+    """An array whose joints, where they have names, are these."""
+    there = _joints_of(array)
+    if not there:
+        return array
+    for joint in joints:
+        if there.count(joint) > 1:
+            raise ValueError(f"{argument} has the joint {joint!r} {there.count(joint)} times")
+        if joint not in there:
+            raise ValueError(
+                f"{argument} has no joint {joint!r}; it has {choice(joint, there, f'{argument}.joint')}"
+            )
+    return array.isel(joint=[there.index(joint) for joint in joints])

@@ -2,15 +2,23 @@
 
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .chosen_names import MOST_NAMES, choice, plain, short
+from .interface import Numbers
+
+if TYPE_CHECKING:
+    # As in interface.py: without torch, tensors are Any.
+    from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
+
+Value = float | NDArray[np.float64]
+"""One number for all samples, or one for each."""
 
 TRIANGLE = 1e-6
 """Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
@@ -30,8 +38,8 @@ class ParametricBody:
 
 
 def checked_values(
-    own: Mapping[str, float], given: Mapping[str, Any], bodies: Sequence[ParametricBody]
-) -> dict[str, Any]:
+    own: Mapping[str, float], given: Mapping[str, object], bodies: Sequence[ParametricBody]
+) -> dict[str, float | Numbers]:
     """All parameters, those `given` in place of their `own` values; raises what the package's `load` says."""
     if not given:
         return dict(own)
@@ -56,7 +64,7 @@ def checked_values(
     return {**plain, **tensors}
 
 
-def _number(name: str, value: Any) -> Any:
+def _number(name: str, value: object) -> Value:
     """A value as a float or an array of them.
 
     Raises TypeError for what is not a real number or an array of them, ValueError for NaN and infinity.
@@ -115,9 +123,9 @@ REASONS = (
 
 
 def _check_bodies(
-    bodies: Sequence[ParametricBody], known: Mapping[str, Any], given: Mapping[str, Any]
+    bodies: Sequence[ParametricBody], values: Mapping[str, Value], given: Mapping[str, Value]
 ) -> None:
-    known = {name: np.float64(value) if type(value) is float else value for name, value in known.items()}
+    known = {name: np.float64(value) if type(value) is float else value for name, value in values.items()}
     with np.errstate(all="ignore"):  # numbers of NumPy divide by zero without raising
         rows = [body.mass_and_inertia(known) for body in bodies]
     flat = [entry for row in rows for entry in row]
@@ -148,33 +156,38 @@ def _unknown(name: str, own: Mapping[str, float]) -> str:
     return f"no parameter {short(name)}; {'' if len(own) > MOST_NAMES else 'the parameters are '}{known}"
 
 
-def _is_tensor(value: Any) -> bool:
+def _is_tensor(value: object) -> "TypeGuard[Tensor]":
     """Whether a value is a torch tensor; torch isn't imported to find out."""
     torch = sys.modules.get("torch")
     return torch is not None and isinstance(value, torch.Tensor)
 
 
-def _looked_at(tensors: Mapping[str, Any]) -> dict[str, Any]:
+def _looked_at(tensors: "Mapping[str, Tensor]") -> dict[str, object]:
     """Values that tensors have now, without gradients, in one transfer a kind.
 
     Those inside torch.func and torch.compile, and those without data, cannot be looked at and are left out.
     """
-    torch: Any = sys.modules.get("torch")
-    if not tensors or torch.compiler.is_compiling() or torch._C._are_functorch_transforms_active():
+    torch = sys.modules.get("torch")
+    if (
+        torch is None
+        or not tensors
+        or torch.compiler.is_compiling()
+        or torch._C._are_functorch_transforms_active()
+    ):
         return {}
-    kinds: dict[Any, dict[str, Any]] = {}
+    kinds: dict[tuple[object, ...], dict[str, Tensor]] = {}
     for name, tensor in tensors.items():
         if not tensor.is_meta:
             kinds.setdefault((tensor.device, tensor.dtype, tensor.shape), {})[name] = tensor.detach()
-    values: dict[str, Any] = {}
-    for (_, dtype, shape), group in kinds.items():
+    values: dict[str, object] = {}
+    for group in kinds.values():
         stacked = torch.stack(list(group.values())).cpu().resolve_conj()
-        array = (stacked if dtype.is_complex else stacked.double()).numpy()
-        values |= zip(group, array if shape else array.tolist(), strict=True)
+        array = (stacked if stacked.is_complex() else stacked.double()).numpy()
+        values |= zip(group, array if array.ndim > 1 else array.tolist(), strict=True)
     return values
 
 
-def _listed(names: Sequence[str] | Mapping[str, Any], values: Mapping[str, Any]) -> str:
+def _listed(names: Collection[str], values: Mapping[str, Value]) -> str:
     """The first few parameters with their values."""
     shown = [
         plain(name) if np.ndim(values[name]) else f"{plain(name)} = {values[name]:g}"

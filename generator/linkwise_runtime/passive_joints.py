@@ -8,7 +8,9 @@ its coordinate ratio times as much; joints of one coordinate sum up:
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from .interface import Library, Numbers
 
 
 class PassiveJoint(NamedTuple):
@@ -56,12 +58,14 @@ def passive_sums(joints: Sequence[PassiveJoint], n: int) -> PassiveSums:
     )
 
 
-def passive_torques(side: Any, sums: PassiveSums, q: Any, qd: Any, qdd: Any) -> tuple[Any, ...]:
-    """Spring, damping, friction, armature, (..., n) each; `side` is what computes with the motion."""
-    stiffness, pull, damping, friction, armature = (side.constant(numbers, q) for numbers in sums)
-    return stiffness * q + pull, damping * qd, friction * side.xp.sign(qd), armature * qdd
+def passive_torques(
+    library: Library, sums: PassiveSums, q: Numbers, qd: Numbers, qdd: Numbers
+) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+    """Spring, damping, friction, armature, (..., n) each."""
+    stiffness, pull, damping, friction, armature = (library.constant(numbers, q) for numbers in sums)
+    return stiffness * q + pull, damping * qd, friction * library.xp.sign(qd), armature * qdd
 
 
-def smooth_friction(side: Any, sums: PassiveSums, qd: Any, width: float) -> Any:
+def smooth_friction(library: Library, sums: PassiveSums, qd: Numbers, width: float) -> Numbers:
     """Friction tanh(qd / width), (..., n): what a controller gives, which must not jump at rest."""
-    return side.constant(sums.friction, qd) * side.xp.tanh(qd / width)
+    return library.constant(sums.friction, qd) * library.xp.tanh(qd / width)

@@ -6,17 +6,28 @@ Torques are what the same power takes: tau^T qd = tau_v^T v.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, SupportsInt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .arguments import as_array
 from .chosen_names import plain, sample_of, short
-from .euler_angles import angles_of, continued, rates_map, rates_of, turned, turning_of_rates
-from .file_joints import COORDINATES, POSITIONS, FileJoint, in_given_order, layout, positions_of
+from .file_joints import (
+    COORDINATES,
+    POSITIONS,
+    FileJoint,
+    Floats,
+    angles_of,
+    continued,
+    in_given_order,
+    layout,
+    positions_of,
+    rates_map,
+    rates_of,
+    turned,
+    turning_of_rates,
+)
 
-Numbers = NDArray[np.float64]
 UNIT = 1e-2
 """By which a quaternion's length, or that of a cosine and a sine, may miss 1."""
 STEEP = 0.05
@@ -28,10 +39,10 @@ UPRIGHT = 1e-6
 class QposMotion(NamedTuple):
     """Arrays (..., n) in SI units; None for what was not given."""
 
-    q: Numbers
-    qd: Numbers | None
-    qdd: Numbers | None
-    tau: Numbers | None
+    q: Floats
+    qd: Floats | None
+    qdd: Floats | None
+    tau: Floats | None
     warnings: tuple[str, ...]
 
 
@@ -39,7 +50,7 @@ class Earlier(NamedTuple):
     """What comes before the samples, where a motion is converted piece by piece."""
 
     samples: int = 0
-    q: Numbers | None = None
+    q: Floats | None = None
     """At the last of them, (n,)."""
 
 
@@ -61,7 +72,7 @@ class Qpos:
         self,
         joints: Sequence[FileJoint],
         pinocchio: Sequence[int],
-        order: Any = "mujoco",
+        order: object = "mujoco",
         names: Sequence[str] | None = None,
     ) -> None:
         """`pinocchio`: the joints in its order; names: those of the joints in that of qpos, if it is another.
@@ -83,10 +94,10 @@ class Qpos:
 
     def motion(
         self,
-        qpos: Any,
-        qvel: Any = None,
-        qacc: Any = None,
-        tau: Any = None,
+        qpos: object,
+        qvel: object = None,
+        qacc: object = None,
+        tau: object = None,
         earlier: Earlier = NOTHING,
     ) -> QposMotion:
         """See `MotionCalls.from_qpos`; angles and numbers of samples go on from what is earlier."""
@@ -106,7 +117,7 @@ class Qpos:
             piece = _Piece(part.joint, self.order, before, earlier.samples, warnings)
             made = _converted(piece, positions[..., part.positions], own)
             for into, values in zip(found[:4], made, strict=True):
-                if into is not None:
+                if into is not None and values is not None:
                     into[..., at] = values
         return found._replace(warnings=tuple(warnings))
 
@@ -126,7 +137,7 @@ class Qpos:
             yield _JointNumbers(joint, slice(at_q, next_q), slice(at_v, next_v))
             at_q, at_v = next_q, next_v
 
-    def _read(self, name: str, given: Any, width: int, shape: tuple[int, ...] | None = None) -> Numbers:
+    def _read(self, name: str, given: object, width: int, shape: tuple[int, ...] | None = None) -> Floats:
         values = as_array(name, given)
         if values.dtype.kind not in "fiu":
             raise TypeError(f"{name} has dtype {values.dtype}; give numbers")
@@ -149,21 +160,21 @@ class _Piece(NamedTuple):
 
     joint: FileJoint
     order: str
-    before: Numbers | None
+    before: Floats | None
     """Its coordinates at the sample before the first."""
     samples: int
     warnings: list[str]
 
-    def at(self, place: Sequence[Any]) -> str:
+    def at(self, place: Sequence[SupportsInt]) -> str:
         """Which sample of all, in words."""
         return sample_of([*map(int, place[:-1]), *(self.samples + int(last) for last in place[-1:])])
 
 
-Given = Sequence[Any]
+Given = Sequence[Floats | None]
 """Velocities, accelerations and torques of one joint, None for what was not given."""
 
 
-def _converted(piece: _Piece, p: Numbers, given: Given) -> tuple[Any, ...]:
+def _converted(piece: _Piece, p: Floats, given: Given) -> tuple[Floats | None, ...]:
     """Coordinates of one joint, and the velocities, accelerations and torques of them that are given."""
     kind, is_mujocos = piece.joint.kind, piece.order == "mujoco"
     if kind == "single" or (is_mujocos and kind in ("continuous", "planar")):
@@ -177,7 +188,7 @@ def _converted(piece: _Piece, p: Numbers, given: Given) -> tuple[Any, ...]:
     return (np.concatenate([p[..., :3], q], -1), *_floating(q, given, not is_mujocos))
 
 
-def _in_plane(piece: _Piece, p: Numbers, given: Given) -> tuple[Any, ...]:
+def _in_plane(piece: _Piece, p: Floats, given: Given) -> tuple[Floats | None, ...]:
     """Of Pinocchio's joints whose angle is a cosine and a sine; a planar one moves along the body's axes."""
     cosine, sine = p[..., -2], p[..., -1]
     _check_unit(piece, np.hypot(cosine, sine), "a cosine and a sine")
@@ -192,7 +203,7 @@ def _in_plane(piece: _Piece, p: Numbers, given: Given) -> tuple[Any, ...]:
     still = np.zeros_like(angle)
     yaw = np.concatenate([angle, still, still], -1)
 
-    def along(values: Numbers) -> Numbers:
+    def along(values: Floats) -> Floats:
         flat = np.concatenate([values[..., :2], still], -1)
         return np.concatenate([turned(yaw, flat)[..., :2], values[..., 2:]], -1)
 
@@ -202,7 +213,7 @@ def _in_plane(piece: _Piece, p: Numbers, given: Given) -> tuple[Any, ...]:
     return (q, *(None if x is None else along(x) for x in (v, a, f)))
 
 
-def _floating(q: Numbers, given: Given, is_local: bool) -> tuple[Any, ...]:
+def _floating(q: Floats, given: Given, is_local: bool) -> tuple[Floats | None, ...]:
     """Velocities, accelerations and torques of x, y, z and the angles q."""
     v, a, f = given
     if is_local and a is not None and v is not None:
@@ -210,12 +221,12 @@ def _floating(q: Numbers, given: Given, is_local: bool) -> tuple[Any, ...]:
     turning = _turning(q, [None if x is None else x[..., 3:] for x in given])
     moving = (None if x is None else x[..., :3] for x in (v, a, f))
     return tuple(
-        None if x is None else np.concatenate([turned(q, x) if is_local else x, turns], -1)
+        None if x is None or turns is None else np.concatenate([turned(q, x) if is_local else x, turns], -1)
         for x, turns in zip(moving, turning, strict=True)
     )
 
 
-def _turning(q: Numbers, given: Given) -> tuple[Any, ...]:
+def _turning(q: Floats, given: Given) -> tuple[Floats | None, ...]:
     """Rates and changes of angles q, and the torques that do the same work on them."""
     v, a, f = given
     rates = None if v is None else rates_of(q, v)
@@ -227,7 +238,7 @@ def _turning(q: Numbers, given: Given) -> tuple[Any, ...]:
     return rates, changes, torque
 
 
-def _angles(piece: _Piece, quaternion: Numbers) -> Numbers:
+def _angles(piece: _Piece, quaternion: Floats) -> Floats:
     size = np.sqrt((quaternion * quaternion).sum(-1))
     _check_unit(piece, size, "a quaternion")
     angles = angles_of(quaternion / size[..., None])
@@ -236,7 +247,7 @@ def _angles(piece: _Piece, quaternion: Numbers) -> Numbers:
     return continued(angles, None if piece.before is None else piece.before[-3:])
 
 
-def _check_unit(piece: _Piece, size: Numbers, what: str) -> None:
+def _check_unit(piece: _Piece, size: Floats, what: str) -> None:
     """Raise ValueError for the first sample at which numbers of length 1 have another."""
     wrong = np.argwhere(~(np.abs(size - 1.0) <= UNIT))
     if len(wrong):
@@ -247,7 +258,7 @@ def _check_unit(piece: _Piece, size: Numbers, what: str) -> None:
         )
 
 
-def _say_steepness(piece: _Piece, q: Numbers, given: Given) -> None:
+def _say_steepness(piece: _Piece, q: Floats, given: Given) -> None:
     """Say where yaw and roll are about nearly the same axis; raise ValueError where they have no rates."""
     level = np.abs(np.cos(q[..., 1]))
     if not level.size or not level.min() < STEEP:

@@ -1,13 +1,16 @@
-"""What the calls answer: coefficients, propagation torques, packed values.
+"""What the calls answer: coefficients, propagation torques, packed values, accelerations by source, motions.
 
 Index i is the joint that is loaded, j the link through which it is loaded, k the coordinate that moves.
 Torques are in N m, or N where joint i is prismatic; a coefficient is in that unit over the unit of the motion
 that it multiplies.
 """
 
-from typing import Generic, NamedTuple
+import math
+from typing import Any, Generic, NamedTuple, cast
 
-from .interface import Array
+from numpy.typing import ArrayLike
+
+from .interface import Array, Numbers
 from .robot_axes import PARAMETER_UNITS
 
 PARAMETERS = len(PARAMETER_UNITS)
@@ -145,3 +148,124 @@ class Packed(NamedTuple, Generic[Array]):
     """tau."""
     velocity_linear: Array
     """h1: the part of c1 from energy terms linear in the velocities; a robot of rigid links has none."""
+
+
+class Contact(NamedTuple):
+    """A frame that the ground holds where it is now, for `Dynamics.constrained`.
+
+    kind: what is held, and how many rows that has:
+        held      all of the frame: 6, turns about the world's axes, then the point along them
+        hinged    all but turns about `axis`: 5, two turns across the axis, then the point
+        point     the point: 3
+        rolling   a ball, or an upright wheel, of `radius` about the point rolls without slip: 3, the velocity
+                  where it touches
+    """
+
+    frame: str | int
+    """A frame by its name, or by its number in `kinematics.frames`."""
+    kind: str = "held"
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """In the frame, in m; of a ball its centre."""
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """Of `hinged`, in the frame."""
+    normal: tuple[float, float, float] | None = None
+    """Of `rolling`: the ground's, in the world, away from it; against gravity unless given."""
+    radius: float = 0.0
+    """Of `rolling`, in m."""
+    name: str | None = None
+    """That of its rows; the frame's and the kind unless given."""
+
+
+class AppliedLoad(NamedTuple):
+    """A force, and a moment if there is one, on a frame; all as `robot.kinematics.load_torque` takes it."""
+
+    frame: str | int
+    """A frame by its name, or by its number in `kinematics.frames`."""
+    force: ArrayLike | Numbers
+    """On the frame, in the world's axes, in N, (3,) or (..., 3)."""
+    moment: ArrayLike | Numbers | None = None
+    """Likewise, in N m; none unless given."""
+    point: ArrayLike | Numbers | None = None
+    """Where the force acts, in the frame, in m; its origin unless given."""
+    at: ArrayLike | Numbers | None = None
+    """The same in the world, in m, as of a centre of pressure; in place of `point`."""
+
+
+class InducedAccelerations(NamedTuple, Generic[Array]):
+    """Shares of an acceleration by source: M qdd = u - h - g + ... is linear in them, so that they sum to it.
+
+    The first axis r after the samples is what accelerates: coordinates in rad/s^2 or m/s^2, the six rows of
+    a frame (rad/s^2, then m/s^2 of its point), or the centre of mass; of reactions, rows of constraints.
+    """
+
+    actuators: Array
+    """(..., r, n): by the torque of joint i alone."""
+    velocity: Array
+    """(..., r, N, n): by velocity forces on link j, whose cause is the velocity of s (closing convention)."""
+    gravity: Array
+    """(..., r, N): by the weight of link j, and its other potentials."""
+    passive: Array
+    """(..., r, 3, n): by spring, damping and friction of joint i; zeros where `passive` is False."""
+    loads: Array
+    """(..., r, L): by each load."""
+    constraints: Array
+    """(..., r, n): by constraints that turn as the robot moves, by the velocity of s: A qdd = -dA/dt qd."""
+    kinematic: Array
+    """(..., r, n): dJ/dt qd of a point, by the velocity of s; zeros for coordinates and reactions."""
+
+    @property
+    def total(self) -> Array:
+        """Their sum, (..., r)."""
+        one = self.actuators, self.gravity, self.loads, self.constraints, self.kinematic
+        two = self.velocity, self.passive
+        return cast(Array, sum(share.sum(-1) for share in one) + sum(share.sum((-2, -1)) for share in two))
+
+    # Any: in a NamedTuple mypy refuses a method whose arguments are of the same kind as `self`.
+    def residual(self: "InducedAccelerations[Any]", acceleration: Array) -> Array:
+        """What the sum exceeds an acceleration (..., r) by, such as a measured one."""
+        residual: Array = self.total - acceleration
+        return residual
+
+    def mapped(
+        self: "InducedAccelerations[Any]", jacobian: Array, jacobian_rate: Array, qd: Array
+    ) -> "InducedAccelerations[Array]":
+        """Shares of J qdd + dJ/dt qd, for those of the coordinates: whatever has a velocity J qd.
+
+        jacobian, jacobian_rate: (..., r, n), as `robot.kinematics` has them
+        """
+        moved: list[Array] = [_product(jacobian, share) for share in self[:-1]]
+        moved.append(jacobian_rate * qd[..., None, :])
+        return InducedAccelerations(*moved)
+
+
+class Trajectory(NamedTuple, Generic[Array]):
+    """A motion over T instants, from a start of shape (..., n), or many of them at once."""
+
+    time: Array
+    """(T,), in s."""
+    q: Array
+    """(T, ..., n)."""
+    qd: Array
+    """(T, ..., n)."""
+    tau: Array
+    """(T, ..., n): what the actuators gave."""
+    energy: Array
+    """(T, ...): kinetic and potential energy of links, springs and armature, in J."""
+    work: Array
+    """(T, ...): done since the start by actuators and loads, less what damping and friction took, in J."""
+
+    @property
+    def energy_drift(self) -> Array:
+        """Energy that came from nowhere since the start, (T, ...): the error of the integration, in J."""
+        drift: Array = self.energy - self.energy[:1] - self.work
+        return drift
+
+
+def _product(jacobian: Array, share: Array) -> Array:
+    """J times a share (..., n, *tail)."""
+    axes = jacobian.ndim - 2
+    tail = tuple(share.shape[axes + 1 :])
+    columns = share.reshape(*share.shape[: axes + 1], math.prod(tail))
+    found = jacobian @ columns
+    product: Array = found.reshape(*found.shape[:-1], *tail)
+    return product

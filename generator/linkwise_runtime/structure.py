@@ -3,13 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .chosen_names import position_of
 from .file_joints import FileJoint
+from .interface import Numbers
 from .parameter_values import ParametricBody, checked_values
 from .passive_joints import PassiveJoint, PassiveSums, passive_sums
 from .qpos_motion import Qpos
@@ -118,7 +119,7 @@ class Structure:
         """Number of packed values of one sample: c2, c1, g, tau, h1."""
         return Sizes(*map(len, self.layout))
 
-    def qpos(self, order: Any = "mujoco", names: Sequence[str] | None = None) -> Qpos:
+    def qpos(self, order: object = "mujoco", names: Sequence[str] | None = None) -> Qpos:
         """How positions of MuJoCo or Pinocchio are those here; raises as `Qpos` does."""
         single = [FileJoint(name, "single", (k,)) for k, name in enumerate(self.joint_names)]
         joints = self.file_joints or tuple(single)
@@ -149,7 +150,9 @@ class Structure:
             passive=(),
         )
 
-    def values(self, given: Mapping[str, Any] | None, allow_unphysical: bool = False) -> dict[str, Any]:
+    def values(
+        self, given: Mapping[str, object] | None, allow_unphysical: bool = False
+    ) -> dict[str, float | Numbers]:
         """All parameters, those `given` in place of their own, checked as the package's `load` says."""
         return checked_values(self.parameters, given or {}, () if allow_unphysical else self.bodies)
 

@@ -10,7 +10,7 @@ import sympy as sp
 from answers import relative_error
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
-from linkwise_runtime.robot_constraints import Contact
+from linkwise_runtime.quantities import Contact
 
 pytest.importorskip("pinocchio")
 

@@ -10,7 +10,7 @@ from corpus import ROBOTS
 from linkwise import LinkwiseError, Load, Options, generate, read_system, write_package
 from linkwise.analysis import Contacts, WhileColumn, analyze
 from linkwise.analysis.loaded_robot import load_robot
-from linkwise_runtime.robot_constraints import Contact
+from linkwise_runtime.quantities import Contact
 from motion_logs import smooth, write_csv
 
 from numeric.pinocchio_model import PinocchioModel

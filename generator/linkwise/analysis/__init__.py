@@ -1,6 +1,6 @@
 """From a recorded movement to who loads whom: torque analysis of motion logs."""
 
-from linkwise_runtime.robot_constraints import Contact
+from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.job import Analysis

@@ -16,10 +16,10 @@ A point accelerates by J q̈_x, and by J̇ q̇ itself.
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
-from linkwise_runtime.induced.responses import FreeResponse, Response, TiedResponse
+from linkwise_runtime.motion.induced_accelerations import Response, response_of
 
 from linkwise.analysis.contacts.ground_contacts import Standing
 from linkwise.analysis.contacts.standing_response import StandingResponse
@@ -113,15 +113,12 @@ class InducedShares:
             moved.append(response.of_velocities())
         if isinstance(response, StandingResponse) and ground is not None:
             moved.append(response.of_contacts(qdd, ground.owners, len(ground.names)))
-        return np.concatenate(moved, axis=2)
+        return np.concatenate(cast("list[Array]", moved), axis=2)
 
     def _response(self, mass: Array, q: Array, qd: Array) -> Response:
         model = opened(self.robot)
-        if self.robot.constrained is None:
-            return FreeResponse(model, q, mass)
-        ties = self.robot.constrained.constraints
-        mapped, bias = (np.asarray(a) for a in (ties.velocity_map(q), ties.velocity_accelerations(q, qd)))
-        return TiedResponse(model, q, mass, ties, mapped, bias)
+        ties = None if self.robot.constrained is None else self.robot.constrained.constraints
+        return response_of(model.backend, ties, q, qd, mass)
 
 
 def _timed(text: str, time: Array) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from linkwise_runtime.quantity_axes import ARRAYS, PASSIVE, POWER, PROPAGATION, TORQUE, Quantity
+from linkwise_runtime.call_table import CALLS, PASSIVE, POWER, PROPAGATION, TORQUE, Quantity
 
 from linkwise.analysis.result_quantities import MEANING
 from linkwise.analysis.result_quantities import Quantity as Kind
@@ -32,7 +32,7 @@ COLUMNS: Mapping[Kind, Quantity] = {
     **_one("qd", "qd", "joint", "velocity:joint"),
     **_one("qdd", "qdd", "joint", "acceleration:joint"),
     **_one("tau", "torque", "joint", TORQUE),
-    "tau_link": ARRAYS["partial_torque"][0],
+    "tau_link": CALLS["partial_torque"].answers[0],
     "tau_qdd": PROPAGATION[0],
     "tau_qd": PROPAGATION[1],
     "tau_gravity": PROPAGATION[2],

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from linkwise_runtime.robot_constraints import Contact
+from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing_robot import standing_on

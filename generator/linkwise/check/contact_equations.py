@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from linkwise_runtime.robot_constraints import Contact
+from linkwise_runtime.quantities import Contact
 from numpy.typing import NDArray
 
 from linkwise.check.body_reference import COMPLEX_STEP

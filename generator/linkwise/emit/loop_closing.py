@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from linkwise_runtime.constraints.closed_places import open_by
 from linkwise_runtime.constraints.closing_search import (
     TRIES,
     Closing,
@@ -12,7 +13,6 @@ from linkwise_runtime.constraints.closing_search import (
     random_starts,
 )
 from linkwise_runtime.constraints.held_frames import held_by
-from linkwise_runtime.constraints.singular_positions import open_by
 from linkwise_runtime.rule.joint_tree import (
     JointTree,
     TreeCoupling,
@@ -75,9 +75,9 @@ def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
 
 def _check_slopes(tree: RigidTree, found: Closing) -> None:
     """Raise LinkwiseError for a coupling whose sum has no slope where it is zero, as that of squares."""
-    for number, coupling in enumerate(tree.couplings, len(found.rows) - len(tree.couplings)):
+    for coupling, slope in zip(tree.couplings, found.slopes, strict=True):
         size = min(max(map(abs, factors[1:])) for _, factors in coupling.terms)
-        if np.abs(found.rows[number]).max() <= FLAT * size:
+        if slope <= FLAT * size:
             raise LinkwiseError(
                 f"constraint {coupling.name!r} closes only where it is singular: no motion of its joints "
                 "changes its sum there, so that none follows from others; write a sum that changes its sign"

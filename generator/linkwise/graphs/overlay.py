@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from linkwise.package.potential_word import potential_word
 
 if TYPE_CHECKING:
-    from linkwise_runtime.lagrangians.torque_graph import TorqueGraph
+    from linkwise_runtime.lagrangians.graph_calls import TorqueGraph
 
 DOTS = {0: "q", 1: "q\N{COMBINING DOT ABOVE}", 2: "q\N{COMBINING DIAERESIS}"}
 """Letters of a motion by its order."""

@@ -61,7 +61,8 @@ class Bearings:
 
 def floating_coordinates(robot: LoadedRobot) -> frozenset[int]:
     """Coordinates of a base that floats, in space or in a plane; none of another."""
-    return frozenset(loose_base(robot.model.backend.tree))
+    tree = robot.model.backend.tree
+    return frozenset() if tree is None else frozenset(loose_base(tree))
 
 
 def _independent(columns: Array) -> NDArray[np.bool_]:

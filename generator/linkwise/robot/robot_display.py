@@ -4,8 +4,7 @@ from collections.abc import Iterable
 from dataclasses import astuple
 from typing import Any
 
-from linkwise_runtime.html_tables import page_part, table
-from linkwise_runtime.robot_table import joint_table
+from linkwise_runtime.html_tables import joint_table, page_part, table
 
 SHOWN = 30
 """Letters of a formula."""

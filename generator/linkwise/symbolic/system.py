@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import sympy as sp
-from linkwise_runtime.html_tables import page_part, table
-from linkwise_runtime.robot_table import joint_table
+from linkwise_runtime.html_tables import joint_table, page_part, table
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.notes import Note

@@ -1,90 +1,120 @@
-"""What back ends of arrays and of tensors do alike: they make the calls, and give a tree's numbers."""
+"""What back ends have in common: the answers that are made of their packed values, and a tree's numbers."""
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, ClassVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property
+from typing import ClassVar
 
-from ..constraints.chosen_constraints import ChosenConstraints
-from ..constraints.constraint_answers import ConstraintAnswers, constraint_answers
-from ..constraints.tie_rows import TieRows
-from ..control.controls import Controls
-from ..induced.induced_answers import InducedAnswers
-from ..kinematics.kinematic_answers import KinematicAnswers
-from ..rule.joint_tree import JointTree
-from ..rule.tree_arrays import TreeArrays, given_numbers
-from ..simulation.simulation_answers import simulated
+from ..answers.answers import Answers
+from ..arguments import as_array
+from ..interface import ClosedForms, Numbers
+from ..kinematics.frame_answers import FrameAnswers
+from ..packed_engine import PackedEngine, TorqueOfOne
+from ..rule.joint_tree import Bodies, JointTree
+from ..rule.rule_calls import RigidRule
+from ..rule.tree_arrays import TreeArrays, checked_bodies, given_numbers
 from ..structure import Structure
-from ..sums.sum_answers import SumAnswers
+from .array_kernels import known_kernel, operations
 
 
-class ArrayBackend:
-    """Base of the back ends that answer in Python; `xp` is the array namespace."""
+class ArrayBackend(PackedEngine):
+    """Base of the back ends; each computes with one library, and is an `PackedEngine` of it."""
 
-    name: ClassVar[str]
-    xp: ClassVar[Any]
-    structure: Structure
-    tree: JointTree | None
-    """Where frames are; None for links of energies."""
+    takes_tensors: ClassVar[bool]
+    """Whether motion is given as torch tensors only."""
+    face: ClassVar[type | None] = None
+    """Class of the robots that compute with it; None for `Dynamics`."""
+    direct: Mapping[str, Callable[..., object]] = {}
+    """Calls by name that are quicker than the table's, given first a robot; they take arrays alone."""
+    at_once: Callable[[str, Sequence[object]], Sequence[Numbers] | None] | None = None
+    """Results of a row for what is plainly one sample, before it is read; None where one has to look."""
+    threads_set: int | None = None
+    """Threads that somebody has set; None where nobody has."""
+    parameters: Mapping[str, float | Numbers]
+    """Values of the run-time parameters by name."""
+    bodies: Bodies[Numbers] | None
+    """In place of the tree's."""
 
-    def answers(self, check_finite: bool) -> SumAnswers:
-        """The calls of `Dynamics`."""
-        own: Any = self
-        return SumAnswers(self.structure, own, check_finite)
-
-    def kinematics(
-        self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]
-    ) -> KinematicAnswers:
-        """The calls of `Kinematics`."""
-        return KinematicAnswers(self.structure, self, check_finite, read_beside_motion)
-
-    def induced(self, robot: Any) -> InducedAnswers:
-        """The calls for induced accelerations of a robot on this back end."""
-        return InducedAnswers(robot)
-
-    def controls(self, robot: Any) -> Controls:
-        """What makes controllers of a robot on this back end."""
-        return Controls(robot)
-
-    def constraints(
-        self, robot: Any, independent: Any, contacts: Any, at: Any, tolerance: Any
-    ) -> ConstraintAnswers:
-        """The calls of `Constraints` on a robot with this back end."""
-
-        def rows(chosen: ChosenConstraints) -> TieRows:
-            return self.tie_rows(chosen, robot.check_finite, robot._answers.read_beside_motion)
-
-        return constraint_answers(robot, independent, contacts, at, tolerance, rows)
-
-    def tie_rows(
+    def __init__(
         self,
-        chosen: ChosenConstraints,
-        check_finite: bool,
-        read_beside_motion: Callable[[], Iterable[Any]],
-    ) -> TieRows:
-        """Rows of ties and contacts."""
-        return TieRows(self.structure, self, check_finite, read_beside_motion, chosen)
+        structure: Structure,
+        links: Sequence[ClosedForms] | None,
+        rule: RigidRule | None = None,
+        kernel: str = "auto",
+        bodies: object = None,
+        reads: Callable[[str, object], Numbers] = as_array,
+        tree: JointTree | None = None,
+    ) -> None:
+        """`links` are the closed forms, `rule` the vectorised rule: a package has one of them, or both.
 
-    def simulated(self, robot: Any, *given: Any) -> Any:
-        """The motion of a robot on this back end over time; see `MotionCalls.simulate`."""
-        return simulated(robot, *given)
+        bodies: in place of the tree's, whose numbers are read so; tree: where frames are, without the rule
 
-    def module(self, robot: Any, call: str, fixed: Mapping[str, Any]) -> Any:
+        Raises ValueError for a kernel that cannot be, and as `checked_bodies` does.
+        """
+        self.structure = structure
+        self.links = links or ()
+        self.operations = operations(links) if links and rule else {}
+        self.rule, self.regresses = rule, rule is not None
+        self.tree = tree or (rule.tree if rule else None)
+        self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
+        self.bodies: Bodies[Numbers] | None = None
+        if bodies is not None:
+            self.bodies = checked_bodies(bodies, structure.N, reads)
+
+    @property
+    def differs_by_sample(self) -> bool:
+        """Whether a parameter or a body is not the same for all samples."""
+        values = any(getattr(value, "ndim", 0) for value in self.parameters.values())
+        return values or (self.bodies is not None and next(iter(self.bodies)).ndim > 1)
+
+    @property
+    def ties_joints(self) -> bool:
+        """Whether the robot's file ties joints."""
+        return self.tree is not None and self.tree.tied
+
+    @cached_property
+    def answers(self) -> Answers:
+        """Rows of the table, of motion that has been read."""
+        return Answers(self)
+
+    @cached_property
+    def frames(self) -> FrameAnswers:
+        """The same of frames; raises ValueError for links of energies."""
+        if self.tree is None:
+            raise ValueError(
+                f"the links of {self.structure.name} are energies, which do not say where anything is; "
+                "kinematics is there for rigid links"
+            )
+        return FrameAnswers(self, self.tree, self.tree_numbers)
+
+    def read(self, named: Mapping[str, object], n: int) -> tuple["ArrayBackend", Sequence[Numbers]]:
+        """What computes with this motion, and it as one shape (..., n); errors name the argument."""
+        return self, self.arrays(named, n)
+
+    def arrays(self, named: Mapping[str, object], n: int) -> Sequence[Numbers]:
+        """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
+        raise NotImplementedError
+
+    def read_beside_motion(self) -> Iterable[object]:
+        """Arrays or tensors that results hang on, beside the motion."""
+        return self.parameters.values()
+
+    def controller(self, joints: object, frame: object) -> TorqueOfOne | None:
+        """Functions of one sample for targets of joints, and of a frame or None; None without any."""
+        return None
+
+    def module(self, robot: object, call: str, fixed: Mapping[str, object]) -> object:
         """One call of a robot on this back end as a torch module; raises TypeError without any."""
         raise TypeError(f"{self.name} has no torch modules; load torch or autograd")
 
-    def side(self, like: Any) -> Any:
-        """What computes with `like`, an array or a tensor."""
-        return self
-
-    def tree_numbers(self, own: tuple[TreeArrays, Any], q: Any) -> TreeArrays:
+    def tree_numbers(self, own: tuple[TreeArrays, Numbers], q: Numbers) -> TreeArrays:
         """The tree's numbers for the parameters and the bodies; see `given_numbers`."""
-        assert self.tree is not None  # KinematicAnswers has seen to it
-        p, bodies = self._values(q), self._bodies(q)
-        return given_numbers(self.xp, self.tree, own, p, bodies, tuple(q.shape[:-1]))
+        assert self.tree is not None  # FrameAnswers has seen to it
+        return given_numbers(self.xp, self.tree, own, self._values(q), self._bodies(q), tuple(q.shape[:-1]))
 
-    def _values(self, q: Any) -> dict[str, Any]:
+    def _values(self, q: Numbers) -> Mapping[str, Numbers]:
         """Values of the run-time parameters, to compute with `q`."""
         raise NotImplementedError
 
-    def _bodies(self, q: Any) -> Any:
+    def _bodies(self, q: Numbers) -> Bodies[Numbers] | None:
         """Bodies in place of the tree's, to compute with `q`; None for its own."""
         raise NotImplementedError

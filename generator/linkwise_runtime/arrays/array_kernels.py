@@ -9,7 +9,7 @@ keep.
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..interface import ClosedForms
 
@@ -61,7 +61,7 @@ def known_kernel(kernel: str, straight: bool, rule: bool, bodies: bool) -> str:
     return kernel if rule else "straight"
 
 
-def refuse_choice(backend: str, kernel: str, bodies: Any) -> None:
+def refuse_choice(backend: str, kernel: str, bodies: object) -> None:
     """Raise ValueError where a back end with one way to compute is asked for another."""
     if kernel != "auto":
         raise ValueError(f"{backend} has no kernels to choose from; leave kernel out, or load numpy or torch")
@@ -69,7 +69,7 @@ def refuse_choice(backend: str, kernel: str, bodies: Any) -> None:
         raise ValueError(f"{backend} computes with the package's own bodies; load numpy or torch with bodies")
 
 
-def refuse_learning(backend: str, requires_grad: Any) -> None:
+def refuse_learning(backend: str, requires_grad: object) -> None:
     """Raise ValueError where a back end without torch modules is asked for nn.Parameters."""
     if not isinstance(requires_grad, bool) or requires_grad:
         raise ValueError(

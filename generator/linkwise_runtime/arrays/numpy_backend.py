@@ -4,19 +4,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import as_array, as_weights, check_axes, no_common_shape, precision, too_many_axes
-from ..interface import ClosedForms, EnergyForms, Entries
+from ..interface import ClosedForms, EnergyForms, Entries, Namespace, Numbers
 from ..parameter_values import fits
 from ..rule.joint_tree import Bodies
 from ..rule.rule_calls import RigidRule
-from ..rule.tree_arrays import checked_bodies
 from ..structure import Structure
 from .array_backend import ArrayBackend
-from .array_kernels import Crossing, known_kernel, operations
+from .array_kernels import Crossing
 
+Dtype = np.dtype[np.floating]
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
+NO_VALUES: Mapping[str, Numbers] = {}
 CROSSINGS = {
     "decomposition": Crossing(1016, ((1016, 32), (3279, 64), (4264, 128), (11719, 256), (28167, 512))),
     "torque": Crossing(618, ((618, 32), (1441, 64), (1985, 128), (21901, 256))),
@@ -32,44 +33,39 @@ class NumpyBackend(ArrayBackend):
 
     name: ClassVar = "numpy"
     takes_tensors: ClassVar = False
-    examples: tuple[Any, ...] = ()
-    face: ClassVar[Any] = None
-    xp: ClassVar[Any] = np
-    fuses: ClassVar = False
+    xp: ClassVar[Namespace] = cast(Namespace, np)
+    fuses: bool = False
+    bodies: Bodies[NDArray[np.floating]] | None
 
     def __init__(
         self,
         structure: Structure,
         links: Sequence[ClosedForms] | None,
-        parameters: Mapping[str, Any],
+        parameters: Mapping[str, object],
         rule: RigidRule | None = None,
         kernel: str = "auto",
-        bodies: Bodies[Any] | None = None,
+        bodies: object = None,
     ) -> None:
-        """`links` are the closed forms, `rule` the vectorised rule: a package has one of them, or both.
-
-        Raises ValueError for a kernel that cannot be and for bodies of a wrong shape.
-        """
-        self.structure = structure
-        self.links = links or ()
-        self.operations = operations(links) if links and rule else {}
-        self.rule, self.tree = rule, rule.tree if rule else None
-        self.kernel = known_kernel(kernel, links is not None, rule is not None, bodies is not None)
-        self.parameters: dict[str, Any] = {
-            k: as_array(f"parameter {k!r}", v).astype(float) for k, v in parameters.items()
+        """Raises ValueError for a kernel that cannot be and for bodies of a wrong shape."""
+        super().__init__(structure, links, rule, kernel, bodies)
+        self._numbers = {k: as_array(f"parameter {k!r}", v).astype(float) for k, v in parameters.items()}
+        self.parameters = self._numbers
+        self._alone = {
+            call: rule if crossing.rule_is_quicker(self.operations[call], ()) else None
+            for call, crossing in CROSSINGS.items()
+            if self.kernel == "auto"
         }
-        self.bodies = None if bodies is None else checked_bodies(bodies, structure.N, as_array)
 
-    def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
+    def arrays(self, named: Mapping[str, object], n: int) -> Sequence[Numbers]:
         """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
-        first, *rest = named.values()
-        if (
-            type(first) is np.ndarray
-            and first.dtype in FLOATS
-            and first.shape[-1:] == (n,)
-            and all(type(a) is np.ndarray and a.shape == first.shape and a.dtype == first.dtype for a in rest)
-        ):
-            return [first, *rest]
+        motion = [*named.values()]
+        first = motion[0]
+        if type(first) is np.ndarray and first.dtype in FLOATS and first.shape[-1:] == (n,):
+            for a in motion:
+                if type(a) is not np.ndarray or a.shape != first.shape or a.dtype != first.dtype:
+                    break
+            else:
+                return cast("list[Numbers]", motion)
         read = {name: as_array(name, value) for name, value in named.items()}
         kind = precision(named, read)
         arrays = {name: a.astype(kind, copy=False) for name, a in read.items()}
@@ -82,7 +78,7 @@ class NumpyBackend(ArrayBackend):
             raise too_many_axes(arrays, n) from None
         return [a if a.shape == shape else np.broadcast_to(a, shape) for a in arrays.values()]
 
-    def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
+    def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         p = self._values(q)
         if rule := self._rule("decomposition", q):
@@ -92,19 +88,19 @@ class NumpyBackend(ArrayBackend):
             # A link without energy terms linear in the velocities has no h1.
             for columns, entries in zip(packed, link.decomposition(np, q, qd, qdd, p), strict=False):
                 columns.fill(entries)
-        return [columns.array for columns in packed]
+        return [columns.array() for columns in packed]
 
-    def torque(self, q: Any, qd: Any, qdd: Any) -> Any:
+    def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """tau (..., count) in the order of `Layout.torque`."""
         p = self._values(q)
         if rule := self._rule("torque", q):
             return rule.torque(self, (q, qd, qdd), p, self._bodies(q))
         columns = _Columns(q, self.structure.sizes.tau)
-        for link in self.links:
+        for link in self.links:  # whose values lend their memory to the next one's
             columns.fill(link.torque(np, q, qd, qdd, p))
-        return columns.array
+        return columns.array()
 
-    def position_gradient(self, q: Any, qd: Any, qdd: Any) -> Any:
+    def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """c0 (..., count) in the order of `Layout.velocity`."""
         p = self._values(q)
         if rule := self._rule("position_gradient", q):
@@ -112,86 +108,93 @@ class NumpyBackend(ArrayBackend):
         columns = _Columns(q, self.structure.sizes.c1)
         for link in self.links:
             columns.fill(link.position_gradient(np, q, qd, qdd, p))
-        return columns.array
+        return columns.array()
 
-    def energies(self, q: Any, qd: Any) -> tuple[Any, Any]:
+    def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
         """Kinetic and potential energies of the links in J, (..., N) each."""
         p = self._values(q)
         if self.rule:
-            kinetic, potential = self.rule.energies(self, (q, qd), p, self._bodies(q))
-            return kinetic, potential
+            return self.rule.energies(self, (q, qd), p, self._bodies(q))
         columns = _Columns(q, 2 * self.structure.N)
         for link in cast("Sequence[EnergyForms]", self.links):
             columns.fill(link.energy(np, q, qd, p))
-        return columns.array[..., 0::2], columns.array[..., 1::2]
+        both = columns.array()
+        return both[..., 0::2], both[..., 1::2]
 
-    def regressor(self, q: Any, qd: Any, qdd: Any) -> Any:
+    def regressor(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
         assert self.rule is not None  # Answers has seen to it
-        rows: Any = self.rule.regressor(self, (q, qd, qdd), self._values(q))
-        return rows
+        return self.rule.regressor(self, (q, qd, qdd), self._values(q))
 
-    def coefficient_regressors(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
+    def coefficient_regressors(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
         assert self.rule is not None  # Answers has seen to it
         return self.rule.coefficient_regressors(self, (q, qd, qdd), self._values(q))
 
-    def constant(self, values: NDArray[Any], like: Any) -> Any:
+    def constant(self, values: ArrayLike, like: Numbers) -> Numbers:
         """A table of numbers, to compute with `like`."""
-        return np.asarray(values, dtype=like.dtype)
+        return np.asarray(values, dtype=cast(Dtype, like.dtype))
 
-    def index(self, values: NDArray[np.intp], like: Any) -> Any:
+    def index(self, values: ArrayLike, like: Numbers) -> Numbers:
         """A table of positions, to take from `like`."""
         return np.asarray(values, dtype=np.intp)
 
-    def weights(self, name: str, value: Any, like: Any) -> Any:
+    def weights(self, name: str, value: object, like: Numbers) -> Numbers:
         """Real numbers in anything array-like, in the dtype of `like`; errors name the argument."""
-        return as_array(name, as_weights(name, value)).astype(like.dtype)
+        return as_array(name, as_weights(name, value)).astype(cast(Dtype, like.dtype))
 
-    def zeros(self, like: Any, count: int) -> Any:
+    def zeros(self, like: Numbers, count: int) -> Numbers:
         """Zeros of shape (..., count) for `like` of shape (..., m)."""
-        return np.zeros((*like.shape[:-1], count), like.dtype)
+        return np.zeros((*like.shape[:-1], count), cast(Dtype, like.dtype))
 
-    def concatenate(self, parts: Iterable[Any]) -> Any:
+    def concatenate(self, parts: Iterable[Numbers]) -> Numbers:
         """The parts joined along the last axis."""
-        return np.concatenate(list(parts), -1)
+        return np.concatenate(cast("list[NDArray[np.floating]]", list(parts)), -1)
 
     def few(self, samples: int, links: int) -> bool:
         """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
         return samples * links <= MATRICES
 
-    def chunk(self, motion: Sequence[Any], most: int) -> int | None:
+    def chunk(self, motion: Sequence[Numbers], most: int) -> int | None:
         """Samples to compute at once: as many as stay in the cache."""
         return most
 
-    def _rule(self, call: str, q: Any) -> RigidRule | None:
+    def _rule(self, call: str, q: Numbers) -> RigidRule | None:
         """The rule where it is to be taken, None for closed forms."""
         if self.kernel == "auto":
+            if q.ndim == 1:
+                return self._alone[call]
             quicker = CROSSINGS[call].rule_is_quicker(self.operations[call], tuple(q.shape[:-1]))
             return self.rule if quicker else None
         return self.rule if self.kernel == "rule" else None
 
-    def _bodies(self, q: Any) -> Bodies[Any] | None:
-        return None if self.bodies is None else Bodies(*(a.astype(q.dtype) for a in self.bodies))
+    def _bodies(self, q: Numbers) -> Bodies[NDArray[np.floating]] | None:
+        return None if self.bodies is None else Bodies(*(a.astype(cast(Dtype, q.dtype)) for a in self.bodies))
 
-    def _values(self, q: Any) -> dict[str, Any]:
-        for name, value in self.parameters.items():
+    def _values(self, q: Numbers) -> Mapping[str, Numbers]:
+        if not self._numbers:
+            return NO_VALUES
+        for name, value in self._numbers.items():
             if value.ndim:
                 fits(name, value.shape, q.shape[:-1])
-        return {k: v.astype(q.dtype) for k, v in self.parameters.items()}
+        return {k: v.astype(cast(Dtype, q.dtype)) for k, v in self._numbers.items()}
 
 
 class _Columns:
-    """An array (..., count) like q, filled from its first column on."""
+    """An array (..., count) like q, filled from its first column on; of one sample made in the end."""
 
-    def __init__(self, q: Any, count: int) -> None:
-        self.array = np.empty((*q.shape[:-1], count), q.dtype)
-        self._next = 0
+    def __init__(self, q: Numbers, count: int) -> None:
+        self._dtype, self._next = cast(Dtype, q.dtype), 0
+        self._entries: list[Any] = []
+        self._array = None if q.ndim == 1 else np.empty((*q.shape[:-1], count), self._dtype)
 
     def fill(self, entries: Entries) -> None:
-        start, self._next = self._next, self._next + len(entries)
-        if self.array.ndim == 1:
-            self.array[start : self._next] = entries
+        if self._array is None:
+            self._entries += entries
             return
-        for column, value in enumerate(entries, start):
-            self.array[..., column] = value
+        for value in entries:
+            self._array[..., self._next] = value
+            self._next += 1
+
+    def array(self) -> NDArray[np.floating]:
+        return np.array(self._entries, self._dtype) if self._array is None else self._array

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +11,15 @@ from ..chosen_names import listed, short
 from ..rule.joint_tree import JointTree
 from ..structure import Structure
 from .closing_search import Closing, TieEquations, best_closing, random_starts
-from .held_frames import Held, all_names, held_by
+from .held_frames import Held, all_names, held_by, tie_tables
 from .independent_joints import chosen_independent, loose_base, rank_of, redundant_names
-from .tie_tables import tie_tables
 
 
 class ChosenConstraints:
     """Ties, couplings and contacts, and the independent joints."""
 
     def __init__(
-        self, structure: Structure, tree: JointTree, independent: Any, contacts: Any, at: Any
+        self, structure: Structure, tree: JointTree, independent: object, contacts: object, at: object
     ) -> None:
         """Raises as `Dynamics.constrained` does."""
         self._structure, self._tree = structure, tree
@@ -33,6 +31,8 @@ class ChosenConstraints:
             )
         self.tables = tie_tables(tree, structure.n, self.held)
         self.names = all_names(self.held, tree)
+        self.couplings = len(tree.couplings)
+        """Whose rows are the last ones."""
         self.rows = (
             *(row for one in self.held for row in one.row_names),
             *(coupling.name for coupling in tree.couplings),
@@ -79,7 +79,7 @@ class ChosenConstraints:
             q = found.q
         return TieEquations(tree, n, self.held).at(q)
 
-    def _independent(self, given: Any, has_contacts: bool) -> tuple[int, ...]:
+    def _independent(self, given: object, has_contacts: bool) -> tuple[int, ...]:
         if self._is_own:
             return self._tree.independent
         n, names = self._structure.n, self._structure.joint_names
@@ -105,7 +105,7 @@ class ChosenConstraints:
             )
         return chosen
 
-    def _listed(self, given: Any) -> tuple[int, ...]:
+    def _listed(self, given: object) -> tuple[int, ...]:
         if isinstance(given, str) or not isinstance(given, list | tuple):
             raise TypeError(f"independent is {short(given)}; give a list of joints by number or by name")
         chosen = sorted(self._structure.joint_index(joint, "independent") for joint in given)
@@ -113,7 +113,7 @@ class ChosenConstraints:
             raise ValueError(f"independent is {short(given)}, which names a joint twice")
         return tuple(chosen)
 
-    def _position(self, at: Any) -> NDArray[np.float64]:
+    def _position(self, at: object) -> NDArray[np.float64]:
         found = as_array("at", at)
         if found.shape != (self._structure.n,) or found.dtype.kind not in "fiu":
             raise ValueError(f"at has shape {found.shape}; give one position of shape ({self._structure.n},)")

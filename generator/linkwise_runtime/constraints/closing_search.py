@@ -5,18 +5,17 @@ loops are often stretched and A loses rank.
 """
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..answers.namespace import NUMPY, array_of
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import own_numbers
-from .held_frames import ROWS, TURNS, Held
+from .held_frames import ROWS, TURNS, Held, tie_tables
 from .independent_joints import RANK, rank_of
-from .singular_positions import OPEN
 from .tie_arrays import pairs, tie_jacobian, violation
-from .tie_tables import tie_tables
 
 WIDTHS = (0.1, 0.3, 1.0, 2.0)
 """How far around zero starts are, in rad and m."""
@@ -28,19 +27,23 @@ STEPS = 60
 LONGEST = 0.5
 """Of a step, in rad and m."""
 SHORTEST = 1e-10
-Numbers = NDArray[np.float64]
+OPEN = 1e-4
+"""In m and rad of the joints, what may be left open that nothing closes: files round their numbers."""
+Floats = NDArray[np.float64]
 
 
 class Closing(NamedTuple):
     """Where the steps from a start ended."""
 
-    q: Numbers
+    q: Floats
     """(n,)"""
-    left: Numbers
-    """phi, (C,)."""
-    rows: Numbers
-    """A, (C, n)."""
-    comparable: Numbers
+    left: Floats
+    """phi, (C,), measured as `row_sizes` has it."""
+    rows: Floats
+    """A, (C, n), measured likewise."""
+    slopes: Floats
+    """The largest of each coupling, as its file counts."""
+    comparable: Floats
     """A without units, so that rows and columns may stand beside each other: metres, of ties and of slides,
     in the robot's size, and couplings by their largest."""
 
@@ -60,26 +63,28 @@ class TieEquations:
 
     def __init__(self, tree: JointTree, n: int, held: Sequence[Held]) -> None:
         self._tables, self._numbers = tie_tables(tree, n, held), own_numbers(tree)
-        numbers = (self._numbers.translations, self._numbers.offsets)
+        numbers = cast("tuple[Floats, ...]", (self._numbers.translations, self._numbers.offsets))
         size = max(np.abs(a).max(initial=0.0) for a in numbers) or 1.0
         turns = [row in TURNS for one in held for row in ROWS[one.kind]]
         self._sizes = np.where(turns, 1.0, size)[:, None]
         slides = [joint.coordinate for joint in tree.joints if joint.kind == "prismatic"]
         self._slides = np.where(np.isin(np.arange(n), slides), size, 1.0)
 
-    def at(self, q: Numbers) -> Closing:
+    def at(self, q: Floats) -> Closing:
         """phi, without what contacts have, and A at q (n,)."""
         column = q[:, None]
-        placed = pairs(np, self._tables, self._numbers, column)
-        phi, rows = (made(np, self._tables, column, placed) for made in (violation, tie_jacobian))
-        return Closing(q, phi[:, 0], rows[..., 0], self._comparable(rows[..., 0]))
-
-    def _comparable(self, rows: Numbers) -> Numbers:
+        placed = pairs(NUMPY, self._tables, self._numbers, column)
+        phi, rows = (
+            array_of(made(NUMPY, self._tables, column, placed))[..., 0] for made in (violation, tie_jacobian)
+        )
         ties, couplings = np.split(rows * self._slides, [len(self._sizes)])
-        most = np.abs(couplings).max(-1, keepdims=True)
-        return np.concatenate([ties / self._sizes, couplings / np.where(most > 0.0, most, 1.0)])
+        slopes = np.abs(rows[len(ties) :]).max(-1, initial=0.0)
+        ones, most = np.ones(len(ties)), np.abs(couplings).max(-1, keepdims=True)
+        sizes = np.concatenate([ones, np.maximum(slopes, 1.0)])
+        comparable = np.concatenate([ties / self._sizes, couplings / np.where(most > 0.0, most, 1.0)])
+        return Closing(q, phi / sizes, rows / sizes[:, None], slopes, comparable)
 
-    def closed_from(self, start: Numbers) -> Closing:
+    def closed_from(self, start: Floats) -> Closing:
         """Where the steps from q (n,) end."""
         at = self.at(start)
         for _ in range(STEPS):
@@ -91,13 +96,13 @@ class TieEquations:
         return at
 
 
-def random_starts(n: int) -> list[Numbers]:
+def random_starts(n: int) -> list[Floats]:
     """Positions (n,), the same at every call."""
     random = np.random.default_rng(0)
     return [width * random.uniform(-1.0, 1.0, n) for width in WIDTHS for _ in range(TRIES)]
 
 
-def best_closing(equations: TieEquations, starts: Iterable[Numbers]) -> tuple[Closing, tuple[Closing, ...]]:
+def best_closing(equations: TieEquations, starts: Iterable[Floats]) -> tuple[Closing, tuple[Closing, ...]]:
     """A closed position where A has its largest rank, and all that were found; else what is open least."""
     ended = []
     for start in starts:

@@ -1,17 +1,21 @@
-"""What ties and contacts hold, row by row: kinds of them, and contacts as they were given."""
+"""What ties and contacts hold, row by row, as it was given and as constants for `tie_arrays`."""
 
 import math
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import refuse_gradient
 from ..chosen_names import known_kind, short
-from ..kinematics.named_frames import frame_index
-from ..robot_constraints import Contact
-from ..rule.joint_tree import JointTree, Triple
+from ..interface import Numbers
+from ..kinematics.frame_answers import frame_index
+from ..kinematics.frame_arrays import FrameTables, frame_tables
+from ..quantities import Contact
+from ..rule.joint_tree import JointTree, TreeCoupling, Triple
 
+Floats = NDArray[np.float64]
 TURNS = ("moment_x", "moment_y", "moment_z")
 SHIFTS = ("force_x", "force_y", "force_z")
 ROWS = {
@@ -36,7 +40,7 @@ class Held(NamedTuple):
     """Index of the tree's frame."""
     second: int | None
     """The same; None for the ground."""
-    axes: NDArray[Any]
+    axes: NDArray[np.float64]
     """In the first frame those of what is held, whose z is a hinge's, (3, 3)."""
     point: Triple = (0.0, 0.0, 0.0)
     """In the first frame."""
@@ -55,7 +59,7 @@ class Held(NamedTuple):
         return ["rad" if row in TURNS else "m" for row in ROWS[self.kind]]
 
 
-def held_by(tree: JointTree, contacts: Any) -> list[Held]:
+def held_by(tree: JointTree, contacts: object) -> list[Held]:
     """Ties of the tree, then contacts; raises as `Dynamics.constrained` does."""
     if isinstance(contacts, Contact) or not isinstance(contacts, list | tuple):
         raise TypeError(f"contacts is {known_kind(contacts, Contact)}; give a list of Contact")
@@ -96,9 +100,10 @@ def _held(contact: Contact, where: str, frames: Sequence[str], gravity: Triple) 
     return Held(name, CONTACTS[contact.kind], first, None, axes, point, arm=arm)
 
 
-def _vector(given: Any, where: str, is_direction: bool = False) -> Triple:
+def _vector(given: object, where: str, is_direction: bool = False) -> Triple:
+    refuse_gradient(where, given)
     try:
-        x, y, z = (float(number) for number in given)
+        x, y, z = (float(number) for number in cast(Iterable[float], given))
     except (TypeError, ValueError):
         raise ValueError(f"{where} is {short(given)}; give x, y, z") from None
     if not all(map(math.isfinite, (x, y, z))):
@@ -117,7 +122,7 @@ def ground_normal(contact: Contact, where: str, gravity: Triple) -> Triple:
     return -gravity[0], -gravity[1], -gravity[2]
 
 
-def axes_around(direction: Triple) -> NDArray[Any]:
+def axes_around(direction: Triple) -> NDArray[np.float64]:
     """Axes whose z points in a direction."""
     z = np.array(direction) / math.hypot(*direction)
     x = np.cross(np.eye(3)[np.abs(z).argmin()], z)
@@ -128,3 +133,118 @@ def axes_around(direction: Triple) -> NDArray[Any]:
 def all_names(held: Sequence[Held], tree: JointTree) -> tuple[str, ...]:
     """Names of what has rows, in their order."""
     return (*(one.name for one in held), *(coupling.name for coupling in tree.couplings))
+
+
+class TieTables(NamedTuple):
+    """Constants of P pairs of frames, of which T are ties and the others contacts, and of their C rows.
+
+    Frames stand in the order first ones of ties, those of contacts, second ones of ties.
+    """
+
+    frames: FrameTables | None
+    """None without ties and contacts."""
+    ties: int
+    pairs: int
+    points: Numbers
+    """In the axes of each frame, (3, frames, 1)."""
+    first: Numbers
+    """Ones where a joint moves the first frame of a pair, (P, joints, 1)."""
+    second: Numbers
+    """The same of the second; none of a contact."""
+    moved_apart: Numbers
+    """Their difference."""
+    all_axes: Numbers | None
+    """Of a pair 1 where all axes are held, 0 where z alone may be, (P, 1); None where none are."""
+    apart: Numbers
+    """Of a row the length that it holds, 0 elsewhere, (C, 1)."""
+    is_apart: Numbers
+    """Of a pair 1 where a length is held, (P, 1)."""
+    row_pairs: Numbers
+    """Pair of each row."""
+    fixed: Numbers
+    """(6, C, 1): what a row has of the turn and the shift of its pair, along the world's axes."""
+    turning: Numbers | None
+    """(3, C, 1): the same of the turn, along the axes of the first frame; None for none."""
+    along: Numbers | None
+    """(C, 1): the same of the shift, along the line between the frames; None for none."""
+    placed: Numbers
+    """(C, 1): ones for rows that a position can violate; rolling has none."""
+    polynomials: tuple[tuple[Numbers, ...], ...]
+    """c_0, c_1, ... of the couplings' sums, of their derivatives and second derivatives, (K, n, 1) each."""
+
+    @property
+    def moved(self) -> int:
+        """Number of pairs of a joint and a tie, by which the memory of a call grows."""
+        return 1 if self.frames is None else len(self.frames.joints.parents) * (1 + self.pairs)
+
+
+def tie_tables(tree: JointTree, n: int, held: Sequence[Held]) -> TieTables:
+    """Tables in float64."""
+    ties = sum(one.second is not None for one in held)
+    seconds = [one.second for one in held[:ties] if one.second is not None]
+    frames, points = None, np.zeros((3, 0, 1))
+    first: Floats = np.zeros(0)
+    second: Floats = np.zeros(0)
+    if held:
+        frames = frame_tables(tree, n, [*(one.first for one in held), *seconds])
+        axes = np.stack([*(one.axes for one in held), *[np.eye(3)] * ties], -1)[..., None]
+        rotations = (frames.rotations[:, :, None] * axes[None]).sum(1)
+        frames = frames._replace(rotations=rotations)
+        # Points are turned as the axes are, in which they are wanted.
+        own = np.array([*(one.axes.T @ one.point for one in held), *[np.zeros(3)] * ties])
+        points = own.T[..., None]
+        moved = np.asarray(frames.carried).T[..., None]
+        first, second = moved[: len(held)], np.zeros_like(moved[: len(held)])
+        second[:ties] = moved[len(held) :]
+    every = np.array([[float(one.kind == "frame")] for one in held])
+    return TieTables(
+        frames,
+        ties,
+        len(held),
+        points,
+        first,
+        second,
+        first - second,
+        every if {"frame", "hinge"} & {one.kind for one in held} else None,
+        np.array([[one.length] for one in held for _ in ROWS[one.kind]]),
+        np.array([[float(one.kind == "distance")] for one in held]),
+        np.array([p for p, one in enumerate(held) for _ in ROWS[one.kind]], dtype=np.intp),
+        *_rows(held),
+        np.array([[float(one.kind != "rolling")] for one in held for _ in ROWS[one.kind]]),
+        _polynomials(tree.couplings, n),
+    )
+
+
+def _rows(held: Sequence[Held]) -> tuple[Floats, Floats | None, Floats | None]:
+    """`fixed`, `turning` and `along`."""
+    count = sum(len(ROWS[one.kind]) for one in held)
+    fixed, turning, along = (np.zeros((size, count, 1)) for size in (6, 3, 1))
+    along = along[0]
+    at, eye = 0, np.eye(3)
+    for one in held:
+        size = len(ROWS[one.kind])
+        if one.kind == "distance":
+            along[at] = 1.0
+        else:
+            fixed[3:, at + size - 3 : at + size, 0] = eye
+        if one.kind == "hinge":
+            turning[:, at : at + 2, 0] = eye[:, :2]
+        if one.kind == "frame":
+            fixed[:3, at : at + 3, 0] = eye
+        if one.kind == "rolling":  # v + omega x -arm is the velocity where it touches
+            fixed[:3, at : at + 3, 0] = np.cross(eye, np.array(one.arm)).T
+        at += size
+    return fixed, turning if turning.any() else None, along if along.any() else None
+
+
+def _polynomials(couplings: Sequence[TreeCoupling], n: int) -> tuple[tuple[Floats, ...], ...]:
+    if not couplings:
+        return ()
+    most = max(len(factors) for coupling in couplings for _, factors in coupling.terms)
+    listed = np.zeros((max(3, most), len(couplings), n, 1))
+    for c, coupling in enumerate(couplings):
+        for k, factors in coupling.terms:
+            listed[: len(factors), c, k, 0] += factors
+    powers = np.arange(len(listed))[:, None, None, None]
+    slopes = (powers * listed)[1:]
+    return tuple(listed), tuple(slopes), tuple((powers[:-1] * slopes)[1:])

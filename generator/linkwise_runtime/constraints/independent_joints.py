@@ -1,4 +1,4 @@
-"""Which joints may be independent: rank and pivoting of A at one position, on NumPy arrays.
+"""Which joints may be independent, and where the others do not follow: rank and pivoting of A.
 
 Rows are comparable, as `closing_search` has them: not each by its own largest entry, for a row that a planar
 loop leaves at zero holds nothing but rounding. Columns are compared by what is left of them across those
@@ -6,12 +6,19 @@ taken before.
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..answers.inertia_solve import SHARE
+from ..answers.namespace import array_of, epsilon_of, hidden, namespace
+from ..chosen_names import listed, plain, sample_of
+from ..interface import Numbers
 from ..rule.joint_tree import JointTree
+
+if TYPE_CHECKING:
+    from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
 
 RANK = 1e-5
 """Singular values below this part of the largest, or of 1, are zero; what is left of columns likewise.
@@ -22,8 +29,40 @@ LEAST = 3
 """Coordinates of a body that floats, in a plane or in space: a slide that turns, too, has bearings."""
 ABLE = 0.05
 """Columns smaller than this part of the largest are not preferred to it, whatever joints they are of."""
-SHARE = 1e-3
+TIED = 1e-3
 """Rows that have less than this part in a sum of rows that is zero are not among those that it ties."""
+AGREE = 1e-4
+"""Rows that follow from others may differ from these by this part of their size: files round numbers."""
+
+
+class JointColumns(NamedTuple):
+    """Joints as tables of positions."""
+
+    independent: Numbers
+    dependent: Numbers
+    order: Numbers
+    """Where each joint stands in the independent ones followed by the dependent ones."""
+
+
+def joint_columns(independent: tuple[int, ...], n: int) -> JointColumns:
+    """Positions in the order of all joints."""
+    dependent = [k for k in range(n) if k not in independent]
+    order = np.argsort([*independent, *dependent])
+    return JointColumns(np.array(independent, dtype=np.intp), np.array(dependent, dtype=np.intp), order)
+
+
+def row_sizes(rows: Numbers, couplings: int) -> Numbers:
+    """What rows of A (..., C, n), the last ones of couplings, are measured by, (..., C).
+
+    A coupling's is its largest slope where that is above 1: what it is counted in is a file's choice, and
+    divided so, what is left of it counts in rad and m of its joints. No gradient runs through it.
+    """
+    own: Numbers = rows if isinstance(rows, np.ndarray) else cast("Tensor", rows).detach()
+    xp, first = namespace(rows), rows.shape[-2] - couplings
+    slopes = xp.amax(abs(own[..., first:, :]), -1)
+    ones = xp.ones_like(own[..., 0])
+    most = xp.where(slopes > 1.0, slopes, ones[..., first:])
+    return xp.concat([ones[..., :first], most], -1)
 
 
 def rank_of(rows: NDArray[np.float64], tolerance: float = RANK) -> int:
@@ -35,7 +74,7 @@ def rank_of(rows: NDArray[np.float64], tolerance: float = RANK) -> int:
 def chosen_independent(
     rows: NDArray[np.float64],
     rather_dependent: Sequence[int] = (),
-    preference: Sequence[Any] | None = None,
+    preference: Sequence[tuple[float, ...]] | None = None,
     tolerance: float = RANK,
 ) -> tuple[int, ...]:
     """Coordinates that are left when columns of A (C, n) are taken by pivoting, as of dependent ones.
@@ -79,7 +118,7 @@ def redundant_names(rows: NDArray[np.float64], owners: Sequence[str]) -> tuple[s
         rows[own] = np.linalg.svd(rows[own])[0].T @ rows[own]
     there = np.abs(rows).max(-1, initial=0.0) > least
     u, values, _ = np.linalg.svd(rows[there])
-    shared = np.abs(u[:, int((values > least).sum()) :]).max(-1, initial=0.0) > SHARE
+    shared = np.abs(u[:, int((values > least).sum()) :]).max(-1, initial=0.0) > TIED
     moving = [owner for owner, moves in zip(owners, there, strict=True) if moves]
     found = {owner for owner, is_so in zip(moving, shared, strict=True) if is_so} | set(owners) - set(moving)
     return tuple(owner for owner in dict.fromkeys(owners) if owner in found)
@@ -107,3 +146,91 @@ def _floating(tree: JointTree, root: int, carried: set[int]) -> tuple[int, ...]:
     kinds = {tree.joints[f].kind for f in run}
     coordinates = tuple(dict.fromkeys(tree.joints[f].coordinate for f in run))
     return coordinates if len(kinds) > 1 and len(coordinates) >= LEAST else ()
+
+
+def check_factors(
+    rows: Numbers, triangle: Numbers, columns: JointColumns, joint_names: Sequence[str]
+) -> None:
+    """Raise ValueError for the first sample where A_d, of which R is given, loses its rank."""
+    place = lost_at(triangle)
+    if place is not None:
+        own = array_of(rows)[tuple(place)].astype(float)
+        raise ValueError(why_not_following(own, columns, _epsilon(rows), joint_names, sample_of(place)))
+
+
+def least_left(triangle: Numbers) -> NDArray[np.floating]:
+    """Of R the least part of a column that is left across those before it, (...,): |R_ff| by its length."""
+    r = array_of(triangle)
+    sizes = np.sqrt((r * r).sum(-2))
+    least: NDArray[np.floating] = (np.abs(r.diagonal(0, -2, -1)) / np.where(sizes > 0.0, sizes, 1.0)).min(-1)
+    return least
+
+
+def lost_at(triangle: Numbers) -> list[int] | None:
+    """The first sample where R has lost its rank."""
+    if hidden(triangle):
+        return None
+    lost = least_left(triangle) <= _epsilon(triangle)
+    if not lost.any():
+        return None
+    place: list[int] = np.argwhere(lost)[0].tolist()
+    return place
+
+
+def why_not_following(
+    rows: NDArray[np.float64], columns: JointColumns, epsilon: float, joint_names: Sequence[str], where: str
+) -> str:
+    """Why A_d of one sample leaves joints free, of whose columns less than the part `epsilon` is left."""
+    dependent = columns.dependent.tolist()
+    told = left_free(rows, columns, joint_names, where)
+    if rank_of(rows, epsilon) < len(dependent):
+        return (
+            f"the position is singular: {told}, for the constraints take fewer freedoms there than elsewhere"
+        )
+    # Those that follow now go on to do so, as far as they can.
+    others = [joint_names[k] for k in chosen_independent(rows, dependent, tolerance=epsilon)]
+    return (
+        f"the independent joints do not tell the others: {told}; there, choose "
+        f"robot.constrained(independent={others})"
+    )
+
+
+def left_free(rows: Numbers, columns: JointColumns, joint_names: Sequence[str], where: str) -> str:
+    """Which dependent joints A_d of one sample leaves free, in words."""
+    dependent, independent = columns.dependent.tolist(), columns.independent.tolist()
+    still = np.abs(np.linalg.svd(array_of(rows).astype(float)[:, dependent])[2][-1])
+    moving = [joint_names[dependent[f]] for f in np.flatnonzero(still > SHARE * still.max())]
+    held = listed([joint_names[k] for k in independent])
+    stand = "stands" if len(independent) == 1 else "stand"
+    return f"{listed(moving)} can move{where} while {held} {stand} still"
+
+
+def check_following(
+    rows: Numbers, columns: JointColumns, mapped: Numbers, names: Sequence[str], joint_names: Sequence[str]
+) -> None:
+    """Raise ValueError for the first sample where rows that follow from others do not agree: A G != 0.
+
+    Rows are measured by the largest of their tie's: of a loop that a joint carries as a whole, or that is
+    open within the tolerance, some are nothing but what is left of differences.
+    """
+    if rows.shape[-2] == len(columns.dependent) or hidden(rows):
+        return
+    a, g = array_of(rows), array_of(mapped)
+    starts = [at for at, name in enumerate(names) if not at or name != names[at - 1]]
+    largest = np.maximum.reduceat(np.abs(a).max(-1), starts, -1)
+    sizes = largest.repeat(np.diff([*starts, len(names)]), -1)
+    scale = sizes[..., None] * np.abs(g).max(-2, keepdims=True)
+    wrong = np.abs(a @ g) > (AGREE if rows.dtype.itemsize == 8 else 10.0 * AGREE) * scale
+    if not wrong.any():
+        return
+    *place, row, joint = np.argwhere(wrong)[0].tolist()
+    mover = joint_names[columns.independent.tolist()[joint]]
+    raise ValueError(
+        f"{plain(names[row])} does not stay closed{sample_of(place)} when {mover} moves and the others "
+        "follow: the loop is over-constrained, and what holds it twice does not agree"
+    )
+
+
+def _epsilon(like: Numbers) -> float:
+    """What is left of a column, as part of it, where nothing is left but rounding."""
+    return float(epsilon_of(like) ** (2.0 / 3.0))

@@ -4,30 +4,46 @@
 
 The last step is one from the closed position, so that a gradient through it is that of what is implied:
 dq_d = -A_d^+ A_y dq_y.
+
+For the independent joints alone, the others are led from where ties are closed: steps along G go straight to
+where the independent joints are wanted, all samples at once, and are halved where others would leap: so ties
+that can close in several ways stay in the one of the start.
 """
 
-from typing import Any
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..chosen_names import plain, sample_of
+from ..answers.namespace import hidden, namespace
+from ..chosen_names import listed, plain, sample_of
+from ..interface import Numbers
 from ..rule.kinematics import taken
-from ..sums.namespace import hidden, namespace
-from .closed_places import RowNames, TiesAt, ties_at
-from .followers import JointColumns, dependent_shares, inverted
-from .singular_positions import (
-    check_factors,
+from .closed_places import (
+    ClosedPlace,
+    RowNames,
+    TiesAt,
     closable_tolerance,
-    left_free,
-    lost_at,
+    dependent_shares,
+    inverted,
     open_by,
+    ties_at,
     worst_open,
 )
+from .independent_joints import JointColumns, check_factors, left_free, lost_at
 from .tie_rows import TieRows
+
+if TYPE_CHECKING:
+    from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
 
 STEPS = 50
 LONGEST = 0.5
 """Of a step, in m and rad; loops that are far from closing are not thrown further."""
+NEAR = 0.1
+"""In rad and m: farther from its guess, a joint may have come to another way to close."""
+SHORTEST = 1e-6
+"""Part of a way that is not halved any more."""
 
 
 class DoesNotClose(ValueError):
@@ -35,14 +51,18 @@ class DoesNotClose(ValueError):
 
     def __init__(self, reason: str, mend: str) -> None:
         super().__init__(f"{reason}; {mend}")
-        self.reason = reason
+        self.reason, self._mend = reason, mend
+
+    def __reduce__(self) -> tuple[type["DoesNotClose"], tuple[str, str]]:
+        """As processes hand it to each other."""
+        return DoesNotClose, (self.reason, self._mend)
 
 
 def closed(
     ties: TieRows,
     columns: JointColumns,
-    q: Any,
-    held_at: Any,
+    q: Numbers,
+    held_at: Numbers,
     tolerance: float | None,
     names: RowNames,
 ) -> TiesAt:
@@ -54,11 +74,13 @@ def closed(
     if isinstance(q, np.ndarray):
         at = _found(ties, columns, q, held_at, tolerance, names)
     else:
-        xp = namespace(q)
-        with xp.no_grad():
+        torch = sys.modules["torch"]
+        with torch.no_grad():
             at = _found(ties, columns, q, held_at, tolerance, names)
-        if xp.is_grad_enabled():
-            found = with_independent(at.q.detach(), taken(q, columns.independent, -1), columns)
+        if torch.is_grad_enabled():
+            found = with_independent(
+                cast("Tensor", at.q).detach(), taken(q, columns.independent, -1), columns
+            )
             at = ties_at(ties, columns, found, held_at)
             step = dependent_shares(columns, inverted(at.factors), at.violation[..., None])[..., 0]
             at = ties_at(ties, columns, found + step, held_at)
@@ -69,7 +91,12 @@ def closed(
 
 
 def _found(
-    ties: TieRows, columns: JointColumns, q: Any, held_at: Any, tolerance: float | None, names: RowNames
+    ties: TieRows,
+    columns: JointColumns,
+    q: Numbers,
+    held_at: Numbers,
+    tolerance: float | None,
+    names: RowNames,
 ) -> TiesAt:
     double = q.dtype.itemsize == 8
     near = 1e-8 if double else 1e-4  # of a step; what is left is about its square
@@ -77,8 +104,9 @@ def _found(
     at, is_near, is_seen = ties_at(ties, columns, q, held_at), False, not hidden(q)
     for count in range(STEPS):
         _check_step(at, columns, tolerance, names, not count)
-        at = at._replace(inverse=inverted(at.factors))
-        step = dependent_shares(columns, at.inverse, at.violation[..., None])[..., 0]
+        inverse = inverted(at.factors)
+        at = at._replace(inverse=inverse)
+        step = dependent_shares(columns, inverse, at.violation[..., None])[..., 0]
         size = (step * step).sum(-1)[..., None] ** 0.5
         if is_near or (is_seen and not bool((size > least).any())):
             return at._replace(q=at.q + step)
@@ -119,13 +147,13 @@ def _led(columns: JointColumns) -> str:
     return f"give closed(q[..., {own}]) the independent joints alone"
 
 
-def with_independent(q: Any, own: Any, columns: JointColumns) -> Any:
+def with_independent(q: Numbers, own: Numbers, columns: JointColumns) -> Numbers:
     """Positions q (..., n) with the independent joints at others (..., m); gradients run through both."""
     others = taken(q, columns.dependent, -1)
     return taken(namespace(q).concat([own, others], -1), columns.order, -1)
 
 
-def _check(violation: Any, tolerance: float | None, columns: JointColumns, names: RowNames) -> None:
+def _check(violation: Numbers, tolerance: float | None, columns: JointColumns, names: RowNames) -> None:
     found = worst_open(violation, tolerance)
     if found is not None:
         place, row, size = found
@@ -134,3 +162,44 @@ def _check(violation: Any, tolerance: float | None, columns: JointColumns, names
             f"leave {open_by(size, names.rows[row])}",
             f"start them elsewhere, or {_led(columns)}, if it can close at all",
         )
+
+
+def led(
+    place_of: Callable[[Numbers], ClosedPlace],
+    start: Numbers,
+    wanted: Numbers,
+    columns: JointColumns,
+    names: Sequence[str],
+) -> Numbers:
+    """Closed positions (..., n), from the start (..., n) to independent joints at `wanted` (..., m).
+
+    place_of: the closed place beside a position; names: of all joints
+    Raises ValueError where the others cannot be led there.
+    """
+    at = place_of(start)
+    first, done, step = at.own(at.q), 0.0, 1.0
+    while done < 1.0:
+        step = min(step, 1.0 - done)
+        own = first + (done + step) * (wanted - first)
+        guess = with_independent(at.q + at.velocity(own - at.own(at.q)), own, columns)
+        try:
+            found, told = place_of(guess), "they would have to leap"
+        except ValueError as error:
+            found, told = None, error.reason if isinstance(error, DoesNotClose) else str(error)
+        # Written so, positions that are not numbers, of gaps in a batch, lead no other sample astray.
+        if found is not None and not bool((abs(found.q - guess) > NEAR).any()):
+            at, done, step = found, done + step, 2.0 * step
+            continue
+        step /= 2.0
+        if step < SHORTEST:
+            raise _not_led(done, told, columns, names)
+    return at.q
+
+
+def _not_led(done: float, told: str, columns: JointColumns, names: Sequence[str]) -> DoesNotClose:
+    own = listed([names[k] for k in columns.independent.tolist()])
+    return DoesNotClose(
+        f"the joints that follow {own} cannot be led there, but {100.0 * done:.3g} % of the straight way "
+        f"from a closed position ({told})",
+        "give closed(q) all joints, those that follow near where ties close, if they do",
+    )

@@ -8,8 +8,9 @@ is how it turns and shifts, J_first - J_second at once. A row is w . J of its pa
 world, one of the first frame, whose rate is omega x w, or u = d / |d|, from the second frame to the first.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from ..interface import Namespace, Numbers
 from ..kinematics.frame_arrays import (
     Carried,
     by_coordinate,
@@ -22,7 +23,7 @@ from ..kinematics.frame_arrays import (
 )
 from ..rule.kinematics import around, cross, joint_screws, taken
 from ..rule.tree_arrays import TreeArrays
-from .tie_tables import TieTables
+from .held_frames import TieTables
 
 TINY = 1e-12
 """Below it cos(t/2)^2 is that of a frame upside down, whose axis of turning is not known."""
@@ -32,7 +33,7 @@ class Ends(NamedTuple):
     """The frames of all pairs where they are."""
 
     carried: Carried
-    places: Any
+    places: Numbers
     """Of their points, (3, frames, samples)."""
 
 
@@ -40,26 +41,26 @@ class Pairs(NamedTuple):
     """The same pair by pair, and what their rows take from it."""
 
     ends: Ends
-    shift: Any
+    shift: Numbers
     """d, (3, P, samples)."""
-    moves: Any
+    moves: Numbers
     """J, (6, P, n, samples)."""
-    weights: Any
+    weights: Numbers
     """w, (6, C, samples)."""
 
 
 class Changes(NamedTuple):
     """How pairs change."""
 
-    moves: Any
+    moves: Numbers
     """dJ/dt, (6, P, n, samples)."""
-    spin: Any
+    spin: Numbers
     """omega of the first frames, (3, P, samples)."""
-    speeds: Any
+    speeds: Numbers
     """Of the points of all frames, (3, frames, samples)."""
 
 
-def ends(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Ends | None:
+def ends(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> Ends | None:
     """Where frames are at q (n, samples); None without ties and contacts."""
     if tables.frames is None:
         return None
@@ -67,7 +68,7 @@ def ends(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Ends | None
     return Ends(found, point_at(found, tables.points))
 
 
-def pairs(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Pairs | None:
+def pairs(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> Pairs | None:
     """Where pairs are at q (n, samples); None without ties and contacts."""
     at = ends(xp, tables, numbers, q)
     if at is None or tables.frames is None:
@@ -78,14 +79,14 @@ def pairs(xp: Any, tables: TieTables, numbers: TreeArrays, q: Any) -> Pairs | No
     return paired(xp, tables, at, by_coordinate(tables.frames, xp.concat([one * z[:3], linear], 0)))
 
 
-def paired(xp: Any, tables: TieTables, at: Ends, moves: Any) -> Pairs:
+def paired(xp: Namespace, tables: TieTables, at: Ends, moves: Numbers) -> Pairs:
     """The pairs of frames that move so, (6, P, n, samples)."""
     shift = at.places[:, : tables.pairs] - _seconds(xp, tables, at.places)
     return Pairs(at, shift, moves, _weights(xp, tables, at, shift))
 
 
 def pair_changes(
-    xp: Any, tables: TieTables, numbers: TreeArrays, qd: Any, at: Pairs | None
+    xp: Namespace, tables: TieTables, numbers: TreeArrays, qd: Numbers, at: Pairs | None
 ) -> Changes | None:
     """How that changes at qd (n, samples): z x X becomes zd x X + z x dX/dt."""
     if at is None or tables.frames is None:
@@ -101,9 +102,11 @@ def pair_changes(
     return Changes(moves, twist[:3, 0, : tables.pairs], speeds)
 
 
-def violation(xp: Any, tables: TieTables, q: Any, at: Pairs | None, held: Ends | None = None) -> Any:
+def violation(
+    xp: Namespace, tables: TieTables, q: Numbers, at: Pairs | None, held: Ends | None = None
+) -> Numbers:
     """phi, (C, samples); held: where contacts took hold, where they are unless given."""
-    parts = []
+    parts: list[Numbers] = []
     if at is not None:
         axes, places = at.ends.carried.axes, at.ends.places
         shift, weights = at.shift, at.weights
@@ -120,9 +123,9 @@ def violation(xp: Any, tables: TieTables, q: Any, at: Pairs | None, held: Ends |
     return _joined(xp, parts)
 
 
-def tie_jacobian(xp: Any, tables: TieTables, q: Any, at: Pairs | None) -> Any:
+def tie_jacobian(xp: Namespace, tables: TieTables, q: Numbers, at: Pairs | None) -> Numbers:
     """A, (C, n, samples)."""
-    parts = []
+    parts: list[Numbers] = []
     if at is not None:
         parts.append((at.weights[:, :, None] * taken(at.moves, tables.row_pairs, -3)).sum(0))
     if tables.polynomials:
@@ -131,10 +134,10 @@ def tie_jacobian(xp: Any, tables: TieTables, q: Any, at: Pairs | None) -> Any:
 
 
 def tie_jacobian_rate(
-    xp: Any, tables: TieTables, q: Any, qd: Any, at: Pairs | None, changes: Changes | None
-) -> Any:
+    xp: Namespace, tables: TieTables, q: Numbers, qd: Numbers, at: Pairs | None, changes: Changes | None
+) -> Numbers:
     """dA/dt, (C, n, samples)."""
-    parts = []
+    parts: list[Numbers] = []
     if at is not None and changes is not None:
         total = at.weights[:, :, None] * taken(changes.moves, tables.row_pairs, -3)
         rates = _weight_rates(xp, tables, at, changes)
@@ -146,7 +149,7 @@ def tie_jacobian_rate(
     return _joined(xp, parts)
 
 
-def _seconds(xp: Any, tables: TieTables, a: Any, held: Any = None) -> Any:
+def _seconds(xp: Namespace, tables: TieTables, a: Numbers, held: Numbers | None = None) -> Numbers:
     """What the second frames of the pairs have, (..., P, samples): that of a contact is its own, held."""
     own = a[..., tables.pairs :, :]
     if tables.ties == tables.pairs:
@@ -155,7 +158,7 @@ def _seconds(xp: Any, tables: TieTables, a: Any, held: Any = None) -> Any:
     return xp.concat([own, kept], -2)
 
 
-def _turn(xp: Any, every: Any, first: Any, second: Any) -> Any:
+def _turn(xp: Namespace, every: Numbers, first: Numbers, second: Numbers) -> Numbers:
     """2 sin(t/2) times the axis about which, by t, the first frames are turned from the second ones.
 
     Of all axes a, or of z alone: sin t times it is half the sum of a2 x a1, or z2 x z1.
@@ -168,7 +171,7 @@ def _turn(xp: Any, every: Any, first: Any, second: Any) -> Any:
     return sine / xp.where(half > TINY, half, 0.0 * half + TINY) ** 0.5
 
 
-def _weights(xp: Any, tables: TieTables, at: Ends, shift: Any) -> Any:
+def _weights(xp: Namespace, tables: TieTables, at: Ends, shift: Numbers) -> Numbers:
     """w, (6, C, samples); one for all samples where they stay as they are."""
     weights = tables.fixed
     if tables.turning is not None:
@@ -180,7 +183,7 @@ def _weights(xp: Any, tables: TieTables, at: Ends, shift: Any) -> Any:
     return weights
 
 
-def _weight_rates(xp: Any, tables: TieTables, at: Pairs, changes: Changes) -> Any:
+def _weight_rates(xp: Namespace, tables: TieTables, at: Pairs, changes: Changes) -> Numbers | None:
     """dw/dt; None where they stay as they are."""
     if tables.turning is None and tables.along is None:
         return None
@@ -198,7 +201,7 @@ def _weight_rates(xp: Any, tables: TieTables, at: Pairs, changes: Changes) -> An
     return xp.concat([turning, along], 0)
 
 
-def _size(xp: Any, tables: TieTables, shift: Any) -> Any:
+def _size(xp: Namespace, tables: TieTables, shift: Numbers) -> Numbers:
     """|d| of pairs whose length is held, (P, samples); 1 of others, and where the ends coincide.
 
     There d has no direction, and u = 0: phi is the whole length, and A, whose row is zero, has lost its rank.
@@ -207,13 +210,13 @@ def _size(xp: Any, tables: TieTables, shift: Any) -> Any:
     return xp.where(squares > 0.0, squares, 0.0 * squares + 1.0) ** 0.5
 
 
-def _arms(xp: Any, tables: TieTables, places: Any) -> Any:
+def _arms(xp: Namespace, tables: TieTables, places: Numbers) -> Numbers:
     """X, (5, P, joints, samples)."""
     first, second = places[:, : tables.pairs], _seconds(xp, tables, places)
     return around(xp, tables.first * first[:, :, None] - tables.second * second[:, :, None])
 
 
-def _polynomial(factors: tuple[Any, ...], q: Any) -> Any:
+def _polynomial(factors: tuple[Numbers, ...], q: Numbers) -> Numbers:
     """c_0 + c_1 q + ..., (K, n, samples), by Horner's rule."""
     value = factors[-1] + 0.0 * q
     for factor in factors[-2::-1]:
@@ -221,5 +224,5 @@ def _polynomial(factors: tuple[Any, ...], q: Any) -> Any:
     return value
 
 
-def _joined(xp: Any, parts: list[Any]) -> Any:
+def _joined(xp: Namespace, parts: list[Numbers]) -> Numbers:
     return parts[0] if len(parts) == 1 else xp.concat(parts, 0)

@@ -1,80 +1,100 @@
-"""Rows of ties, couplings and contacts for positions as a user gives them."""
+"""Rows of ties, couplings and contacts for positions that have been read."""
 
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..kinematics.asked_samples import Asked, in_pieces
-from ..kinematics.kinematic_answers import KinematicAnswers
-from ..structure import Structure
+from ..answers.namespace import side_by_side
+from ..interface import Numbers
+from ..kinematics.frame_answers import Asked, FrameAnswers, in_pieces
+from ..kinematics.frame_arrays import Carried
+from ..packed_engine import OneSample
+from ..rule.kinematics import Poses
 from .chosen_constraints import ChosenConstraints
-from .tie_arrays import Changes, Pairs, ends, pair_changes, pairs, tie_jacobian, tie_jacobian_rate, violation
-from .tie_tables import TieTables
+from .held_frames import TieTables
+from .tie_arrays import (
+    Changes,
+    Ends,
+    Pairs,
+    ends,
+    pair_changes,
+    paired,
+    pairs,
+    tie_jacobian,
+    tie_jacobian_rate,
+    violation,
+)
 
-ROWS_OF = "rows"
+OnTies = Asked[TieTables]
 
 
-class TieRows(KinematicAnswers):
-    """phi, A and dA/dt; arguments as `Constraints` says."""
+class TieEnd(NamedTuple):
+    """A frame of the tree, a point of it, and axes in it."""
 
-    def __init__(
-        self,
-        structure: Structure,
-        backend: Any,
-        check_finite: bool,
-        read_beside_motion: Callable[[], Iterable[Any]],
-        chosen: ChosenConstraints,
-    ) -> None:
-        super().__init__(structure, backend, check_finite, read_beside_motion)
-        self._constants, self._count = chosen.tables, len(chosen.rows)
+    frame: int
+    point: NDArray[np.float64]
+    """(3,)"""
+    axes: NDArray[np.float64]
+    """(3, 3)"""
+
+
+class TieRows:
+    """phi, A and dA/dt on one back end; arguments as `Constraints` says."""
+
+    def __init__(self, frames: FrameAnswers, chosen: ChosenConstraints) -> None:
+        self._frames, self._constants, self.count = frames, chosen.tables, len(chosen.rows)
+        self.couplings = chosen.couplings
+        self._tables: dict[object, TieTables] = {}
         self._has_contacts = chosen.tables.ties < chosen.tables.pairs
+        first = [TieEnd(one.first, np.array(one.point), one.axes) for one in chosen.held]
+        seconds = [one.second for one in chosen.held if one.second is not None]
+        self._ends = [*first, *(TieEnd(frame, np.zeros(3), np.eye(3)) for frame in seconds)]
 
-    def at(self, q: Any, held_at: Any = None) -> "RowsAt":
-        """Rows at positions that have been read, (..., n); contacts are held as they are, or at others."""
-        own = self._backend.side(q)
-        return RowsAt(own, self._asked_at(own, q, held_at), tuple(q.shape), self._count)
-
-    def _asked_at(self, own: Any, q: Any, held_at: Any) -> Asked:
+    def at(self, q: Numbers, held_at: Numbers | None = None) -> "RowsAt":
+        """Rows at positions (..., n); contacts are held as they are, or at others."""
         is_held = self._has_contacts and held_at is not None
-        return self._asked(own, ROWS_OF, [q, held_at] if is_held else [q], {})
+        asked = self._asked([q, held_at] if is_held and held_at is not None else [q])
+        one = self._frames.engine.one_sample
+        if one is not None and isinstance(q, np.ndarray) and q.size == q.shape[-1] and self._ends:
+            return RowsAtOne(self._frames, asked, q, self.count, self._ends, one)
+        return RowsAt(self._frames, asked, q, self.count)
 
-    def violation(self, q: Any, held_at: Any) -> Any:
+    def violation(self, q: Numbers, held_at: Numbers) -> Numbers:
         """phi, (..., C), from where contacts took hold."""
 
-        def answer(at: Asked) -> Any:
-            q, *held_at = at.motion
-            held = ends(at.xp, at.tables, at.numbers, *held_at) if self._has_contacts else None
-            return violation(at.xp, at.tables, q, _pairs(at), held)
+        def answer(at: OnTies) -> Numbers:
+            held = ends(at.xp, at.tables, at.numbers, at.motion[1]) if self._has_contacts else None
+            return violation(at.xp, at.tables, at.motion[0], _pairs(at), held)
 
-        return self._rows("violation", (q, held_at), answer, (self._count,), ("q", "held_at"))
+        motion = [q, held_at]
+        values = in_pieces(self._frames.engine, motion, self._asked(motion), answer, self.count)
+        return side_by_side(values.reshape(*q.shape[:-1], self.count))
 
-    def rates(self, q: Any, qd: Any) -> Any:
+    def rates(self, q: Numbers, qd: Numbers) -> Numbers:
         """dA/dt, (..., C, n)."""
+        return self.at(q).rates(qd)
 
-        def answer(at: Asked) -> Any:
-            return _rates(at, placed := _pairs(at), _changes(at, placed))
+    def _asked(self, motion: Sequence[Numbers]) -> OnTies:
+        return self._frames.asked(self._tables, "rows", self._listed, motion)
 
-        return self._rows("rates", (q, qd), answer, (self._count, self._structure.n))
-
-    def _rows(self, call: str, given: Any, answer: Any, shape: Any, names: Any = ("q", "qd")) -> Any:
-        return self._answer(call, given, ROWS_OF, {}, answer, shape, None, names)
-
-    def _tables_of(self, part: Any) -> TieTables:
+    def _listed(self, part: object) -> TieTables:
         return self._constants
 
 
 class RowsAt:
     """Rows at some positions; of few samples, what they are made of is kept for their rates."""
 
-    def __init__(self, own: Any, asked: Asked, shape: tuple[int, ...], count: int) -> None:
-        self._own, self._asked, self._shape, self._count = own, asked, shape, count
+    def __init__(self, frames: FrameAnswers, asked: OnTies, q: Numbers, count: int) -> None:
+        self._frames, self._asked, self._count = frames, asked, count
+        self._shape = tuple(q.shape)
         self._kept: Pairs | None = None
 
-    def positions(self) -> Any:
+    def positions(self) -> Numbers:
         """phi and A beside it, (..., C, 1 + n)."""
 
-        def answer(at: Asked) -> Any:
+        def answer(at: OnTies) -> Numbers:
             placed = self._pairs(at)
             if at is self._asked:
                 self._kept = placed
@@ -85,40 +105,86 @@ class RowsAt:
 
         return self._made(answer, self._asked, 1 + self._shape[-1])
 
-    def rates(self, qd: Any) -> Any:
+    def rates(self, qd: Numbers) -> Numbers:
         """dA/dt, (..., C, n), for velocities (..., n) of the same samples."""
         first = self._asked
         flat = first.xp.swapaxes(qd.reshape(-1, qd.shape[-1]), 0, 1)
         asked = first._replace(motion=[first.motion[0], flat])
 
-        def answer(at: Asked) -> Any:
+        def answer(at: OnTies) -> Numbers:
             placed = self._kept if at is asked and self._kept is not None else self._pairs(at)
-            return _rates(at, placed, self._changes(at, placed))
+            q, moved = at.motion
+            return tie_jacobian_rate(at.xp, at.tables, q, moved, placed, self._changes(at, placed))
 
         return self._made(answer, asked, self._shape[-1])
 
-    def _pairs(self, at: Asked) -> Pairs | None:
+    def _pairs(self, at: OnTies) -> Pairs | None:
         """Where pairs are."""
         return _pairs(at)
 
-    def _changes(self, at: Asked, placed: Pairs | None) -> Changes | None:
+    def _changes(self, at: OnTies, placed: Pairs | None) -> Changes | None:
         """How pairs change."""
-        return _changes(at, placed)
+        return pair_changes(at.xp, at.tables, at.numbers, at.motion[1], placed)
 
-    def _made(self, answer: Callable[[Asked], Any], asked: Asked, width: int) -> Any:
-        flat = in_pieces(self._own, asked.motion, asked, answer, self._count * width)
-        values = flat.reshape(*self._shape[:-1], self._count, width)
-        return np.ascontiguousarray(values) if isinstance(values, np.ndarray) else values.contiguous()
+    def _made(self, answer: Callable[[OnTies], Numbers], asked: OnTies, width: int) -> Numbers:
+        flat = in_pieces(self._frames.engine, asked.motion, asked, answer, self._count * width)
+        return side_by_side(flat.reshape(*self._shape[:-1], self._count, width))
 
 
-def _pairs(at: Asked) -> Pairs | None:
+class RowsAtOne(RowsAt):
+    """Rows at one sample, for whose frames a back end has functions."""
+
+    def __init__(
+        self,
+        frames: FrameAnswers,
+        asked: OnTies,
+        q: NDArray[np.floating],
+        count: int,
+        ends: Sequence[TieEnd],
+        one: OneSample,
+    ) -> None:
+        super().__init__(frames, asked, q, count)
+        self._q, self._ends, self._one = q, ends, one
+        self._jacobians: NDArray[np.floating] | None = None
+
+    def _pairs(self, at: OnTies) -> Pairs | None:
+        poses, jacobians = self._of_ends("pose", [self._q]), self._of_ends("jacobian", [self._q])
+        if poses is None or jacobians is None:
+            return super()._pairs(at)
+        self._jacobians = jacobians
+        turns, kind = poses[:, :3, :3], poses.dtype
+        points = np.array([end.point for end in self._ends], kind)[..., None]
+        places = poses[:, :3, 3] + (turns @ points)[..., 0]
+        axes = (turns @ np.array([end.axes for end in self._ends], kind)).transpose(1, 2, 0)[..., None]
+        # Nothing more is asked of joints whose frames are known.
+        found = Ends(Carried(cast(Poses, None), axes, cast(Numbers, None)), places.T[..., None])
+        return paired(at.xp, at.tables, found, self._apart(at, jacobians))
+
+    def _changes(self, at: OnTies, placed: Pairs | None) -> Changes | None:
+        qd = cast("NDArray[np.floating]", at.motion[1])[:, 0]
+        rates = None if self._jacobians is None else self._of_ends("jacobian_rate", [self._q, qd])
+        if rates is None or self._jacobians is None:
+            return super()._changes(at, placed)
+        speeds = (self._jacobians @ qd).T[..., None]
+        return Changes(self._apart(at, rates), speeds[:3, : at.tables.pairs], speeds[3:])
+
+    def _of_ends(self, call: str, motion: Sequence[NDArray[np.floating]]) -> NDArray[np.floating] | None:
+        """Answers for all frames; None where there are none."""
+        kind, found = self._q.dtype, []
+        for end in self._ends:
+            point = end.point.astype(kind) if call != "pose" and end.point.any() else None
+            answer = self._one.answer(call, motion, end.frame, point)
+            if answer is None:
+                return None
+            found.append(answer.reshape(answer.shape[-2:]))
+        return np.array(found)
+
+    def _apart(self, at: OnTies, jacobians: NDArray[np.floating]) -> NDArray[np.floating]:
+        """What the first frames of the pairs have less than the second ones, (6, P, n, 1)."""
+        moves = jacobians[: at.tables.pairs].copy()
+        moves[: at.tables.ties] -= jacobians[at.tables.pairs :]
+        return moves.transpose(1, 0, 2)[..., None]
+
+
+def _pairs(at: OnTies) -> Pairs | None:
     return pairs(at.xp, at.tables, at.numbers, at.motion[0])
-
-
-def _changes(at: Asked, placed: Pairs | None) -> Changes | None:
-    return pair_changes(at.xp, at.tables, at.numbers, at.motion[1], placed)
-
-
-def _rates(at: Asked, placed: Pairs | None, changes: Changes | None) -> Any:
-    q, qd = at.motion
-    return tie_jacobian_rate(at.xp, at.tables, q, qd, placed, changes)

@@ -11,16 +11,21 @@ velocities to rates of the rotation vector. qdd_0 is what the joints' targets as
 approach for motion and force control of robot manipulators, 1987.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ..answers.inertia_solve import Told
+from ..answers.namespace import namespace
+from ..arguments import refuse_gradient
+from ..arrays.array_backend import ArrayBackend
 from ..chosen_names import known_kind, short
-from ..controllers import ROWS, FrameImpedance, Natural
-from ..kinematics.named_frames import frame_index
-from ..sums.known_digits import Told
-from ..sums.namespace import namespace
+from ..interface import Library, Namespace, Numbers
+from ..kinematics.frame_answers import FrameAnswers, frame_index, with_vectors
+from ..rule.joint_tree import JointTree
+from ..targets import ROWS, FrameImpedance, Natural, Target
 from .frame_rotation import rates_of_turning, rotation_vector
 from .gains import Gain
 from .joint_impedance import JointState, times
@@ -33,48 +38,49 @@ class FramePart(NamedTuple):
     kept: float
     added: Gain | None
 
-    def of(self, side: Any, natural: Any, like: Any) -> Any:
+    def of(self, library: Library, natural: Numbers, like: Numbers) -> Numbers:
         """The wanted matrix (..., r, r)."""
         kept = natural if self.kept == 1.0 else self.kept * natural
-        return kept if self.added is None else kept + self.added.matrix(side, like)
+        return kept if self.added is None else kept + self.added.matrix(library, like)
 
 
 class FrameState(NamedTuple):
     """A frame in motion, by its chosen rows."""
 
-    jacobian: Any
+    jacobian: Numbers
     """J (..., r, n)."""
-    bias: Any
+    bias: Numbers
     """dJ/dt qd (..., r)."""
-    inertia: Any
+    inertia: Numbers
     """L (..., r, r)."""
-    dual: Any
+    dual: Numbers
     """Jd (..., n, r)."""
-    wanted_inertia: Any
-    wanted_damping: Any
-    rate: Any
+    wanted_inertia: Numbers
+    wanted_damping: Numbers
+    rate: Numbers
     """nu - nu_d (..., r)."""
-    place: Any
+    place: Numbers | None
     """x (..., r), None without stiffness."""
-    turning: Any
+    turning: Numbers | None
     """E (..., r, r), None without stiffness."""
-    wanted: Any
+    wanted: Numbers | None
     """nud_d (..., r), None for none."""
 
 
 class FrameTargets:
     """What is wanted of one frame, for whatever motion."""
 
-    def __init__(self, robot: Any, asked: FrameImpedance) -> None:
+    def __init__(self, frames: FrameAnswers, asked: FrameImpedance) -> None:
         """Raises ValueError and TypeError as `Dynamics.partial_impedance` does."""
         if not isinstance(asked, FrameImpedance):
             frame = short(asked) if isinstance(asked, str | int) else "frame"
             raise TypeError(
                 f"frame is {known_kind(asked, FrameImpedance)}; give FrameImpedance({frame}, ...)"
             )
-        self._robot, self.rows, self.names = robot, _chosen(asked.rows), tuple(asked.rows)
+        self.rows, self.names = _chosen(asked.rows), tuple(asked.rows)
         self.frame, self.point = asked.frame, _point(asked.point)
-        self._check_movable(frame_index(asked.frame, robot.kinematics.frames))
+        self.number = frame_index(asked.frame, frames.names)
+        self._check_movable(frames.tree)
         self.inertia = self._part("frame.inertia", asked.inertia, True)
         self.damping = self._part("frame.damping", asked.damping, False)
         gain = Gain("frame.stiffness", asked.stiffness, self.names)
@@ -89,10 +95,9 @@ class FrameTargets:
         turns = sum(row < 3 for row in self.rows)
         return self.inertia.kept == self.damping.kept and (turns in (0, 3) or self.stiffness is None)
 
-    def _check_movable(self, frame: int) -> None:
+    def _check_movable(self, tree: JointTree) -> None:
         """Raise ValueError for rows that no joints can move, wherever they are."""
-        tree = self._robot.backend.tree
-        moving = tree.chain(tree.frames[frame].joint)
+        moving = tree.chain(tree.frames[self.number].joint)
         joints = {tree.joints[f].coordinate for f in moving}
         if len(joints) < len(self.rows):
             raise ValueError(
@@ -100,33 +105,35 @@ class FrameTargets:
                 f"{len(joints)} joint{'s' * (len(joints) != 1)} move it; choose rows, such as rows=('x', 'y')"
             )
 
-    def state(self, joints: JointState, q: Any, qd: Any, target: Any) -> FrameState:
-        """The frame at q and qd, by `target` of `controllers.Target`."""
-        robot, side, xp = self._robot, self._robot.backend.side(q), namespace(q)
-        point = side.constant(self.point, q)
-        rows = side.index(np.array(self.rows, np.intp), q)
-        whole = robot.kinematics.jacobian(q, self.frame, point)
+    def state(
+        self, engine: ArrayBackend, joints: JointState, q: Numbers, qd: Numbers, target: Target
+    ) -> FrameState:
+        """The frame at q and qd, by a target."""
+        xp, frames = engine.xp, engine.frames
+        rows = engine.index(np.array(self.rows, np.intp), q)
+        motion, vectors = with_vectors(engine, [q, qd], {"point": self.point})
+        whole = frames.answer("jacobian", motion[:1], self.number, vectors)
         j = whole[..., rows, :]
-        rate = robot.kinematics.jacobian_rate(q, qd, self.frame, point)[..., rows, :]
+        rate = frames.answer("jacobian_rate", motion, self.number, vectors)[..., rows, :]
         sizes = joints.inertia.diagonal(0, -2, -1)
         vague = Told(
             "the mass matrix is nearly singular",
-            robot.joint_names,
+            engine.structure.joint_names,
             beside=", and torques for a frame perhaps by fewer digits",
         )
         about = WantedInertia("the mass matrix is not positive", vague)
         moved = solved_wanted(about, joints.inertia, xp.swapaxes(j, -1, -2), sizes)
         compliance = j @ moved
-        ones = side.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
+        ones = engine.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
         hardly = f"frame {self.frame!r} can hardly move along rows each by itself"
         singular = f"frame {self.frame!r} cannot move along rows each by itself"
         about = WantedInertia(singular, Told(hardly, self.names, of_frame=True))
         inertia = solved_wanted(about, compliance, ones, _reach(whole, sizes)[..., rows])
         dual = moved @ inertia
         natural = (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.coriolis - rate)) @ dual
-        place, turning = self._place(side, q, target)
+        place, turning = self._place(engine, q, target)
         velocity, wanted = (
-            None if a is None else _six(name, side.weights(name, a, q))[..., rows]
+            None if a is None else _six(name, engine.weights(name, a, q))[..., rows]
             for name, a in (
                 ("target.velocity", target.velocity),
                 ("target.acceleration", target.acceleration),
@@ -138,20 +145,22 @@ class FrameTargets:
             times(rate, qd),
             inertia,
             dual,
-            self.inertia.of(side, inertia, q),
-            self.damping.of(side, natural, q),
+            self.inertia.of(engine, inertia, q),
+            self.damping.of(engine, natural, q),
             speed if velocity is None else speed - velocity,
             place,
             turning,
             wanted,
         )
 
-    def acceleration(self, state: FrameState, qdd: Any, external: Any) -> Any:
+    def acceleration(
+        self, engine: ArrayBackend, state: FrameState, qdd: Numbers, external: Numbers | None
+    ) -> Numbers:
         """qdd of the joints, nearest to the one given, with which the frame moves as asked."""
-        xp = namespace(qdd)
+        xp = engine.xp
         pull = -times(state.wanted_damping, state.rate)
-        if state.place is not None:
-            pull = pull - times(xp.swapaxes(state.turning, -1, -2), self._pull(state.place))
+        if state.place is not None and state.turning is not None:
+            pull = pull - times(xp.swapaxes(state.turning, -1, -2), self._pull(engine, state.place))
         if external is not None:
             pull = pull + times(xp.swapaxes(state.dual, -1, -2), external)
         what = f"the wanted inertia of frame {self.frame!r}"
@@ -164,19 +173,21 @@ class FrameTargets:
             moved = moved + state.wanted
         return qdd + times(state.dual, moved - state.bias - times(state.jacobian, qdd))
 
-    def stored(self, state: FrameState) -> Any:
+    def stored(self, engine: ArrayBackend, state: FrameState) -> Numbers:
         """(nu~' M_e nu~ + x' K_e x) / 2, (...)."""
         energy = (state.rate * times(state.wanted_inertia, state.rate)).sum(-1) / 2.0
         if state.place is None:
             return energy
-        return energy + (state.place * self._pull(state.place)).sum(-1) / 2.0
+        return energy + (state.place * self._pull(engine, state.place)).sum(-1) / 2.0
 
-    def _pull(self, place: Any) -> Any:
+    def _pull(self, library: Library, place: Numbers) -> Numbers:
         """K_e x."""
         assert self.stiffness is not None  # there is no place without it
-        return times(self.stiffness.matrix(self._robot.backend.side(place), place), place)
+        return times(self.stiffness.matrix(library, place), place)
 
-    def _place(self, side: Any, q: Any, target: Any) -> tuple[Any, Any]:
+    def _place(
+        self, engine: ArrayBackend, q: Numbers, target: Target
+    ) -> tuple[Numbers | None, Numbers | None]:
         """x and E of the chosen rows; None where nothing is stiff."""
         if self.stiffness is None:
             return None, None
@@ -185,26 +196,26 @@ class FrameTargets:
                 f"frame {self.frame!r} is stiff, but target has no pose; give Target(pose=...), (..., 4, 4), "
                 "such as robot.kinematics.pose(q, frame) of where it shall be"
             )
-        xp = side.xp
-        wanted = side.weights("target.pose", target.pose, q)
+        xp = engine.xp
+        wanted = engine.weights("target.pose", target.pose, q)
         if tuple(wanted.shape[-2:]) != (4, 4):
             raise ValueError(f"target.pose has shape {tuple(wanted.shape)}; its last axes must be 4, 4")
-        point = side.constant(self.point, q)
-        pose = self._robot.kinematics.pose(q, self.frame)
+        point = engine.constant(self.point, q)
+        pose = engine.frames.answer("pose", [q], self.number)
         places = [times(m[..., :3, :3], point) + m[..., :3, 3] for m in (pose, wanted)]
         moved = places[0] - places[1]
         if max(self.rows) < 3 or min(self.rows) < 3:
-            theta = rotation_vector(pose[..., :3, :3], wanted[..., :3, :3])
+            theta = rotation_vector(engine, pose[..., :3, :3], wanted[..., :3, :3])
         else:
             theta = 0.0 * moved
-        rows = side.index(np.array(self.rows, np.intp), q)
+        rows = engine.index(np.array(self.rows, np.intp), q)
         whole = xp.zeros_like(theta[..., :, None] * theta[..., None, :])
-        ones = whole + side.constant(np.eye(3), q)
-        upper = xp.concat([rates_of_turning(theta), whole], -1)
+        ones = whole + engine.constant(np.eye(3), q)
+        upper = xp.concat([rates_of_turning(engine, theta), whole], -1)
         turning = xp.concat([upper, xp.concat([whole, ones], -1)], -2)
         return xp.concat([theta, moved], -1)[..., rows], turning[..., rows, :][..., rows]
 
-    def _part(self, name: str, given: Any, definite: bool) -> FramePart:
+    def _part(self, name: str, given: object, definite: bool) -> FramePart:
         if isinstance(given, Natural):
             if isinstance(given.scale, bool) or not isinstance(given.scale, int | float) or given.scale < 0.0:
                 raise ValueError(f"{name}.scale is {given.scale!r}; give a number, 0 or above")
@@ -215,23 +226,24 @@ class FrameTargets:
         return FramePart(0.0, Gain(name, given, self.names, None, definite, symmetric=definite))
 
 
-def _reach(jacobian: Any, inertia: Any) -> Any:
+def _reach(jacobian: Numbers, inertia: Numbers) -> Numbers:
     """How far joints of these inertias (..., n), each by itself, turn and move a frame, (..., 6)."""
-    xp = namespace(jacobian)
+    xp: Namespace = namespace(jacobian)
     each = (jacobian**2 / inertia[..., None, :]).sum(-1)
     turns, moves = each[..., :3].sum(-1)[..., None], each[..., 3:].sum(-1)[..., None]
     return xp.concat([turns, turns, turns, moves, moves, moves], -1)
 
 
-def _point(given: Any) -> NDArray[Any]:
-    """Raises ValueError for what is not three finite numbers."""
-    point = np.array(given, float)
+def _point(given: object) -> NDArray[np.float64]:
+    """Raises ValueError for what is not three finite numbers, TypeError for a gradient."""
+    refuse_gradient("frame.point", given)
+    point = np.array(cast(ArrayLike, given), float)
     if point.shape != (3,) or not np.isfinite(point).all():
         raise ValueError(f"frame.point is {short(given)}; give x, y, z in the frame, in m")
     return point
 
 
-def _six(name: str, given: Any) -> Any:
+def _six(name: str, given: Numbers) -> Numbers:
     """Raises ValueError for other than the six of a frame and its point."""
     if not given.ndim or given.shape[-1] != 6:
         raise ValueError(
@@ -241,7 +253,7 @@ def _six(name: str, given: Any) -> Any:
     return given
 
 
-def _chosen(rows: Any) -> tuple[int, ...]:
+def _chosen(rows: Sequence[str]) -> tuple[int, ...]:
     """Numbers of rows; raises ValueError for one that is not there, or there twice."""
     unknown = [row for row in rows if row not in ROWS]
     if unknown or len(set(rows)) < len(rows) or not len(rows):

@@ -1,11 +1,13 @@
 """How far a frame is turned from another: the rotation vector, and how it changes with angular velocity."""
 
 import math
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..sums.namespace import hidden, namespace
+from ..answers.namespace import array_of, hidden
+from ..chosen_names import sample_of
+from ..interface import Library, Numbers
 
 SMALL = 1e-2
 """Radians below which series serve: their errors are some 1e-17."""
@@ -14,12 +16,12 @@ SKEWED = 1e-4
 """By so much a pose of float32, or of a file, may not be a rotation."""
 
 
-def rotation_vector(turn: Any, wanted: Any) -> Any:
+def rotation_vector(library: Library, turn: Numbers, wanted: Numbers) -> Numbers:
     """theta (..., 3), in rad, with turn = exp([theta]) wanted, of matrices (..., 3, 3).
 
     Raises ValueError at half a turn, which has no direction, and for what turns nothing.
     """
-    xp = namespace(turn)
+    xp = library.xp
     relative = turn @ xp.swapaxes(wanted, -1, -2)
     twice = xp.stack(
         [relative[..., c, b] - relative[..., b, c] for b, c in ((1, 2), (2, 0), (0, 1))], -1
@@ -30,9 +32,10 @@ def rotation_vector(turn: Any, wanted: Any) -> Any:
     sine = xp.where(near, xp.ones_like(square), square) ** 0.5
     angle = xp.arctan2(sine, cosine)
     if not hidden(turn):
-        _refuse(
-            "target.pose is no rotation", abs(wanted @ xp.swapaxes(wanted, -1, -2) - _ones(wanted)) > SKEWED
-        )
+        ones = library.constant(np.eye(3), wanted)
+        _refuse("target.pose is no rotation", abs(wanted @ wanted.mT - ones) > SKEWED)
+        mirrored = xp.linalg.det(wanted) < 0.0
+        _refuse("target.pose is no rotation, but mirrors", mirrored[..., None, None])
         far = ~near & (angle > HALF_TURN)
         _refuse(
             "the frame is half a turn from its target, which has no direction; take steps between",
@@ -45,13 +48,19 @@ def rotation_vector(turn: Any, wanted: Any) -> Any:
     return xp.where(near, series, angle / sine)[..., None] * twice / 2.0
 
 
-def rates_of_turning(theta: Any) -> Any:
+def is_rotation(turn: NDArray[np.floating]) -> bool:
+    """Whether one matrix (3, 3) would be taken."""
+    skewed = np.abs(turn @ turn.T - np.eye(3)).max() > SKEWED
+    return not skewed and bool(np.linalg.det(turn) > 0.0)
+
+
+def rates_of_turning(library: Library, theta: Numbers) -> Numbers:
     """E (..., 3, 3) of d(theta)/dt = E w, w being the angular velocity in the same axes.
 
     E = 1 - [theta]/2 + c [theta]^2 with c = (1 - t/2 cot(t/2)) / t^2, t the angle: the inverse of the left
     Jacobian of rotations.
     """
-    xp = namespace(theta)
+    xp = library.xp
     square = (theta * theta).sum(-1)
     near = square < SMALL * SMALL
     t = xp.where(near, xp.ones_like(square), square) ** 0.5
@@ -64,19 +73,11 @@ def rates_of_turning(theta: Any) -> Any:
     none = xp.zeros_like(x)
     cross = xp.stack([xp.stack(row, -1) for row in ((none, -z, y), (z, none, -x), (-y, x, none))], -2)
     product = cross @ cross
-    return _ones(cross) - cross / 2.0 + c[..., None, None] * product
+    return library.constant(np.eye(3), cross) - cross / 2.0 + c[..., None, None] * product
 
 
-def _ones(like: Any) -> Any:
-    """The matrix that turns nothing, (..., 3, 3)."""
-    xp, device = namespace(like), getattr(like, "device", None)
-    on = {} if xp is np else {"device": device}
-    return xp.zeros_like(like) + xp.eye(3, dtype=like.dtype, **on)
-
-
-def _refuse(what: str, wrong: Any) -> None:
+def _refuse(what: str, wrong: Numbers) -> None:
     """Raise ValueError for the first sample of (..., 3, 3) or (..., 1, 1) where anything is wrong."""
     if bool(wrong.any()):
-        found = np.asarray(wrong if isinstance(wrong, np.ndarray) else wrong.detach().cpu()).any((-2, -1))
-        sample = np.argwhere(found)[0].tolist()
-        raise ValueError(f"{what}{' at sample ' + ', '.join(map(str, sample)) if sample else ''}")
+        sample = np.argwhere(array_of(wrong).any((-2, -1)))[0].tolist()
+        raise ValueError(f"{what}{sample_of(sample)}")

@@ -6,17 +6,25 @@ H is the inertia of links and armature, p what the joints' own springs and dampi
 what is to be compensated, v what a task asks for where motions are cancelled.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from numbers import Real
+from typing import NamedTuple
 
 import numpy as np
 
-from ..dense import Dense
+from ..answers.inertia_solve import Told
+from ..arrays.array_backend import ArrayBackend
+from ..chosen_names import short
+from ..interface import Numbers
 from ..passive_joints import passive_torques, smooth_friction
-from ..sums.joint_matrices import JointMatrices
-from ..sums.known_digits import Told
-from .gains import Gain
-from .wanted_coefficients import WantedShares
+from ..structure import Structure
+from .gains import Gain, WantedShares
 from .wanted_solve import WantedInertia, solved_wanted
+
+ORDERS = (1, 2)
+"""Of motion propagation torques that can be cancelled: of velocity and of acceleration."""
+Entry = tuple[int, int, int, int]
+"""i, j, k and the order."""
 
 
 class JointTargets(NamedTuple):
@@ -36,78 +44,74 @@ class JointTargets(NamedTuple):
 class JointState(NamedTuple):
     """A robot at q and qd: what its joints obey, and the targets for it."""
 
-    inertia: Any
+    inertia: Numbers
     """H (..., n, n)."""
-    coriolis: Any
+    coriolis: Numbers
     """C (..., n, n)."""
-    rest: Any
+    rest: Numbers
     """g + p (..., n)."""
-    wanted_inertia: Any
+    wanted_inertia: Numbers
     """M* (..., n, n)."""
-    wanted_damping: Any
+    wanted_damping: Numbers
     """B* (..., n, n)."""
 
 
 class Errors(NamedTuple):
     """How far a state is from its target, and what else there is, (..., n) each; None for nothing."""
 
-    place: Any
-    rate: Any
-    wanted: Any
+    place: Numbers | None
+    rate: Numbers
+    wanted: Numbers | None
     """qdd_d."""
-    force: Any
+    force: Numbers | None
     """f, from outside, and v, of a task."""
 
 
 class JointImpedance:
     """The targets of one robot, for whatever motion."""
 
-    def __init__(self, robot: Any, targets: JointTargets) -> None:
-        self.targets, self._robot, self._side = targets, robot, robot.backend
-        self._dense = Dense(robot.structure, robot.backend)
-        self._matrices = JointMatrices(robot.structure, robot.backend)
+    def __init__(self, structure: Structure, targets: JointTargets) -> None:
+        self.targets, self._structure = targets, structure
         self._shares = any(not isinstance(t.kept, float) for t in (targets.inertia, targets.damping))
 
-    def state(self, q: Any, qd: Any) -> JointState:
+    def state(self, engine: ArrayBackend, q: Numbers, qd: Numbers) -> JointState:
         """What its joints obey at q and qd (..., n), and what they shall."""
-        side, targets = self._robot.backend.side(q), self.targets
-        c2 = c1 = None
+        targets, c2, c1 = self.targets, None, None
         if self._shares:
-            c2, c1, by_link = self._robot.coefficients(q, qd)
+            c2, c1, by_link = engine.answers.coefficients(q, qd)
             mass, coriolis, rest = c2.sum(-2), c1.sum(-2), by_link.sum(-1)
         else:
-            packed = self._robot.packed(q, qd, 0.0 * q)
-            mass = self._matrices.summed(packed.acceleration, "acceleration")
-            coriolis = self._matrices.summed(packed.velocity, "velocity")
-            rest = self._dense.summed(packed.gravity)
-        inertia, wanted = mass, targets.inertia.of(side, mass, c2, q)
+            mass, coriolis, rest = engine.answers.sums(q, qd)
+        inertia, wanted = mass, targets.inertia.of(engine, mass, c2, q)
         if targets.passive:
-            sums = self._robot.structure.passive_sums
-            armature = side.constant(np.diag(sums.armature), q)
-            spring, damping, _, _ = passive_torques(side, sums, q, qd, qd)
+            sums = self._structure.passive_sums
+            armature = engine.constant(np.diag(sums.armature), q)
+            spring, damping, _, _ = passive_torques(engine, sums, q, qd, qd)
             inertia, rest = mass + armature, rest + spring + damping
             if targets.friction_width is not None:
-                rest = rest + smooth_friction(side, sums, qd, targets.friction_width)
+                rest = rest + smooth_friction(engine, sums, qd, targets.friction_width)
             # a share of links leaves the armature beside it, a sum that is given whole has it in it
             wanted = wanted if targets.inertia.whole else wanted + armature
-        return JointState(inertia, coriolis, rest, wanted, targets.damping.of(side, coriolis, c1, q))
+        return JointState(inertia, coriolis, rest, wanted, targets.damping.of(engine, coriolis, c1, q))
 
-    def pull(self, state: JointState, errors: Errors, like: Any) -> Any:
+    def pull(self, engine: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
         """-B* ed - K* e, (..., n)."""
         pull = -times(state.wanted_damping, errors.rate)
-        if self.targets.stiffness is None:
+        if self.targets.stiffness is None or errors.place is None:
             return pull
-        return pull - times(self.targets.stiffness.matrix(self._robot.backend.side(like), like), errors.place)
+        return pull - times(self.targets.stiffness.matrix(engine, errors.place), errors.place)
 
-    def acceleration(self, state: JointState, errors: Errors, like: Any, told: bool = False) -> Any:
+    def acceleration(
+        self, engine: ArrayBackend, state: JointState, errors: Errors, told: bool = False
+    ) -> Numbers:
         """qdd = qdd_d + M*^-1 (f + v - B* ed - K* e), (..., n).
 
         told: whether it is said elsewhere how well a natural M* tells it
         """
-        pull = self.pull(state, errors, like)
+        pull = self.pull(engine, state, errors)
         if errors.force is not None:
             pull = pull + errors.force
-        names, positive = self._robot.joint_names, self.targets.positive
+        names, positive = self._structure.joint_names, self.targets.positive
         whose = "what is left of the mass matrix"
         if positive:
             whose = "the mass matrix" if self.targets.inertia.natural else "the wanted inertia"
@@ -119,26 +123,26 @@ class JointImpedance:
         moved = solved[..., 0]
         return moved if errors.wanted is None else errors.wanted + moved
 
-    def natural_torque(self, state: JointState, qd: Any, errors: Errors) -> Any:
+    def natural_torque(self, engine: ArrayBackend, state: JointState, qd: Numbers, errors: Errors) -> Numbers:
         """u = H qdd_d + C qd + g + p - B* ed - K* e: f drops out where all inertia stays."""
-        torque = times(state.coriolis, qd) + state.rest + self.pull(state, errors, qd)
+        torque = times(state.coriolis, qd) + state.rest + self.pull(engine, state, errors)
         return torque if errors.wanted is None else torque + times(state.inertia, errors.wanted)
 
-    def torque(self, state: JointState, qd: Any, qdd: Any, external: Any) -> Any:
+    def torque(self, state: JointState, qd: Numbers, qdd: Numbers, external: Numbers | None) -> Numbers:
         """u = H qdd + C qd + g + p - f, (..., n)."""
         torque = times(state.inertia, qdd) + times(state.coriolis, qd) + state.rest
         return torque if external is None else torque - external
 
-    def stored(self, state: JointState, errors: Errors, like: Any) -> Any:
+    def stored(self, engine: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
         """(ed' M* ed + e' K* e) / 2, (...)."""
         energy = (errors.rate * times(state.wanted_inertia, errors.rate)).sum(-1) / 2.0
-        if self.targets.stiffness is None:
+        if self.targets.stiffness is None or errors.place is None:
             return energy
-        stiffness = self.targets.stiffness.matrix(self._robot.backend.side(like), like)
+        stiffness = self.targets.stiffness.matrix(engine, errors.place)
         return energy + (errors.place * times(stiffness, errors.place)).sum(-1) / 2.0
 
 
-def times(matrix: Any, vector: Any) -> Any:
+def times(matrix: Numbers, vector: Numbers) -> Numbers:
     """(..., r, n) times (..., n)."""
     return (matrix @ vector[..., None])[..., 0]
 
@@ -148,3 +152,67 @@ def dissipates(inertia: WantedShares, damping: WantedShares) -> bool:
     if not (inertia.positive and damping.positive) or inertia.by_link is None or damping.by_link is None:
         return False
     return bool((inertia.by_link == damping.by_link).all())
+
+
+def cancelled_motions(entries: Iterable[object], structure: Structure) -> tuple[Entry, ...]:
+    """Numbers of what is chosen by name or number, None in a place standing for all that there are.
+
+    Raises ValueError for what is not there, what is always zero, and what is named twice.
+    """
+    found: dict[Entry, None] = {}
+    if isinstance(entries, str) or not isinstance(entries, Iterable):
+        raise TypeError(
+            f"{short(entries)} is to be cancelled; give a set of (joint, link, coordinate, order)"
+        )
+    for entry in entries:
+        if not isinstance(entry, tuple) or len(entry) != 4:
+            raise ValueError(f"{short(entry)} is to be cancelled; give (joint, link, coordinate, order)")
+        here = _meant(entry, structure)
+        if not here:
+            raise ValueError(
+                f"{short(entry)} is to be cancelled, but is always zero, as a joint "
+                "acts on the links that it moves"
+            )
+        if None not in entry and here[0] in found:
+            raise ValueError(f"{short(entry)} is to be cancelled twice; name it once")
+        found.update(dict.fromkeys(here))
+    if not found:
+        raise ValueError("nothing is to be cancelled; give (joint, link, coordinate, order), one or more")
+    return tuple(sorted(found))
+
+
+def _meant(entry: tuple[int | str | None, ...], structure: Structure) -> list[Entry]:
+    """All that an entry stands for and that is not always zero."""
+    joint, link, coordinate, order = entry
+    if order is not None and (isinstance(order, bool) or order not in ORDERS):
+        raise ValueError(
+            f"the order of {short(entry)} is {short(order)}; cancel 1, of velocity, or 2, of "
+            "acceleration, as gravity, as any potential, is compensated in any case"
+        )
+    i_wanted = None if joint is None else structure.joint_index(joint)
+    j_wanted = None if link is None else structure.link_index(link)
+    k_wanted = None if coordinate is None else structure.joint_index(coordinate, "coordinate")
+    return [
+        (i, j, k, m)
+        for j, path in enumerate(structure.paths)
+        for i in path
+        for k in path
+        for m in ORDERS
+        if i_wanted in (None, i) and j_wanted in (None, j) and k_wanted in (None, k) and order in (None, m)
+    ]
+
+
+def friction_width_of(given: object, passive: bool) -> float | None:
+    """A width of friction; raises ValueError for one that is no velocity, or without friction."""
+    if given is None:
+        return None
+    if isinstance(given, bool) or not isinstance(given, Real) or not 0.0 < float(given) < np.inf:
+        raise ValueError(
+            f"friction_width is {short(given)}; give a velocity above 0, in rad/s or m/s, within which "
+            "friction is smooth, or None to compensate none"
+        )
+    if not passive:
+        raise ValueError(
+            "friction_width is given, and passive=False takes friction for not being there; leave one away"
+        )
+    return float(given)

@@ -3,17 +3,16 @@
 What half of the digits are asks for, and what is refused, C judges by the same numbers (impedance.h).
 """
 
-import sys
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..answers.inertia_solve import ROUNDINGS, Told, warn_of_vague
+from ..answers.namespace import array_of, epsilon_of, hidden, namespace
 from ..chosen_names import sample_of
-from ..controllers import ROWS
-from ..sums.inertia_solve import ROUNDINGS
-from ..sums.known_digits import Told, as_array, epsilon_of, warn_of_vague
-from ..sums.namespace import hidden, namespace
+from ..interface import Namespace, Numbers
+from ..targets import ROWS
 
 SMALL = 1e3
 """Beside the root of rounding: where no pivot is less, half of the digits and more are known."""
@@ -32,8 +31,13 @@ class WantedInertia(NamedTuple):
 
 
 def solved_wanted(
-    about: WantedInertia, wanted: Any, force: Any, natural: Any, positive: bool = True, told: bool = False
-) -> Any:
+    about: WantedInertia,
+    wanted: Numbers,
+    force: Numbers,
+    natural: Numbers,
+    positive: bool = True,
+    told: bool = False,
+) -> Numbers:
     """a (..., r, X) of M* (..., r, r) and forces (..., r, X).
 
     natural: numbers (..., r), as large as those that each row of M* is made from, whose rounding is in it
@@ -45,23 +49,24 @@ def solved_wanted(
     digits. A positive matrix is judged by its own diagonal, as M is: links that are made lighter all alike
     are as well known as before.
     """
-    xp = namespace(wanted)
+    xp: Namespace = namespace(wanted)
     own, natural = abs(wanted.diagonal(0, -2, -1)), abs(natural)
     size = own if positive else xp.maximum(own, natural)
     size = xp.where(size > 0.0, size, xp.ones_like(size)) ** 0.5
     scaled = wanted / (size[..., :, None] * size[..., None, :])
     if not hidden(wanted):
-        diagonals = as_array(wanted).diagonal(0, -2, -1), as_array(natural)
-        _check(about, as_array(scaled), diagonals, positive, told)
-    if xp is np:
-        return np.linalg.solve(scaled, force / size[..., None]) / size[..., None]
-    return sys.modules["torch"].linalg.solve_ex(scaled, force / size[..., None])[0] / size[..., None]
+        diagonals = array_of(wanted).diagonal(0, -2, -1), array_of(natural)
+        _check(about, array_of(scaled), diagonals, positive, told)
+    right = force / size[..., None]
+    array = isinstance(wanted, np.ndarray)
+    moved: Numbers = xp.linalg.solve(scaled, right) if array else xp.linalg.solve_ex(scaled, right)[0]
+    return moved / size[..., None]
 
 
 def _check(
     about: WantedInertia,
-    scaled: NDArray[Any],
-    diagonals: tuple[NDArray[Any], NDArray[Any]],
+    scaled: NDArray[np.floating],
+    diagonals: tuple[NDArray[np.floating], NDArray[np.floating]],
     positive: bool,
     told: bool,
 ) -> None:
@@ -89,12 +94,12 @@ def _check(
         warn_of_vague(known, mobility, about.vague)
 
 
-def _refuse(about: WantedInertia, sample: tuple[int, ...], rows: NDArray[Any]) -> None:
+def _refuse(about: WantedInertia, sample: tuple[int, ...], rows: NDArray[np.bool_]) -> None:
     along = ", ".join(about.vague.names[r] for r in np.flatnonzero(rows).tolist())
     raise ValueError(f"{about.singular}{sample_of(sample)}: along {along}")
 
 
-def _largest_when_free(matrices: NDArray[Any]) -> NDArray[Any]:
+def _largest_when_free(matrices: NDArray[np.floating]) -> NDArray[np.floating]:
     """Of positive ones, 1 by the part of a row's inertia that is left when all others move freely (...,).
 
     It is of the row with the least pivot; infinite where one of the matrices is not positive.
@@ -108,26 +113,26 @@ def _largest_when_free(matrices: NDArray[Any]) -> NDArray[Any]:
         return _inverted(pivots.min(-1))
     unit = np.eye(matrices.shape[-1], dtype=matrices.dtype)[pivots.argmin(-1)]
     moved = np.linalg.solve(matrices, unit[..., None])[..., 0]
-    mobility: NDArray[Any] = (moved * unit).sum(-1)
+    mobility: NDArray[np.floating] = (moved * unit).sum(-1)
     return np.where(mobility > 0.0, mobility, np.inf)  # rounding may leave less than nothing
 
 
-def _largest_of_inverse(matrices: NDArray[Any]) -> NDArray[Any]:
+def _largest_of_inverse(matrices: NDArray[np.floating]) -> NDArray[np.floating]:
     """Of any, the largest number of its inverse (...,); infinite where one is exactly singular."""
     try:
-        largest: NDArray[Any] = np.abs(np.linalg.inv(matrices)).max((-2, -1))
+        largest: NDArray[np.floating] = np.abs(np.linalg.inv(matrices)).max((-2, -1))
     except np.linalg.LinAlgError:
         return _inverted(np.linalg.svd(matrices, compute_uv=False)[..., -1])
     return largest
 
 
-def _inverted(least: NDArray[Any]) -> NDArray[Any]:
+def _inverted(least: NDArray[np.floating]) -> NDArray[np.floating]:
     """1 by each, infinite for what is not above 0."""
     above = least > 0.0
     return np.where(above, 1.0 / np.where(above, least, 1.0), np.inf).astype(least.dtype)
 
 
-def _least_along(matrix: NDArray[Any], symmetric: bool) -> NDArray[Any]:
+def _least_along(matrix: NDArray[np.floating], symmetric: bool) -> NDArray[np.floating]:
     """The rows (r,) along which a matrix is the least."""
     if symmetric:
         return np.asarray(np.linalg.eigh(matrix)[1][:, 0])

@@ -11,25 +11,125 @@ f moves, J_f = m_f s + z x h_f and dJ_f/dt = m_f sd + zd x h_f + z x hd_f.
 A force F and a moment M on a point ask joint f for -J_f^T (M, F) = -(z . M + (s + z x x) . F).
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
-from ..rule.kinematics import Poses, Twists, around, cross, joint_screws, poses, product, taken, twists
+import numpy as np
+from numpy.typing import NDArray
+
+from ..interface import Namespace, Numbers
+from ..rule.joint_tree import JointTree
+from ..rule.kinematics import (
+    KinematicTables,
+    Poses,
+    Twists,
+    around,
+    cross,
+    joint_screws,
+    kinematic_tables,
+    poses,
+    product,
+    taken,
+    twists,
+)
 from ..rule.tree_arrays import TreeArrays
-from .frame_tables import FrameTables
+
+
+class FrameTables(NamedTuple):
+    """Constants of some frames and of the joints before them; behind all joints stands the ground."""
+
+    joints: KinematicTables
+    from_world: KinematicTables
+    """The same, with places counted from the world's origin instead of the first hinge of a path."""
+    chosen: Numbers
+    """Which of the tree's joints these are, and its ground."""
+    carriers: Numbers
+    """Of each frame, which of these joints moves it."""
+    frames: Numbers
+    """Which of the tree's frames these are."""
+    rotations: Numbers
+    """From the axes of each frame to those of its carrier, (3, 3, frames, 1)."""
+    columns: tuple[Numbers, ...]
+    """Joints of each coordinate, the first of each, then the second of each, ...; the ground for none."""
+    carried: Numbers
+    """(joints, frames): ones where a joint moves a frame."""
+
+    @property
+    def moved(self) -> int:
+        """Number of joints and frames, by which the memory of a call grows."""
+        return len(self.joints.parents) + len(self.carriers)
+
+
+def frame_tables(tree: JointTree, n: int, frames: Sequence[int]) -> FrameTables:
+    """Tables of some of a tree's frames, in float64."""
+    some = [tree.frames[f] for f in frames]
+    rotations = np.array([frame.rotation for frame in some])
+    return _tables(tree, n, [frame.joint for frame in some], frames, rotations)
+
+
+def link_tables(tree: JointTree, n: int) -> FrameTables:
+    """Tables of all links, whose frames are those of their joints."""
+    links = tree.links
+    rotations = np.array([np.eye(3)] * len(links))
+    return _tables(tree, n, [link.joint for link in links], range(len(links)), rotations)
+
+
+def _tables(
+    tree: JointTree,
+    n: int,
+    carriers: Sequence[int | None],
+    frames: Sequence[int],
+    rotations: NDArray[np.float64],
+) -> FrameTables:
+    chains = [tree.chain(carrier) for carrier in carriers]
+    chosen = sorted({joint for chain in chains for joint in chain})
+    at = {joint: position for position, joint in enumerate(chosen)}
+    joints = tuple(
+        joint._replace(parent=None if joint.parent is None else at[joint.parent])
+        for joint in (tree.joints[f] for f in chosen)
+    )
+    part, ground = kinematic_tables(replace(tree, joints=joints)), len(chosen)
+    carried = np.zeros((ground + 1, len(carriers)))
+    for frame, chain in enumerate(chains):
+        carried[[at[joint] for joint in chain], frame] = 1.0
+    return FrameTables(
+        part,
+        part._replace(behind=np.ones_like(part.behind)),
+        np.array([*chosen, len(tree.joints)]),
+        np.array([ground if carrier is None else at[carrier] for carrier in carriers]),
+        np.array(frames),
+        rotations.transpose(1, 2, 0)[..., None],
+        tuple(_columns([joint.coordinate for joint in joints], n)),
+        carried,
+    )
+
+
+def _columns(coordinates: Sequence[int], n: int) -> Sequence[NDArray[np.intp]]:
+    own = [[f for f, k in enumerate(coordinates) if k == wanted] for wanted in range(n)]
+    most, ground = max(map(len, own)), len(coordinates)
+    return [
+        np.array([joints[r] if r < len(joints) else ground for joints in own]) for r in range(max(1, most))
+    ]
 
 
 class Carried(NamedTuple):
     """Joints where they are, and frames on them."""
 
     joints: Poses
-    axes: Any
+    axes: Numbers
     """Of the frames, (3, 3, frames, samples): [component, axis]."""
-    places: Any
+    places: Numbers
     """Of their origins, (3, frames, samples)."""
 
 
 def carried(
-    xp: Any, tables: FrameTables, numbers: TreeArrays, offsets: Any, q: Any, from_world: bool = False
+    xp: Namespace,
+    tables: FrameTables,
+    numbers: TreeArrays,
+    offsets: Numbers,
+    q: Numbers,
+    from_world: bool = False,
 ) -> Carried:
     """Forward kinematics of frames.
 
@@ -43,26 +143,28 @@ def carried(
     return Carried(placed, product(axes, tables.rotations), places)
 
 
-def point_at(found: Carried, point: Any) -> Any:
+def point_at(found: Carried, point: Numbers | None) -> Numbers:
     """Where points (3, frames, samples) are, which are given in the axes of the frames."""
     return found.places if point is None else found.places + turned(found.axes, point)
 
 
-def homogeneous(xp: Any, found: Carried) -> Any:
+def homogeneous(xp: Namespace, found: Carried) -> Numbers:
     """Matrices (4, 4, frames, samples) from the frames' coordinates to the world's."""
     upper = xp.concat([found.axes, found.places[:, None]], 1)
     zero = xp.zeros_like(upper[:1, :1])
     return xp.concat([upper, xp.concat([zero, zero, zero, zero + 1.0], 1)], 0)
 
 
-def jacobian(xp: Any, tables: FrameTables, found: Carried, x: Any) -> Any:
+def jacobian(xp: Namespace, tables: FrameTables, found: Carried, x: Numbers) -> Numbers:
     """Of a point at x (3, 1, samples) of one frame, (6, n, samples)."""
     screws = joint_screws(xp, tables.joints, found.joints)
     z, s = screws[:, 0], screws[:, 1]
     return by_coordinate(tables, xp.concat([z[:3], s[:3] + cross(z, around(xp, x))], 0))
 
 
-def load_torque(xp: Any, tables: FrameTables, found: Carried, x: Any, force: Any, moment: Any) -> Any:
+def load_torque(
+    xp: Namespace, tables: FrameTables, found: Carried, x: Numbers, force: Numbers, moment: Numbers | None
+) -> Numbers:
     """What a force, and a moment or None, (3, 1, samples) each, on a point at x ask of coordinates.
 
     Of one frame, (n, samples).
@@ -76,12 +178,12 @@ def load_torque(xp: Any, tables: FrameTables, found: Carried, x: Any, force: Any
 
 
 def moving(
-    xp: Any,
+    xp: Namespace,
     tables: FrameTables,
     numbers: TreeArrays,
     found: Carried,
-    qd: Any,
-    qdd: Any = None,
+    qd: Numbers,
+    qdd: Numbers | None = None,
     from_world: bool = False,
 ) -> Twists:
     """Screws and motion of the joints, without gravity; qd, qdd: (n, samples), no qdd for none."""
@@ -91,7 +193,7 @@ def moving(
     return twists(xp, joints, found.joints, 0.0 * numbers.gravity, velocity, acceleration)
 
 
-def jacobian_rate(xp: Any, tables: FrameTables, moved: Twists, x: Any) -> Any:
+def jacobian_rate(xp: Namespace, tables: FrameTables, moved: Twists, x: Numbers) -> Numbers:
     """Rate of `jacobian`, (6, n, samples)."""
     zd, sd = moved.rates[:, 0], moved.rates[:, 1]
     xd = point_velocity(xp, of_frames(tables, moved.twists), x)
@@ -99,13 +201,13 @@ def jacobian_rate(xp: Any, tables: FrameTables, moved: Twists, x: Any) -> Any:
     return by_coordinate(tables, xp.concat([zd[:3], linear], 0))
 
 
-def velocity_of(xp: Any, tables: FrameTables, moved: Twists, x: Any) -> Any:
+def velocity_of(xp: Namespace, tables: FrameTables, moved: Twists, x: Numbers) -> Numbers:
     """(omega, xd) of points, (6, frames, samples)."""
     twist = of_frames(tables, moved.twists)
     return xp.concat([twist[:3, 0], point_velocity(xp, twist, x)], 0)
 
 
-def acceleration_of(xp: Any, tables: FrameTables, moved: Twists, x: Any) -> Any:
+def acceleration_of(xp: Namespace, tables: FrameTables, moved: Twists, x: Numbers) -> Numbers:
     """(alpha, xdd) of points, (6, frames, samples): xdd = a + alpha x x + omega x xd."""
     twist, change = (of_frames(tables, a) for a in (moved.twists, moved.accelerations))
     xd = around(xp, point_velocity(xp, twist, x))
@@ -113,19 +215,21 @@ def acceleration_of(xp: Any, tables: FrameTables, moved: Twists, x: Any) -> Any:
     return xp.concat([change[:3, 0], linear], 0)
 
 
-def centre_of_mass(masses: Any, found: Carried) -> Any:
+def centre_of_mass(masses: Numbers, found: Carried) -> Numbers:
     """Of all links, (3, samples)."""
     return (_shares(masses) * found.places).sum(1)
 
 
-def centre_jacobian(xp: Any, tables: FrameTables, masses: Any, found: Carried) -> Any:
+def centre_jacobian(xp: Namespace, tables: FrameTables, masses: Numbers, found: Carried) -> Numbers:
     """Jacobian of the centre of mass, (3, n, samples)."""
     screws = joint_screws(xp, tables.joints, found.joints)
     mass, moment = _behind(tables, masses, found.places)
     return by_coordinate(tables, mass * screws[:3, 1] + cross(screws[:, 0], around(xp, moment)))
 
 
-def centre_jacobian_rate(xp: Any, tables: FrameTables, masses: Any, found: Carried, moved: Twists) -> Any:
+def centre_jacobian_rate(
+    xp: Namespace, tables: FrameTables, masses: Numbers, found: Carried, moved: Twists
+) -> Numbers:
     """Its rate, (3, n, samples)."""
     speeds = point_velocity(xp, of_frames(tables, moved.twists), found.places)
     mass, moment = _behind(tables, masses, found.places)
@@ -135,33 +239,33 @@ def centre_jacobian_rate(xp: Any, tables: FrameTables, masses: Any, found: Carri
     return by_coordinate(tables, linear)
 
 
-def _shares(masses: Any) -> Any:
+def _shares(masses: Numbers) -> Numbers:
     """m_j / m, (N, samples)."""
     return masses / masses.sum(0)
 
 
-def _behind(tables: FrameTables, masses: Any, vectors: Any) -> tuple[Any, Any]:
+def _behind(tables: FrameTables, masses: Numbers, vectors: Numbers) -> tuple[Numbers, Numbers]:
     """Sums over the links that each joint moves: of their shares m_j / m, and of these times vectors."""
     shares = _shares(masses)
     return tables.carried @ shares, tables.carried @ (shares * vectors)
 
 
-def of_frames(tables: FrameTables, twists: Any) -> Any:
+def of_frames(tables: FrameTables, twists: Numbers) -> Numbers:
     """Those of the joints that carry the frames."""
     return taken(twists, tables.carriers)
 
 
-def point_velocity(xp: Any, twist: Any, x: Any) -> Any:
+def point_velocity(xp: Namespace, twist: Numbers, x: Numbers) -> Numbers:
     """v + omega x x."""
     return twist[:3, 1] + cross(twist[:, 0], around(xp, x))
 
 
-def turned(axes: Any, vector: Any) -> Any:
+def turned(axes: Numbers, vector: Numbers) -> Numbers:
     """Matrices (3, 3, ...) times vectors (3, ...)."""
     return axes[:, 0] * vector[0] + axes[:, 1] * vector[1] + axes[:, 2] * vector[2]
 
 
-def by_coordinate(tables: FrameTables, columns: Any) -> Any:
+def by_coordinate(tables: FrameTables, columns: Numbers) -> Numbers:
     """Columns (..., joints, samples) summed over the joints of each coordinate, (..., n, samples)."""
     first, *others = tables.columns
     total = taken(columns, first)

@@ -1,17 +1,17 @@
 """Lagrangians differentiated by torch."""
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, ClassVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, ClassVar, cast
 
 import torch
 from torch import Tensor
 
-from ..arrays.run_time_values import RunTimeValues
 from ..arrays.torch_backend import TorchBackend
+from ..arrays.torch_modules import RunTimeValues
+from ..interface import Numbers
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays
 from ..structure import Structure
-from ..sums.sum_answers import SumAnswers
 from .energy_interface import Energies, Parameters, numbers_of
 from .functional_sweeps import decomposition_followed, energies, position_gradient_followed, torque_followed
 from .graph_calls import graph_of, graph_parts_of
@@ -42,60 +42,58 @@ class AutogradBackend(TorchBackend):
     ) -> None:
         super().__init__(structure, (), {}, tree=tree)
         self.modules, self.given = modules, given
-        self.parameters: Any = given
+        self.parameters = cast("Mapping[str, Any]", given)
 
-    def answers(self, check_finite: bool) -> SumAnswers:
-        """The calls of `Dynamics`."""
-        return _Answers(self.structure, self, check_finite)
-
-    def numbers(self) -> Iterable[Tensor]:
-        """All tensors that the energies hang on, beside the motion."""
-        sources: dict[int, Any] = {id(self.given): self.given}
+    def read_beside_motion(self) -> Iterable[Tensor]:
+        """All tensors that the energies hang on, beside the motion: constants of links too."""
+        sources: dict[int, torch.nn.Module] = {id(self.given): self.given}
         for link in self.modules:
-            at: Any = link
+            at: Energies | None = link
             while at is not None and id(at) not in sources:
-                sources[id(at)] = at
+                sources[id(at)] = cast(torch.nn.Module, at)
                 at = at.before
         return numbers_of(tuple(sources.values()))
 
     def seen_by(self, q: Tensor) -> Parameters:
         """Parameters and constants as a call computes with them."""
-        wanted = torch.is_grad_enabled() and any(t.requires_grad for t in self.numbers())
+        wanted = torch.is_grad_enabled() and any(t.requires_grad for t in self.read_beside_motion())
         return Parameters(self._values(q), q[..., 0], wanted)
 
-    def tree_numbers(self, own: tuple[TreeArrays, Any], q: Tensor) -> TreeArrays:
+    def tree_numbers(self, own: tuple[TreeArrays, Numbers], q: Numbers) -> TreeArrays:
         """The tree's numbers, those in place of its own that the modules of the links have."""
         numbers = super().tree_numbers(own, q)
-        translations, masses, centres = (list(a.unbind(-2)) for a in numbers[1:4])
+        translations, masses, centres = (list(cast(Tensor, a).unbind(-2)) for a in numbers[1:4])
+        like = cast(Tensor, q)
         for j, link in enumerate(self.modules):
             held: Any = link
             for joint, name in held.places.items():
-                translations[joint] = getattr(held, name).to(q)[:, None]
+                translations[joint] = getattr(held, name).to(like)[:, None]
             if "mass" in held.constants:
-                masses[j] = held.mass.to(q)[None]
+                masses[j] = held.mass.to(like)[None]
             if "com" in held.constants:
-                centres[j] = held.com.to(q)[:, None]
+                centres[j] = held.com.to(like)[:, None]
         found = (_side_by_side(rows) for rows in (translations, masses, centres))
         return numbers._replace(**dict(zip(("translations", "masses", "centres"), found, strict=True)))
 
-    def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
+    def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         parts: Sequence[Tensor] = self._of_links((decomposition, decomposition_followed), q, qd, qdd)
         return parts
 
-    def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+    def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """tau (..., count) in the order of `Layout.torque`."""
         tau: Tensor = self._of_links((torque, torque_followed), q, qd, qdd)
         return tau
 
-    def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+    def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """c0 (..., count) in the order of `Layout.velocity`."""
         c0: Tensor = self._of_links((position_gradient, position_gradient_followed), q, qd, qdd)
         return c0
 
-    def energies(self, q: Tensor, qd: Tensor) -> tuple[Tensor, Tensor]:
+    def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
         """Kinetic and potential energies of the links in J, (..., N) each."""
-        kinetic, potential = energies(tuple(self.modules), q, qd, self.seen_by(q))
+        at = cast(Tensor, q)
+        kinetic, potential = energies(tuple(self.modules), at, cast(Tensor, qd), self.seen_by(at))
         return kinetic.movedim(0, -1), potential.movedim(0, -1)
 
     def graph(self, *asked: Any) -> Any:
@@ -106,9 +104,10 @@ class AutogradBackend(TorchBackend):
         """See `Dynamics.graph_parts`."""
         return graph_parts_of(self, *asked)
 
-    def _of_links(self, calls: tuple[Call, Call], q: Tensor, qd: Tensor, qdd: Tensor) -> Any:
+    def _of_links(self, calls: tuple[Call, Call], *motion: Numbers) -> Any:
         """What a function of sweeps.py makes of the Lagrangians, or its like where the call is followed."""
         links, (sweep, followed) = tuple(self.modules), calls
+        q, qd, qdd = cast("tuple[Tensor, Tensor, Tensor]", motion)
         if torch.compiler.is_exporting():
             # It records sweeps as they run, for any number of samples, but no torch.func within another.
             return sweep(links, self.seen_by(q), q, qd, qdd)
@@ -143,13 +142,3 @@ def _in_pieces(call: Callable[..., Any], p: Parameters, motion: Sequence[Tensor]
     if torch.is_tensor(parts[0]):
         return torch.cat(parts).reshape(*batch, -1)
     return [torch.cat(part).reshape(*batch, part[0].shape[-1]) for part in zip(*parts, strict=True)]
-
-
-class _Answers(SumAnswers):
-    """Calls that refuse `out` also where a constant of a link is learned."""
-
-    def read_beside_motion(self) -> Iterable[Any]:
-        """Tensors that results hang on, beside the motion."""
-        backend: Any = self._backend
-        tensors: Iterable[Any] = backend.numbers()
-        return tensors

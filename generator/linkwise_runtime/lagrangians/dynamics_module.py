@@ -6,16 +6,17 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
-from ..arrays.run_time_values import RunTimeValues
+from ..arrays.array_backend import ArrayBackend
+from ..arrays.torch_modules import RunTimeValues
+from ..door import Door
 from ..dynamics import Dynamics
-from ..interface import Backend
 from ..rule.rule_calls import RigidRule
 from ..structure import Structure
 from .autograd_backend import AutogradBackend
 from .link_modules import LinkModules, links_and_values
 from .partial_lagrangian import PartialLagrangian
 
-MADE_ANEW = ("structure", "backend", "layout", "_load", "_asked", "_answers", "kinematics", "constraints")
+MADE_ANEW = ("structure", "backend", "layout", "_load", "_asked", "door", "kinematics", "constraints")
 """What a copy does not take over: it has its own."""
 
 
@@ -36,7 +37,7 @@ class DynamicsModule(Dynamics, torch.nn.Module):
     def __init__(
         self,
         structure: Structure,
-        backend: Backend[Any],
+        backend: ArrayBackend,
         load: Callable[..., Dynamics],
         asked: tuple[Any, ...],
         check_finite: bool = False,
@@ -59,15 +60,16 @@ class DynamicsModule(Dynamics, torch.nn.Module):
         """Pickled, copied or sent to another process, it is loaded again there, with this one's modules."""
         name, _, *asked = self._asked
         state = {key: value for key, value in vars(self).items() if key not in MADE_ANEW}
-        return self._load, (name, None, *asked), state
+        return self._load, (name, None, *asked), (state, self.check_finite)
 
     def __setstate__(self, state: Any) -> None:
         """Take over the modules of the robot that this one is a copy of, and whatever else was set there."""
-        vars(self).update(state)
+        kept, check_finite = state
+        vars(self).update(kept)
         kind: Any = type(self.backend)
         own: Any = self.backend
         self.backend = kind(own.structure, self.links, self.values, own.tree)
-        self._answers = self.backend.answers(self.check_finite)
+        self.door = Door(self.structure, self.backend, check_finite)
 
 
 class BackendOfLinks(AutogradBackend):

@@ -1,6 +1,6 @@
 """What the energies of a link are asked with: coordinates, and the run-time parameters of the robot."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 import torch
@@ -8,6 +8,11 @@ from torch import Tensor
 from torch.utils._python_dispatch import _get_current_dispatch_mode
 
 from .recording import transformed
+
+Number = Tensor | float
+"""One number for all samples, or a tensor of one value or of one a sample."""
+Nested = Number | Sequence["Nested"]
+"""A number, or numbers in lists of lists, as `Tensor.tolist` nests them."""
 
 
 class Values(Protocol):
@@ -29,11 +34,11 @@ class Parameters(Mapping[str, Tensor]):
         values: Mapping[str, Tensor],
         like: Tensor,
         wanted: bool,
-        learned: Mapping[torch.nn.Module, Mapping[str, Any]] | None = None,
+        learned: Mapping[torch.nn.Module, Mapping[str, Nested]] | None = None,
     ) -> None:
         self._values, self.like, self.wanted, self._learned = values, like, wanted, learned or {}
         self._followed = transformed() or _get_current_dispatch_mode() is not None
-        self._constants: dict[torch.nn.Module, dict[str, Any]] = {}
+        self._constants: dict[torch.nn.Module, dict[str, Nested]] = {}
 
     def __getitem__(self, name: str) -> Tensor:
         return self._values[name]
@@ -59,7 +64,7 @@ class Parameters(Mapping[str, Tensor]):
             }
         return self._constants[module]
 
-    def _seen(self, tensor: Tensor) -> Any:
+    def _seen(self, tensor: Tensor) -> Nested:
         followed = self._followed or (self.wanted and tensor.requires_grad)
         return tensor.to(self.like) if followed or tensor.device.type != "cpu" else tensor.tolist()
 
@@ -76,17 +81,17 @@ class Energies(Protocol):
         """Whether the kinetic energy has terms linear in the velocities."""
 
     @property
-    def before(self) -> Any:
+    def before(self) -> "Energies | None":
         """The link that carries this one, None where their energies share no work."""
 
-    def kinetic(self, q: Values, qd: Values, p: Parameters) -> Any:
+    def kinetic(self, q: Values, qd: Values, p: Parameters) -> Number:
         """Kinetic energy: a tensor of the coordinates' shape, or one number for all."""
 
-    def potential(self, q: Values, p: Parameters) -> Any:
+    def potential(self, q: Values, p: Parameters) -> Number:
         """Potential energy, likewise."""
 
 
-def numbers_of(sources: "tuple[torch.nn.Module, ...]") -> Iterator[Tensor]:
+def numbers_of(sources: Iterable[torch.nn.Module]) -> Iterator[Tensor]:
     """Every tensor that these modules hold, their own modules' too."""
     for source in sources:
         for module in source.modules() if source._modules else (source,):

@@ -6,22 +6,52 @@ every component of every vector, so they ask little, and ask it in place.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import torch
+from torch import Tensor
 
-from .energy_interface import Values
-from .joint_curve import JointCurve
+from .energy_interface import Number, Values
 
-Number = Any
-"""A float, or a tensor of one value or of one a sample."""
-Vector = Sequence[Number]
+Vector = Sequence[Number] | Tensor
 Triple = tuple[Number, Number, Number]
 Signed = tuple[float, Number]
 """A sign, 1.0 or -1.0, and what it stands before."""
 
 GROUND = (0.0, 0.0, 0.0)
 """Velocity and angular velocity of what everything hangs on."""
+
+
+class JointCurve:
+    """Polynomials in q - start, each from its start on; the first one holds before its start too.
+
+    pieces: coefficients of powers 0, 1, 2, ... for rad or m
+    """
+
+    def __init__(self, starts: Sequence[float], pieces: Sequence[Sequence[float]]) -> None:
+        size = max(2, *map(len, pieces))
+        filled = torch.tensor(
+            [(*piece, *[0.0] * (size - len(piece))) for piece in pieces], dtype=torch.float64
+        )
+        self._starts = torch.tensor(starts, dtype=torch.float64)
+        self._pieces = torch.cat([self._starts[:, None], filled], 1)
+        self._slopes = torch.cat([self._starts[:, None], (filled * torch.arange(size))[:, 1:]], 1)
+
+    def __call__(self, q: Tensor) -> Tensor:
+        """What the joint moves by."""
+        return self._value(q, self._pieces)
+
+    def slope(self, q: Tensor) -> Tensor:
+        """How that changes with q."""
+        return self._value(q, self._slopes)
+
+    def _value(self, q: Tensor, pieces: Tensor) -> Tensor:
+        """For rows of a start and the coefficients from there on."""
+        piece = (q.detach().unsqueeze(-1) >= self._starts[1:].to(q)).sum(-1)
+        start, *coefficients = torch.nn.functional.embedding(piece, pieces.to(q)).unbind(-1)
+        value = coefficients[-1]
+        for coefficient in reversed(coefficients[:-1]):
+            value = value * (q - start) + coefficient
+        return value
 
 
 class Axes:
@@ -54,7 +84,7 @@ class Turn:
 
     def __init__(self, axes: Axes, q: Values, k: int, ratio: float, curve: JointCurve | None) -> None:
         self._axes, self._q, self._k, self._ratio, self._curve = axes, q, k, ratio, curve
-        self._sine_and_cosine: tuple[Any, Any] | None = None
+        self._sine_and_cosine: tuple[Tensor, Tensor] | None = None
 
     def __call__(self, a: Vector) -> Triple:
         """The vector in the axes behind the joint."""
@@ -66,7 +96,7 @@ class Turn:
         s, c = self._sine_and_cosine or self._trigonometry()
         return _two(i, c, x, k, s, y), _two(k, c, y, -i, s, x), z
 
-    def _trigonometry(self) -> tuple[Any, Any]:
+    def _trigonometry(self) -> tuple[Tensor, Tensor]:
         """Sine and cosine of the angle, once, where they are needed."""
         moved = self._curve(self._q[self._k]) if self._curve else self._q[self._k]
         angle = moved if self._ratio == 1.0 else self._ratio * moved
@@ -102,7 +132,7 @@ def _dot(column: Sequence[float], a: Vector) -> Number:
     return value
 
 
-def _two(i: float, f: Number, x: Number, k: float, g: Number, y: Number) -> Number:
+def _two(i: float, f: Tensor, x: Number, k: float, g: Tensor, y: Number) -> Number:
     """i f x + k g y with signs i and k."""
     if y.__class__ is float and y == 0.0:
         return f * x if i > 0.0 else -(f * x)

@@ -1,11 +1,11 @@
 """The modules of a robot's links, by number or by name."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from typing import Any, cast
+from typing import cast
 
 import torch
 
-from ..arrays.run_time_values import RunTimeValues, attribute_names
+from ..arrays.torch_modules import RunTimeValues, attribute_names
 from ..chosen_names import choice, position_of, short
 from ..structure import Structure
 from .partial_lagrangian import PartialLagrangian
@@ -42,13 +42,13 @@ class LinkModules(torch.nn.Module):
 def links_and_values(
     structure: Structure,
     kinds: Sequence[type[PartialLagrangian]],
-    values: Mapping[str, Any],
+    values: Mapping[str, object],
     requires_grad: bool | str | Iterable[str],
 ) -> tuple[LinkModules, RunTimeValues]:
     """One module a link, and what they share; `requires_grad` as the package's `load` says."""
     rigid = any(issubclass(kind, RigidLagrangian) for kind in kinds)
     learned = learned_names(requires_grad, values, rigid)
-    given, made = RunTimeValues(values, learned), dict[Any, PartialLagrangian]()
+    given, made = RunTimeValues(values, learned), dict[type[PartialLagrangian] | None, PartialLagrangian]()
     for j, kind in enumerate(kinds):
         made[kind] = kind(structure.only(j), given, made.get(kind.parent), learned)
     if not isinstance(requires_grad, bool):
@@ -74,7 +74,7 @@ def learned_names(asked: bool | str | Iterable[str], parameters: Iterable[str], 
 
 
 def _refuse_idle(
-    kinds: Iterable[str], modules: Collection[PartialLagrangian], parameters: Mapping[str, Any]
+    kinds: Iterable[str], modules: Collection[PartialLagrangian], parameters: Mapping[str, object]
 ) -> None:
     """Raise ValueError for a kind of constants that no link has, as they hang on run-time parameters."""
     for kind in sorted(kinds):

@@ -1,16 +1,16 @@
 """The Lagrangian of one link as a torch module."""
 
-from collections.abc import Collection
-from typing import Any, ClassVar
+from collections.abc import Collection, Sequence
+from typing import Any, ClassVar, cast
 
 import torch
 from torch import Tensor
 
-from ..arrays.run_time_values import RunTimeValues
+from ..arrays.torch_modules import RunTimeValues
 from ..quantities import Coefficients
 from ..structure import Structure
 from .autograd_backend import AutogradBackend
-from .energy_interface import Parameters, Values
+from .energy_interface import Number, Parameters, Values
 from .functional_sweeps import lagrangians
 
 
@@ -43,37 +43,39 @@ class PartialLagrangian(torch.nn.Module):
         super().__init__()
         self._before = (before,)
         self._backend = AutogradBackend(alone, (self,), given)
-        self._answers = self._backend.answers(check_finite=False)
 
     @property
     def before(self) -> Any:
         """Module of the link that carries this one, None where their energies share no work."""
         return self._before[0]
 
-    def kinetic(self, q: Values, qd: Values, p: Parameters) -> Any:
+    def kinetic(self, q: Values, qd: Values, p: Parameters) -> Number:
         """Kinetic energy in J."""
         raise NotImplementedError
 
-    def potential(self, q: Values, p: Parameters) -> Any:
+    def potential(self, q: Values, p: Parameters) -> Number:
         """Potential energy in J."""
         raise NotImplementedError
 
     def forward(self, q: Tensor, qd: Tensor) -> Tensor:
         """Lagrangian in J, shape (...); q and qd of shape (..., n)."""
-        q, qd = self._backend.arrays({"q": q, "qd": qd}, self._backend.structure.n)
-        return lagrangians((self,), q, qd, self._backend.seen_by(q))[0]
+        at, moved = self._read(q=q, qd=qd)
+        return lagrangians((self,), at, moved, self._backend.seen_by(at))[0]
 
     def energies(self, q: Tensor, qd: Tensor) -> tuple[Tensor, Tensor]:
         """Kinetic and potential energy in J, shape (...) each."""
-        kinetic, potential = self._answers.energy(q, qd)
-        return kinetic[..., 0], potential[..., 0]
+        kinetic, potential = self._backend.answers.energy(*self._read(q=q, qd=qd))
+        return cast(Tensor, kinetic[..., 0]), cast(Tensor, potential[..., 0])
 
     def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """tau_ij of this link j, the torque on each joint i through it, shape (..., n)."""
-        tau: Tensor = self._answers.partial_torque(q, qd, qdd)
-        return tau[..., 0]
+        (tau,) = self._backend.answers.partial_torque(*self._read(q=q, qd=qd, qdd=qdd))
+        return cast(Tensor, tau[..., 0])
 
     def coefficients(self, q: Tensor, qd: Tensor) -> Coefficients[Tensor]:
         """c2_ik and c1_ik (..., n, n) and g_i (..., n) of this link, in the closing convention."""
-        c2, c1, g = self._answers.coefficients(q, qd)
-        return Coefficients(c2[..., 0, :], c1[..., 0, :], g[..., 0])
+        c2, c1, g = self._backend.answers.coefficients(*self._read(q=q, qd=qd))
+        return Coefficients(*(cast(Tensor, a) for a in (c2[..., 0, :], c1[..., 0, :], g[..., 0])))
+
+    def _read(self, **named: Tensor) -> Sequence[Tensor]:
+        return cast("Sequence[Tensor]", self._backend.arrays(named, self._backend.structure.n))

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -49,7 +48,11 @@ def variable(a: Tensor) -> Tensor:
 
 
 def gradient(
-    values: Sequence[Any], weights: Sequence[Tensor] | None, inputs: Sequence[Tensor], keep: bool, last: bool
+    values: Sequence[Tensor | float],
+    weights: Sequence[Tensor] | None,
+    inputs: Sequence[Tensor],
+    keep: bool,
+    last: bool,
 ) -> Sequence[Tensor]:
     """Gradients of the weighted sum of `values`, of their sum if no weights are given.
 

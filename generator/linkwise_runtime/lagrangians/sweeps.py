@@ -23,8 +23,7 @@ import torch
 from torch import Tensor
 
 from .energy_interface import Energies, Parameters
-from .lane_entries import NOWHERE, Indices, LaneEntries, Rows, pick
-from .lanes import Leaf, Motion, Plan
+from .lanes import NOWHERE, Indices, LaneEntries, Leaf, Motion, Plan, Rows, pick
 from .recording import Recording, gradient, variable
 
 Links = Sequence[Energies]

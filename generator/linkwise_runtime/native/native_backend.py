@@ -1,43 +1,102 @@
 """Compiled C on NumPy arrays and torch CPU tensors."""
 
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar, cast
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..answers.answers import Answers
 from ..arguments import has_tensors
+from ..arrays.array_backend import ArrayBackend
 from ..arrays.numpy_backend import NumpyBackend
-from ..constraints.chosen_constraints import ChosenConstraints
-from ..control.controls import Controls
-from ..interface import ClosedForms
+from ..call_table import CALLS
+from ..control.frame_impedance import FrameTargets
+from ..control.joint_impedance import JointTargets
+from ..interface import ClosedForms, Numbers
+from ..packed_engine import TorqueOfOne
 from ..rule.rule_calls import RigidRule
 from ..structure import Structure
-from .native_answers import NativeAnswers
-from .native_calls import NativeCalls, checked_threads
-from .native_control import ControlCalls, NativeKinematics
-from .native_impedance import NativeControlAnswers
-from .native_ties import NativeTieRows
+from .native_calls import FUNCTIONS, NativeCalls, checked_threads
+from .native_control import ControlCalls, NativeTorque
+from .native_memory import NumberArray, NumberType
+from .native_module import QuickCalls
 
 if TYPE_CHECKING:
     from .native_torch import TorchSide
 
 
+Arrays = Sequence[NumberArray]
+
+
+class NativeAnswers(Answers):
+    """The rows that C has for arrays; the others are made of these."""
+
+    contiguous = True
+
+    def __init__(self, engine: ArrayBackend, quick: QuickCalls, control: ControlCalls | None) -> None:
+        """control: C functions that take one sample; links of energies have none."""
+        super().__init__(engine)
+        self._quick, self._control, self._tied = quick, control, engine.ties_joints
+
+    def compute_into(self, call: str, motion: Sequence[Numbers], into: Sequence[Numbers]) -> None:
+        """Compute a call's results where these arrays lie."""
+        if call in FUNCTIONS:
+            self._quick.run(call, cast(Arrays, motion), cast(Arrays, into))
+        else:
+            super().compute_into(call, motion, into)
+
+    def mass_matrix(self, q: Numbers) -> Sequence[Numbers]:
+        """M."""
+        found = self._of_one("mass_matrix", (q,))
+        return super().mass_matrix(q) if found is None else (found,)
+
+    def forward_dynamics(self, q: Numbers, qd: Numbers, tau: Numbers) -> Sequence[Numbers]:
+        """Where C finds M singular, arrays say what is wrong."""
+        found = self._accelerated("forward_dynamics", q, qd, tau)
+        return super().forward_dynamics(q, qd, tau) if found is None else (found,)
+
+    def forward_dynamics_of_links(self, q: Numbers, qd: Numbers, tau: Numbers) -> Sequence[Numbers]:
+        """The same; C has it apart where joints have anything of their own."""
+        call = "forward_dynamics_of_links" if self._structure.passive else "forward_dynamics"
+        found = self._accelerated(call, q, qd, tau)
+        return super().forward_dynamics_of_links(q, qd, tau) if found is None else (found,)
+
+    def _accelerated(self, call: str, *motion: Numbers) -> Numbers | None:
+        """What C answers; None where it has no such function, as of joints that are tied."""
+        return None if self._tied else self._of_one(call, motion)
+
+    def _of_one(self, call: str, motion: Sequence[Numbers]) -> Numbers | None:
+        return None if self._control is None else self._control.answer(call, motion)
+
+
+def _of_c(key: str) -> Callable[..., Sequence[Numbers]]:
+    """A row that C has."""
+
+    def row(self: NativeAnswers, *motion: Numbers) -> Sequence[Numbers]:
+        return self._quick.run(key, cast(Arrays, motion))
+
+    return row
+
+
+for _name in FUNCTIONS.keys() & CALLS.keys():
+    setattr(NativeAnswers, _name, _of_c(_name))
+
+
 class NativeBackend(NumpyBackend):
-    """Arrays for arrays, tensors for tensors; each parameter is one number for all samples."""
+    """Arrays for arrays, of which this is what computes, tensors for tensors, on a side of their own.
+
+    Each parameter is one number for all samples.
+    """
 
     name: ClassVar = "native"
-    takes_tensors: ClassVar = False
 
     def __init__(
         self,
         structure: Structure,
         sources: Path,
         links: Sequence[ClosedForms] | None,
-        parameters: Mapping[str, Any],
+        parameters: Mapping[str, float | Numbers],
         rule: RigidRule | None = None,
     ) -> None:
         """`sources` is the package's folder of C; `links` or `rule` serve torch, which differentiates them.
@@ -45,13 +104,15 @@ class NativeBackend(NumpyBackend):
         Compiles at the first call for this package; raises RuntimeError where that cannot be.
         """
         super().__init__(structure, links, {}, rule)
-        self.forms = links
+        self._forms = links
         self.parameters = dict(parameters)
         self.calls = NativeCalls(structure, sources, parameters)
-        self.control = ControlCalls(self.calls)
-        self._torch_side: TorchSide | None = None
+        self.quick = QuickCalls(self.calls)
+        self.direct = self.quick.direct()
+        self.at_once = None if self.direct else self.calls.at_once
+        self.one_sample = None if self.tree is None else ControlCalls(self.calls)
         if "torch" in sys.modules:
-            self.examples = self.on_torch().examples
+            _ = self.on_torch  # a compiler could not trace how it is made
 
     @property
     def threads(self) -> int:
@@ -61,114 +122,54 @@ class NativeBackend(NumpyBackend):
     @threads.setter
     def threads(self, count: int) -> None:
         """Raises TypeError or ValueError for what is not a whole number from 1 on."""
-        self.calls.threads_set = checked_threads(count)
+        self.threads_set = checked_threads(count)
 
     @property
     def threads_set(self) -> int | None:
         """Threads that somebody has set; None where nobody has."""
         return self.calls.threads_set
 
-    def arrays(self, named: Mapping[str, Any], n: int) -> Sequence[Any]:
-        """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
-        values = named.values()
-        if {np.ndarray}.issuperset(map(type, values)) or not has_tensors(values):
-            return super().arrays(named, n)
-        return self.on_torch().arrays(named, n)
+    @threads_set.setter
+    def threads_set(self, count: int | None) -> None:
+        self.calls.threads_set = count
 
-    def answers(self, check_finite: bool) -> NativeAnswers:
-        """The calls of `Dynamics`: C writes the answers, but for tensors of which gradients are recorded."""
-        control = None if self.tree is None else self.control
-        return NativeAnswers(self, self.calls, self.on_torch, check_finite, control)
+    @cached_property
+    def answers(self) -> Answers:
+        """Rows of the table, of arrays that have been read."""
+        return NativeAnswers(self, self.quick, cast("ControlCalls | None", self.one_sample))
 
-    def controls(self, robot: Any) -> Controls:
-        """What makes controllers of a robot: C answers for one sample, arrays and tensors else."""
-        return Controls(robot, partial(NativeControlAnswers, self.calls))
-
-    def kinematics(
-        self, check_finite: bool, read_beside_motion: Callable[[], Iterable[Any]]
-    ) -> NativeKinematics:
-        """The calls of `Kinematics`: C answers for one sample, arrays and tensors else."""
-        return NativeKinematics(self.structure, self, check_finite, read_beside_motion, self.control)
-
-    def tie_rows(
-        self,
-        chosen: ChosenConstraints,
-        check_finite: bool,
-        read_beside_motion: Callable[[], Iterable[Any]],
-    ) -> NativeTieRows:
-        """Rows of ties and contacts: C answers for their frames of one sample."""
-        return NativeTieRows(self.structure, self, check_finite, read_beside_motion, chosen, self.control)
-
-    def side(self, like: Any) -> Any:
-        """What computes with `like`, an array or a tensor."""
-        return self.on_torch() if has_tensors([like]) else self
-
-    def decomposition(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
-        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
-        if has_tensors([q]):
-            return self.on_torch().decomposition(q, qd, qdd)
-        return self.calls.run("packed", (q, qd, qdd))
-
-    def torque(self, q: Any, qd: Any, qdd: Any) -> Any:
-        """tau (..., count) in the order of `Layout.torque`."""
-        if has_tensors([q]):
-            return self.on_torch().torque(q, qd, qdd)
-        return self.calls.run("packed_torque", (q, qd, qdd))[0]
-
-    def position_gradient(self, q: Any, qd: Any, qdd: Any) -> Any:
-        """c0 (..., count) in the order of `Layout.velocity`."""
-        if has_tensors([q]):
-            return self.on_torch().position_gradient(q, qd, qdd)
-        return self.calls.run("packed_position_gradient", (q, qd, qdd))[0]
-
-    def energies(self, q: Any, qd: Any) -> tuple[Any, Any]:
-        """Kinetic and potential energies of the links in J, (..., N) each; C has none."""
-        return self.on_torch().energies(q, qd) if has_tensors([q]) else super().energies(q, qd)
-
-    def regressor(self, q: Any, qd: Any, qdd: Any) -> Any:
-        """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
-        return self.on_torch().regressor(q, qd, qdd) if has_tensors([q]) else super().regressor(q, qd, qdd)
-
-    def coefficient_regressors(self, q: Any, qd: Any, qdd: Any) -> Sequence[Any]:
-        """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
-        if has_tensors([q]):
-            return self.on_torch().coefficient_regressors(q, qd, qdd)
-        return super().coefficient_regressors(q, qd, qdd)
-
-    def constant(self, values: NDArray[Any], like: Any) -> Any:
-        """A table of numbers, to compute with `like`."""
-        return (
-            self.on_torch().constant(values, like) if has_tensors([like]) else super().constant(values, like)
-        )
-
-    def index(self, values: NDArray[np.intp], like: Any) -> Any:
-        """A table of positions, to take from `like`."""
-        return self.on_torch().index(values, like) if has_tensors([like]) else super().index(values, like)
-
-    def weights(self, name: str, value: Any, like: Any) -> Any:
-        """Real numbers in anything array-like, of the kind and dtype of `like`; errors name the argument."""
-        return (
-            self.on_torch().weights(name, value, like)
-            if has_tensors([like])
-            else super().weights(name, value, like)
-        )
-
-    def zeros(self, like: Any, count: int) -> Any:
-        """Zeros of shape (..., count) for `like` of shape (..., m)."""
-        return self.on_torch().zeros(like, count) if has_tensors([like]) else super().zeros(like, count)
-
-    def concatenate(self, parts: Iterable[Any]) -> Any:
-        """The parts joined along the last axis."""
-        parts = list(parts)
-        return self.on_torch().concatenate(parts) if has_tensors(parts) else super().concatenate(parts)
-
-    def _values(self, q: Any) -> dict[str, Any]:
-        return self.calls.values(q.dtype)
-
+    @cached_property
     def on_torch(self) -> "TorchSide":
         """What computes with tensors."""
-        if self._torch_side is None:
-            from .native_torch import TorchSide  # it needs torch, which arrays do without
+        from .native_torch import TorchSide  # it needs torch, which arrays do without
 
-            self._torch_side = TorchSide(self.calls, self.forms, self.rule)
-        return self._torch_side
+        return TorchSide(self.calls, self.quick.run, self._forms, self.rule)
+
+    def read(self, named: Mapping[str, object], n: int) -> tuple[ArrayBackend, Sequence[Numbers]]:
+        """What computes with this motion, and it as one shape (..., n); errors name the argument."""
+        if "torch" in sys.modules and has_tensors(named.values()):
+            return self.on_torch, self.on_torch.arrays(named, n)
+        return self, self.arrays(named, n)
+
+    def controller(self, joints: object, frame: object) -> TorqueOfOne | None:
+        """C's torque of one sample."""
+        targets, framed = cast(JointTargets, joints), cast("FrameTargets | None", frame)
+        return NativeTorque(self.calls, self.tree is not None, targets, framed)
+
+    def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
+        return self._run("packed", q, qd, qdd)
+
+    def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
+        """tau (..., count) in the order of `Layout.torque`."""
+        return self._run("packed_torque", q, qd, qdd)[0]
+
+    def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
+        """c0 (..., count) in the order of `Layout.velocity`."""
+        return self._run("packed_position_gradient", q, qd, qdd)[0]
+
+    def _run(self, call: str, *motion: Numbers) -> Arrays:
+        return self.calls.run(call, cast(Arrays, motion))
+
+    def _values(self, q: Numbers) -> Mapping[str, Numbers]:
+        return self.calls.values(cast(NumberType, q.dtype))

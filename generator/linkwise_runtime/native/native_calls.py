@@ -7,39 +7,33 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..answers import answer_shapes
-from ..arguments import has_tensors
+from ..answers.answers import answer_shapes
+from ..arguments import has_tensors, shape_of
+from ..call_table import CALLS
+from ..interface import Numbers
 from ..structure import Structure
 from .native_build import loaded
-from .native_desk import Desk, Desks, new_desk
-from .native_library import NumberArray, address, function, memory, place
+from .native_library import OneSampleCall, OneSamplePool, function, one_sample_call, start_of
+from .native_memory import NumberArray, NumberType, address, memory, place
+
+if TYPE_CHECKING:
+    from ctypes import _NamedFuncPointer as CFunction
+
+    from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
 
 PER_THREAD = 1 << 20
 """Bytes of results below which another thread costs more than it saves."""
 
-FUNCTIONS = {
-    "packed": "decomposition",
-    "packed_torque": "torque",
-    "packed_position_gradient": "position_gradient",
-    "position_gradient": "dense_position_gradient",
-    **{
-        call: call
-        for call in (
-            "partial_torque",
-            "inverse_dynamics",
-            "coefficients",
-            "propagation",
-            "gradient_propagation",
-            "regressor",
-            "coefficient_regressors",
-        )
-    },
+PACKED_GRADIENT = "packed_position_gradient"
+"""What gradients of a position are spread from; no row of the table, as no call of Python answers with it."""
+FUNCTIONS = {key: row.c for key, row in CALLS.items() if row.c and not row.one} | {
+    PACKED_GRADIENT: "position_gradient"
 }
-"""What the calls are called in C."""
+"""What the calls of many samples are called in C."""
 
 AT_REST = ("coefficients", "coefficient_regressors")
 """Calls that take no qdd."""
@@ -56,7 +50,7 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=pool.cache_clear)
 
 
-def checked_threads(count: Any) -> int:
+def checked_threads(count: object) -> int:
     """How many threads a large batch may use; raises TypeError or ValueError for what is no such number."""
     if isinstance(count, bool) or not isinstance(count, int | np.integer):
         raise TypeError(f"threads is a {type(count).__name__}; give a whole number from 1 on")
@@ -72,7 +66,11 @@ class NativeCalls:
     """
 
     def __init__(
-        self, structure: Structure, sources: Path, parameters: Mapping[str, Any], threads: int | None = None
+        self,
+        structure: Structure,
+        sources: Path,
+        parameters: Mapping[str, float | Numbers],
+        threads: int | None = None,
     ) -> None:
         """Compile at the first call for this package; raises RuntimeError where that cannot be.
 
@@ -81,20 +79,36 @@ class NativeCalls:
         self.structure, self.parameters = structure, dict(parameters)
         self.sources = loaded(structure, sources)
         self.threads_set, self._cores = threads, os.cpu_count() or 1
-        self.shapes = answer_shapes(structure)
+        self.shapes = answer_shapes(structure) | {PACKED_GRADIENT: ((structure.sizes.c1,),)}
         self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
         self._complete = {call: all(sizes) for call, sizes in self.sizes.items()}
         self._widths = {call: sum(sizes) for call, sizes in self.sizes.items()}
         self.learned = has_tensors(parameters.values())
         self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
-        self.desks = Desks(structure.n, self._desk)
-        self._functions: dict[tuple[str, np.dtype[Any]], Any] = {}
+        self._of_one, self._shape = OneSamplePool(self._one_sample), (structure.n,)
+        self._functions: dict[tuple[str, NumberType], CFunction] = {}
         self._function("packed", np.dtype("f8"))
 
     @property
     def threads(self) -> int:
         """How many threads a large batch may use."""
         return self.threads_set or self._cores
+
+    def at_once(self, call: str, motion: Sequence[object]) -> list[NumberArray] | None:
+        """Results for what is plainly one sample of a call that there has been; else None."""
+        kind, shape = getattr(motion[0], "dtype", None), self._shape
+        for a in motion:
+            if type(a) is not np.ndarray or a.dtype is not kind or a.shape != shape:
+                return None
+        key: Any = call, kind
+        if key not in self._of_one.free:
+            return None
+        arrays: Any = motion
+        try:
+            numbers = b"".join(arrays)
+        except TypeError:  # one has gaps
+            return None
+        return self._of_one.results(key, numbers)
 
     def run(
         self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
@@ -104,7 +118,7 @@ class NativeCalls:
         kind, batch = q.dtype, q.shape[:-1]
         count = q.size // q.shape[-1]
         if count == 1 and into is None and not self.learned:
-            results = self.desks.results(call, motion)
+            results = self._of_one.results((call, kind), b"".join(a.tobytes() for a in motion))
             return [a.reshape(*batch, *a.shape) for a in results] if batch else results
         shapes = self.shapes[call]
         if into is None:
@@ -131,23 +145,25 @@ class NativeCalls:
         self._share(compute, count, arrays, parts, (read, into))
         return into
 
-    def _desk(self, call: str, kind: "np.dtype[Any]") -> Desk:
-        """Memory for one sample of a call."""
-        compute = self._functions.get((call, kind)) or self._function(call, kind)
+    def _one_sample(self, key: tuple[str, NumberType]) -> OneSampleCall:
+        """A call for one sample of a dtype."""
+        call, kind = key
+        compute = self._functions.get(key) or self._function(call, kind)
         motion = np.empty((2 if call in AT_REST else 3, self.structure.n), kind)
         constants = [self._constants[kind]] if self.parameters else []
         results = [np.empty(shape, kind) for shape in self.shapes[call]]
-        return new_desk(compute, (ctypes.c_size_t(1), *motion, *constants), motion, results)
+        given = (ctypes.c_size_t(1), *motion, *constants)
+        return one_sample_call(compute, False, given, motion, results)
 
-    def constants(self, kind: "np.dtype[Any]") -> NumberArray:
+    def constants(self, kind: NumberType) -> NumberArray:
         """Values of the parameters in the order of the structure, as they are now."""
         return self._numbers(kind) if self.learned else self._constants[kind]
 
-    def address(self, call: str, kind: "np.dtype[Any]") -> int:
+    def address(self, call: str, kind: NumberType) -> int:
         """Where the C function of a call that has been made stands in memory."""
-        return ctypes.cast(self._functions[call, kind], ctypes.c_void_p).value or 0
+        return start_of(self._functions[call, kind])
 
-    def _function(self, call: str, kind: "np.dtype[Any]") -> Any:
+    def _function(self, call: str, kind: NumberType) -> "CFunction":
         """C function of a call for a dtype, compiled if it is not there yet."""
         reads = 2 if call in AT_REST else 3
         arrays = reads + bool(self.parameters) + sum(size > 0 for size in self.sizes[call])
@@ -155,7 +171,12 @@ class NativeCalls:
         return found
 
     def _share(
-        self, compute: Any, count: int, arrays: Sequence[tuple[int, int]], parts: int, held: Any
+        self,
+        compute: "CFunction",
+        count: int,
+        arrays: Sequence[tuple[int, int]],
+        parts: int,
+        held: object,
     ) -> None:
         """Call a C function in several parts; `arrays` are addresses, and bytes from one sample to the next.
 
@@ -164,7 +185,7 @@ class NativeCalls:
         """
         share = -(-count // parts // 16) * 16
 
-        def run(first: int, held: Any = held) -> None:
+        def run(first: int, held: object = held) -> None:
             compute(min(share, count - first), *(start + first * step for start, step in arrays))
 
         first, *others = range(0, count, share)
@@ -185,14 +206,15 @@ class NativeCalls:
         for future in waiting:
             future.result()
 
-    def values(self, kind: "np.dtype[Any]") -> dict[str, Any]:
+    def values(self, kind: NumberType) -> dict[str, Numbers]:
         """Parameters by name, as numbers of this dtype."""
-        return dict(zip(self.structure.parameters, self.constants(kind), strict=True))
+        numbers = cast("Sequence[Numbers]", self.constants(kind))
+        return dict(zip(self.structure.parameters, numbers, strict=True))
 
-    def _numbers(self, kind: "np.dtype[Any]") -> NumberArray:
+    def _numbers(self, kind: NumberType) -> NumberArray:
         """Parameters in the order of the structure; a tensor's value is the one it has now."""
         for name in self.structure.parameters:
-            if np.shape(self.parameters[name]) != ():
+            if shape_of(self.parameters[name]) != ():
                 raise ValueError(
                     f"parameter {name!r} must be one number here; "
                     "the numpy and torch back ends take one per sample"
@@ -205,6 +227,6 @@ def plain(a: NumberArray) -> NumberArray:
     return a if a.flags.c_contiguous and a.flags.aligned else np.array(a, order="C")
 
 
-def _number(value: Any) -> float:
+def _number(value: float | Numbers) -> float:
     """A parameter's value as it is now, without its gradient."""
-    return float(value.detach() if has_tensors([value]) else value)
+    return float(cast("Tensor", value).detach() if has_tensors([value]) else value)

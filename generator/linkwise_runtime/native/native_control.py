@@ -1,18 +1,62 @@
-"""Answers of C to one sample: frames, the mass matrix and forward dynamics."""
+"""C functions of one sample: frames, the mass matrix, forward dynamics and the torques of controllers."""
 
 import ctypes
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, cast
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from ..interface import Backend
-from ..kinematics.kinematic_answers import KinematicAnswers
-from ..structure import Structure
-from ..sums.summed import Compute, Summed
+from ..control.frame_impedance import FrameTargets
+from ..control.frame_rotation import is_rotation
+from ..control.joint_impedance import JointTargets
+from ..interface import Numbers
+from ..targets import Target
 from .native_calls import NativeCalls
-from .native_desk import Desk, new_desk
-from .native_library import CONTROL, NumberArray, symbol
+from .native_library import CONTROL, IMPEDANCE, OneSampleCall, OneSamplePool, one_sample_call, symbol
+from .native_memory import NumberArray, NumberType, address
+
+RealType = type[ctypes.c_double] | type[ctypes.c_float]
+FieldType = RealType | type[ctypes.c_void_p] | type[ctypes.c_int]
+
+JOINTS = ("target", "target.qd", "target.qdd", "task", "external")
+"""What a call of joints may be given beside q and qd, in the order of C; a frame is given no task."""
+OF_FRAME = {"pose": 16, "velocity": 6, "acceleration": 6}
+"""What stands in place of a task for a frame, and how many numbers."""
+
+
+def joint_struct(real: RealType) -> type[ctypes.Structure]:
+    """NAME_impedance, of double or float; C has the last where joints have anything of their own."""
+    pointers = ("keep_inertia", "inertia", "keep_velocity", "damping", "stiffness")
+    fields: list[tuple[str, FieldType]] = [(name, ctypes.c_void_p) for name in pointers]
+    fields += [("regular", ctypes.c_int), ("friction_width", real)]
+    return type("JointStruct", (ctypes.Structure,), {"_fields_": fields})
+
+
+def frame_struct(real: RealType) -> type[ctypes.Structure]:
+    """NAME_frame_impedance, of double or float."""
+    pointer = ctypes.c_void_p
+    fields: list[tuple[str, FieldType]] = [
+        ("frame", ctypes.c_int),
+        ("point", pointer),
+        ("rows", ctypes.c_int),
+        ("row", pointer),
+        ("keep_inertia", real),
+        ("keep_velocity", real),
+        ("inertia", pointer),
+        ("damping", pointer),
+        ("stiffness", pointer),
+    ]
+    return type("FrameStruct", (ctypes.Structure,), {"_fields_": fields})
+
+
+class Settings(NamedTuple):
+    """What C is told of a controller in one number type."""
+
+    joints: ctypes.Structure
+    frame: ctypes.Structure | None
+    kept: list[NDArray[np.generic]]
+    """The memory that they point to."""
 
 
 class ControlCalls:
@@ -29,88 +73,163 @@ class ControlCalls:
             "forward_dynamics": (n,),
             "forward_dynamics_of_links": (n,),
         }
-        self._free: dict[Any, list[Desk]] = {}
+        self._of_one = OneSamplePool(self._one_sample)
 
     def answer(
-        self, call: str, motion: Sequence[Any], frame: int | None = None, point: Any = None
+        self, call: str, motion: Sequence[Numbers], frame: int | None = None, point: Numbers | None = None
     ) -> NumberArray | None:
         """The answer to a motion (..., n), of a frame and a point (..., 3) of it where there are such.
 
-        None for what is not one sample in arrays, learned parameters, and a singular mass matrix.
+        None for what is not one sample in arrays, learned parameters, a singular mass matrix, and calls that
+        C does not have.
         """
         q = motion[0]
+        if call not in CONTROL:
+            return None
         if self._calls.learned or type(q) is not np.ndarray or q.size != q.shape[-1]:
             return None
-        key = call, frame, point is None, q.dtype
-        free = self._free.setdefault(key, [])
-        try:
-            desk = free.pop()  # no other thread finds it meanwhile
-        except IndexError:
-            desk = self._desk(*key)
-        given = motion if point is None else (point, *motion)
-        desk.motion[:] = b"".join(a.tobytes() for a in given)
-        failed, answer = desk.compute(), desk.results[0].copy()
-        free.append(desk)
-        return None if failed else answer.reshape(*q.shape[:-1], *answer.shape)
+        given = cast("Sequence[NumberArray]", motion if point is None else (point, *motion))
+        numbers = b"".join(a.tobytes() for a in given)
+        found = self._of_one.results((call, frame, point is None, q.dtype), numbers)
+        return found[0].reshape(*q.shape[:-1], *found[0].shape) if found else None
 
-    def _desk(self, call: str, frame: int | None, origin: bool, kind: "np.dtype[Any]") -> Desk:
-        """Memory for a call; a point stands in it before the motion."""
+    def _one_sample(self, key: tuple[str, int | None, bool, NumberType]) -> OneSampleCall:
+        """A call, in whose memory a point stands before the motion."""
+        call, frame, at_origin, kind = key
         about, n = CONTROL[call], self._calls.structure.n
-        memory = np.empty((0 if origin else 3) + about.motion * n, kind)
+        memory = np.empty((0 if at_origin else 3) + about.motion * n, kind)
         motion = memory[memory.size - about.motion * n :].reshape(-1, n)
-        told: list[Any] = [] if frame is None else [ctypes.c_int(frame)]
+        told: list[object] = [] if frame is None else [ctypes.c_int(frame)]
         if about.point:
-            told.append(None if origin else memory[:3])
+            told.append(None if at_origin else memory[:3])
         found = symbol(self._calls.sources, call, kind.str[1:])
-        found.restype = ctypes.c_int if call.startswith("forward_dynamics") else None
-        given = (*told, *motion, self._calls.constants(kind))
-        return new_desk(found, given, memory, [np.empty(self._shapes[call], kind)])
+        given, result = (*told, *motion, self._calls.constants(kind)), np.empty(self._shapes[call], kind)
+        return one_sample_call(found, call.startswith("forward_dynamics"), given, memory, [result])
 
 
-class NativeSums(Summed):
-    """The sums of a robot of rigid links: those that control needs, C computes for one sample."""
-
-    def __init__(
-        self, structure: Structure, backend: Backend[Any], compute: Compute, control: ControlCalls
-    ) -> None:
-        super().__init__(structure, backend, compute)
-        tree = backend.tree
-        self._control, self._tied = control, tree is not None and tree.tied
-
-    def mass_matrix(self, q: Any) -> tuple[Any, ...]:
-        """See `Summed.mass_matrix`."""
-        found = self._control.answer("mass_matrix", (q,))
-        return super().mass_matrix(q) if found is None else (found,)
-
-    def forward_dynamics(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
-        """See `Summed.forward_dynamics`, which says what is wrong where C finds M singular."""
-        found = self._accelerated("forward_dynamics", q, qd, tau)
-        return super().forward_dynamics(q, qd, tau) if found is None else (found,)
-
-    def forward_dynamics_of_links(self, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
-        """See `Summed.forward_dynamics_of_links`; C has it apart where joints have anything of their own."""
-        call = "forward_dynamics_of_links" if self._structure.passive else "forward_dynamics"
-        found = self._accelerated(call, q, qd, tau)
-        return super().forward_dynamics_of_links(q, qd, tau) if found is None else (found,)
-
-    def _accelerated(self, call: str, *motion: Any) -> NumberArray | None:
-        """What C answers; None where it has no such function, as of joints that are tied."""
-        return None if self._tied else self._control.answer(call, motion)
-
-
-class NativeKinematics(KinematicAnswers):
-    """The kinematics of frames: poses, Jacobians and their rates of one sample, C computes."""
+class NativeTorque:
+    """The torque of one controller: C has it for one sample in arrays."""
 
     def __init__(
-        self,
-        structure: Structure,
-        backend: Any,
-        check_finite: bool,
-        read_beside_motion: Callable[[], Iterable[Any]],
-        control: ControlCalls,
+        self, calls: NativeCalls, is_rigid: bool, targets: JointTargets, frame: FrameTargets | None
     ) -> None:
-        super().__init__(structure, backend, check_finite, read_beside_motion)
-        self._control = control
+        self._calls, self._structure = calls, calls.structure
+        self._targets, self._frame = targets, frame
+        self._beside = JOINTS if frame is None else (*JOINTS[:3], *OF_FRAME, *JOINTS[4:])
+        self._settings: dict[NumberType, Settings] = {}
+        self._of_one = OneSamplePool(self._one_sample)
+        gains = [targets.inertia.added, targets.damping.added, targets.stiffness]
+        if frame is not None:
+            gains += [frame.inertia.added, frame.damping.added, frame.stiffness]
+        compensated = targets.passive or not self._structure.passive
+        kept = (targets.inertia.kept, targets.damping.kept)
+        fixed = all(isinstance(w, float | np.ndarray) for w in kept)
+        fixed = fixed and not any(gain is not None and gain.learned for gain in gains)
+        self._known = fixed and compensated and is_rigid
 
-    def _at_once(self, call: str, motion: Sequence[Any], part: Any, point: Any) -> Any:
-        return self._control.answer(call, motion, part, point) if call in CONTROL else None
+    def torque(self, given: Mapping[str, Numbers], target: object) -> NumberArray | None:
+        """The torque (n,); None for what C does not answer, of which arrays say what is wrong."""
+        q = given["q"]
+        if not self._known or self._calls.learned or type(q) is not np.ndarray or q.ndim > 1:
+            return None
+        beside = cast("dict[str, NumberArray]", given)
+        if self._frame is not None:
+            asked = self._of_frame(self._frame, cast(Target, target))
+            if asked is None:
+                return None
+            beside = {**beside, **asked}
+        names = tuple(name for name in self._beside if name in beside)
+        arrays = [beside[name] for name in ("q", "qd", *names)]
+        numbers = b"".join(a.astype(q.dtype, copy=False).tobytes() for a in arrays)
+        found = self._of_one.results((q.dtype, names), numbers)
+        return found[0] if found else None
+
+    def _of_frame(self, frame: FrameTargets, target: Target) -> dict[str, NumberArray] | None:
+        """Arrays of a frame's target that are plainly those of one sample; None for others."""
+        pose = target.pose if frame.stiffness is not None else None
+        found: dict[str, NumberArray] = {}
+        for name, a, shape in (
+            ("pose", pose, (4, 4)),
+            ("velocity", target.velocity, (6,)),
+            ("acceleration", target.acceleration, (6,)),
+        ):
+            if a is None:
+                continue
+            if type(a) is not np.ndarray or a.shape != shape or a.dtype.kind != "f":
+                return None
+            found[name] = a
+        if frame.stiffness is None:
+            return found
+        turns = min(frame.rows) < 3
+        return found if "pose" in found and (not turns or is_rotation(found["pose"][:3, :3])) else None
+
+    def _one_sample(self, key: tuple[NumberType, tuple[str, ...]]) -> OneSampleCall:
+        """A call that is given these arrays beside q and qd."""
+        kind, names = key
+        n, settings = self._structure.n, self._set(kind)
+        sizes = [n, n, *(OF_FRAME.get(name, n) for name in names)]
+        memory = np.empty(sum(sizes), kind)
+        q, qd, *parts = np.split(memory, np.cumsum(sizes)[:-1])
+        placed = dict(zip(names, parts, strict=True))
+        told = [placed.get(name) for name in self._beside]
+        given: list[object] = [q, qd, self._calls.constants(kind), ctypes.byref(settings.joints), *told[:3]]
+        if settings.frame is not None:
+            given.append(ctypes.byref(settings.frame))
+        found = symbol(self._calls.sources, IMPEDANCE[settings.frame is not None], kind.str[1:])
+        return one_sample_call(found, True, [*given, *told[3:]], memory, [np.empty(n, kind)])
+
+    def _set(self, kind: NumberType) -> Settings:
+        """What C is told, made once for each number type."""
+        if kind not in self._settings:
+            self._settings[kind] = self._made(kind)
+        return self._settings[kind]
+
+    def _made(self, kind: NumberType) -> Settings:
+        targets, n, links = self._targets, self._structure.n, self._structure.N
+        memory: list[NDArray[np.generic]] = []
+
+        def at(numbers: ArrayLike | None) -> int | None:
+            """Where numbers stand; None for none of them."""
+            if numbers is None:
+                return None
+            array = np.array(numbers, kind)
+            memory.append(array)
+            return address(array)
+
+        def weights(kept: object) -> NumberArray | None:
+            """w, which is numbers or arrays: tensors are learned, and not for C."""
+            if isinstance(kept, float) and kept == 1.0:
+                return None
+            return np.broadcast_to(cast(NumberArray, kept), (n, links, n))
+
+        inertia = None if targets.inertia.added is None else targets.inertia.added.numbers
+        if inertia is not None and targets.inertia.whole:  # C adds the armature to what links have
+            inertia = inertia - np.diag(self._structure.passive_sums.armature)
+        real = ctypes.c_double if kind.itemsize == 8 else ctypes.c_float
+        joints = joint_struct(real)(
+            at(weights(targets.inertia.kept)),
+            at(inertia),
+            at(weights(targets.damping.kept)),
+            at(None if targets.damping.added is None else targets.damping.added.numbers),
+            at(None if targets.stiffness is None else targets.stiffness.numbers),
+            not targets.positive,
+            targets.friction_width or 0.0,
+        )
+        if self._frame is None:
+            return Settings(joints, None, memory)
+        frame, rows = self._frame, np.array(self._frame.rows, np.intc)
+        memory.append(rows)
+        added = (
+            at(None if gain is None else gain.numbers)
+            for gain in (frame.inertia.added, frame.damping.added, frame.stiffness)
+        )
+        made = frame_struct(real)(
+            frame.number,
+            at(frame.point),
+            len(rows),
+            address(rows),
+            frame.inertia.kept,
+            frame.damping.kept,
+            *added,
+        )
+        return Settings(joints, made, memory)

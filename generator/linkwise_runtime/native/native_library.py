@@ -1,26 +1,24 @@
-"""The functions of a robot's compiled C, and memory for their results."""
+"""The functions of a robot's compiled C, and how they are called for one sample.
+
+One sample is copied to and from a known place: to find out where arrays lie costs more.
+"""
 
 import ctypes
-import math
+from collections.abc import Callable, Hashable, Iterable
 from contextlib import suppress
-from functools import cache
-from typing import Any, NamedTuple
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..call_table import CALLS
 from .native_build import Sources, library
-from .native_memory import LARGE, lasting
+from .native_memory import NumberArray, Place
 
-NumberArray = NDArray[Any]
+if TYPE_CHECKING:
+    from ctypes import _NamedFuncPointer as CFunction
 
-Place = ctypes.c_char * 0
-
-CARRAY, WARNS = 0x501, 1 << 31
-"""Of `flags.num`: an array that C can read and write; one that warns where writing is spoken of."""
-
-LITTLE = 1 << 15
-"""Bytes below which where memory starts is of no account."""
+Key = TypeVar("Key", bound=Hashable)
 
 
 class Control(NamedTuple):
@@ -30,21 +28,14 @@ class Control(NamedTuple):
     point: bool = False
 
 
-CONTROL = {
-    "pose": Control(1),
-    "jacobian": Control(1, point=True),
-    "jacobian_rate": Control(2, point=True),
-    "mass_matrix": Control(1),
-    "forward_dynamics": Control(3),
-    "forward_dynamics_of_links": Control(3),
-}
+CONTROL = {row.c: Control(len(row.motion), "point" in row.options) for row in CALLS.values() if row.one}
 """Functions that take one sample and no count."""
 IMPEDANCE = ("partial_impedance", "frame_partial_impedance")
-"""Those beside them for control, which `native_impedance` calls."""
+"""Those beside them for control, the second one with a frame."""
 
 
 @cache
-def function(sources: Sources, call: str, kind: str, arrays: int) -> Any:
+def function(sources: Sources, call: str, kind: str, arrays: int) -> "CFunction":
     """C function of a call that takes a count and `arrays` pointers; raises as `symbol` does."""
     found = symbol(sources, call, kind)
     found.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * arrays
@@ -52,7 +43,7 @@ def function(sources: Sources, call: str, kind: str, arrays: int) -> Any:
     return found
 
 
-def symbol(sources: Sources, call: str, kind: str) -> Any:
+def symbol(sources: Sources, call: str, kind: str) -> "CFunction":
     """C function by its name; the first from a library compiles it.
 
     kind: f8 or f4. Raises RuntimeError if it cannot be had.
@@ -60,7 +51,7 @@ def symbol(sources: Sources, call: str, kind: str) -> Any:
     real, suffix = {"f8": ("double", ""), "f4": ("float", "f")}[kind]
     path = library(sources, real, _library_of(call))
     try:
-        return getattr(ctypes.CDLL(str(path)), f"{sources.name}_{call}{suffix}")
+        return ctypes.CDLL(str(path))[f"{sources.name}_{call}{suffix}"]
     except (OSError, AttributeError) as error:
         with suppress(OSError):
             path.unlink()  # whole as it is, it is of no use: the next time it is made anew
@@ -79,29 +70,66 @@ def _library_of(call: str) -> str:
     return "regressors" if "regressor" in call else "decomposition"
 
 
-def address(array: NumberArray) -> int:
-    """Where an array begins in memory."""
-    start: int = array.__array_interface__["data"][0]
-    return start
+def start_of(function: "CFunction") -> int:
+    """Where a C function stands in memory."""
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
-def place(array: NumberArray) -> Any:
-    """What ctypes takes for an array's place in memory, quicker than its address where it is writable."""
-    buffer: Any = array
-    writable = array.flags.num & (CARRAY | WARNS) == CARRAY
-    return Place.from_buffer(buffer) if writable else address(array)
+class OneSampleCall(NamedTuple):
+    """A C function that knows where its arguments lie: memory for one sample."""
+
+    compute: Callable[[], int | None]
+    """Of a function that may fail, a number other than 0 says that it did."""
+    motion: memoryview
+    """Bytes of what changes from call to call: q, qd and qdd, say, one after another."""
+    results: list[NumberArray]
 
 
-def memory(shape: tuple[int, ...], kind: "np.dtype[Any]") -> NumberArray:
-    """New memory for an array; unless it is little, it starts on a cache line, as C wants it.
+def one_sample_call(
+    function: "CFunction",
+    may_fail: bool,
+    given: Iterable[object],
+    motion: NumberArray,
+    results: list[NumberArray],
+) -> OneSampleCall:
+    """A call of a C function that takes what is given, then results, and no arrays that are empty.
 
-    It is never that of an earlier result that somebody still holds.
+    given: numbers as ctypes has them, None for NULL, and arrays, those of the motion in its memory
     """
-    count = math.prod(shape) * kind.itemsize
-    if count < LITTLE:
-        return np.empty(shape, kind)
-    if count >= LARGE:
-        return lasting(count)[:count].view(kind).reshape(shape)
-    owner = np.empty(count + 64, np.uint8)
-    start = -address(owner) % 64
-    return owner[start : start + count].view(kind).reshape(shape)
+    # Without argtypes: its arguments are made here, not at every call.
+    bare = ctypes.CFUNCTYPE(ctypes.c_int if may_fail else None)(start_of(function))
+    arguments = [
+        _argument(value) for value in (*given, *results) if not isinstance(value, np.ndarray) or value.size
+    ]
+    return OneSampleCall(partial(bare, *arguments), motion.data.cast("B"), results)
+
+
+def _argument(value: object) -> object:
+    """As ctypes passes it on: an array by its place."""
+    buffer: Any = value
+    return ctypes.byref(Place.from_buffer(buffer)) if isinstance(value, np.ndarray) else value
+
+
+class OneSamplePool(Generic[Key]):
+    """Calls for one sample by what they are for, made when there is none free.
+
+    One in use is not among them: no other thread, and no signal handler, finds it.
+    """
+
+    def __init__(self, make: Callable[[Key], OneSampleCall]) -> None:
+        self._make = make
+        self.free: dict[Key, list[OneSampleCall]] = {}
+
+    def results(self, key: Key, numbers: bytes) -> list[NumberArray]:
+        """Copies of the results for the bytes of a motion; none where the function failed."""
+        try:
+            free = self.free[key]
+            one = free.pop()
+        except LookupError:
+            one, free = self._make(key), self.free.setdefault(key, [])
+        compute, motion, results = one
+        motion[:] = numbers
+        failed = compute()
+        copies = [] if failed else [a.copy() for a in results]
+        free.append(one)
+        return copies

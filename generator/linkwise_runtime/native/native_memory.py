@@ -1,4 +1,4 @@
-"""Memory for large results, in huge pages, and taken again once nobody holds what was in it.
+"""Memory for results: large ones lie in huge pages, taken again once nobody holds what was in them.
 
 The system clears fresh memory page by page, which costs more than large results do, so blocks are kept.
 An array over a block has a `Lease` for a base: that is gone when the last array, view, tensor or buffer over
@@ -6,6 +6,8 @@ it is, and only then is the block free again. Meanwhile the system may take its 
 (MADV_FREE).
 """
 
+import ctypes
+import math
 import mmap
 from contextlib import suppress
 from typing import Any
@@ -13,12 +15,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+NumberArray = NDArray[np.floating]
+NumberType = np.dtype[np.floating]
+"""float64 or float32."""
+
+Place = ctypes.c_char * 0
+
+CARRAY, WARNS = 0x501, 1 << 31
+"""Of `flags.num`: an array that C can read and write; one that warns where writing is spoken of."""
+
+LITTLE = 1 << 15
+"""Bytes below which where memory starts is of no account."""
+
 LARGE = 1 << 20
 """Bytes from which results lie in blocks."""
 MOST = 1 << 29
 """Bytes of blocks that are kept while nobody needs them."""
 PAGE = 1 << 21
-APART: dict[str, Any] = (
+APART: dict[str, int] = (
     {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
 )
 """Has a fork have memory of its own, where there are forks."""
@@ -53,7 +67,7 @@ class Lease:
         _free.setdefault(self._size, []).append(block)
 
 
-def lasting(count: int) -> NDArray[Any]:
+def lasting(count: int) -> NDArray[np.uint8]:
     """Bytes of a block, at least `count` of them, that start on a page."""
     return np.asarray(Lease(-(-count // PAGE) * PAGE))
 
@@ -67,3 +81,31 @@ def _new(size: int) -> mmap.mmap:
         with suppress(OSError):  # a kernel without them
             block.madvise(mmap.MADV_HUGEPAGE)
     return block
+
+
+def address(array: NDArray[np.generic]) -> int:
+    """Where an array begins in memory."""
+    start: int = array.__array_interface__["data"][0]
+    return start
+
+
+def place(array: NumberArray) -> "ctypes.Array[ctypes.c_char] | int":
+    """What ctypes takes for an array's place in memory, quicker than its address where it is writable."""
+    buffer: Any = array  # which it is, and numpy says so from Python 3.12 on
+    writable = array.flags.num & (CARRAY | WARNS) == CARRAY
+    return Place.from_buffer(buffer) if writable else address(array)
+
+
+def memory(shape: tuple[int, ...], kind: NumberType) -> NumberArray:
+    """New memory for an array; unless it is little, it starts on a cache line, as C wants it.
+
+    It is never that of an earlier result that somebody still holds.
+    """
+    count = math.prod(shape) * kind.itemsize
+    if count < LITTLE:
+        return np.empty(shape, kind)
+    if count >= LARGE:
+        return lasting(count)[:count].view(kind).reshape(shape)
+    owner = np.empty(count + 64, np.uint8)
+    start = -address(owner) % 64
+    return owner[start : start + count].view(kind).reshape(shape)

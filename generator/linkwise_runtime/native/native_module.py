@@ -5,17 +5,59 @@ It is there where Python's and NumPy's headers are; without it, ctypes calls the
 
 import sys
 import sysconfig
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.machinery import ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Any
+from typing import Protocol, cast
 
 import numpy as np
 
+from ..call_table import CALLS
 from .native_build import extension
+from .native_calls import NativeCalls
+from .native_memory import LARGE, NumberArray, NumberType
 
 SOURCE = Path(__file__).with_suffix(".c")
+
+DTYPES = (np.dtype("f8"), np.dtype("f4"))
+"""In the order of the compiled module."""
+
+COMPILED = (
+    "packed",
+    "packed_torque",
+    "partial_torque",
+    "inverse_dynamics",
+    "coefficients",
+    "propagation",
+    "position_gradient",
+)
+"""What the compiled module has of the calls of `Dynamics`."""
+CONVENTIONS = {"propagation": ("closing",), "gradient_propagation": ("gradient",)}
+"""What these are called with there, as calls of one name."""
+
+
+class CompiledCalls(Protocol):
+    """An object of the class `Calls` of native_module.c: one robot's calls, by name."""
+
+    def learn(self, call: str, kind: int, address: int) -> None:
+        """Know from now on where the C function of a call stands in memory."""
+
+
+class CompiledClass(Protocol):
+    """That class."""
+
+    def __call__(
+        self,
+        n: int,
+        most: int,
+        doubles: NumberArray,
+        floats: NumberArray,
+        answers: Mapping[str, tuple[type | None, Sequence[tuple[int, ...]]]],
+        /,
+    ) -> CompiledCalls:
+        """most: bytes of results that it answers with; doubles, floats: the parameters; answers: of calls."""
 
 
 def headers() -> tuple[str, ...]:
@@ -29,7 +71,7 @@ def headers() -> tuple[str, ...]:
 
 
 @cache
-def compiled_calls() -> Any:
+def compiled_calls() -> CompiledClass | None:
     """The class `Calls` of native_module.c, compiled if need be; None where it cannot be had."""
     found = headers()
     if not found:
@@ -44,4 +86,75 @@ def compiled_calls() -> Any:
         loader.exec_module(module)
     except (RuntimeError, ImportError, OSError):
         return None
-    return module.Calls
+    return cast(CompiledClass, module.Calls)
+
+
+class QuickCalls:
+    """C through the compiled module, where there is one and it has the call, else through ctypes."""
+
+    def __init__(self, calls: NativeCalls) -> None:
+        self.calls = calls
+        made = compiled_calls()
+        # What is learned may change from call to call.
+        self.compiled = None if made is None or calls.learned else self._made(made)
+        self._known: set[tuple[str, NumberType]] = set()
+
+    def _made(self, made: CompiledClass) -> CompiledCalls:
+        """The compiled module's side of this robot."""
+        doubles, floats = (self.calls.constants(kind) for kind in DTYPES)
+        shapes = {key: shapes for key, shapes in self.calls.shapes.items() if key in CALLS}
+        answers = {key: (CALLS[key].record, shapes) for key, shapes in shapes.items()}
+        return made(self.calls.structure.n, LARGE - 1, doubles, floats, answers)
+
+    def direct(self) -> Mapping[str, Callable[..., object]]:
+        """The compiled module's calls, where there is one."""
+        calls = {call: getattr(self.compiled, call) for call in COMPILED} if self.compiled else {}
+        for call in calls.values():
+            call.__module__ = __name__  # torch.jit asks where a function is from, before it calls it
+        return calls
+
+    def run(
+        self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
+    ) -> Sequence[NumberArray]:
+        """Results of a call for arrays of one shape, written to `into`, or to new memory."""
+        convention = CONVENTIONS.get(call, ())
+        if not self.compiled or not (convention or call in COMPILED):
+            return self.through_ctypes(call, motion, into)
+        several = CALLS[call].record is not None
+        out = into if into is None else tuple(into) if several else into[0]
+        name = CALLS[call].name
+        answer = getattr(self.compiled, name)(self, *motion, *convention, out)
+        results: Sequence[NumberArray] = answer if several else (answer,)
+        return results
+
+    def through_ctypes(
+        self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
+    ) -> Sequence[NumberArray]:
+        """The same, and tell the compiled module of a function that it has not known so far."""
+        results = self.calls.run(call, motion, into)
+        kind = motion[0].dtype
+        if self.compiled and (call, kind) not in self._known and motion[0].size:
+            self._known.add((call, kind))
+            self.compiled.learn(call, DTYPES.index(kind), self.calls.address(call, kind))
+        return results
+
+
+def _passed_on(name: str) -> Callable[..., object]:
+    """What the compiled module asks of its owner's class, if it has no answer: motion, and places or None."""
+
+    def passed_on(self: QuickCalls, *given: object) -> object:
+        *motion, out = given
+        call = name
+        if name == "propagation":
+            call = {"closing": name, "gradient": "gradient_propagation"}[cast(str, motion.pop())]
+        several = CALLS[call].record is not None
+        into = out if several or out is None else [out]
+        arrays = cast("Sequence[NumberArray]", motion)
+        results = self.through_ctypes(call, arrays, cast("Sequence[NumberArray] | None", into))
+        return results if several else results[0]
+
+    return passed_on
+
+
+for _name in COMPILED:
+    setattr(QuickCalls, _name, _passed_on(_name))

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import IO, cast
 
 from .native_system import system_here
 
@@ -83,7 +83,7 @@ class _Running:
     """
 
     process: "subprocess.Popen[bytes]"
-    stream: Any
+    stream: IO[bytes]
     said: bytearray
 
     def has_ended(self) -> bool:
@@ -117,7 +117,7 @@ def _started(command: Sequence[str], listened: str) -> _Running:
         raise RuntimeError(
             f"{command[0]} cannot be run: {error.strerror}; point CC to a C compiler"
         ) from None
-    stream = getattr(process, listened) or outlet
+    stream = cast("IO[bytes]", getattr(process, listened) or outlet)
     system.listen(stream)
     return _Running(process, stream, bytearray())
 

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import IO, Any, ClassVar
 
 STEP = 0.1
 """Seconds between two tries of what the system cannot wait for."""
@@ -99,15 +99,15 @@ class OperatingSystem:
         """Words of a command line; raises ValueError where a quotation mark is missing."""
         return shlex.split(command)
 
-    def outlet(self) -> Any:
+    def outlet(self) -> int | IO[bytes]:
         """What a program is to write to: see `hear`. Raises OSError."""
         return subprocess.PIPE
 
-    def listen(self, stream: Any) -> None:
+    def listen(self, stream: IO[bytes]) -> None:
         """Make ready for `hear`."""
         os.set_blocking(stream.fileno(), False)
 
-    def hear(self, stream: Any, said: bytearray, ended: bool) -> None:
+    def hear(self, stream: IO[bytes], said: bytearray, ended: bool) -> None:
         """Add to `said` what a program, that may have ended, has written to a stream by now."""
         said.extend(stream.read() or b"")
 
@@ -192,14 +192,14 @@ class Windows(OperatingSystem):
         """Words of a command line in which backslashes are those of paths."""
         return [word.strip('"') for word in shlex.split(command, posix=False)]
 
-    def outlet(self) -> Any:
+    def outlet(self) -> int | IO[bytes]:
         """A file without a name: pipes there can only be waited for."""
         return tempfile.TemporaryFile()
 
-    def listen(self, stream: Any) -> None:
+    def listen(self, stream: IO[bytes]) -> None:
         """Nothing is to be made ready."""
 
-    def hear(self, stream: Any, said: bytearray, ended: bool) -> None:
+    def hear(self, stream: IO[bytes], said: bytearray, ended: bool) -> None:
         """Add to `said` what a program has written, once it has ended: both write and read at one place."""
         if ended and not said:
             stream.seek(0)

@@ -5,20 +5,23 @@ Forward runs the C code; backward differentiates closed forms or rule in torch, 
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from contextlib import AbstractContextManager
+from functools import cached_property
+from typing import ClassVar, Protocol, cast
 
 import torch
 from torch import Tensor
 from torch._subclasses.fake_tensor import is_fake
 
-from ..answers import MOTION
+from ..answers.answers import Answers
 from ..arguments import too_many_axes
 from ..arrays.torch_backend import TorchBackend
-from ..interface import ClosedForms
+from ..call_table import CALLS, QDD
+from ..interface import ClosedForms, Numbers
 from ..rule.rule_calls import RigidRule
 from .native_build import Sources
-from .native_calls import NativeCalls
-from .native_library import NumberArray
+from .native_calls import FUNCTIONS, NativeCalls
+from .native_memory import NumberArray
 
 FLOATS = (torch.float64, torch.float32)
 
@@ -32,8 +35,27 @@ OPERATED = {
 }
 """What torch is given as operators, from which all answers are composed, and what `NativeCalls` calls it."""
 
-OPERATORS: dict[tuple[Sources, str], Any] = {}
+Results = Tensor | tuple[Tensor, ...]
+"""Of an operator: one by itself, or several."""
+Operator = Callable[[Tensor, Tensor, Tensor, Tensor, int], Results]
+"""Of q, qd, qdd, parameters and threads."""
+Inputs = tuple[Tensor, Tensor, Tensor, Tensor]
+"""What an operator has gradients of."""
+Again = Callable[[Tensor, Tensor, Tensor, Tensor], Sequence[Tensor]]
+"""Results computed once more in torch."""
+
+OPERATORS: dict[tuple[Sources, str], Operator] = {}
 """Operators made so far; torch wants each to be made once."""
+
+
+class Context(Protocol):
+    """What torch keeps from a forward pass for the backward one."""
+
+    saved_tensors: Inputs
+    needs_input_grad: Sequence[bool]
+
+    def save_for_backward(self, *tensors: Tensor) -> None:
+        """Have these as `saved_tensors`."""
 
 
 class TorchSide(TorchBackend):
@@ -43,24 +65,30 @@ class TorchSide(TorchBackend):
     traced: ClassVar = False
 
     def __init__(
-        self, calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None
+        self, calls: NativeCalls, run: Run, links: Sequence[ClosedForms] | None, rule: RigidRule | None
     ) -> None:
+        """run: what C answers for arrays."""
         super().__init__(calls.structure, links, calls.parameters, rule)
-        self.calls = calls
+        self.calls, self.run = calls, run
         self._given = [value for value in calls.parameters.values() if torch.is_tensor(value)]
         self.operators = {call: operator(calls, links, rule, call) for call in OPERATED}
 
-    def arrays(self, named: Mapping[str, Tensor], n: int) -> Sequence[Tensor]:
+    @cached_property
+    def answers(self) -> Answers:
+        """Rows of the table: C writes those that it has, where nothing is recorded."""
+        return TensorAnswers(self)
+
+    def arrays(self, named: Mapping[str, object], n: int) -> Sequence[Numbers]:
         """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
         self.check_untraced()
-        motion = list(named.values())
+        motion = cast("list[Tensor]", list(named.values()))
         q = motion[0]
         plain = all(
             type(t) is Tensor and t.is_cpu and t.layout is torch.strided and not t.is_nested for t in motion
         )
         alike = plain and q.dtype in FLOATS and q.shape[-1:] == (n,)
         if not alike or not all(t.dtype == q.dtype and t.shape == q.shape for t in motion[1:]):
-            motion = list(super().arrays(named, n))
+            motion = cast("list[Tensor]", list(super().arrays(named, n)))
             if not motion[0].is_cpu:
                 raise TypeError(
                     f"the tensors lie on {motion[0].device}; this back end takes CPU tensors, torch takes all"
@@ -71,22 +99,22 @@ class TorchSide(TorchBackend):
             )
         return motion
 
-    def decomposition(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Sequence[Tensor]:
+    def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         return list(self._run("decomposition", q, qd, qdd))
 
-    def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+    def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """tau (..., count) in the order of `Layout.torque`."""
         return self._run("torque", q, qd, qdd)[0]
 
-    def position_gradient(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+    def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """c0 (..., count) in the order of `Layout.velocity`."""
         return self._run("position_gradient", q, qd, qdd)[0]
 
-    def _run(self, call: str, q: Tensor, qd: Tensor, qdd: Tensor) -> tuple[Tensor, ...]:
+    def _run(self, call: str, *motion: Numbers) -> tuple[Tensor, ...]:
+        q, qd, qdd = cast("tuple[Tensor, Tensor, Tensor]", motion)
         if not self.needs_operators((q, qd, qdd)):
-            results: tuple[Tensor, ...] = compute(self.calls.run, OPERATED[call], (q, qd, qdd))
-            return results
+            return compute(self.run, OPERATED[call], (q, qd, qdd))
         names = self.structure.parameters
         values = [self.parameters[name].to(q).reshape(()) for name in names]
         p = torch.stack(values) if values else q.new_empty(0)
@@ -100,18 +128,55 @@ class TorchSide(TorchBackend):
         return torch.is_grad_enabled() and any(t.requires_grad for t in (*motion, *self._given))
 
 
-def compute(run: Run, call: str, motion: Sequence[Tensor], into: Sequence[Tensor] | None = None) -> Any:
+class TensorAnswers(Answers):
+    """The rows that C has, where torch need not know what is computed."""
+
+    contiguous = True
+
+    def __init__(self, side: TorchSide) -> None:
+        super().__init__(side)
+        self._side = side
+
+    def compute_into(self, call: str, motion: Sequence[Numbers], into: Sequence[Numbers]) -> None:
+        """Compute a call's results where these tensors lie."""
+        tensors = cast("Sequence[Tensor]", motion)
+        if call in FUNCTIONS and not self._side.needs_operators(tensors):
+            compute(self._side.run, call, tensors, cast("Sequence[Tensor]", into))
+        else:
+            super().compute_into(call, motion, into)
+
+
+def _of_c(key: str) -> Callable[..., Sequence[Numbers]]:
+    """A row that C has."""
+    composed = getattr(Answers, key)
+
+    def row(self: TensorAnswers, *motion: Tensor) -> Sequence[Numbers]:
+        if self._side.needs_operators(motion):
+            found: Sequence[Numbers] = composed(self, *motion)
+            return found
+        return compute(self._side.run, key, motion)
+
+    return row
+
+
+for _name in FUNCTIONS.keys() & CALLS.keys():
+    setattr(TensorAnswers, _name, _of_c(_name))
+
+
+def compute(
+    run: Run, call: str, motion: Sequence[Tensor], into: Sequence[Tensor] | None = None
+) -> tuple[Tensor, ...]:
     """Results of the C code, which `run` calls with arrays, as tensors that share its memory."""
     try:
         arrays = [as_numbers(t) for t in motion]
     except ValueError:  # of more than 64 axes
-        raise too_many_axes(dict(zip(MOTION, motion, strict=False)), motion[0].shape[-1]) from None
+        raise too_many_axes(dict(zip(QDD, motion, strict=False)), motion[0].shape[-1]) from None
     if into is None:
         return tuple(torch.from_numpy(result) for result in run(call, arrays, None))
     for t in into:
         torch.autograd.graph.increment_version(t)  # so that no gradient is taken of what stood there
     run(call, arrays, [as_numbers(t) for t in into])
-    return into
+    return tuple(into)
 
 
 def as_numbers(t: Tensor) -> NumberArray:
@@ -121,7 +186,7 @@ def as_numbers(t: Tensor) -> NumberArray:
 
 def operator(
     calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
-) -> Any:
+) -> Operator:
     """Torch operator of a C function, with a gradient, made when first asked for."""
     key = (calls.sources, call)
     if key not in OPERATORS:
@@ -131,32 +196,35 @@ def operator(
 
 def _define(
     calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
-) -> Any:
+) -> Operator:
     """Operator (q, qd, qdd, p, threads) -> results; p holds the parameters in the structure's order."""
     structure, sources, sizes = calls.structure, calls.sources, calls.sizes[OPERATED[call]]
 
     def values(p: Tensor) -> dict[str, Tensor]:
         return dict(zip(structure.parameters, p.unbind(), strict=True))
 
-    def forward(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, threads: int) -> Any:
+    def forward(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, threads: int) -> Results:
         present = NativeCalls(structure, sources.directory, values(p.detach()), threads)
         return _bare(compute(present.run, OPERATED[call], (q, qd, qdd)))
 
-    def fake(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, threads: int) -> Any:
+    def fake(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, threads: int) -> Results:
         return _bare(tuple(q.new_empty((*q.shape[:-1], size)) for size in sizes))
 
-    def setup(ctx: Any, inputs: Any, output: Any) -> None:
-        ctx.save_for_backward(*inputs[:-1])
+    def setup(ctx: Context, inputs: tuple[Tensor, Tensor, Tensor, Tensor, int], output: Results) -> None:
+        ctx.save_for_backward(*inputs[:4])
 
-    def again(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Any:
-        return getattr(TorchBackend(structure, links, values(p), rule), call)(q, qd, qdd)
+    def again(q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor) -> Sequence[Tensor]:
+        found = getattr(TorchBackend(structure, links, values(p), rule), call)(q, qd, qdd)
+        return [found] if torch.is_tensor(found) else cast("Sequence[Tensor]", found)
 
-    def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
+    def backward(ctx: Context, *slopes: Tensor) -> tuple[Tensor | None, ...]:
         inputs, needed = ctx.saved_tensors, ctx.needs_input_grad[:-1]
-        if any(map(is_fake, inputs)):
-            found = iter(differentiated(*inputs, needed, slopes))
-            return (*(next(found) if need else None for need in needed), None)
-        return (*_backward(again, inputs, needed, slopes), None)
+        hidden = any(map(is_fake, inputs))
+        found = (
+            differentiated(*inputs, needed, slopes) if hidden else _backward(again, inputs, needed, slopes)
+        )
+        each = iter(found)
+        return (*(next(each) if need else None for need in needed), None)
 
     results = ", ".join(["Tensor"] * len(sizes))
     schema = f"(Tensor q, Tensor qd, Tensor qdd, Tensor p, int threads) -> ({results})"
@@ -167,7 +235,7 @@ def _define(
     return made
 
 
-def _differentiated(name: str, again: Any) -> Any:
+def _differentiated(name: str, again: Again) -> Callable[..., list[Tensor]]:
     """Operator (q, qd, qdd, p, which of them, slopes of results) -> slopes of these.
 
     A compiler takes it as it stands: what torch would record of the rule has tables that it may not see.
@@ -176,11 +244,9 @@ def _differentiated(name: str, again: Any) -> Any:
     def forward(
         q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, needed: Sequence[bool], slopes: Sequence[Tensor | None]
     ) -> list[Tensor]:
-        inputs = q, qd, qdd, p
         with _recorded_in_an_operator():
-            found = _backward(again, inputs, needed, slopes)
-        pairs = zip(inputs, found, needed, strict=True)
-        return [torch.zeros_like(t) if slope is None else slope.clone() for t, slope, need in pairs if need]
+            found = _backward(again, (q, qd, qdd, p), needed, slopes)
+        return [slope.clone() for slope in found]
 
     def fake(
         q: Tensor, qd: Tensor, qdd: Tensor, p: Tensor, needed: Sequence[bool], slopes: Sequence[Tensor | None]
@@ -193,28 +259,28 @@ def _differentiated(name: str, again: Any) -> Any:
     return made
 
 
-def _recorded_in_an_operator() -> Any:
+def _recorded_in_an_operator() -> AbstractContextManager[object]:
     """Within operators torch records nothing for gradients, unless it is told to."""
     left_out = torch._C._dispatch_tls_local_exclude_set().remove(torch._C.DispatchKey.AutogradCPU)
     return torch._C._ForceDispatchKeyGuard(torch._C._dispatch_tls_local_include_set(), left_out)
 
 
 def _backward(
-    again: Any, inputs: Sequence[Tensor], needed: Sequence[bool], slopes: Sequence[Tensor | None]
-) -> tuple[Tensor | None, ...]:
-    """Slopes of the inputs from those of the results, by computing these once more in torch."""
+    again: Again, inputs: Inputs, needed: Sequence[bool], slopes: Sequence[Tensor | None]
+) -> Sequence[Tensor]:
+    """Slopes of the needed inputs from those of the results, by computing these once more in torch."""
     differentiable = torch.is_grad_enabled()
     with torch.enable_grad():
         fresh = [t if differentiable else t.detach().requires_grad_() for t in inputs]
         results = again(*fresh)
-        results = results if isinstance(results, list) else [results]
         pairs = [(r, s) for r, s in zip(results, slopes, strict=True) if r.requires_grad and s is not None]
         wanted = [t for t, need in zip(fresh, needed, strict=True) if need]
+        if not pairs:  # constants alone, as the stiffness of a slide is
+            return [torch.zeros_like(t) for t in wanted]
         reached, given = zip(*pairs, strict=True)
-        found = iter(
-            torch.autograd.grad(reached, wanted, given, create_graph=differentiable, allow_unused=True)
+        return torch.autograd.grad(
+            reached, wanted, given, create_graph=differentiable, materialize_grads=True
         )
-    return tuple(next(found) if need else None for need in needed)
 
 
 def _transformed(motion: Sequence[Tensor]) -> bool:
@@ -231,7 +297,7 @@ def _has_tangent(t: Tensor) -> bool:
     return torch.autograd.forward_ad.unpack_dual(t).tangent is not None  # type: ignore[no-untyped-call]
 
 
-def _bare(results: tuple[Tensor, ...]) -> Any:
+def _bare(results: tuple[Tensor, ...]) -> Results:
     """An operator with one result returns it by itself."""
     return results if len(results) > 1 else results[0]
 

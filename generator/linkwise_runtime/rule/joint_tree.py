@@ -7,12 +7,13 @@ the frame at `translation` in the frame of its parent, turned by `rotation` Rz(r
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Generic, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
-from ..interface import Array
+from ..interface import Numbers
 
+Own = TypeVar("Own", bound=Numbers, covariant=True)
 Triple = tuple[float, float, float]
-Formula = Callable[[Any, Mapping[str, Any]], Any]
+Formula = Callable[[Any, Mapping[str, Numbers]], Numbers]
 """A number's value, from the array namespace (numpy or torch) and the run-time parameters by name."""
 
 
@@ -133,15 +134,15 @@ class JointTree:
         return tuple(reversed(chain))
 
 
-class Bodies(NamedTuple, Generic[Array]):
+class Bodies(NamedTuple, Generic[Own]):
     """What the links carry, in the order of j; an axis of samples may stand before each shape.
 
     Axes and origin are those of the link's own frame, z on the axis of its joint, as tree.py has them.
     """
 
-    masses: Array
+    masses: Own
     """In kg, (N,)."""
-    centres: Array
+    centres: Own
     """Centres of mass in m, (N, 3)."""
-    inertias: Array
+    inertias: Own
     """About the centres of mass in kg m^2, (N, 3, 3); of each the symmetric part counts."""

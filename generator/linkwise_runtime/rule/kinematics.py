@@ -8,40 +8,69 @@ four, eight, and so is what adds up along a chain of joints.
 Vectors are in the base's axes, and moments and linear velocities about an origin o at rest: at the instant
 it is in the first hinge of each path, and places are counted from there, so that what is far from the base,
 or from another arm, loses no digits. The screw of joint f, times its ratio, is S_f = (z, s): s = (p - o) x z
-for a hinge at p, and z = 0, s = axis for a slide, wherever it is. Where joints follow curves of their
-coordinates, the slopes of these are factors of the screws too, see `joint_curves`.
+for a hinge at p, and z = 0, s = axis for a slide, wherever it is.
+
+With d(q) the curve of a joint whose screw is sigma at a ratio of 1, all formulas stay as they are for its
+screw S = d' sigma, of which the rates have more terms:
+
+    Sd  = V x S  + d'' qd sigma
+    Sdd = A x S + V x Sd + d'' qd V x sigma + (d''' qd^2 + d'' qdd) sigma
+
+and the position gradient c0_ik one for a joint's screw itself, d'' sigma . W with the wrench W of tau.
 """
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .joint_curves import CurveTables, curve_tables, displaced
-from .joint_tree import JointTree
+from ..interface import Namespace, Numbers
+from .joint_tree import JointTree, TreeCurve
+
+LINE = TreeCurve((0.0,), ((0.0, 1.0),))
+"""The curve of a joint that has none: what it moves by is its ratio's matter."""
+Positions = slice | Numbers
+"""What to take of an axis: entries in a row, or a table of positions."""
+Slopes = tuple[Numbers, Numbers, Numbers]
+"""The first three derivatives of all curves by q, (frames, samples) each."""
+
+
+class CurveTables(NamedTuple):
+    """Curves of all frames; each has as many pieces, and each piece as many powers, as the longest."""
+
+    ends: Numbers
+    """Where each piece ends, (pieces - 1, frames, 1); infinite where there is none."""
+    first: Numbers
+    """Index of each frame's first piece among all, (frames, 1)."""
+    starts: Numbers
+    """Of all pieces, (frames * pieces)."""
+    powers: Numbers
+    """Coefficients of the powers of the curve and its three derivatives, (4, powers, frames * pieces)."""
 
 
 class KinematicTables(NamedTuple):
     """What kinematics needs of a tree. Frames are those of the joints, and one for the ground behind them."""
 
-    coordinates: Any
+    coordinates: Numbers
     """Index of the coordinate of each frame."""
-    turns: Any
+    turns: Numbers
     """Ratio of a revolute joint, 0 of another, (frames, 1)."""
-    slides: Any
+    slides: Numbers | None
     """Ratio of a prismatic joint, 0 of another, (frames, 1); None where no joint slides."""
-    still: Any
+    still: Numbers
     """(3, 3, frames, 1): axes of a frame in its parent's, without what follows."""
-    cosine: Any
+    cosine: Numbers
     """The same: what its joint's cosine multiplies."""
-    sine: Any
+    sine: Numbers
     """The same: what its joint's sine multiplies."""
-    axes: Any
+    axes: Numbers
     """(3, frames, 1): direction of the joint in its parent's axes."""
-    parents: Any
+    parents: Numbers
     """Frame that carries each one."""
-    steps: tuple[Any, ...]
+    steps: tuple[Numbers, ...]
     """For each step of composition the frame that each one's axes are in so far."""
-    behind: Any
+    behind: Numbers
     """(frames, 1): ones for the frames that have a hinge before them, whose steps count."""
     curves: CurveTables | None
     """What joints follow; None where none does."""
@@ -50,12 +79,12 @@ class KinematicTables(NamedTuple):
 class Poses(NamedTuple):
     """Frames of all joints in the base's axes, and of the ground behind them."""
 
-    axes: Any
+    axes: Numbers
     """(3, 3, frames, samples): [component, axis x, y or z]."""
-    places: Any
+    places: Numbers
     """From the first hinge of the path, (3, frames, samples), in m; zero before it."""
-    moved: Any = None
-    """`Displacement` of the joints."""
+    slopes: Slopes | None = None
+    """Of the joints' curves; None where no joint follows one."""
 
 
 class Twists(NamedTuple):
@@ -64,17 +93,17 @@ class Twists(NamedTuple):
     Vectors end with their x and y once more, see `around`.
     """
 
-    screws: Any
+    screws: Numbers
     """(5, 2, frames, samples): z and s of each joint times its ratio; none for the ground."""
-    rates: Any
+    rates: Numbers
     """The same of their rates, zd and sd."""
-    twists: Any
+    twists: Numbers
     """The same: omega and v of each frame; V x S is also that of what carries the joint, as S x S = 0."""
-    accelerations: Any
+    accelerations: Numbers
     """The same: their rates, from minus gravity."""
-    second: Any = None
+    second: Numbers | None = None
     """The same: what curves add to the second rates of the screws; None where no joint follows one."""
-    bends: Any = None
+    bends: Numbers | None = None
     """The same: how the screws change by their own coordinates; None likewise."""
 
 
@@ -103,27 +132,60 @@ def kinematic_tables(tree: JointTree) -> KinematicTables:
     )
 
 
+def curve_tables(tree: JointTree) -> CurveTables | None:
+    """Tables of a tree, in float64; None where no joint follows a curve."""
+    if not any(joint.curve for joint in tree.joints):
+        return None
+    curves = [*(joint.curve or LINE for joint in tree.joints), LINE]
+    pieces = max(len(curve.starts) for curve in curves)
+    size = max(len(piece) for curve in curves for piece in curve.pieces)
+    starts = np.zeros((len(curves), pieces))
+    ends = np.full((pieces - 1, len(curves), 1), np.inf)
+    powers = np.zeros((4, size, len(curves), pieces))
+    for f, curve in enumerate(curves):
+        starts[f, : len(curve.starts)] = curve.starts
+        ends[: len(curve.starts) - 1, f, 0] = curve.starts[1:]
+        for at, piece in enumerate(curve.pieces):
+            powers[0, : len(piece), f, at] = piece
+    for order in range(3):
+        scaled = powers[order] * np.arange(size)[:, None, None]
+        powers[order + 1, :-1] = scaled[1:]
+    first = np.arange(len(curves))[:, None] * pieces
+    return CurveTables(ends, first, starts.reshape(-1), powers.reshape(4, size, -1))
+
+
 def hinge_before(tree: JointTree) -> list[bool]:
     """Whether each joint's path has a hinge before it."""
     hinges = [joint.kind == "revolute" for joint in tree.joints]
     return [any(hinges[f] for f in tree.chain(joint.parent)) for joint in tree.joints]
 
 
-def doubled(parents: Any) -> Any:
+def doubled(parents: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
     """Frames 1, 2, 4, ... joints before each; the ground, the last one, stays where it is."""
     while (parents != len(parents) - 1).any():
         yield parents
         parents = parents[parents]
 
 
-def poses(xp: Any, tables: KinematicTables, translations: Any, position: Any) -> Poses:
+def displaced(tables: CurveTables, position: Numbers) -> tuple[Numbers, Slopes]:
+    """What each joint's ratio multiplies, d, and its slopes, for q of every frame's coordinate."""
+    piece = tables.first + (position >= tables.ends).sum(0)
+    at = position - tables.starts[piece]
+    coefficients = tables.powers[:, :, piece]
+    value = coefficients[:, -1]
+    for power in range(coefficients.shape[1] - 2, -1, -1):
+        value = value * at + coefficients[:, power]
+    return value[0], (value[1], value[2], value[3])
+
+
+def poses(xp: Namespace, tables: KinematicTables, translations: Numbers, position: Numbers) -> Poses:
     """Forward kinematics of the whole tree.
 
     translations: of every frame in its parent's axes, (3, frames, samples); position: q of every frame's
     coordinate, (frames, samples)
     """
-    moved = displaced(xp, tables.curves, position)
-    angle = tables.turns * moved.value
+    way, slopes = (position, None) if tables.curves is None else displaced(tables.curves, position)
+    angle = tables.turns * way
     # Stacked, as a compiler then keeps them; else it works them out again for every entry of the axes.
     cosine, sine = xp.stack([xp.cos(angle), xp.sin(angle)], 0)
     axes = tables.still + tables.cosine * cosine + tables.sine * sine
@@ -132,19 +194,19 @@ def poses(xp: Any, tables: KinematicTables, translations: Any, position: Any) ->
     # Each joint is so far from the one before: p_f - p_parent = R_parent t, and it all adds up.
     step = translations
     if tables.slides is not None:
-        step = step + tables.axes * (tables.slides * moved.value)
+        step = step + tables.axes * (tables.slides * way)
     before = taken(axes, tables.parents)
     step = before[:, 0] * step[0] + before[:, 1] * step[1] + before[:, 2] * step[2]
-    return Poses(axes, _summed(tables, tables.behind * step), moved)
+    return Poses(axes, _summed(tables, tables.behind * step), slopes)
 
 
-def joint_screws(xp: Any, tables: KinematicTables, poses: Poses) -> Any:
+def joint_screws(xp: Namespace, tables: KinematicTables, poses: Poses) -> Numbers:
     """z and s of each joint times its ratio and slope, (5, 2, frames, samples); none for the ground."""
     screws = _straight_screws(xp, tables, poses)
-    return screws if tables.curves is None else screws * poses.moved.slope
+    return screws if poses.slopes is None else screws * poses.slopes[0]
 
 
-def _straight_screws(xp: Any, tables: KinematicTables, poses: Poses) -> Any:
+def _straight_screws(xp: Namespace, tables: KinematicTables, poses: Poses) -> Numbers:
     """The same without slopes."""
     axis = poses.axes[:, 2]
     z = axis * tables.turns
@@ -155,7 +217,12 @@ def _straight_screws(xp: Any, tables: KinematicTables, poses: Poses) -> Any:
 
 
 def twists(
-    xp: Any, tables: KinematicTables, poses: Poses, gravity: Any, velocity: Any, acceleration: Any
+    xp: Namespace,
+    tables: KinematicTables,
+    poses: Poses,
+    gravity: Numbers,
+    velocity: Numbers,
+    acceleration: Numbers,
 ) -> Twists:
     """Screws and motion of the tree.
 
@@ -163,15 +230,16 @@ def twists(
     samples)
     """
     screws = straight = _straight_screws(xp, tables, poses)
-    if tables.curves is not None:
-        screws = straight * poses.moved.slope
+    if poses.slopes is not None:
+        slope, bend, jerk = poses.slopes
+        screws = straight * slope
     # V = sum of S qd, Sd = V x S, A = -gravity + sum of S qdd + Sd qd, over the joints of the path.
     moved = _summed(tables, screws * velocity)
     rates = motion_cross(xp, moved, screws)
     second = bends = None
-    if tables.curves is not None:
-        bends = straight * poses.moved.bend
-        own = poses.moved.jerk * velocity * velocity + poses.moved.bend * acceleration
+    if poses.slopes is not None:
+        bends = straight * bend
+        own = jerk * velocity * velocity + bend * acceleration
         second = motion_cross(xp, moved, bends) * velocity + straight * own
         rates = rates + bends * velocity
     change = _summed(tables, screws * acceleration + rates * velocity)
@@ -179,39 +247,40 @@ def twists(
     return Twists(screws, rates, moved, change - weight, second, bends)
 
 
-def _summed(tables: KinematicTables, a: Any) -> Any:
+def _summed(tables: KinematicTables, a: Numbers) -> Numbers:
     """Sums over the path of each frame, itself included; of (..., frames, samples), zero for the ground."""
     for parents in tables.steps:
         a = a + taken(a, parents)
     return a
 
 
-def taken(a: Any, index: Any, axis: int = -2) -> Any:
-    """Some entries of an axis, counted from the end: -2 is that of the joints in (..., joints, samples).
-
-    index: a slice, or a table of positions
-    """
+def taken(a: Numbers, index: Positions, axis: int = -2) -> Numbers:
+    """Some entries of an axis, counted from the end: -2 is that of the joints in (..., joints, samples)."""
     if isinstance(index, slice):
         return a[(..., index) + (slice(None),) * (-1 - axis)]
-    return a.take(index, axis) if isinstance(a, np.ndarray) else a.index_select(axis, index)
+    either: Any = a
+    some: Numbers = (
+        either.take(index, axis) if isinstance(a, np.ndarray) else either.index_select(axis, index)
+    )
+    return some
 
 
-def product(a: Any, b: Any) -> Any:
+def product(a: Numbers, b: Numbers) -> Numbers:
     """Products of matrices (3, 3, ...)."""
     return a[:, 0:1] * b[0:1] + a[:, 1:2] * b[1:2] + a[:, 2:3] * b[2:3]
 
 
-def around(xp: Any, a: Any) -> Any:
+def around(xp: Namespace, a: Numbers) -> Numbers:
     """A vector with its x and y once more, (5, ...), for `cross`."""
     return xp.concat([a, a[:2]], 0)
 
 
-def cross(a: Any, b: Any) -> Any:
+def cross(a: Numbers, b: Numbers) -> Numbers:
     """a x b of vectors (5, ...), as a vector (3, ...)."""
     return a[1:4] * b[2:5] - a[2:5] * b[1:4]
 
 
-def motion_cross(xp: Any, a: Any, b: Any) -> Any:
+def motion_cross(xp: Namespace, a: Numbers, b: Numbers) -> Numbers:
     """(omega, v) x (z, s) = (omega x z, omega x s + v x z) of pairs of vectors (5, 2, ...)."""
     both = cross(a[:, 0:1], b)
     return around(xp, xp.stack([both[:, 0], both[:, 1] + cross(a[:, 1], b[:, 0])], 1))

@@ -21,15 +21,17 @@ It is the rule of `rigid_rule` about that origin, sorted by mass, first moment h
 those of `kinematics`: samples innermost.
 """
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arguments import has_tensors
+from ..interface import Namespace, Numbers
 from ..quantities import PARAMETERS
-from .joint_tree import Bodies, JointTree
-from .kinematics import KinematicTables, around, cross, poses, taken, twists
+from .joint_tree import Bodies, JointTree, Own
+from .kinematics import KinematicTables, Twists, around, cross, poses, taken, twists
 from .rule_layout import joined, members
 from .tree_arrays import TreeArrays
 
@@ -37,27 +39,31 @@ from .tree_arrays import TreeArrays
 class RegressorTables(NamedTuple):
     """Rows of a robot: a pair is a link and a coordinate of its path, in the order of `Layout.torque`."""
 
-    joints: tuple[Any, ...]
+    joints: tuple[Numbers, ...]
     """Joints that follow each pair's coordinate, a table for each summand; the ground where there is none."""
-    frames: Any
+    frames: Numbers
     """Joint that moves each pair's link."""
-    upper: tuple[Any, Any]
+    upper: tuple[Numbers, Numbers]
     """Pairs of i and of k, in the order of `Layout.acceleration`."""
-    every: tuple[Any, Any]
+    every: tuple[Numbers, Numbers]
     """The same in the order of `Layout.velocity`."""
 
 
 class LinkAxes(NamedTuple):
     """Pairs in the axes of their links, about the origins of their frames; vectors (5, pairs, samples)."""
 
-    z: Any
-    u: Any
-    omega: Any
-    v: Any
+    z: Numbers
+    u: Numbers
+    omega: Numbers
+    v: Numbers
     """Of the origin, in m/s."""
 
 
-def inertial_parameters(bodies: Bodies[Any]) -> Any:
+Turn = Callable[[Numbers], tuple[Numbers, Numbers]]
+"""What turns screws (5, 2, pairs, samples) into the links' axes."""
+
+
+def inertial_parameters(bodies: Bodies[Own]) -> Own:
     """pi_j of bodies, (..., N, 10), an array or a tensor as they are.
 
     I is about the origin: I = J + m (c . c 1 - c c^T), J about the centre c.
@@ -66,17 +72,18 @@ def inertial_parameters(bodies: Bodies[Any]) -> Any:
     h = m[..., None] * c
     squares = (h * c).sum(-1)
 
-    def about_origin(a: int, b: int) -> Any:
+    def about_origin(a: int, b: int) -> Numbers:
         own = 0.5 * (j[..., a, b] + j[..., b, a]) - h[..., a] * c[..., b]
         return own + squares if a == b else own
 
     moments = [about_origin(b, c) for c in range(3) for b in range(c + 1)]
-    columns = [m, *(h[..., a] for a in range(3)), *moments]
-    if has_tensors(columns):
+    library: ModuleType = np
+    if has_tensors(bodies):
         import torch
 
-        return torch.stack(columns, -1)
-    return np.stack(columns, -1)
+        library = torch
+    rows: Own = library.stack([m, *(h[..., a] for a in range(3)), *moments], -1)
+    return rows
 
 
 def regressor_tables(tree: JointTree) -> RegressorTables:
@@ -99,8 +106,12 @@ def regressor_tables(tree: JointTree) -> RegressorTables:
 
 
 def torque_rows(
-    xp: Any, frames: KinematicTables, tables: RegressorTables, numbers: TreeArrays, motion: Sequence[Any]
-) -> list[Any]:
+    xp: Namespace,
+    frames: KinematicTables,
+    tables: RegressorTables,
+    numbers: TreeArrays,
+    motion: Sequence[Numbers],
+) -> list[Numbers]:
     """Y of tau, (samples, pairs * 10), for q, qd and qdd (n, samples)."""
     moved, turn, link, _ = _moved(xp, frames, tables, numbers, motion)
     rate = turn(taken(moved.accelerations, tables.frames))
@@ -110,8 +121,12 @@ def torque_rows(
 
 
 def coefficient_rows(
-    xp: Any, frames: KinematicTables, tables: RegressorTables, numbers: TreeArrays, motion: Sequence[Any]
-) -> list[Any]:
+    xp: Namespace,
+    frames: KinematicTables,
+    tables: RegressorTables,
+    numbers: TreeArrays,
+    motion: Sequence[Numbers],
+) -> list[Numbers]:
     """Y of c2, c1 and g, (samples, entries * 10) each, for q, qd and qdd (n, samples)."""
     moved, turn, link, gravity = _moved(xp, frames, tables, numbers, motion)
     zd, fixed = (around(xp, a) for a in turn(_of_pairs(moved.rates, tables)))
@@ -126,19 +141,23 @@ def coefficient_rows(
 
 
 def _moved(
-    xp: Any, frames: KinematicTables, tables: RegressorTables, numbers: TreeArrays, motion: Sequence[Any]
-) -> Any:
-    """Twists, what turns screws (5, 2, pairs, samples) into the links' axes, the pairs there, and gravity."""
+    xp: Namespace,
+    frames: KinematicTables,
+    tables: RegressorTables,
+    numbers: TreeArrays,
+    motion: Sequence[Numbers],
+) -> tuple[Twists, Turn, LinkAxes, Numbers]:
+    """Twists, what turns screws, the pairs in the links' axes, and gravity there."""
     position, velocity, acceleration = (taken(a, frames.coordinates) for a in motion)
     placed = poses(xp, frames, numbers.translations, position)
     moved = twists(xp, frames, placed, numbers.gravity, velocity, acceleration)
     axes = taken(placed.axes, tables.frames)
     place = around(xp, taken(placed.places, tables.frames))
 
-    def turned(a: Any) -> Any:
+    def turned(a: Numbers) -> Numbers:
         return (axes * a[:, None]).sum(0)
 
-    def turn(screw: Any) -> tuple[Any, Any]:
+    def turn(screw: Numbers) -> tuple[Numbers, Numbers]:
         z, s = screw[:, 0], screw[:, 1]
         return turned(z[:3]), turned(s[:3] + cross(z, place))
 
@@ -150,17 +169,17 @@ def _moved(
     return moved, turn, LinkAxes(z, u, omega, v), turned(numbers.gravity + 0.0 * z[:3])
 
 
-def _of_pairs(screws: Any, tables: RegressorTables) -> Any:
+def _of_pairs(screws: Numbers, tables: RegressorTables) -> Numbers:
     """Screws of frames for each pair, summed over the joints that follow its coordinate."""
     first, *others = (taken(screws, joints) for joints in tables.joints)
     return sum(others, first)
 
 
-def _taken(link: LinkAxes, pairs: Any) -> LinkAxes:
+def _taken(link: LinkAxes, pairs: Numbers) -> LinkAxes:
     return LinkAxes(*(taken(a, pairs) for a in link))
 
 
-def _rows(xp: Any, link: LinkAxes, a: Any, alpha: Any, beta: Any) -> Any:
+def _rows(xp: Namespace, link: LinkAxes, a: Numbers, alpha: Numbers, beta: Numbers) -> Numbers:
     """Y of the links' pairs, (samples, rows * 10), for vectors (5, rows, samples) or (3, rows, samples)."""
     z, u = link.z, link.u
     y = cross(z, link.omega)
@@ -172,4 +191,5 @@ def _rows(xp: Any, link: LinkAxes, a: Any, alpha: Any, beta: Any) -> Any:
     ]
     rows = xp.stack([(u[:3] * a[:3]).sum(0), *h, *inertia], 0)
     ordered = xp.swapaxes(rows, 0, 2)  # (samples, rows, 10)
-    return ordered.reshape(rows.shape[2], rows.shape[1] * PARAMETERS)
+    flat: Numbers = ordered.reshape(rows.shape[2], rows.shape[1] * PARAMETERS)
+    return flat

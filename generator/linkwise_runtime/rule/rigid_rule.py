@@ -21,34 +21,48 @@ matrix products answer for the links of a group and all pairs of joints, of whic
 packed.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from .kinematics import Poses, Twists, around, cross, motion_cross, product, taken
+from ..interface import Namespace, Numbers
+from .kinematics import (
+    KinematicTables,
+    Poses,
+    Positions,
+    Twists,
+    around,
+    cross,
+    motion_cross,
+    poses,
+    product,
+    taken,
+    twists,
+)
+from .tree_arrays import TreeArrays
 
 
 class LinkNumbers(NamedTuple):
     """What the links carry, in the axes of their frames."""
 
-    masses: Any
+    masses: Numbers
     """(N, samples)"""
-    mass_matrices: Any
+    mass_matrices: Numbers
     """m 1, (3, 3, N, samples)"""
-    centres: Any
+    centres: Numbers
     """(3, N, samples)"""
-    half_traces: Any
+    half_traces: Numbers
     """Half the traces of the inertias J about the centres, (N, samples)."""
-    second_moments: Any
+    second_moments: Numbers
     """1/2 tr(J) - J, (3, 3, N, samples)"""
 
 
 class LinkTables(NamedTuple):
     """Constants of the rule."""
 
-    joints: Any
+    joints: Positions
     """Joint of each link."""
-    eye: Any
+    eye: Numbers
     """(3, 3, 1, 1)"""
-    skew: Any
+    skew: Numbers
     """Where (a, -a, 0) stands in [a]x, row by row."""
 
 
@@ -58,15 +72,15 @@ class LinkMoments(NamedTuple):
     Vectors end with their x and y once more, matrices have their columns first.
     """
 
-    m: Any
+    m: Numbers
     """(N, samples)"""
-    h: Any
+    h: Numbers
     """(5, N, samples)"""
-    inertia: Any
+    inertia: Numbers
     """(3, 3, N, samples)"""
-    momentum: Any
+    momentum: Numbers
     """P, (5, N, samples)."""
-    b: Any
+    b: Numbers
     """(3, 3, N, samples)"""
 
 
@@ -74,10 +88,12 @@ class LinkStates(NamedTuple):
     """Links in motion, and their wrenches (6, 2, N, samples): tau's and that of their weight."""
 
     moments: LinkMoments
-    wrenches: Any
+    wrenches: Numbers
 
 
-def link_numbers(xp: Any, eye: Any, masses: Any, centres: Any, inertias: Any) -> LinkNumbers:
+def link_numbers(
+    xp: Namespace, eye: Numbers, masses: Numbers, centres: Numbers, inertias: Numbers
+) -> LinkNumbers:
     """From masses (N, samples), centres (3, N, samples) and inertias (3, 3, N, samples) about them."""
     inertias = 0.5 * (inertias + xp.swapaxes(inertias, 0, 1))
     half = 0.5 * (inertias[0, 0] + inertias[1, 1] + inertias[2, 2])
@@ -85,7 +101,7 @@ def link_numbers(xp: Any, eye: Any, masses: Any, centres: Any, inertias: Any) ->
 
 
 def link_states(
-    xp: Any, tables: LinkTables, numbers: LinkNumbers, poses: Poses, moved: Twists, gravity: Any
+    xp: Namespace, tables: LinkTables, numbers: LinkNumbers, poses: Poses, moved: Twists, gravity: Numbers
 ) -> LinkStates:
     """Moments and wrenches of the links; gravity (3, 1, samples)."""
     joints = tables.joints
@@ -97,11 +113,13 @@ def link_states(
     return LinkStates(moments, xp.stack([whole, -weight], 1))
 
 
-def _moments(xp: Any, tables: LinkTables, numbers: LinkNumbers, poses: Poses, twist: Any) -> LinkMoments:
+def _moments(
+    xp: Namespace, tables: LinkTables, numbers: LinkNumbers, poses: Poses, twist: Numbers
+) -> LinkMoments:
     """Moments of the links from their frames and twists (5, 2, N, samples)."""
     omega, v, m, c = twist[:, 0], twist[:, 1], numbers.masses, numbers.centres
     axes, place = taken(poses.axes, tables.joints), taken(poses.places, tables.joints)
-    centre = place + axes[:, 0] * c[0] + axes[:, 1] * c[1] + axes[:, 2] * c[2]
+    centre = _centres(axes, place, c)
     h = m * centre
     # About o: E = R (1/2 tr(J) - J) R^T + h c^T, I = tr(E) - E with tr(E) = 1/2 tr(J) + h . c.
     turned = product(axes, numbers.second_moments)
@@ -116,23 +134,23 @@ def _moments(xp: Any, tables: LinkTables, numbers: LinkNumbers, poses: Poses, tw
     return LinkMoments(m, first, inertia, around(xp, momentum), b)
 
 
-def accelerated(xp: Any, link: LinkMoments, z: Any, s: Any) -> Any:
+def accelerated(xp: Namespace, link: LinkMoments, z: Numbers, s: Numbers) -> Numbers:
     """N = h x s + I z over f = m s + z x h, (6, ...), of vectors (5, ...)."""
     moment = cross(link.h, s) + applied(link.inertia, z)
     return xp.concat([moment, link.m * s[:3] + cross(z, link.h)], 0)
 
 
-def turning(xp: Any, link: LinkMoments, z: Any) -> Any:
+def turning(xp: Namespace, link: LinkMoments, z: Numbers) -> Numbers:
     """N = B z over f = z x P, (6, ...), of a vector (5, ...)."""
     return xp.concat([applied(link.b, z), cross(z, link.momentum)], 0)
 
 
-def applied(matrix: Any, z: Any) -> Any:
+def applied(matrix: Numbers, z: Numbers) -> Numbers:
     """A matrix, columns first, times a vector."""
     return matrix[0] * z[0] + matrix[1] * z[1] + matrix[2] * z[2]
 
 
-def link_matrices(xp: Any, tables: LinkTables, numbers: LinkNumbers, link: LinkMoments) -> Any:
+def link_matrices(xp: Namespace, tables: LinkTables, numbers: LinkNumbers, link: LinkMoments) -> Numbers:
     """`accelerated` and `turning` as matrices that meet (z, s) and z, columns first: (9, 6, N, samples)."""
     hx, px = _skew(tables, xp, link.h[:3]), _skew(tables, xp, link.momentum[:3])
     mass = xp.broadcast_to(numbers.mass_matrices, link.inertia.shape)
@@ -141,37 +159,71 @@ def link_matrices(xp: Any, tables: LinkTables, numbers: LinkNumbers, link: LinkM
     return xp.concat([xp.concat(row, 1) for row in rows], 0)
 
 
-def gradient_matrices(xp: Any, tables: LinkTables, matrices: Any, wrench: Any) -> Any:
+def gradient_matrices(xp: Namespace, tables: LinkTables, matrices: Numbers, wrench: Numbers) -> Numbers:
     """The same with S x* (wrench) behind: -[N]x z - [f]x s over -[f]x z, (15, 6, N, samples)."""
     n, f = _skew(tables, xp, wrench[:3]), _skew(tables, xp, wrench[3:])
     return xp.concat([matrices, xp.concat([n, f], 1), xp.concat([f, 0.0 * f], 1)], 0)
 
 
-def _skew(tables: LinkTables, xp: Any, a: Any) -> Any:
+def _skew(tables: LinkTables, xp: Namespace, a: Numbers) -> Numbers:
     """[a]x of vectors (3, N, samples), (3, 3, N, samples)."""
     rows = xp.concat([a, -a, 0.0 * a[:1]], 0)[tables.skew]
-    return rows.reshape(3, 3, *a.shape[1:])
+    matrices: Numbers = rows.reshape(3, 3, *a.shape[1:])
+    return matrices
 
 
-def decomposition_columns(xp: Any, moved: Twists) -> Any:
+def decomposition_columns(xp: Namespace, moved: Twists) -> Numbers:
     """What the matrices meet for c2 and for c1, (9, 2, joints, samples)."""
     (z, s), (zd, sd) = _halves(moved.screws), _halves(moved.rates)
     return xp.stack([xp.concat([z, s, 0.0 * z], 0), xp.concat([zd, sd, z], 0)], 1)
 
 
-def gradient_columns(xp: Any, moved: Twists) -> Any:
+def gradient_columns(xp: Namespace, moved: Twists) -> Numbers:
     """What the matrices meet for c0 of joints behind joint f, and of it and those before, (15, 2, ...)."""
     (z, s), (zd, _), (zdd, sdd) = (_halves(a) for a in (moved.screws, moved.rates, second_rates(xp, moved)))
     after = xp.concat([zdd, sdd, 2.0 * zd], 0)
     return xp.stack([xp.concat([after, 0.0 * z, 0.0 * s], 0), xp.concat([after, z, s], 0)], 1)
 
 
-def second_rates(xp: Any, moved: Twists) -> Any:
+def second_rates(xp: Namespace, moved: Twists) -> Numbers:
     """S-dot-dot = A x S + V x S-dot, (5, 2, frames, samples)."""
     second = motion_cross(xp, moved.accelerations, moved.screws) + motion_cross(xp, moved.twists, moved.rates)
     return second if moved.second is None else second + moved.second
 
 
-def _halves(screws: Any) -> tuple[Any, Any]:
+def _halves(screws: Numbers) -> tuple[Numbers, Numbers]:
     """z and s of pairs of vectors (5, 2, frames, samples), without the ground."""
     return screws[:3, 0, :-1], screws[:3, 1, :-1]
+
+
+def link_energies(
+    xp: Namespace, tables: KinematicTables, joints: Positions, numbers: TreeArrays, q: Numbers, qd: Numbers
+) -> list[Numbers]:
+    """Kinetic and potential energies in J, (N, samples) each.
+
+    With v and omega the twist of a link about the origin, c its centre of mass seen from there, J its inertia
+    about c and w = R^T omega in its own axes,
+
+        K = 1/2 (m |v + omega x c|^2 + w . J w)        P = -m a_g . c, c from the world's origin
+
+    joints: of the links; q, qd: (n, samples)
+    """
+    position, velocity = taken(q, tables.coordinates), taken(qd, tables.coordinates)
+    placed = poses(xp, tables, numbers.translations, position)
+    moved = twists(xp, tables, placed, numbers.gravity, velocity, 0.0 * velocity)
+    twist, axes = taken(moved.twists, joints), taken(placed.axes, joints)
+    omega, centre = twist[:, 0], _centres(axes, taken(placed.places, joints), numbers.centres)
+    speed = twist[:3, 1] + cross(omega, around(xp, centre))
+    own = (axes * omega[:3, None]).sum(0)
+    spin = (own[:, None] * numbers.inertias * own[None]).sum((0, 1))
+    kinetic = 0.5 * (numbers.masses * (speed * speed).sum(0) + spin)
+    # Counted from the world's origin, where what has a hinge before it is counted from there otherwise.
+    whole = tables._replace(behind=xp.ones_like(tables.behind))
+    places = poses(xp, whole, numbers.translations, position).places
+    height = _centres(axes, taken(places, joints), numbers.centres)
+    return [kinetic, -numbers.masses * (numbers.gravity * height).sum(0)]
+
+
+def _centres(axes: Numbers, places: Numbers, c: Numbers) -> Numbers:
+    """Centres of mass (3, N, samples), from where places are counted."""
+    return places + axes[:, 0] * c[0] + axes[:, 1] * c[1] + axes[:, 2] * c[2]

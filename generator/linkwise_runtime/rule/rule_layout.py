@@ -7,7 +7,6 @@ entries; where several joints follow one coordinate, as mimic joints do, it is t
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,7 +150,7 @@ class _Block:
         """Coordinates that move the link."""
         return len(self.members)
 
-    def entries(self, kind: Any) -> NDArray[np.intp]:
+    def entries(self, kind: int | NDArray[np.intp]) -> NDArray[np.intp]:
         """Positions (summands, i and k) of a kind, or of one for each two joints (path, path); -1: none."""
         i, k = self.members[:, :, None, None], self.members[None, None]
         if not isinstance(kind, int):

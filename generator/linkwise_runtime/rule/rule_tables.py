@@ -1,42 +1,77 @@
-"""The constants of the rigid-link rule for one robot, as each back end has them."""
+"""The constants of the rigid-link rule for one robot, as each back end has them.
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+Those of `spatial_rule` are matrices, 6 x 6. Motions are ordered (s, z), linear before angular, and wrenches
+(f, N), so that S . W is the part of wrench W on the joint of screw S. A frame turned by R and moved by t has
+
+    X = |R     0|     which brings its wrenches into the axes, and to the place, of what carries it,
+        |[t]xR R|     and its spatial inertia too: X I X^T.
+
+Their samples are outermost, and what all samples share has one.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..interface import Library, Namespace, Numbers
 from .joint_tree import JointTree
-from .kinematics import KinematicTables, kinematic_tables
+from .kinematics import KinematicTables, Positions, doubled, hinge_before, kinematic_tables
 from .regressors import RegressorTables, regressor_tables
 from .rigid_rule import LinkNumbers, LinkTables, link_numbers
 from .rule_layout import RuleLayout, pair_layout
-from .spatial_tables import SpatialNumbers, SpatialTables, spatial_numbers, spatial_tables
 from .tree_arrays import TreeArrays, formula_sources, own_numbers
 
+Table = TypeVar("Table")
 
-class Space(Protocol):
-    """What the rule asks of a back end: its array namespace, and constants beside the arrays given."""
 
-    @property
-    def xp(self) -> Any:
-        """The array namespace, numpy or torch."""
+class SpatialTables(NamedTuple):
+    """What a tree's joints are. Frames are those of the joints, and one for the ground behind them."""
 
-    def constant(self, values: NDArray[Any], like: Any) -> Any:
-        """A table of numbers, to compute with `like`."""
+    coordinates: Numbers
+    """Index of the coordinate of each frame."""
+    own: Positions
+    """The same of each joint."""
+    turns: Numbers
+    """Ratio of a revolute joint, 0 of another, (frames,)."""
+    slides: Numbers | None
+    """Ratio of a prismatic joint, 0 of another, (frames,); None where no joint slides."""
+    turned: Numbers
+    """X without t: still, and what cosine and sine multiply; (3, 1, frames, 6, 6)."""
+    axes: Numbers
+    """(frames, 3): direction of the joint in its parent's axes; zeros before the first hinge."""
+    behind: Numbers
+    """(frames, 1): ones for the frames that have a hinge before them, whose translations count."""
+    steps: tuple[Numbers, ...]
+    """For each step of composition the frame that each one's X leads to so far."""
+    units: Numbers
+    """(joints, 6, 1): (z, s) of each joint in its own frame, times its ratio."""
+    chains: Numbers
+    """(joints, joints): ones for the joints on each one's path, itself included."""
+    joints: Positions
+    """Joint of each link."""
+    swapped: Numbers
+    """(s, z) of (z, s)."""
+    offset: Numbers
+    """Where t stands in [0 0; [t]x 0], (3, 36)."""
+    body: Numbers
+    """Where mass and inertia stand in those of a body about its centre, (10, 36)."""
+    motion_cross: Numbers
+    """Where (v, omega) stands in the matrix of V x, (6, 36)."""
+    force_cross: Numbers
+    """Where W = (f, N) stands in the matrix of S -> S x* W, (6, 36)."""
 
-    def index(self, values: NDArray[np.intp], like: Any) -> Any:
-        """A table of positions, to take from `like`."""
 
-    @property
-    def fuses(self) -> bool:
-        """Whether a compiler makes one loop of many operations, to which a matrix product is a wall."""
+class SpatialNumbers(NamedTuple):
+    """The numbers of a tree in matrices."""
 
-    def few(self, samples: int, links: int) -> bool:
-        """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
-
-    def chunk(self, motion: Sequence[Any], most: int) -> int | None:
-        """Samples to compute at once where `most` of them stay in the cache; None for all."""
+    frames: Numbers
+    """X of each frame: still, and what cosine, sine and q multiply; (3 or 4, samples, frames, 6, 6)."""
+    inertias: Numbers
+    """In the axes of the links' frames, about their origins; (samples, N, 6, 6)."""
+    gravity: Numbers
+    """(samples, 1, 6), as an acceleration of the base's axes."""
 
 
 class RuleTables(NamedTuple):
@@ -49,22 +84,23 @@ class RuleTables(NamedTuple):
     spatial: SpatialTables
     matrices: SpatialNumbers
     """The tree's own."""
-    sources: Any
-    groups: tuple[tuple[Any, Any], ...]
+    sources: Numbers
+    groups: tuple[tuple[Positions, Positions], ...]
     """Links and path of each."""
-    positions: tuple[tuple[Any, ...], ...]
+    positions: tuple[tuple[Numbers, ...], ...]
     """Of c2, c1, c0, g and tau in the answers, a table for each summand."""
-    diagonal: Any
+    diagonal: Numbers
     """Of each c0_ik with i = k the packed tau_i, of others a zero behind."""
-    pairs: tuple[Any, Any]
+    pairs: tuple[Numbers, Numbers]
     """Links and joints of the pairs of `PairLayout`."""
-    entries: tuple[tuple[tuple[Any, Any], ...], ...]
+    entries: tuple[tuple[tuple[Numbers, Numbers], ...], ...]
     """Of c2, c1 and c0, its rows, and of g and tau those of joint and of kind and link."""
     regressors: RegressorTables
 
 
 def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
     """All constants in float64, of NumPy."""
+    xp = cast("Namespace", np)
     own, eye = own_numbers(tree), np.eye(3)[:, :, None, None]
     # (a, -a, 0)
     skew = np.array([6, 5, 1, 2, 6, 3, 4, 0, 6])
@@ -83,9 +119,9 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
         kinematic_tables(tree),
         links,
         own,
-        link_numbers(np, eye, *own.carried),
+        link_numbers(xp, eye, *own.carried),
         spatial,
-        spatial_numbers(np, spatial, own),
+        spatial_numbers(xp, spatial, own),
         formula_sources(tree),
         tuple((_span(group.links), _span(group.path)) for group in layout.groups),
         tuple(tuple(getattr(layout, field)) for field in fields),
@@ -96,19 +132,111 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
     )
 
 
-def converted(table: Any, space: Space, like: Any) -> Any:
+def converted(table: Table, library: Library, like: Numbers) -> Table:
     """A table, with what it holds, for a dtype and device."""
     if isinstance(table, np.ndarray):
-        return space.index(table, like) if table.dtype.kind == "i" else space.constant(table, like)
+        made = library.index if table.dtype.kind == "i" else library.constant
+        return cast("Table", made(table, like))
     if isinstance(table, tuple):
-        entries = (converted(entry, space, like) for entry in table)
-        return type(table)(*entries) if hasattr(table, "_fields") else tuple(entries)
+        entries = [converted(entry, library, like) for entry in table]
+        return cast("Table", type(table)(*entries) if hasattr(table, "_fields") else tuple(entries))
     return table
 
 
-def _span(positions: Sequence[int]) -> Any:
+def _span(positions: Sequence[int]) -> Positions:
     """Positions in a row as a slice, which takes no copy."""
     first, count = positions[0], len(positions)
     if list(positions) == list(range(first, first + count)):
         return slice(first, first + count)
     return np.array(positions, dtype=np.intp)
+
+
+def spatial_tables(tree: JointTree, joints: Positions, own: Positions) -> SpatialTables:
+    """Tables of a tree, in float64; joints of the links and coordinates of the joints as given."""
+    moved, count = tree.joints, len(tree.joints)
+    hinge = np.array([*(joint.kind == "revolute" for joint in moved), True])
+    ratio = np.array([*(joint.ratio for joint in moved), 0.0])
+    rotation = np.array([*(joint.rotation for joint in moved), np.eye(3)])
+    behind = np.array([*hinge_before(tree), False])[:, None].astype(float)
+    parents = np.array([*(count if j.parent is None else j.parent for j in moved), count])
+    chains = np.zeros((count, count))
+    units = np.zeros((count, 6, 1))
+    for f in range(count):
+        chains[f, list(tree.chain(f))] = 1.0
+        units[f, 2 if hinge[f] else 5] = ratio[f]
+    return SpatialTables(
+        np.array([*(joint.coordinate for joint in moved), 0]),
+        own,
+        np.where(hinge, ratio, 0.0),
+        None if hinge.all() else np.where(hinge, 0.0, ratio),
+        np.array([_twice(part) for part in _turned(rotation)])[:, None],
+        rotation[:, :, 2] * behind,
+        behind,
+        tuple(doubled(parents)),
+        units,
+        chains,
+        joints,
+        np.array([3, 4, 5, 0, 1, 2]),
+        *_places(),
+    )
+
+
+def spatial_numbers(xp: Namespace, tables: SpatialTables, numbers: TreeArrays) -> SpatialNumbers:
+    """The numbers of a tree in matrices, from those with their samples innermost."""
+    gravity, translations, masses, centres, inertias, _ = (xp.moveaxis(a, -1, 0) for a in numbers)
+    # X = (1 + [0 0; [t]x 0]) diag(R, R)
+    offset = as_matrices(xp.swapaxes(translations, 1, 2) * tables.behind, tables.offset)
+    frames = tables.turned + offset @ tables.turned
+    if tables.slides is not None:
+        slide = as_matrices(tables.axes, tables.offset) @ (tables.turned[0, 0] + tables.turned[1, 0])
+        frames = xp.concat([frames, xp.broadcast_to(slide, frames[:1].shape)], 0)
+    # (1 + [0 0; [c]x 0]) diag(m 1, J) (1 + [0 0; [c]x 0])^T
+    flat = xp.moveaxis(inertias.reshape(inertias.shape[0], 9, inertias.shape[3]), 1, 2)
+    count = len(flat) if len(masses) == 1 else len(masses)
+    parts = [xp.broadcast_to(a, (count, *a.shape[1:])) for a in (masses[..., None], flat)]
+    body = as_matrices(xp.concat(parts, -1), tables.body)
+    away = as_matrices(xp.swapaxes(centres, 1, 2), tables.offset)
+    body = body + away @ body
+    gravity = gravity[..., 0][:, None]
+    return SpatialNumbers(
+        frames, body + body @ xp.swapaxes(away, -1, -2), xp.concat([gravity, 0.0 * gravity], -1)
+    )
+
+
+def as_matrices(entries: Numbers, places: Numbers) -> Numbers:
+    """Matrices whose entries are numbers (..., m) at their places, (m, 36)."""
+    flat = entries @ places
+    matrices: Numbers = flat.reshape(*flat.shape[:-1], 6, 6)
+    return matrices
+
+
+def _turned(rotation: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    """R Rz(a) = [x cos a + y sin a, y cos a - x sin a, z]: what stands still, and of cosine and sine."""
+    x, y, z = (rotation[:, :, i] for i in range(3))
+    none = np.zeros_like(x)
+    for columns in ((none, none, z), (x, y, none), (y, -x, none)):
+        yield np.stack(columns, -1)
+
+
+def _twice(part: NDArray[np.float64]) -> NDArray[np.float64]:
+    """diag(R, R)"""
+    none = np.zeros_like(part)
+    return np.block([[part, none], [none, part]])
+
+
+def _places() -> Iterator[NDArray[np.float64]]:
+    """The tables `offset`, `body`, `motion_cross` and `force_cross`."""
+    eye = np.eye(3)
+    skew = np.cross(eye[:, None], eye).swapaxes(1, 2)
+    none = np.zeros((3, 3, 3))
+    offset = np.block([[none, none], [skew, none]])
+    body = np.zeros((10, 6, 6))
+    body[0, :3, :3] = eye
+    for i in range(3):
+        for k in range(3):  # of an inertia the symmetric part counts
+            body[1 + 3 * i + k, 3 + i, 3 + k] += 0.5
+            body[1 + 3 * i + k, 3 + k, 3 + i] += 0.5
+    motion = np.concatenate([np.block([[none, skew], [none, none]]), np.block([[skew, none], [none, skew]])])
+    # (s, z) x* (f, N) = (z x f, s x f + z x N)
+    force = -np.concatenate([np.block([[none, skew], [skew, none]]), np.block([[none, none], [none, skew]])])
+    yield from (table.reshape(len(table), -1) for table in (offset, body, motion, force))

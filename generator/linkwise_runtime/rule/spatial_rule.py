@@ -1,7 +1,7 @@
 """The rigid-link rule in spatial matrices: few array operations, for few samples.
 
 The formulas are those of `rigid_rule` with S = (s, z), V = (v, omega) and A its rate, from minus gravity, and
-with 6 x 6 matrices in place of 3-vectors, see `spatial_tables`. With V x S = (omega x s + v x z, omega x z),
+with 6 x 6 matrices in place of 3-vectors, see `rule_tables`. With V x S = (omega x s + v x z, omega x z),
 V x* its negative transpose, and I the spatial inertia of a link about the base's origin,
 
     Sd = V x S       Sdd = A x S + V x Sd                  rates of a joint's screw
@@ -19,13 +19,12 @@ innermost, as `rigid_rule` has them.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from .joint_curves import Displacement, displaced
-from .kinematics import taken
+from ..interface import Namespace, Numbers
+from .kinematics import Slopes, displaced, taken
 from .rule_products import packed
-from .rule_tables import RuleTables
-from .spatial_tables import SpatialNumbers, as_matrices
+from .rule_tables import RuleTables, SpatialNumbers, as_matrices
 
 
 class SpatialMoment(NamedTuple):
@@ -34,37 +33,37 @@ class SpatialMoment(NamedTuple):
     Its methods are those of `Moment`.
     """
 
-    xp: Any
+    xp: Namespace
     tables: RuleTables
-    screws: Any
+    screws: Numbers
     """S of each joint, (samples, joints, 6)."""
-    rates: Any
+    rates: Numbers
     """Sd, the same."""
-    accelerations: Any
+    accelerations: Numbers
     """A, the same."""
-    crosses: Any
+    crosses: Numbers
     """V x of each joint, (samples, joints, 6, 6)."""
-    inertias: Any
+    inertias: Numbers
     """I of each link, (samples, N, 6, 6)."""
-    momenta: Any
+    momenta: Numbers
     """P, (samples, N, 6)."""
-    wrenches: Any
+    wrenches: Numbers
     """W, (samples, N, 6)."""
-    weights: Any
+    weights: Numbers
     """I of minus gravity, the same."""
-    second: Any = None
+    second: Numbers | None = None
     """What curves add to Sdd of each joint, (samples, joints, 6); None where no joint follows one."""
-    bends: Any = None
+    bends: Numbers | None = None
     """The same: how S changes by its own coordinate; None likewise."""
 
-    def coefficients(self) -> list[Any]:
+    def coefficients(self) -> list[Numbers]:
         """Packed c2 and c1."""
         z = self.screws[..., 3:]
         columns = [self.screws, 0.0 * z], [self.rates, z]
         dense = self._products(self._matrices(), columns)
         return [packed(self.xp, dense, positions) for positions in self.tables.positions[:2]]
 
-    def gradient(self) -> list[Any]:
+    def gradient(self) -> list[Numbers]:
         """Packed c0."""
         s, rate = self.screws, self.rates
         second = _applied(self._cross(self.accelerations), s) + _applied(self.crosses, rate)
@@ -73,30 +72,30 @@ class SpatialMoment(NamedTuple):
         matrices = self.xp.concat([self._matrices(), self._wrench_cross(self.wrenches)], -1)
         return [packed(self.xp, self._products(matrices, columns), self.tables.positions[2])]
 
-    def own_bends(self) -> Any:
+    def own_bends(self) -> Numbers | None:
         """What tau's wrench does along how S changes by its own coordinate, packed as tau; or None."""
         return None if self.bends is None else self._replace(screws=self.bends).singles((4,))[0]
 
-    def singles(self, fields: Sequence[int]) -> list[Any]:
+    def singles(self, fields: Sequence[int]) -> list[Numbers]:
         """Packed S_e . (wrench) of g or tau, or both."""
         both = self.xp.concat([self.wrenches, self.weights], 1)
-        dense = self.screws @ self.xp.swapaxes(both, 1, 2)
+        dense = self.screws @ both.mT
         dense = dense.reshape(dense.shape[0], dense.shape[1] * dense.shape[2])
         return [packed(self.xp, dense, self.tables.positions[field]) for field in fields]
 
-    def _matrices(self) -> Any:
+    def _matrices(self) -> Numbers:
         """[I B] of each link, of B the columns that meet z, (samples, N, 6, 9)."""
         own = self.inertias @ taken(self.crosses, self.tables.spatial.joints, -3)
-        b = 0.5 * (self._wrench_cross(self.momenta) - own - self.xp.swapaxes(own, -1, -2))
+        b = 0.5 * (self._wrench_cross(self.momenta) - own - own.mT)
         return self.xp.concat([self.inertias, b[..., 3:]], -1)
 
-    def _cross(self, motions: Any) -> Any:
+    def _cross(self, motions: Numbers) -> Numbers:
         return as_matrices(motions, self.tables.spatial.motion_cross)
 
-    def _wrench_cross(self, wrenches: Any) -> Any:
+    def _wrench_cross(self, wrenches: Numbers) -> Numbers:
         return as_matrices(wrenches, self.tables.spatial.force_cross)
 
-    def _products(self, matrices: Any, columns: Sequence[Sequence[Any]]) -> Any:
+    def _products(self, matrices: Numbers, columns: Sequence[Sequence[Numbers]]) -> Numbers:
         """S_e . (L column) for each group's links and any two joints e and f on its path, (samples, entries).
 
         matrices: L, (samples, N, 6, m); columns: of each kind the parts that make one of m entries, (samples,
@@ -109,30 +108,31 @@ class SpatialMoment(NamedTuple):
             block, behind = taken(matrices, links, -3), taken(right, path, -2)
             count, depth = block.shape[1], behind.shape[2]
             rows = xp.swapaxes(block, 1, 2).reshape(samples, 6 * count, size)
-            wrench = rows @ xp.swapaxes(behind.reshape(samples, kinds * depth, size), 1, 2)
+            wrench = rows @ behind.reshape(samples, kinds * depth, size).mT
             answer = taken(self.screws, path) @ wrench.reshape(samples, 6, count * kinds * depth)
             answers.append(answer.reshape(samples, depth * count * kinds * depth))
         return xp.concat(answers, 1) if len(answers) > 1 else answers[0]
 
 
 def spatial_moment(
-    xp: Any, tables: RuleTables, numbers: SpatialNumbers, motion: Sequence[Any]
+    xp: Namespace, tables: RuleTables, numbers: SpatialNumbers, motion: Sequence[Numbers]
 ) -> SpatialMoment:
     """Motion of joints and links for q, qd and qdd, (samples, n) each."""
     spatial = tables.spatial
-    moved = _moved(xp, tables, taken(motion[0], spatial.coordinates, -1))
-    x = _placed(xp, tables, numbers, moved.value)
+    way, slopes = _moved(xp, tables, taken(motion[0], spatial.coordinates, -1))
+    x = _placed(xp, tables, numbers, way)
     s = straight = taken((x[:, :-1] @ spatial.units)[..., 0], spatial.swapped, -1)
-    velocity, acceleration = (taken(a, spatial.own, -1)[..., None] for a in motion[1:])
-    slope, bend, jerk = (a if a is None else a[:, :-1, None] for a in moved[1:])
-    if slope is not None:
+    velocity = taken(motion[1], spatial.own, -1)[..., None]
+    acceleration = taken(motion[2], spatial.own, -1)[..., None]
+    if slopes is not None:
+        slope, bend, jerk = (a[:, :-1, None] for a in slopes)
         s = straight * slope
     # V = sum of S qd, A = -gravity + sum of S qdd + Sd qd, over the joints of the path; S x S = 0.
     v = spatial.chains @ (s * velocity)
     crosses = as_matrices(v, spatial.motion_cross)
     rate = _applied(crosses, s)
     second = bends = None
-    if slope is not None:
+    if slopes is not None:
         bends = straight * bend
         second = _applied(crosses, bends) * velocity + straight * (
             jerk * velocity * velocity + bend * acceleration
@@ -141,24 +141,25 @@ def spatial_moment(
     a = spatial.chains @ (s * acceleration + rate * velocity) - numbers.gravity
     links = spatial.joints
     x = taken(x, links, -3)
-    inertia = x @ numbers.inertias @ xp.swapaxes(x, -1, -2)
+    inertia = x @ numbers.inertias @ x.mT
     momentum = _applied(inertia, taken(v, links))
     # V x* is minus the transpose of V x.
-    turning = _applied(xp.swapaxes(taken(crosses, links, -3), -1, -2), momentum)
+    turning = _applied(taken(crosses, links, -3).mT, momentum)
     wrench = _applied(inertia, taken(a, links)) - turning
     weight = _applied(inertia, -numbers.gravity)
     return SpatialMoment(xp, tables, s, rate, a, crosses, inertia, momentum, wrench, weight, second, bends)
 
 
-def _moved(xp: Any, tables: RuleTables, position: Any) -> Displacement:
-    """What all joints move by, (samples, frames), for q of each."""
+def _moved(xp: Namespace, tables: RuleTables, position: Numbers) -> tuple[Numbers, Slopes | None]:
+    """What all joints move by and its slopes, (samples, frames), for q of each."""
     if tables.frames.curves is None:
-        return Displacement(position)
-    found = displaced(xp, tables.frames.curves, xp.swapaxes(position, 0, 1))
-    return Displacement(*(xp.swapaxes(a, 0, 1) for a in found))
+        return position, None
+    way, slopes = displaced(tables.frames.curves, xp.swapaxes(position, 0, 1))
+    slope, bend, jerk = (xp.swapaxes(a, 0, 1) for a in slopes)
+    return xp.swapaxes(way, 0, 1), (slope, bend, jerk)
 
 
-def _placed(xp: Any, tables: RuleTables, numbers: SpatialNumbers, position: Any) -> Any:
+def _placed(xp: Namespace, tables: RuleTables, numbers: SpatialNumbers, position: Numbers) -> Numbers:
     """X of all frames into the base's axes, (samples, frames, 6, 6); position: (samples, frames)."""
     angle = tables.spatial.turns * position
     x = numbers.frames[0] + numbers.frames[1] * xp.cos(angle)[..., None, None]
@@ -170,6 +171,6 @@ def _placed(xp: Any, tables: RuleTables, numbers: SpatialNumbers, position: Any)
     return x
 
 
-def _applied(matrices: Any, vectors: Any) -> Any:
+def _applied(matrices: Numbers, vectors: Numbers) -> Numbers:
     """Matrices (..., 6, 6) times vectors (..., 6)."""
     return (matrices @ vectors[..., None])[..., 0]

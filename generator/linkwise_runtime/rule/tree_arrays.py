@@ -5,13 +5,15 @@ Samples are innermost; what all of them share has one. See `kinematics` for `xp`
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import precision
+from ..interface import Namespace, Numbers
 from ..parameter_values import fits
-from .joint_tree import Bodies, JointTree
+from .joint_tree import Bodies, JointTree, Own
 
 SHAPES = {"masses": (), "centres": (3,), "inertias": (3, 3)}
 """What `Bodies` holds of each link."""
@@ -20,21 +22,21 @@ SHAPES = {"masses": (), "centres": (3,), "inertias": (3, 3)}
 class TreeArrays(NamedTuple):
     """The numbers of a tree."""
 
-    gravity: Any
+    gravity: Numbers
     """(3, 1, samples), in the base's axes."""
-    translations: Any
+    translations: Numbers
     """Of each frame, and none of the ground, (3, frames, samples)."""
-    masses: Any
+    masses: Numbers
     """(N, samples)"""
-    centres: Any
+    centres: Numbers
     """(3, N, samples)"""
-    inertias: Any
+    inertias: Numbers
     """(3, 3, N, samples)"""
-    offsets: Any
+    offsets: Numbers
     """Of the frames that have names, in the axes of what carries them, (3, frames, samples)."""
 
     @property
-    def carried(self) -> tuple[Any, Any, Any]:
+    def carried(self) -> tuple[Numbers, Numbers, Numbers]:
         """Masses, centres and inertias of the links."""
         return self.masses, self.centres, self.inertias
 
@@ -51,7 +53,7 @@ def own_numbers(tree: JointTree) -> TreeArrays:
     )
 
 
-def formula_sources(tree: JointTree) -> Any:
+def formula_sources(tree: JointTree) -> NDArray[np.intp]:
     """For every number where it stands in all the listed ones followed by those of the formulas, flat."""
     listed = {place: at for at, place in enumerate(_places(tree))}
     sources = np.arange(len(listed))
@@ -71,8 +73,13 @@ def _places(tree: JointTree) -> Iterator[str]:
     yield from (f"frames[{f}].translation[{i}]" for i in range(3) for f in range(len(tree.frames)))
 
 
-def with_formulas(
-    xp: Any, tree: JointTree, own: TreeArrays, sources: Any, p: Mapping[str, Any], batch: tuple[int, ...]
+def _with_formulas(
+    xp: Namespace,
+    tree: JointTree,
+    own: TreeArrays,
+    sources: Numbers,
+    p: Mapping[str, Numbers],
+    batch: tuple[int, ...],
 ) -> TreeArrays:
     """The numbers for values of the parameters, each one for all samples or one for each, (...)."""
     if not tree.formulas:
@@ -93,9 +100,11 @@ def with_formulas(
     return TreeArrays(*found)
 
 
-def with_bodies(xp: Any, numbers: TreeArrays, bodies: Bodies[Any], batch: tuple[int, ...]) -> TreeArrays:
+def _with_bodies(
+    xp: Namespace, numbers: TreeArrays, bodies: Bodies[Numbers], batch: tuple[int, ...]
+) -> TreeArrays:
     """The numbers with bodies in place of the tree's; they may have an axis for each of the batch."""
-    given = {}
+    given: dict[str, Numbers] = {}
     for name, value in bodies._asdict().items():
         own = len(SHAPES[name]) + 1
         shape = tuple(value.shape[len(value.shape) - own :])
@@ -114,22 +123,22 @@ def with_bodies(xp: Any, numbers: TreeArrays, bodies: Bodies[Any], batch: tuple[
 
 
 def given_numbers(
-    xp: Any,
+    xp: Namespace,
     tree: JointTree,
-    own: tuple[TreeArrays, Any],
-    p: Mapping[str, Any],
-    bodies: Bodies[Any] | None,
+    own: tuple[TreeArrays, Numbers],
+    p: Mapping[str, Numbers],
+    bodies: Bodies[Numbers] | None,
     batch: tuple[int, ...],
 ) -> TreeArrays:
     """The numbers for values of the parameters and, where they are given, bodies.
 
     own: `own_numbers` and `formula_sources` of the tree, to compute with
     """
-    numbers = with_formulas(xp, tree, *own, p, batch)
-    return numbers if bodies is None else with_bodies(xp, numbers, bodies, batch)
+    numbers = _with_formulas(xp, tree, *own, p, batch)
+    return numbers if bodies is None else _with_bodies(xp, numbers, bodies, batch)
 
 
-def checked_bodies(given: Any, links: int, read: Callable[[str, Any], Any]) -> Bodies[Any]:
+def checked_bodies(given: object, links: int, read: Callable[[str, object], Own]) -> Bodies[Own]:
     """Bodies as `read` makes arrays or tensors of them by name; arrays are copied, tensors may be learned.
 
     Raises TypeError for what is no number, and ValueError for a wrong shape.
@@ -143,12 +152,12 @@ def checked_bodies(given: Any, links: int, read: Callable[[str, Any], Any]) -> B
     for (name, value), inner in zip(values.items(), SHAPES.values(), strict=True):
         if value is None:
             raise TypeError(f"{name} is None; give an array or a tensor of shape {(links, *inner)}")
-    values = {name: read(name, value) for name, value in values.items()}
-    precision(values, values)
-    for (name, value), inner in zip(values.items(), SHAPES.values(), strict=True):
+    found = {name: read(name, value) for name, value in values.items()}
+    precision(found, found)
+    for (name, array), inner in zip(found.items(), SHAPES.values(), strict=True):
         shape = (links, *inner)
-        if tuple(value.shape[-len(shape) :]) != shape:
+        if tuple(array.shape[-len(shape) :]) != shape:
             raise ValueError(
-                f"{name} has shape {tuple(value.shape)}; it must be {shape}, or that behind axes of samples"
+                f"{name} has shape {tuple(array.shape)}; it must be {shape}, or that behind axes of samples"
             )
-    return Bodies(*(a.copy() if isinstance(a, np.ndarray) else a for a in values.values()))
+    return Bodies(*(a.copy() if isinstance(a, np.ndarray) else a for a in found.values()))

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.constraints.held_frames import axes_around
 from linkwise_runtime.dynamics import Dynamics
-from linkwise_runtime.robot_constraints import Contact
+from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.package.load import Array

@@ -7,7 +7,7 @@ from typing import Any
 from linkwise_runtime.chosen_names import nearest_first
 from linkwise_runtime.constraints.held_frames import ground_normal
 from linkwise_runtime.constraints.independent_joints import loose_base
-from linkwise_runtime.robot_constraints import Contact
+from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.body_names import body_frame
 from linkwise.analysis.contacts.given_contacts import Contacts

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from linkwise_runtime.robot_constraints import Contact
+from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.body_names import named_body
 from linkwise.analysis.contacts.given_contacts import Contacts, WhileColumn

@@ -1,0 +1,1 @@
+"""From packed values to answers: spread, summed over links, solved for accelerations."""

@@ -1,0 +1,259 @@
+"""The table's calls of `Dynamics` as one back end answers them, for motion that has been read."""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from ..call_table import CALLS, PACKED
+from ..interface import Numbers
+from ..packed_engine import PackedEngine
+from ..passive_joints import passive_torques
+from ..robot_axes import axes_of
+from ..structure import Structure
+from .inertia_solve import solved
+from .namespace import hidden, namespace, side_by_side
+from .packed_tables import PackedTables
+
+AT_ONCE = 1 << 22
+"""Packed numbers of one chunk of samples, each at n unit velocities; of one sample at some of them."""
+
+Shapes = tuple[tuple[int, ...], ...]
+
+
+def answer_shapes(structure: Structure) -> dict[str, Shapes]:
+    """Shapes for one sample of each call's results, by its key; without those that hang on what is asked."""
+    axes = axes_of(structure.joint_names, structure.joint_units, structure.link_names)
+    sizes = {axis: len(named.names) for axis, named in axes.items()}
+    sizes |= dict(zip(PACKED, structure.sizes, strict=True))
+    return {
+        key: tuple(tuple(sizes[axis] for axis in quantity.axes) for quantity in row.answers)
+        for key, row in CALLS.items()
+        if all(axis in sizes for quantity in row.answers for axis in quantity.axes)
+    }
+
+
+class Answers:
+    """Rows of the table by their keys: each takes motion (..., n) in one shape, and answers with arrays."""
+
+    contiguous = False
+    """Whether what `out` says must be contiguous."""
+
+    def __init__(self, engine: PackedEngine) -> None:
+        self._engine, self._structure = engine, engine.structure
+        self._tables = PackedTables(engine)
+
+    @cached_property
+    def shapes(self) -> dict[str, Shapes]:
+        """Of each call's results for one sample."""
+        return answer_shapes(self._structure)
+
+    def compute_into(self, call: str, motion: Sequence[Numbers], into: Sequence[Numbers]) -> None:
+        """Compute a call's results where these arrays or tensors lie."""
+        for place, value in zip(into, getattr(self, call)(*motion), strict=True):
+            place[...] = value
+
+    def packed(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """c2, c1, g, tau, h1."""
+        return self._engine.decomposition(q, qd, qdd)
+
+    def packed_torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """tau on the paths."""
+        return (self._engine.torque(q, qd, qdd),)
+
+    def partial_torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """tau_ij."""
+        return (self._tables.spread(self._engine.torque(q, qd, qdd), "torque"),)
+
+    def inverse_dynamics(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """tau_i."""
+        return (self._tables.summed(self._engine.torque(q, qd, qdd)),)
+
+    def passive_torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """Spring, damping, friction, armature."""
+        return passive_torques(self._engine, self._structure.passive_sums, q, qd, qdd)
+
+    def coefficients(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
+        """c2, c1, g."""
+        c2, c1, g, _, _ = self.packed(q, qd, self._rest(q))
+        spread = self._tables.spread
+        return spread(c2, "acceleration"), spread(c1, "velocity"), spread(g, "gravity")
+
+    def propagation(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """c2_ijk qdd_k, c1_ijk qd_k, g_ij."""
+        c2, c1, g, _, _ = self.packed(q, qd, qdd)
+        return self._propagated(c2, self._tables.spread(c1, "velocity"), g, qd, qdd)
+
+    def gradient_propagation(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """The same with c1 = d(tau_ij)/d(qd_k)."""
+        c2, c1, g, _, h1 = self.packed(q, qd, qdd)
+        return self._propagated(c2, self._slopes(c1, h1), g, qd, qdd)
+
+    def natural_impedance(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """c2, 2 c1 - h1, c0."""
+        c2, c1, _, _, h1 = self.packed(q, qd, qdd)
+        (stiffness,) = self.position_gradient(q, qd, qdd)
+        return self._tables.spread(c2, "acceleration"), self._slopes(c1, h1), stiffness
+
+    def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """c0."""
+        return (self._tables.spread(self._engine.position_gradient(q, qd, qdd), "velocity"),)
+
+    def masked(self, q: Numbers, qd: Numbers, qdd: Numbers, weights: Numbers) -> Sequence[Numbers]:
+        """sum over m, k of w_mk c_m,ijk q_k^(m), w of shape (3, n)."""
+        acceleration, velocity, _ = self.coefficients(q, qd)
+        total = velocity @ (weights[1] * qd)[..., None, :, None]
+        total = total + acceleration @ (weights[2] * qdd)[..., None, :, None]
+        # A tensor of numbers that nobody may look at yet, as under vmap, might ask for positions too.
+        if not isinstance(weights, np.ndarray) or weights[0].any():
+            (stiffness,) = self.position_gradient(q, qd, qdd)
+            total = total + stiffness @ (weights[0] * q)[..., None, :, None]
+        return (total[..., 0],)
+
+    def regressor(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """Y of tau_ij."""
+        return (self._tables.spread_rows(self._engine.regressor(q, qd, qdd), "torque"),)
+
+    def coefficient_regressors(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
+        """Y of c2, c1, g."""
+        rows = self._engine.coefficient_regressors(q, qd, self._rest(q))
+        fields = ("acceleration", "velocity", "gravity")
+        return tuple(self._tables.spread_rows(a, field) for a, field in zip(rows, fields, strict=True))
+
+    def mass_matrix(self, q: Numbers) -> Sequence[Numbers]:
+        """M_ik = sum_j c2_ijk."""
+        rest = self._rest(q)
+        return (self._tables.matrices(self.packed(q, rest, rest)[0], "acceleration"),)
+
+    def mass_matrix_by_link(self, q: Numbers) -> Sequence[Numbers]:
+        """c2."""
+        return self.coefficients(q, self._rest(q))[:1]
+
+    def coriolis_matrix(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
+        """C_ik = sum_j c1_ijk."""
+        return (self._tables.matrices(self.packed(q, qd, self._rest(q))[1], "velocity"),)
+
+    def coriolis_matrix_by_link(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
+        """c1."""
+        return self.coefficients(q, qd)[1:2]
+
+    def gravity_torque(self, q: Numbers) -> Sequence[Numbers]:
+        """g_i = tau_i at rest."""
+        rest = self._rest(q)
+        return self.inverse_dynamics(q, rest, rest)
+
+    def gravity_torque_by_link(self, q: Numbers) -> Sequence[Numbers]:
+        """g_ij = tau_ij at rest."""
+        rest = self._rest(q)
+        return self.partial_torque(q, rest, rest)
+
+    def forward_dynamics_of_links(self, q: Numbers, qd: Numbers, tau: Numbers) -> Sequence[Numbers]:
+        """Solve M qdd = tau - (h + g)."""
+        mass, bias = self.equations(q, qd)
+        return (solved(mass, tau - bias, self._structure.joint_names),)
+
+    def forward_dynamics(self, q: Numbers, qd: Numbers, tau: Numbers) -> Sequence[Numbers]:
+        """Solve (M + armature) qdd = tau - spring - damping - friction - (h + g)."""
+        mass, bias = self.equations(q, qd, passive=True)
+        return (solved(mass, tau - bias, self._structure.joint_names),)
+
+    def equations(self, q: Numbers, qd: Numbers, passive: bool = False) -> tuple[Numbers, Numbers]:
+        """M (..., n, n) and h + g (..., n) of M qdd + h + g = tau.
+
+        passive: whether what joints have of their own is among them
+        """
+        rest = self._rest(q)
+        c2, _, _, bias, _ = self.packed(q, qd, rest)
+        mass, force = self._tables.matrices(c2, "acceleration"), self._tables.summed(bias)
+        if not (passive and self._structure.passive):
+            return mass, force
+        sums = self._structure.passive_sums
+        spring, damping, friction, _ = passive_torques(self._engine, sums, q, qd, rest)
+        armature = self._engine.constant(np.diag(sums.armature), q)
+        return mass + armature, force + (spring + damping + friction)
+
+    def sums(self, q: Numbers, qd: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+        """M, C (..., n, n) and g (..., n)."""
+        c2, c1, g, _, _ = self.packed(q, qd, self._rest(q))
+        matrices = self._tables.matrices
+        return matrices(c2, "acceleration"), matrices(c1, "velocity"), self._tables.summed(g)
+
+    def energy(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
+        """K_j and P_j."""
+        return [side_by_side(values) for values in self._engine.energies(q, qd)]
+
+    def power(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """c2_ijk qdd_k qd_i, c1_ijk qd_k qd_i, g_ij qd_i."""
+        acceleration, velocity, gravity = self.propagation(q, qd, qdd)
+        rate = qd[..., :, None, None]
+        return acceleration * rate, velocity * rate, gravity * rate[..., 0]
+
+    def christoffel(self, q: Numbers) -> Sequence[Numbers]:
+        """The sums over j of the next."""
+        return self._christoffel(q, lambda c1: self._tables.matrices(c1, "velocity"))
+
+    def christoffel_by_link(self, q: Numbers) -> Sequence[Numbers]:
+        """Gamma_ijkl = c1_ijk at qd = e_l, less c1 at rest, which terms of energies linear in qd leave."""
+        return self._christoffel(q, lambda c1: self._tables.spread(c1, "velocity"))
+
+    def check_regresses(self) -> None:
+        """Raise ValueError where rows of the table that are for rigid links are not there."""
+        if not self._engine.regresses:
+            raise ValueError(
+                f"{self._structure.name} on {self._engine.name} has no regressors, which come from the rule "
+                "for rigid links; load numpy, torch or native of a robot of rigid links"
+            )
+
+    def _slopes(self, c1: Numbers, h1: Numbers) -> Numbers:
+        """d(tau_ij)/d(qd_k) = 2 c1 - h1."""
+        slopes = 2.0 * self._tables.spread(c1, "velocity")
+        return slopes - self._tables.spread(h1, "velocity_linear") if self._structure.linear else slopes
+
+    def _propagated(
+        self, c2: Numbers, velocity: Numbers, g: Numbers, qd: Numbers, qdd: Numbers
+    ) -> Sequence[Numbers]:
+        acceleration = self._tables.spread(c2, "acceleration") * qdd[..., None, None, :]
+        return acceleration, velocity * qd[..., None, None, :], self._tables.spread(g, "gravity")
+
+    def _christoffel(self, q: Numbers, made: Callable[[Numbers], Numbers]) -> Sequence[Numbers]:
+        n, batch, each = self._structure.n, q.shape[:-1], max(1, sum(self._structure.sizes))
+        units = self._engine.constant(np.eye(n), q)
+        if hidden(q):
+            return (side_by_side(self._of_units(q, units, made)),)
+        if self._engine.differs_by_sample:  # samples stay with their numbers
+            rates = max(1, AT_ONCE // (each * max(1, math.prod(batch))))
+            return (side_by_side(_joined([self._of_units(q, u, made) for u in _pieces(units, rates)], -1)),)
+        samples, rates = max(1, AT_ONCE // (n * each)), max(1, AT_ONCE // each)
+        whole = _joined(
+            [
+                _joined([self._of_units(part, some, made) for some in _pieces(units, rates)], -1)
+                for part in _pieces(q.reshape(-1, n), samples)
+            ],
+            0,
+        )
+        return (side_by_side(whole.reshape(*batch, *whole.shape[1:])),)
+
+    def _of_units(self, q: Numbers, units: Numbers, made: Callable[[Numbers], Numbers]) -> Numbers:
+        """What is made of c1 at some unit velocities e_l, for samples (..., n); l is the last axis."""
+        rates = units.reshape(len(units), *[1] * (q.ndim - 1), units.shape[-1]) + 0.0 * q
+        values = self.packed(q + 0.0 * rates, rates, 0.0 * rates)[1]
+        if self._structure.linear:
+            rest = self._rest(q)
+            values = values - self.packed(q, rest, rest)[1]
+        symbols = made(values)
+        for axis in range(symbols.ndim - 1):  # vmap knows no moveaxis
+            symbols = namespace(q).swapaxes(symbols, axis, axis + 1)
+        return symbols
+
+    def _rest(self, q: Numbers) -> Numbers:
+        return self._engine.zeros(q, self._structure.n)
+
+
+def _pieces(rows: Numbers, most: int) -> list[Numbers]:
+    """Rows (count, n), so many at a time; one piece of none where there are none."""
+    return [rows[at : at + most] for at in range(0, max(1, len(rows)), most)]
+
+
+def _joined(parts: list[Numbers], axis: int) -> Numbers:
+    return parts[0] if len(parts) == 1 else namespace(parts[0]).concat(parts, axis)

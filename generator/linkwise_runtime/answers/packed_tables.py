@@ -1,0 +1,137 @@
+"""Packed values spread over tensors with their zeros, and summed over the links."""
+
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..interface import Numbers
+from ..packed_engine import PackedEngine
+from ..quantities import PARAMETERS
+from ..structure import Indices, Layout
+
+if TYPE_CHECKING:
+    from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
+
+
+class SumTable(NamedTuple):
+    """Which packed values a matrix of joints sums: first those of its first entry, row by row."""
+
+    values: Numbers
+    """Position of each summand."""
+    entries: Numbers
+    """Entry of the matrix, flat, that it belongs to."""
+    starts: Numbers
+    """Where the summands of each entry begin that has any."""
+    filled: Numbers
+    """These entries."""
+
+
+class PackedTables:
+    """Spreads and sums packed values of one robot, with tables of constants kept for each device."""
+
+    def __init__(self, engine: PackedEngine) -> None:
+        structure = engine.structure
+        self._engine, self._layout, self._n = engine, structure.layout, structure.n
+        over = (structure.n, structure.N)
+        self._shapes = {
+            "acceleration": (*over, structure.n),
+            "velocity": (*over, structure.n),
+            "velocity_linear": (*over, structure.n),
+            "gravity": over,
+            "torque": over,
+        }
+        self._places: dict[object, Numbers] = {}
+        self._sums: dict[object, SumTable] = {}
+        for like in engine.examples:
+            for field in self._shapes:
+                self._table(field, like)
+            for field in ("acceleration", "velocity"):
+                self._sum_table(field, like)
+            self._joint_sums(like)
+
+    def spread(self, values: Numbers, field: str) -> Numbers:
+        """Values (..., count) of a field of `Layout` over (..., n, N) or (..., n, N, n), zeros elsewhere."""
+        table, batch = self._table(field, values), values.shape[:-1]
+        if isinstance(values, np.ndarray):
+            padded = np.zeros((*batch, values.shape[-1] + 1), values.dtype)
+            padded[..., :-1] = values
+            placed: NDArray[np.floating] = padded.take(cast(Indices, table), -1)
+            return placed.reshape(*batch, *self._shapes[field])
+        entries = self._engine.concatenate([values, self._engine.zeros(values, 1)])[..., table]
+        dense: Numbers = entries.reshape(*batch, *self._shapes[field])
+        return dense
+
+    def spread_rows(self, values: Numbers, field: str) -> Numbers:
+        """Rows of 10 (..., 10 count) of a field over (..., n, N[, n], 10), zeros elsewhere."""
+        padded = self._engine.concatenate([values, self._engine.zeros(values, PARAMETERS)])
+        rows = padded.reshape(*values.shape[:-1], len(getattr(self._layout, field)) + 1, PARAMETERS)
+        entries = rows[..., self._table(field, values), :]
+        dense: Numbers = entries.reshape(*values.shape[:-1], *self._shapes[field], PARAMETERS)
+        return dense
+
+    def summed(self, tau: Numbers) -> Numbers:
+        """Packed torques (..., count), summed over the links: (..., n)."""
+        return tau @ self._joint_sums(tau)
+
+    def matrices(self, values: Numbers, field: str) -> Numbers:
+        """Sums sum_j c_ijk (..., n, n) of values (..., count) of a field with rows (i, j, k)."""
+        # Any: of arrays or of tensors, as the values are.
+        table: Any = self._sum_table(field, values)
+        size = self._n * self._n
+        sums = self._engine.zeros(values, size)
+        if not isinstance(values, np.ndarray):
+            chosen = cast("Tensor", values).index_select(-1, table.values)
+            sums = cast("Tensor", sums).index_add(-1, table.entries, chosen)
+        elif len(table.starts):
+            found = np.add.reduceat(values.take(table.values, -1), table.starts, -1)
+            if len(table.starts) == size:
+                sums = found
+            else:
+                sums[..., table.filled] = found
+        matrices: Numbers = sums.reshape(*values.shape[:-1], self._n, self._n)
+        return matrices
+
+    def _table(self, field: str, like: Numbers) -> Numbers:
+        key = field, getattr(like, "device", None)
+        if key not in self._places:
+            self._places[key] = self._engine.index(self._positions(field), like)
+        return self._places[key]
+
+    def _joint_sums(self, like: Numbers) -> Numbers:
+        """Ones (count, n) where a packed torque is on a joint."""
+        key = like.dtype, getattr(like, "device", None)
+        if key not in self._places:
+            rows = self._layout.torque
+            sums = np.zeros((len(rows), self._n))
+            sums[np.arange(len(rows)), rows[:, 0]] = 1.0
+            self._places[key] = self._engine.constant(sums, like)
+        return self._places[key]
+
+    def _sum_table(self, field: str, like: Numbers) -> SumTable:
+        key = field, getattr(like, "device", None)
+        if key not in self._sums:
+            listed = sum_table(self._layout, field, self._n)
+            self._sums[key] = SumTable(*(self._engine.index(a, like) for a in listed))
+        return self._sums[key]
+
+    def _positions(self, field: str) -> Indices:
+        """For each entry of the dense tensor its packed position, or that of the zero behind them."""
+        rows: Indices = getattr(self._layout, field)
+        positions = np.full(self._shapes[field], len(rows), dtype=np.intp)
+        positions[tuple(rows.T)] = np.arange(len(rows))
+        if field == "acceleration":
+            positions[rows[:, 2], rows[:, 1], rows[:, 0]] = np.arange(len(rows))
+        return positions.reshape(-1)
+
+
+def sum_table(layout: Layout, field: str, n: int) -> tuple[NDArray[np.intp], ...]:
+    """The `SumTable` of a field; of c2, whose half i <= k is listed, the other half too."""
+    rows: Indices = getattr(layout, field)
+    i, k = rows[:, 0], rows[:, 2]
+    values, entries = np.arange(len(rows)), i * n + k
+    if field == "acceleration":
+        values, entries = np.append(values, values[i < k]), np.append(entries, (k * n + i)[i < k])
+    order = np.argsort(entries, kind="stable")
+    filled, starts = np.unique(entries[order], return_index=True)
+    return values[order], entries[order], starts, filled

@@ -1,0 +1,191 @@
+"""Torch modules of a robot: what owns its run-time parameters and bodies, and one call to be exported."""
+
+import contextlib
+import inspect
+from collections.abc import Callable, Collection, ItemsView, Iterable, Iterator, KeysView, Mapping, ValuesView
+from operator import attrgetter
+from typing import Protocol, cast
+
+import torch
+from torch import Tensor
+
+from ..chosen_names import short
+from ..interface import Numbers
+from ..rule.joint_tree import Bodies
+from .array_backend import ArrayBackend
+
+MOTION = {"q", "qd", "qdd", "tau"}
+"""Arguments of shape (..., n)."""
+
+
+class ReloadableRobot(Protocol):
+    """A robot that can be loaded once more."""
+
+    backend: ArrayBackend
+
+    @property
+    def name(self) -> str:
+        """That of its package."""
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+
+    @property
+    def _load(self) -> Callable[..., "ReloadableRobot"]: ...
+    @property
+    def _asked(self) -> tuple[object, ...]: ...
+
+
+class RunTimeValues(torch.nn.Module):
+    """Run-time parameters by name, which links that share one ask for its tensor.
+
+    They are buffers, but nn.Parameters where they are given as such or `learned`.
+    """
+
+    def __init__(self, values: Mapping[str, object], learned: Collection[str] = ()) -> None:
+        super().__init__()
+        self._keys = dict(zip(values, attribute_names(values, self), strict=True))
+        for name, value in values.items():
+            hold(self, self._keys[name], value, name in learned)
+
+    def __getitem__(self, name: str) -> Tensor:
+        key = self._keys[name]
+        tensor = self._parameters.get(key)
+        return cast(Tensor, self._buffers[key]) if tensor is None else tensor
+
+    def __setitem__(self, name: str, value: Tensor) -> None:
+        setattr(self, self._keys[name], value)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._keys)
+
+    def __len__(self) -> int:
+        return len(self._keys)
+
+    def _as_dict(self) -> dict[str, Tensor]:
+        return {name: self[name] for name in self._keys}
+
+    def keys(self) -> KeysView[str]:
+        """Names."""
+        return self._keys.keys()
+
+    def values(self) -> ValuesView[Tensor]:
+        """Tensors."""
+        return self._as_dict().values()
+
+    def items(self) -> ItemsView[str, Tensor]:
+        """Names and tensors."""
+        return self._as_dict().items()
+
+
+class BodyTensors(torch.nn.Module):
+    """The tensors of `Bodies`, in the same order."""
+
+    def __init__(self, bodies: Bodies[Numbers]) -> None:
+        super().__init__()
+        self._names = bodies._fields
+        for name, value in bodies._asdict().items():
+            hold(self, name, value, False)
+
+    def __iter__(self) -> Iterator[Tensor]:
+        return (getattr(self, name) for name in self._names)
+
+
+class CallModule(torch.nn.Module):
+    """module(q, ...) answers as the call does; where that has several results, with a dict of them by name.
+
+    forward takes what the call takes, under the same names, but for what is `fixed`, and out. The robot is
+    one of its own: its run-time parameters are `values`, and bodies that were given to `load` are `bodies`,
+    nn.Parameters where they were given as such, buffers otherwise. A robot that is itself a module is shared,
+    as `robot`.
+    """
+
+    def __init__(self, robot: ReloadableRobot, call: str, fixed: Mapping[str, object]) -> None:
+        """Raises ValueError for a call that the robot does not have, and for what the call does not take."""
+        super().__init__()
+        self.call, self.fixed = call, dict(fixed)
+        self._left = _left_open(robot, call, fixed)
+        if not isinstance(robot, torch.nn.Module):
+            robot = robot._load(*robot._asked)
+            self.values = RunTimeValues(robot.backend.parameters)
+            self.bodies = None if robot.backend.bodies is None else BodyTensors(robot.backend.bodies)
+        self.robot: ReloadableRobot = robot
+        self._lend()
+
+    @property
+    def forward(self) -> Callable[..., object]:  # type: ignore[override]
+        """The call, with the signature in which exporters look for the names of what it takes."""
+
+        def forward(*given: object, **named: object) -> object:
+            bound = self._left.bind(*given, **named).arguments
+            answer = attrgetter(self.call)(self.robot)(**bound, **self.fixed)
+            return answer if torch.is_tensor(answer) else answer._asdict()
+
+        vars(forward)["__signature__"] = self._left
+        return forward
+
+    def extra_repr(self) -> str:
+        """The call and what is left to give."""
+        return f"{self.call}({', '.join(self._left.parameters)})"
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Take over what the module held of which this is a copy."""
+        super().__setstate__(state)  # type: ignore[no-untyped-call]
+        self._lend()
+
+    def _lend(self) -> None:
+        """Have the robot compute with the tensors held here."""
+        if not isinstance(self.robot, torch.nn.Module):
+            # They are asked as mappings and tuples are, which modules cannot be.
+            self.robot.backend.parameters = cast("Mapping[str, Tensor]", self.values)
+            self.robot.backend.bodies = cast("Bodies[Tensor] | None", self.bodies)
+        self._make_tables()
+
+    def _make_tables(self) -> None:
+        """Call with no samples: torch.compile cannot trace what a first call makes, and finds it made."""
+        needed = [name for name, p in self._left.parameters.items() if p.default is p.empty or name == "tau"]
+        if MOTION.issuperset(needed):
+            for dtype in (torch.float32, torch.float64):
+                with contextlib.suppress(TypeError, ValueError):  # which a call of the user's will raise
+                    self.forward(*(torch.zeros(0, self.robot.n, dtype=dtype) for _ in needed))
+
+
+def hold(module: torch.nn.Module, key: str, value: object, learned: bool) -> None:
+    """Register a number of the robot: as it is if it is a tensor, of float64 otherwise."""
+    tensor = value if torch.is_tensor(value) else torch.as_tensor(value, dtype=torch.float64)
+    if learned and not isinstance(tensor, torch.nn.Parameter):
+        real = tensor if tensor.is_floating_point() else tensor.double()
+        tensor = torch.nn.Parameter(real.detach().clone())
+    if isinstance(tensor, torch.nn.Parameter):
+        module.register_parameter(key, tensor)
+    else:
+        module.register_buffer(key, tensor)
+
+
+def attribute_names(names: Iterable[str], module: torch.nn.Module) -> list[str]:
+    """Names as keys of a state_dict: without dots, and none that the module has for something else."""
+    found: list[str] = []
+    for name in names:
+        key = name.replace(".", "_") or "_"
+        while hasattr(module, key) or key in found:
+            key += "_"
+        found.append(key)
+    return found
+
+
+def _left_open(robot: ReloadableRobot, call: str, fixed: Mapping[str, object]) -> inspect.Signature:
+    """Signature of a call without what is fixed, and without out."""
+    taken: Mapping[str, inspect.Parameter] = {}
+    with contextlib.suppress(AttributeError, TypeError):
+        taken = inspect.signature(attrgetter(call)(robot)).parameters
+    if next(iter(taken), None) != "q":
+        raise ValueError(
+            f"{short(call)} is no call of {robot.name} that is given positions q; name one, such as "
+            "partial_torque or kinematics.jacobian"
+        )
+    open_to = [name for name in taken if name != "out"]
+    for name in fixed:
+        if name not in open_to:
+            raise ValueError(f"{call} takes no {short(name)}; it takes {', '.join(open_to)}")
+    return inspect.Signature([taken[name] for name in open_to if name not in fixed])

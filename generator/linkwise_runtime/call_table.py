@@ -1,0 +1,520 @@
+"""The table of calls: what each takes of a robot and what it answers, in Python, in C and on every page.
+
+Axes stand in the order of arrays, behind those of the samples: i the joint that is loaded, j the link
+through which it is loaded, k the coordinate that moves, which here is called the cause.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from .quantities import (
+    Coefficients,
+    ConstrainedMotion,
+    Energy,
+    GradientPropagation,
+    InducedAccelerations,
+    NaturalImpedance,
+    Packed,
+    PassiveTorque,
+    Power,
+    Propagation,
+    Trajectory,
+)
+
+
+class Quantity(NamedTuple):
+    """An array of an answer."""
+
+    name: str
+    axes: tuple[str, ...]
+    """Names of `robot_axes.NamedAxis`, such as joint; `moved` is what an induced acceleration is of."""
+    unit: str
+    """Factors of it over factors below: symbols, or what is measured along which axis."""
+    meaning: str
+    beside: tuple[str, str] | None = None
+    """Where several arrays are entries of one along an axis more: its name, and the name of the entry."""
+
+
+ORDER = "order"
+"""The axis along which shares by acceleration stand beside those by velocity."""
+TORQUE = "torque:joint"
+PASSIVE_KINDS = ("spring", "damping", "friction", "armature")
+IJK = ("joint", "link", "cause")
+TAU_IJK = "on the joint, through the link, by the motion of the cause"
+
+
+def _one(name: str, axes: str, unit: str, meaning: str) -> tuple[Quantity]:
+    return (Quantity(name, tuple(axes.split()), unit, meaning),)
+
+
+def _by_order(
+    name: str, unit: tuple[str, str], gravity: tuple[str, str], meaning: str, more: str = ""
+) -> tuple[Quantity, ...]:
+    """Shares by acceleration, by velocity, and those of gravity, which have no cause: (name, unit)."""
+    extra = tuple(more.split())
+    return (
+        Quantity(name, (*IJK, *extra), unit[0], meaning, (ORDER, "acceleration")),
+        Quantity(name, (*IJK, *extra), unit[1], meaning, (ORDER, "velocity")),
+        Quantity(gravity[0], (*IJK[:2], *extra), gravity[1], "the share of gravity and other potentials"),
+    )
+
+
+COEFFICIENT_UNITS = "~torque:joint / acceleration:cause", "torque:joint / velocity:cause"
+"""Of c2 and c1; a ~ is for units that are told in kg, m and s."""
+PROPAGATION = _by_order("propagation", (TORQUE, TORQUE), ("gravity", TORQUE), f"torque {TAU_IJK}")
+POWER = _by_order("power_propagation", ("W", "W"), ("power_gravity", "W"), f"power {TAU_IJK}")
+COEFFICIENTS = _by_order("coefficient", COEFFICIENT_UNITS, ("gravity", TORQUE), f"coefficient {TAU_IJK}")
+PASSIVE = tuple(
+    Quantity("passive_torque", ("joint",), TORQUE, "what the joint takes of its own", ("source", kind))
+    for kind in PASSIVE_KINDS
+)
+QDD_OF_JOINTS = _one("forward_dynamics", "joint", "acceleration:joint", "joint acceleration")
+REQUIRED = object()
+"""Of an option that has to be given."""
+BY_LINK: Mapping[str, object] = {"by_link": True}
+
+
+class Call(NamedTuple):
+    """A row of the table."""
+
+    key: str
+    """The call, and what is chosen of it: "mass_matrix_by_link", "kinematics.pose", "constraints.forces"."""
+    motion: tuple[str, ...]
+    """What it is given of shape (..., n), or (..., m) where that is of the independent joints, in order."""
+    answers: tuple[Quantity, ...]
+    record: type | None = None
+    """What it answers with, of several arrays."""
+    call: str = ""
+    """Its name, where that is not the key."""
+    chosen: Mapping[str, object] = {}
+    """Options with which it is this row."""
+    options: Mapping[str, object] = {}
+    """What else may be given, and what counts unless it is."""
+    own: str = "not"
+    """Whether joints' springs, damping, friction and armature count: "not", "alone", "passive" if asked."""
+    ties: str = "cut"
+    """Of loops and couplings: "cut", as the open tree's; "kept"; "refused" with the call that keeps them."""
+    rigid: bool = False
+    """Whether it is there for rigid links alone, and refused for links that are energies."""
+    lacking: tuple[str, ...] = ()
+    """Back ends that refuse it."""
+    out: bool = True
+    """Whether `out` says where the answer goes."""
+    c: str = ""
+    """The function of C that has it, without the robot's name; none where arrays alone have it."""
+    one: bool = False
+    """Whether that takes one sample and no count."""
+
+    @property
+    def name(self) -> str:
+        """As robot has it, or robot.kinematics, or robot.constraints."""
+        return self.call or self.key
+
+    @property
+    def is_named(self) -> bool:
+        """Whether the axes of the answer have names; packed values have one of indices."""
+        return not any(axis in PACKED for quantity in self.answers for axis in quantity.axes)
+
+
+Q, QD, QDD = ("q",), ("q", "qd"), ("q", "qd", "qdd")
+PACKED = ("c2", "c1", "g", "tau", "h1")
+"""Axes of packed values, as `Structure.sizes` counts them."""
+
+
+def _by_link(
+    name: str, motion: tuple[str, ...], axes: str, unit: str, meaning: str, c: str = ""
+) -> tuple[Call, Call]:
+    """A sum over the links, and with the axis of links behind the first one."""
+    first, *rest = axes.split()
+    by_link = _one(name, " ".join([first, "link", *rest]), unit, f"{meaning}, by link")
+    return (
+        Call(name, motion, _one(name, axes, unit, meaning), chosen={"by_link": False}, c=c, one=bool(c)),
+        Call(f"{name}_by_link", motion, by_link, call=name, chosen={"by_link": True}),
+    )
+
+
+def _packed(*fields: tuple[str, str]) -> tuple[Quantity, ...]:
+    return tuple(
+        Quantity(name, (axis,), "", "packed values, as the layout has them") for name, axis in fields
+    )
+
+
+DYNAMICS = (
+    Call(
+        "packed",
+        QDD,
+        _packed(*zip(Packed._fields, PACKED, strict=True)),
+        Packed,
+        c="decomposition",
+    ),
+    Call("packed_torque", QDD, _packed(("torque", "tau")), c="torque"),
+    Call(
+        "partial_torque",
+        QDD,
+        _one("partial_torque", "joint link", TORQUE, "torque on the joint, through the link"),
+        c="partial_torque",
+    ),
+    Call(
+        "inverse_dynamics",
+        QDD,
+        _one("inverse_dynamics", "joint", TORQUE, "joint torque of all links"),
+        c="inverse_dynamics",
+    ),
+    Call("passive_torque", QDD, PASSIVE, PassiveTorque, own="alone"),
+    Call("coefficients", QD, COEFFICIENTS, Coefficients, c="coefficients"),
+    Call("propagation", QDD, PROPAGATION, Propagation, chosen={"convention": "closing"}, c="propagation"),
+    Call(
+        "gradient_propagation",
+        QDD,
+        PROPAGATION,
+        GradientPropagation,
+        call="propagation",
+        chosen={"convention": "gradient"},
+        c="gradient_propagation",
+    ),
+    Call(
+        "position_gradient",
+        QDD,
+        _one(
+            "position_gradient", "joint link cause", "torque:joint / position:cause", f"stiffness {TAU_IJK}"
+        ),
+        c="dense_position_gradient",
+    ),
+    Call(
+        "masked",
+        QDD,
+        _one("masked", "joint link", TORQUE, "chosen torques on the joint, through the link"),
+        options={"mask": REQUIRED},
+    ),
+    Call(
+        "regressor",
+        QDD,
+        _one("regressor", "joint link parameter", "~torque:joint / place:parameter", "torque per parameter"),
+        rigid=True,
+        lacking=("autograd",),
+        c="regressor",
+    ),
+    Call(
+        "coefficient_regressors",
+        QD,
+        _by_order(
+            "coefficient_regressor",
+            (f"{COEFFICIENT_UNITS[0]} place:parameter", f"~{COEFFICIENT_UNITS[1]} place:parameter"),
+            ("gravity_regressor", "~torque:joint / place:parameter"),
+            f"coefficient per parameter, {TAU_IJK}",
+            "parameter",
+        ),
+        Coefficients,
+        rigid=True,
+        lacking=("autograd",),
+        c="coefficient_regressors",
+    ),
+    *_by_link(
+        "mass_matrix",
+        Q,
+        "joint cause",
+        COEFFICIENT_UNITS[0],
+        "torque per acceleration of the cause",
+        "mass_matrix",
+    ),
+    *_by_link("coriolis_matrix", QD, "joint cause", COEFFICIENT_UNITS[1], "torque per velocity of the cause"),
+    *_by_link("gravity_torque", Q, "joint", TORQUE, "torque of gravity and other potentials"),
+    Call(
+        "forward_dynamics",
+        ("q", "qd", "tau"),
+        QDD_OF_JOINTS,
+        chosen={"passive": True},
+        own="passive",
+        ties="refused",
+        c="forward_dynamics",
+        one=True,
+    ),
+    Call(
+        "forward_dynamics_of_links",
+        ("q", "qd", "tau"),
+        QDD_OF_JOINTS,
+        call="forward_dynamics",
+        chosen={"passive": False},
+        ties="refused",
+        c="forward_dynamics_of_links",
+        one=True,
+    ),
+    Call(
+        "energy",
+        QD,
+        (
+            Quantity("kinetic", ("link",), "J", "kinetic energy of the link"),
+            Quantity("potential", ("link",), "J", "potential energy of the link"),
+        ),
+        Energy,
+    ),
+    Call("power", QDD, POWER, Power),
+    *_by_link(
+        "christoffel",
+        Q,
+        "joint cause other_cause",
+        "~torque:joint / velocity:cause velocity:other_cause",
+        "torque per pair of velocities",
+    ),
+    Call(
+        "natural_impedance",
+        QDD,
+        (
+            Quantity("inertia", IJK, COEFFICIENT_UNITS[0], "torque per acceleration of the cause"),
+            Quantity("damping", IJK, COEFFICIENT_UNITS[1], "torque per velocity of the cause"),
+            Quantity("stiffness", IJK, "torque:joint / position:cause", "torque per position of the cause"),
+        ),
+        NaturalImpedance,
+    ),
+)
+"""Calls of `Dynamics` whose answers have one shape a sample."""
+
+SOURCES = (
+    ("actuators", "cause", "by what the actuator of the cause gives"),
+    ("velocity", "link cause", "by velocity forces on the link, by the velocity of the cause"),
+    ("gravity", "link", "by the weight of the link and other potentials"),
+    ("passive", "source cause", "by spring, damping and friction of the cause"),
+    ("loads", "load", "by the load"),
+    ("constraints", "cause", "by constraints that turn with the velocity of the cause"),
+    ("kinematic", "cause", "by the velocity of the cause, without any acceleration of a joint"),
+)
+
+
+def _induced(unit: str, what: str) -> tuple[Quantity, ...]:
+    return tuple(Quantity(n, ("moved", *a.split()), unit, f"{what} {meaning}") for n, a, meaning in SOURCES)
+
+
+DRIVEN = {"tau": None, "qdd": None, "loads": (), "passive": True}
+"""What drives a motion, as calls on its causes are told."""
+MOTIONS = (
+    Call(
+        "induced_accelerations",
+        QD,
+        _induced("acceleration:moved", "acceleration"),
+        InducedAccelerations,
+        options=DRIVEN | {"frame": None, "point": None, "constraints": None},
+        own="passive",
+        ties="kept",
+        out=False,
+    ),
+    Call(
+        "induced_reactions",
+        QD,
+        _induced("torque:moved", "force of the constraint"),
+        InducedAccelerations,
+        options=DRIVEN | {"constraints": None},
+        own="passive",
+        ties="kept",
+        rigid=True,
+        out=False,
+    ),
+    Call(
+        "simulate",
+        QD,
+        (
+            Quantity("time", (), "s", "time"),
+            Quantity("q", ("joint",), "position:joint", "joint position"),
+            Quantity("qd", ("joint",), "velocity:joint", "joint velocity"),
+            Quantity("tau", ("joint",), TORQUE, "what the actuators gave"),
+            Quantity("energy", (), "J", "energy of links, springs and armature"),
+            Quantity("work", (), "J", "work of actuators and loads, less what was lost"),
+        ),
+        Trajectory,
+        options={
+            "time": REQUIRED,
+            "tau": None,
+            "loads": (),
+            "passive": True,
+            "step": None,
+            "method": "RK4",
+            "rtol": 1e-9,
+            "atol": 1e-12,
+            "constraints": None,
+        },
+        own="passive",
+        ties="kept",
+        out=False,
+    ),
+)
+"""Calls of `Dynamics` on motion, whose axes hang on what is asked."""
+
+OF_FRAME: Mapping[str, object] = {"frame": REQUIRED}
+OF_POINT: Mapping[str, object] = {"frame": REQUIRED, "point": None}
+
+
+def _frame(
+    name: str,
+    motion: tuple[str, ...],
+    axes: str,
+    unit: str,
+    meaning: str,
+    options: Mapping[str, object] = {},
+    c: str = "",
+) -> Call:
+    answers = _one(name, axes, unit, meaning)
+    return Call(f"kinematics.{name}", motion, answers, options=options, rigid=True, c=c, one=bool(c))
+
+
+PLACED = "of a place in the frame to one in the world"
+RATE_OF_COMPONENT = "velocity:component / position:cause"
+KINEMATICS = (
+    _frame("pose", Q, "world own", "place:world / place:own", PLACED, OF_FRAME, "pose"),
+    _frame("poses", Q, "frame world own", "place:world / place:own", PLACED),
+    _frame(
+        "jacobian",
+        Q,
+        "component cause",
+        "position:component / position:cause",
+        "motion of the frame per motion of the cause",
+        OF_POINT,
+        "jacobian",
+    ),
+    _frame("jacobian_rate", QD, "component cause", RATE_OF_COMPONENT, "its rate", OF_POINT, "jacobian_rate"),
+    _frame("velocity", QD, "component", "velocity:component", "velocity of the frame", OF_POINT),
+    _frame("acceleration", QDD, "component", "acceleration:component", "acceleration of the frame", OF_POINT),
+    _frame(
+        "load_torque",
+        Q,
+        "joint",
+        TORQUE,
+        "what the joint takes to bear the load",
+        {"frame": REQUIRED, "force": REQUIRED, "moment": None, "point": None, "at": None},
+    ),
+    _frame("centre_of_mass", Q, "axis", "position:axis", "centre of mass in the world"),
+    _frame("centre_of_mass_jacobian", Q, "axis cause", "position:axis / position:cause", "its Jacobian"),
+    _frame(
+        "centre_of_mass_jacobian_rate", QD, "axis cause", "velocity:axis / position:cause", "rate of that"
+    ),
+)
+"""Those of `Kinematics`; the axis of frames is as long as the robot has frames."""
+
+
+def _driven(quantity: Quantity) -> Quantity:
+    """The same of the joints that constraints leave independent."""
+    named = {"joint": "independent", "cause": "independent_cause"}
+    unit = quantity.unit.replace("joint", "independent").replace("cause", "independent_cause")
+    return quantity._replace(axes=tuple(named.get(axis, axis) for axis in quantity.axes), unit=unit)
+
+
+def _tied(
+    name: str,
+    motion: tuple[str, ...],
+    axes: str,
+    unit: str,
+    meaning: str,
+    options: Mapping[str, object] = {},
+    call: str = "",
+    chosen: Mapping[str, object] = {},
+) -> Call:
+    return _kept(name, motion, _one(name, axes, unit, meaning), None, call, chosen, options)
+
+
+def _kept(
+    name: str,
+    motion: tuple[str, ...],
+    answers: tuple[Quantity, ...],
+    record: type | None,
+    call: str = "",
+    chosen: Mapping[str, object] = {},
+    options: Mapping[str, object] = {},
+    own: str = "not",
+) -> Call:
+    named = f"constraints.{call}" if call else ""
+    return Call(
+        f"constraints.{name}",
+        motion,
+        answers,
+        record,
+        named,
+        chosen,
+        options,
+        own,
+        ties="kept",
+        rigid=True,
+        out=False,
+    )
+
+
+FORCE = "torque:constraint"
+TORQUES = {"torque": REQUIRED}
+SUMMED: Mapping[str, object] = {"by_link": False}
+CONSTRAINTS = (
+    _tied(
+        "violation",
+        Q,
+        "constraint",
+        "position:constraint",
+        "how far the row is from closing",
+        {"held_at": None},
+    ),
+    _tied(
+        "jacobian",
+        Q,
+        "constraint cause",
+        "position:constraint / position:cause",
+        "row per motion of the cause",
+    ),
+    _tied("jacobian_rate", QD, "constraint cause", "velocity:constraint / position:cause", "its rate"),
+    _tied(
+        "closed",
+        Q,
+        "joint",
+        "position:joint",
+        "joint position in which all ties close",
+        {"held_at": None, "start": None},
+    ),
+    _tied(
+        "velocity_map",
+        Q,
+        "joint independent_cause",
+        "position:joint / position:independent_cause",
+        "motion of the joint per motion of the cause",
+    ),
+    _tied("velocity", ("q", "yd"), "joint", "velocity:joint", "joint velocity"),
+    _tied("acceleration", ("q", "qd", "ydd"), "joint", "acceleration:joint", "joint acceleration"),
+    _tied("velocity_accelerations", QD, "joint cause", "acceleration:joint", "by the velocity of the cause"),
+    _tied(
+        "projected",
+        Q,
+        "independent",
+        "torque:independent",
+        "torque on the independent joint",
+        TORQUES,
+        chosen=SUMMED,
+    ),
+    _tied(
+        "projected_by_link",
+        Q,
+        "independent part",
+        "torque:independent",
+        "torque on the independent joint",
+        TORQUES,
+        "projected",
+        BY_LINK,
+    ),
+    *(
+        _kept(row.key, row.motion, tuple(map(_driven, row.answers)), row.record)
+        for row in DYNAMICS
+        if row.key in ("inverse_dynamics", "partial_torque", "coefficients", "propagation")
+    ),
+    _tied("forces", QDD, "constraint link", FORCE, "what the row bears of the link"),
+    _tied("forces_of", Q, "constraint", FORCE, "what the row bears", TORQUES, chosen=SUMMED),
+    _tied(
+        "forces_of_by_link", Q, "constraint part", FORCE, "what the row bears", TORQUES, "forces_of", BY_LINK
+    ),
+    _kept(
+        "forward_dynamics",
+        ("q", "qd", "tau"),
+        (
+            Quantity("qdd", ("joint",), "acceleration:joint", "joint acceleration"),
+            Quantity("forces", ("constraint",), FORCE, "what the row bears"),
+        ),
+        ConstrainedMotion,
+        options={"passive": True},
+        own="passive",
+    ),
+)
+"""Those of `Constraints`."""
+
+CALLS: Mapping[str, Call] = {row.key: row for row in (*DYNAMICS, *MOTIONS, *KINEMATICS, *CONSTRAINTS)}
+"""Every row by its key."""

@@ -1,0 +1,375 @@
+"""The dynamics of a robot whose joints are tied: closed loops, coupled joints, contacts."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from numbers import Real
+from typing import Any, Generic, Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..answers.answers import Answers
+from ..answers.namespace import array_of, hidden, namespace, side_by_side
+from ..arguments import check_numbers, shape_of
+from ..arrays.array_backend import ArrayBackend
+from ..door import Door
+from ..interface import Array, Numbers
+from ..labelled import labelled
+from ..quantities import Coefficients, ConstrainedMotion, Propagation
+from ..structure import Structure
+from .chosen_constraints import ChosenConstraints
+from .closed_places import (
+    ClosedPlace,
+    Followers,
+    borne,
+    projected,
+)
+from .newton_closing import led, with_independent
+from .tied_joints import TiedJoints, without_gradient
+
+
+class TiedRobot(Protocol):
+    """What constraints ask of a robot."""
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints."""
+
+    @property
+    def structure(self) -> Structure:
+        """Names, paths and parameters."""
+
+    @property
+    def backend(self) -> ArrayBackend:
+        """What computes."""
+
+    @property
+    def door(self) -> Door[ArrayBackend]:
+        """Where motion comes in."""
+
+
+class Constraints(Generic[Array]):
+    """What ties, couplings and contacts leave of a robot's motion; `Dynamics.constraints`, `.constrained`.
+
+    A qd = 0 has C rows, by which all other joints d follow the m independent ones y:
+
+        qd = G yd    qdd = G ydd + bias    G_d = -A_d^-1 A_y    bias_d = -A_d^-1 dA/dt qd
+        tau^_aj = sum_i G_ia tau_ij = sum_b c2^_ajb ydd_b + sum_b c1^_ajb yd_b + g^_aj
+
+    is what actuators of the independent joints a give through link j while all other joints move freely. The
+    shares sum up as those of the open tree do, in the closing convention.
+
+    Forces lambda are those on the first frame of a tie, minus those on the second, or on a contact's frame:
+    moments in N m, then forces in N, along the axes that the rows have; a distance's pushes apart; a
+    coupling's is on the unit of its sum. They load the joints with A^T lambda. Where rows say the same
+    twice, as those of a planar loop in space do, A_d^-1 is the pseudoinverse, and of all forces that do it
+    these are the least, by the sum of their squares, a coupling's times its largest slope where that is above
+    1: `redundant` names where that choice was made. Others are unique.
+
+    q, batches and errors are as for `Dynamics`, and q (..., n) is that of all joints, in which the ties must
+    close within the tolerance of `Dynamics.constrained`: else ValueError, and `closed` is the mend. Of qd and
+    qdd (..., n) the independent joints count, and the others follow; ydd and yd are (..., m). Answers are of
+    the motion's kind and dtype; gradients flow through motion and parameters.
+
+    Raises ValueError at a singular position, and for a choice of independent joints that does not go, with
+    sample and joints.
+    """
+
+    def __init__(
+        self, robot: "TiedRobot", chosen: ChosenConstraints, tolerance: float | None, made: tuple[object, ...]
+    ) -> None:
+        """Made again, as for a copy, by calling a method of the robot, with arguments: `made`."""
+        self._robot, self._made = robot, made
+        self.ties = TiedJoints(robot.structure, chosen, tolerance)
+        """How joints follow, for motion that has been read."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled or copied, they are made again by the robot, which is copied with them."""
+        return _again, (self._robot, self._made)
+
+    def are_of(self, robot: object) -> bool:
+        """Whether they were made by this robot, on this back end."""
+        return self._robot is robot
+
+    def __repr__(self) -> str:
+        return f"<constraints of {len(self.rows)} rows, independent {', '.join(self.independent)}>"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of ties, couplings and contacts, in the order of their rows."""
+        return self.ties.chosen.names
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """What each of the C rows holds: "loop force_x", say."""
+        return self.ties.chosen.rows
+
+    @property
+    def row_units(self) -> tuple[str, ...]:
+        """In which each row is open: rad or m; none for a coupling, whose sum may have any."""
+        return self.ties.chosen.row_units
+
+    def labelled(self, call: str, *given: Any, along: Any = None, **named: Any) -> Any:
+        """`Dynamics.labelled` of these calls: made.labelled("forces", q, qd, qdd)."""
+        return labelled(self._robot, self, call, given, named, along)
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Joints y, whose motion tells that of all others; in the order of all joints."""
+        return self.ties.independent
+
+    @property
+    def dependent(self) -> tuple[str, ...]:
+        """The other joints."""
+        return self.ties.dependent
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """Names of those among whose rows some follow from others: how they share forces is a choice."""
+        return self.ties.chosen.redundant
+
+    def violation(self, q: Array, held_at: Array | None = None) -> Array:
+        """How far each row is from closing, (..., C), in m, rad or a coupling's unit.
+
+        Of a turn it is twice the sine of half the angle. held_at: positions (..., n) in which contacts took
+        hold of their frames; without them, and of rolling, contacts have none.
+        """
+        engine, (at, held) = self._read(q=q, held_at=q if held_at is None else held_at)
+        return cast("Array", self.ties.rows(engine).violation(at, held))
+
+    def jacobian(self, q: Array) -> Array:
+        """A, (..., C, n), at any q."""
+        engine, (at,) = self._read(q=q)
+        return cast("Array", side_by_side(self.ties.rows(engine).at(at).positions()[..., 1:]))
+
+    def jacobian_rate(self, q: Array, qd: Array) -> Array:
+        """dA/dt, (..., C, n), at any q and qd, none of which is replaced here."""
+        engine, (at, moved) = self._read(q=q, qd=qd)
+        return cast("Array", self.ties.rows(engine).rates(at, moved))
+
+    @property
+    def closed_position(self) -> NDArray[np.float64]:
+        """A position of all joints in which the ties close, (n,).
+
+        It is the one that generating found, near zero if ties close there; of `Dynamics.constrained` with
+        other joints or contacts the one at which these were chosen.
+        """
+        return self._closed_position.copy()
+
+    def closed(self, q: Array, held_at: Array | None = None, start: Array | None = None) -> Array:
+        """The same q with its dependent joints moved until all ties close, (..., n), by Newton's method.
+
+        q: of all joints, (..., n), the dependent ones where they are looked for; or of the independent ones
+        alone, (..., m): the others are then led there from `start`, step by step without leaps, so that ties
+        that can close in several ways stay in the one of the start
+        held_at: positions in which contacts took hold; q itself unless given, or the start
+        start: a closed position (..., n); `closed_position` unless given
+
+        Raises ValueError, with the sample, the tie and what remains, if they do not close.
+        """
+        m = len(self.independent)
+        if shape_of(q)[-1:] == (m,):
+            return cast("Array", self._led(q, held_at, start))
+        if start is not None:
+            raise ValueError(
+                f"start is where joints are led from that q does not have, and q has shape {shape_of(q)}; "
+                f"leave it out, or give q the {m} independent joints alone"
+            )
+        engine, (at, held) = self._read(q=q, held_at=q if held_at is None else held_at)
+        return cast("Array", self.ties.closed(engine, at, held).q)
+
+    def velocity_map(self, q: Array) -> Array:
+        """G, (..., n, m): qd = G yd."""
+        engine, (at,) = self._read(q=q)
+        return cast("Array", side_by_side(self.ties.place(engine, at).found.map))
+
+    def velocity(self, q: Array, yd: Array) -> Array:
+        """qd of all joints, (..., n), for that of the independent ones, (..., m)."""
+        engine, (at,) = self._read(q=q)
+        return cast("Array", self.ties.place(engine, at).velocity(self._own("yd", yd, engine, at)))
+
+    def acceleration(self, q: Array, qd: Array, ydd: Array) -> Array:
+        """qdd of all joints, (..., n), for that of the independent ones, (..., m)."""
+        place, engine, (at, moved) = self._moving(q, qd)
+        own = self._own("ydd", ydd, engine, at)
+        return cast("Array", place.velocity(own) + place.bias(moved))
+
+    def velocity_accelerations(self, q: Array, qd: Array) -> Array:
+        """The bias of qdd = G ydd + bias by its causes, (..., n, n): what joint k gets through qd_s.
+
+        Over s they sum to it; independent joints have none.
+        """
+        place, _, (_, moved) = self._moving(q, qd)
+        return cast("Array", place.bias_by_cause(moved))
+
+    def projected(self, q: Array, torque: Array, by_link: bool = False) -> Array:
+        """G^T torque: what torques (..., n) on all joints come to on the independent ones, (..., m).
+
+        by_link: torque is (..., n, X), for X links, loads or others, and the answer (..., m, X)
+        """
+        engine, (at,) = self._read(q=q)
+        found = projected(self.ties.place(engine, at).found, self._torque(torque, engine, at, by_link))
+        return cast("Array", found if by_link else found[..., 0])
+
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Torques of the independent joints, sum_j tau^_aj, (..., m): of the links, as in `Dynamics`."""
+        found, answers, motion = self._accelerated(q, qd, qdd)
+        return cast("Array", projected(found, answers.inverse_dynamics(*motion)[0][..., None])[..., 0])
+
+    def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """tau^_aj, (..., m, N)."""
+        found, answers, motion = self._accelerated(q, qd, qdd)
+        return cast("Array", projected(found, answers.partial_torque(*motion)[0]))
+
+    def coefficients(self, q: Array, qd: Array) -> Coefficients[Array]:
+        """c2^, c1^ (..., m, N, m) and g^ (..., m, N) of the closing convention."""
+        place, engine, (_, moved) = self._moving(q, qd)
+        return cast("Coefficients[Array]", Coefficients(*self.ties.coefficients(engine, place, moved)))
+
+    def propagation(self, q: Array, qd: Array, qdd: Array) -> Propagation[Array]:
+        """c2^_ajb ydd_b and c1^_ajb yd_b, (..., m, N, m), and g^_aj, (..., m, N): they sum to tau^_aj."""
+        place, engine, (_, moved, asked) = self._moving(q, qd, qdd=qdd)
+        c2, c1, g = self.ties.coefficients(engine, place, moved)
+        yd, ydd = (place.own(a)[..., None, None, :] for a in (moved, asked))
+        return cast("Propagation[Array]", Propagation(c2 * ydd, c1 * yd, g))
+
+    def forces(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """lambda^(j), (..., C, N): what the constraints bear of link j, where dependent joints have no
+        actuators."""
+        found, answers, motion = self._accelerated(q, qd, qdd)
+        return cast("Array", borne(found, answers.partial_torque(*motion)[0]))
+
+    def forces_of(self, q: Array, torque: Array, by_link: bool = False) -> Array:
+        """lambda, (..., C), for torques (..., n) that joints need and the dependent ones do not give.
+
+        by_link: torque is (..., n, X), and the answer (..., C, X). Actuators, springs or loads of dependent
+        joints are taken from the torque first.
+        """
+        engine, (at,) = self._read(q=q)
+        found = borne(self.ties.place(engine, at).found, self._torque(torque, engine, at, by_link))
+        return cast("Array", found if by_link else found[..., 0])
+
+    def forward_dynamics(
+        self, q: Array, qd: Array, tau: Array, passive: bool = True
+    ) -> ConstrainedMotion[Array]:
+        """qdd (..., n) and lambda (..., C) of M qdd + h + g + p = tau + A^T lambda, tau on all joints.
+
+        tau: (..., n)
+        passive: as `Dynamics.forward_dynamics` has it, with p
+        """
+        place, engine, (_, moved, asked) = self._moving(q, qd, tau=tau)
+        qdd, forces = self.ties.motion(engine, place, moved, asked, passive)
+        return cast("ConstrainedMotion[Array]", ConstrainedMotion(qdd, forces))
+
+    @cached_property
+    def _closed_position(self) -> NDArray[np.float64]:
+        engine, (q,) = self._read(q=self.ties.chosen.closed_position)
+        with without_gradient(q):
+            found = self.ties.closed(engine, q, q).q
+        return np.array(array_of(found), dtype=np.float64)
+
+    def _led(self, q: object, held_at: object, start: object) -> Numbers:
+        """Closed positions for independent joints (..., m)."""
+        engine, (own,) = self._robot.door.read({"q": q}, self.independent)
+        n = self._robot.n
+        if hidden(own):
+            raise ValueError(
+                "joints cannot be led where nobody may look at numbers, as under vmap or a compiler; give "
+                f"closed(q) all {n} joints"
+            )
+        begin = self._positions("start", self._closed_position if start is None else start, engine, own)
+        held = begin if held_at is None else self._positions("held_at", held_at, engine, own)
+        shapes: dict[str, Numbers] = {"q": own, "start": begin, "held_at": held}
+        batch: tuple[int, ...]
+        try:
+            batch = engine.xp.broadcast_shapes(*(tuple(a.shape[:-1]) for a in shapes.values()))
+        except (ValueError, RuntimeError):  # of NumPy, of torch
+            told = ", ".join(f"{name} {tuple(a.shape)}" for name, a in shapes.items())
+            raise ValueError(
+                f"the shapes do not go together: {told}; before the last axis, axes must be equal or 1"
+            ) from None
+        own = engine.xp.broadcast_to(own, (*batch, own.shape[-1]))
+        begin, held = (engine.xp.broadcast_to(a, (*batch, n)) for a in (begin, held))
+        columns = self.ties.columns(engine, own)
+        with without_gradient(own):
+            found = led(
+                lambda q: self.ties.closed_place(engine, q, held),
+                begin,
+                own,
+                columns,
+                self._robot.joint_names,
+            )
+        return self.ties.closed(engine, with_independent(found, own, columns), held).q
+
+    def _positions(self, name: str, given: object, engine: ArrayBackend, like: Numbers) -> Numbers:
+        """Positions of all joints that are given beside those of the independent ones."""
+        values, n = engine.weights(name, given, like), self._robot.n
+        if values.shape[-1:] != (n,):
+            raise ValueError(f"{name} has shape {tuple(values.shape)}; give a closed position ({n},)")
+        if self._robot.door.check_finite:
+            check_numbers({name: values}, self._robot.joint_names)
+        return values
+
+    def _read(self, **named: object) -> tuple[ArrayBackend, Sequence[Numbers]]:
+        return self._robot.door.read(named)
+
+    def _own(self, name: str, given: object, engine: ArrayBackend, q: Numbers) -> Numbers:
+        """What is given of the independent joints, (..., m)."""
+        values, m = engine.weights(name, given, q), len(self.independent)
+        if values.ndim == 0 or values.shape[-1] != m:
+            told = f"its last axis must be {m}, one for each of {', '.join(self.independent)}"
+            raise ValueError(f"{name} has shape {tuple(values.shape)}; {told}")
+        if self._robot.door.check_finite:
+            check_numbers({name: values}, self.independent)
+        return values
+
+    def _torque(self, given: object, engine: ArrayBackend, q: Numbers, by_link: bool) -> Numbers:
+        """Torques (..., n, X)."""
+        values, axis, n = engine.weights("torque", given, q), -2 if by_link else -1, self._robot.n
+        if values.ndim < -axis or values.shape[axis] != n:
+            shape = "(..., n, X)" if by_link else "(..., n), or with by_link=True (..., n, X)"
+            raise ValueError(f"torque has shape {tuple(values.shape)}; give {shape}, n = {n}")
+        if self._robot.door.check_finite:
+            joints = namespace(values).swapaxes(values, -1, -2) if by_link else values
+            check_numbers({"torque": joints}, self._robot.joint_names)
+        return values if by_link else values[..., None]
+
+    def _moving(
+        self, q: object, qd: object, **more: object
+    ) -> tuple[ClosedPlace, ArrayBackend, Sequence[Numbers]]:
+        """How joints follow, what computes, and q, qd in which all follow, with what else was given."""
+        engine, (at, moved, *others) = self._read(q=q, qd=qd, **more)
+        place = self.ties.place(engine, at)
+        return place, engine, (at, place.velocity(place.own(moved)), *others)
+
+    def _accelerated(
+        self, q: object, qd: object, qdd: object
+    ) -> tuple[Followers, Answers, tuple[Numbers, Numbers, Numbers]]:
+        """How joints follow, what answers for the open tree, and a motion in which they follow."""
+        place, engine, (at, moved, asked) = self._moving(q, qd, qdd=qdd)
+        qdd_there = place.velocity(place.own(asked)) + place.bias(moved)
+        return place.found, engine.answers, (at, moved, qdd_there)
+
+
+def _again(robot: Any, made: tuple[object, ...]) -> object:
+    return robot.constrained(*made)
+
+
+def constraints_of(
+    robot: "TiedRobot", independent: object, contacts: object, at: object, tolerance: object
+) -> Constraints[Any]:
+    """Constraints as `Dynamics.constrained` makes them; raises as it says."""
+    if robot.backend.tree is None:
+        raise ValueError(
+            f"the links of {robot.structure.name} are energies, which do not say where anything is; "
+            "constraints are there for rigid links"
+        )
+    allowed = float(tolerance) if isinstance(tolerance, Real) and not isinstance(tolerance, bool) else None
+    if tolerance is not None and (allowed is None or not 0.0 <= allowed < np.inf):
+        raise ValueError(f"tolerance is {tolerance!r}; give a number of m and rad, 0 or more")
+    chosen = ChosenConstraints(robot.structure, robot.backend.tree, independent, contacts, at)
+    return Constraints(robot, chosen, allowed, (independent, contacts, at, allowed))

@@ -1,0 +1,116 @@
+"""How a robot's joints follow its ties, and what moves them: for motion that has been read."""
+
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, cast
+
+import numpy as np
+
+from ..answers.inertia_solve import solved
+from ..answers.namespace import namespace
+from ..arrays.array_backend import ArrayBackend
+from ..interface import Numbers
+from ..structure import Structure
+from .chosen_constraints import ChosenConstraints
+from .closed_places import (
+    ClosedPlace,
+    Followers,
+    RowNames,
+    TiesAt,
+    borne,
+    closed_place,
+    followed,
+    projected,
+    times,
+)
+from .independent_joints import JointColumns, joint_columns
+from .newton_closing import closed
+from .tie_rows import TieRows
+
+
+class TiedJoints:
+    """What constraints were chosen, on whatever back end computes; tables are made when first asked for."""
+
+    def __init__(self, structure: Structure, chosen: ChosenConstraints, tolerance: float | None) -> None:
+        self.chosen, self._tolerance = chosen, tolerance
+        self._listed = joint_columns(chosen.independent, structure.n)
+        self.independent, self.dependent = (
+            tuple(structure.joint_names[k] for k in columns.tolist()) for columns in self._listed[:2]
+        )
+        """Names of the joints."""
+        self._names = RowNames(chosen.rows, chosen.row_names, structure.joint_names)
+        self._columns: dict[object, JointColumns] = {}
+        self._rows: dict[ArrayBackend, TieRows] = {}
+
+    def rows(self, engine: ArrayBackend) -> TieRows:
+        """Rows of the constraints."""
+        if engine not in self._rows:
+            self._rows[engine] = TieRows(engine.frames, self.chosen)
+        return self._rows[engine]
+
+    def columns(self, engine: ArrayBackend, q: Numbers) -> JointColumns:
+        """Positions of the joints, to take from `q`."""
+        key = type(q), getattr(q, "device", None)
+        if key not in self._columns:
+            self._columns[key] = JointColumns(*(engine.index(a, q) for a in self._listed))
+        return self._columns[key]
+
+    def place(self, engine: ArrayBackend, q: Numbers) -> ClosedPlace:
+        """How joints follow at q (..., n), in which all ties close; raises as `Constraints` says."""
+        return closed_place(self.rows(engine), self.columns(engine, q), q, self._tolerance, self._names)
+
+    def closed(self, engine: ArrayBackend, q: Numbers, held_at: Numbers) -> TiesAt:
+        """Ties where dependent joints close them; held_at: positions in which contacts took hold."""
+        columns = self.columns(engine, q)
+        return closed(self.rows(engine), columns, q, held_at, self._tolerance, self._names)
+
+    def closed_place(self, engine: ArrayBackend, q: Numbers, held_at: Numbers) -> ClosedPlace:
+        """The same place, and how joints follow there."""
+        at = self.closed(engine, q, held_at)
+        return followed(at, self.columns(engine, at.q), self._names)
+
+    def motion(
+        self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
+    ) -> tuple[Numbers, Numbers]:
+        """qdd (..., n) and lambda (..., C) under torques (..., n), at velocities that follow.
+
+        (G^T M G) ydd = G^T (tau - h - g - M bias), then A^T lambda = M qdd + h + g - tau.
+        """
+        mass, bias = engine.answers.equations(place.q, qd, passive)
+        force, own = tau - bias, place.bias(qd)
+        qdd = place.velocity(self._solved(place, mass, force, own)) + own
+        return qdd, borne(place.found, (times(mass, qdd) - force)[..., None])[..., 0]
+
+    def acceleration(
+        self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
+    ) -> Numbers:
+        """ydd (..., m) of the same."""
+        mass, bias = engine.answers.equations(place.q, qd, passive)
+        return self._solved(place, mass, tau - bias, place.bias(qd))
+
+    def coefficients(
+        self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers
+    ) -> tuple[Numbers, Numbers, Numbers]:
+        """c2^ = G^T c2 G, c1^ = G^T (c2 dG/dt + c1 G), g^ = G^T g, for each link."""
+        c2, c1, g = engine.answers.coefficients(place.q, qd)
+        found, rate = place.found, place.map_rate(qd)[..., None, :, :]
+        mapped = found.map[..., None, :, :]
+        acceleration, velocity = c2 @ mapped, c2 @ rate + c1 @ mapped
+        return _projected_cubes(found, acceleration), _projected_cubes(found, velocity), projected(found, g)
+
+    def _solved(self, place: ClosedPlace, mass: Numbers, force: Numbers, bias: Numbers) -> Numbers:
+        found = place.found
+        driven = projected(found, (force - times(mass, bias))[..., None])[..., 0]
+        return solved(projected(found, mass @ found.map), driven, self.independent)
+
+
+def without_gradient(like: Numbers) -> AbstractContextManager[object]:
+    """Within it nothing is recorded for gradients."""
+    return nullcontext() if isinstance(like, np.ndarray) else cast(Any, namespace(like)).no_grad()
+
+
+def _projected_cubes(found: Followers, parts: Numbers) -> Numbers:
+    """G^T over i of (..., n, N, m)."""
+    *batch, n, links, m = parts.shape
+    flat = projected(found, parts.reshape(*batch, n, links * m))
+    cubes: Numbers = flat.reshape(*batch, m, links, m)
+    return cubes

@@ -1,0 +1,288 @@
+"""Controllers of a robot's partial impedance: targets are read, motion is checked, torques are computed."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Generic, Protocol, cast
+
+import numpy as np
+
+from ..arrays.array_backend import ArrayBackend
+from ..chosen_names import known_kind
+from ..constraints.robot_constraints import TiedRobot
+from ..interface import Array, Numbers
+from ..packed_engine import TorqueOfOne
+from ..targets import FrameImpedance, Target
+from .frame_impedance import FrameTargets
+from .gains import WantedShares, stiffness_of, wanted
+from .joint_impedance import (
+    ORDERS,
+    Errors,
+    JointImpedance,
+    JointTargets,
+    cancelled_motions,
+    dissipates,
+    friction_width_of,
+    times,
+)
+
+Given = Mapping[str, Numbers]
+"""What a call was given, by name, in one shape (..., n)."""
+
+
+class ControlledRobot(TiedRobot, Protocol):
+    """What controllers ask of a robot."""
+
+    @property
+    def name(self) -> str:
+        """That of its package."""
+
+
+class Controller:
+    """What controllers have in common: targets of a robot, and how its state is told."""
+
+    def __init__(self, robot: ControlledRobot, targets: JointTargets, frame: FrameTargets | None) -> None:
+        self._robot, self._frame = robot, frame
+        self._joints = JointImpedance(robot.structure, targets)
+        self._of_one: dict[ArrayBackend, TorqueOfOne | None] = {}
+
+    def _about(self) -> str:
+        """The robot, and the frame that is controlled."""
+        frame = "" if self._frame is None else f", frame {self._frame.frame!r}"
+        return f"{self._robot.name} on {self._robot.backend.name}{frame}"
+
+    def _torque_of_one(self, engine: ArrayBackend, given: Given, target: Target) -> Numbers | None:
+        """The torque, where a back end has it for one sample without these arrays; None where it does not."""
+        if engine not in self._of_one:
+            self._of_one[engine] = engine.controller(self._joints.targets, self._frame)
+        of_one = self._of_one[engine]
+        return None if of_one is None else of_one.torque(given, target)
+
+    def _arrays(
+        self, q: object, qd: object, beside: Mapping[str, object]
+    ) -> tuple[ArrayBackend, dict[str, Numbers]]:
+        """What computes, and what was given."""
+        named = {"q": q, "qd": qd} | {name: a for name, a in beside.items() if a is not None}
+        engine, arrays = self._robot.door.read(named)
+        return engine, dict(zip(named, arrays, strict=True))
+
+
+class PartialImpedance(Controller, Generic[Array]):
+    """Torques under which the robot obeys its targets; `Dynamics.partial_impedance` makes it.
+
+    With e = q - q_d and f, what acts on the joints from outside (the paper's equation, summed over j):
+
+        M* (qdd - qdd_d) + B* (qd - qd_d) + K* e = f     M* = sum_j M_ijk, B* and K* likewise
+        u = M qdd + C qd + g - f, where qdd follows from the line above
+
+    Only the sums over the links move the robot: which link is said to have which share is a choice, made
+    when entries are given or the natural ones are scaled.
+
+    With a frame, that has precedence: of all accelerations with which the frame moves as asked, the joints
+    take the one nearest to what the lines above ask for, by Gauss's principle of least constraint.
+
+    M is the inertia of links and armatures. Friction of the joints brakes them beside f, but for what is
+    compensated, which is never more than there is. Arguments, batches and errors are as for `Dynamics`;
+    gradients flow through motion, targets and gains.
+
+    target: positions q_d (..., n) to stay at, or a `Target`
+    external: what the surroundings put on the joints, (..., n), in N m or N: J^T (n, f) of a moment and a
+    force, and so the negative of `kinematics.load_torque`; nothing unless given. What is natural in M* needs
+    no measured f.
+
+    Raises ValueError for an M* that is not positive at a sample, for a frame that cannot move along a row,
+    and for one that is half a turn from its target. Warns where rounding leaves fewer than half of the
+    digits of the accelerations that are wanted.
+    """
+
+    def __repr__(self) -> str:
+        return f"<partial impedance of {self._about()}>"
+
+    @property
+    def dissipative(self) -> bool:
+        """Whether the stored energy falls along every motion with f = 0, for targets at rest of a frame, and
+        for any of joints.
+
+        It does where inertia and damping keep the same share of each link, all that is added and the
+        stiffness being positive: the kept c1 take up what the inertia changes by. Not so for a frame that is
+        stiff about one or two of the three axes, as the angle about one changes by turns about the others.
+        """
+        if self._robot.backend.tree is None:  # nobody knows what energies of a user's do
+            return False
+        if self._frame is not None:
+            return self._frame.dissipative
+        return dissipates(self._joints.targets.inertia, self._joints.targets.damping)
+
+    def __call__(self, q: Array, qd: Array, target: object = None, external: Array | None = None) -> Array:
+        """Torque u of the actuators, (..., n), in N m or N."""
+        read, engine, given = self._given(q, qd, target, external)
+        torque = self._torque_of_one(engine, given, read)
+        if torque is None and self._frame is None and self._joints.targets.inertia.natural:
+            state = self._joints.state(engine, given["q"], given["qd"])
+            torque = self._joints.natural_torque(engine, state, given["qd"], _errors(given))
+        return cast("Array", self._followed(engine, given, read)[1] if torque is None else torque)
+
+    def acceleration(
+        self, q: Array, qd: Array, target: object = None, external: Array | None = None
+    ) -> Array:
+        """qdd that follows, (..., n)."""
+        read, engine, given = self._given(q, qd, target, external)
+        return cast("Array", self._followed(engine, given, read)[0])
+
+    def stored_energy(self, q: Array, qd: Array, target: object = None) -> Array:
+        """(ed' M* ed + e' K* e) / 2 in J, (...); with a frame that of the frame."""
+        read, engine, given = self._given(q, qd, target, None)
+        at, moved = given["q"], given["qd"]
+        state = self._joints.state(engine, at, moved)
+        if self._frame is None:
+            return cast("Array", self._joints.stored(engine, state, _errors(given)))
+        framed = self._frame.state(engine, state, at, moved, read)
+        return cast("Array", self._frame.stored(engine, framed))
+
+    def _followed(self, engine: ArrayBackend, given: Given, target: Target) -> tuple[Numbers, Numbers]:
+        """Acceleration that follows, and torque for it."""
+        q, qd, external = given["q"], given["qd"], given.get("external")
+        state = self._joints.state(engine, q, qd)
+        qdd = self._joints.acceleration(engine, state, _errors(given), told=self._frame is not None)
+        if self._frame is not None:
+            framed = self._frame.state(engine, state, q, qd, target)
+            qdd = self._frame.acceleration(engine, framed, qdd, external)
+        return qdd, self._joints.torque(state, qd, qdd, external)
+
+    def _given(
+        self, q: object, qd: object, target: object, external: object
+    ) -> tuple[Target, ArrayBackend, dict[str, Numbers]]:
+        """Target, what computes, and motion; positions alone are a target."""
+        read = target if isinstance(target, Target) else Target(q=target)
+        if hasattr(read.q, "_fields"):
+            raise TypeError(
+                f"target is {known_kind(read.q, Target)}; give positions (..., n), or Target(q, qd, ...)"
+            )
+        if read.q is None and self._joints.targets.stiffness is not None:
+            raise ValueError("the joints are stiff, but target has no q; give positions, (..., n)")
+        if self._frame is None and any(a is not None for a in read[3:]):
+            raise ValueError(
+                "target has what a frame shall do, but none is controlled; give frame=FrameImpedance(...)"
+            )
+        beside: dict[str, object] = {
+            "target": read.q,
+            "target.qd": read.qd,
+            "target.qdd": read.qdd,
+            "external": external,
+        }
+        return read, *self._arrays(q, qd, beside)
+
+
+class Cancellation(Controller, Generic[Array]):
+    """Torques that cancel chosen motion propagation torques and leave the others; see `Dynamics.cancel`.
+
+    u = tau + sum over the cancelled c_m,ijk q_k^(m) + g, and what joints have of their own, as
+    `partial_impedance` compensates it, under which the robot obeys
+
+        (M - M_S) qdd + (C - C_S) qd = tau + f
+
+    with S for what is cancelled. Arguments, batches and errors are as for `PartialImpedance`.
+    """
+
+    entries: tuple[tuple[str, str, str, int], ...]
+    """What is cancelled, by joint, link, coordinate and order."""
+
+    def __init__(
+        self, robot: ControlledRobot, targets: JointTargets, entries: tuple[tuple[str, str, str, int], ...]
+    ) -> None:
+        super().__init__(robot, targets, None)
+        self.entries = entries
+
+    def __repr__(self) -> str:
+        return f"<{len(self.entries)} motion propagation torques of {self._about()} cancelled>"
+
+    def __call__(
+        self,
+        q: Array,
+        qd: Array,
+        tau: Array | None = None,
+        external: Array | None = None,
+        qdd: Array | None = None,
+    ) -> Array:
+        """Torque u of the actuators, (..., n), in N m or N.
+
+        tau: what the task asks for, (..., n); nothing unless given
+        qdd: acceleration at which the cancelled torques are taken, measured or wanted; unless given, the one
+        that follows. With all of them cancelled and a wanted one this is computed torque, but for
+        armature, which is of no link.
+        """
+        engine, given = self._arrays(q, qd, {"task": tau, "external": external, "qdd": qdd})
+        at, moved, accelerated = given["q"], given["qd"], given.pop("qdd", None)
+        if accelerated is None and (torque := self._torque_of_one(engine, given, Target())) is not None:
+            return cast("Array", torque)
+        state = self._joints.state(engine, at, moved)
+        if accelerated is None:
+            accelerated = self._joints.acceleration(engine, state, _errors(given))
+        # tau + M_S qdd + C_S qd + g + p
+        cancelled = times(state.inertia - state.wanted_inertia, accelerated)
+        cancelled = cancelled + times(state.coriolis - state.wanted_damping, moved) + state.rest
+        return cast("Array", cancelled + given["task"] if "task" in given else cancelled)
+
+    def acceleration(
+        self, q: Array, qd: Array, tau: Array | None = None, external: Array | None = None
+    ) -> Array:
+        """qdd that follows, (..., n)."""
+        engine, given = self._arrays(q, qd, {"task": tau, "external": external})
+        state = self._joints.state(engine, given["q"], given["qd"])
+        return cast("Array", self._joints.acceleration(engine, state, _errors(given)))
+
+
+def partial_impedance(
+    robot: ControlledRobot,
+    inertia: object,
+    damping: object,
+    stiffness: object,
+    frame: FrameImpedance | None,
+    passive: bool,
+    friction_width: float | None,
+) -> PartialImpedance[Any]:
+    """See `Dynamics.partial_impedance`."""
+    _check_free(robot)
+    structure = robot.structure
+    targets = JointTargets(
+        wanted("inertia", inertia, structure, True),
+        wanted("damping", damping, structure, False),
+        stiffness_of(stiffness, structure),
+        True,
+        bool(passive),
+        friction_width_of(friction_width, passive),
+    )
+    held = None if frame is None else FrameTargets(robot.backend.frames, frame)
+    return PartialImpedance(robot, targets, held)
+
+
+def cancellation(
+    robot: ControlledRobot, entries: Iterable[object], passive: bool, friction_width: float | None
+) -> Cancellation[Any]:
+    """See `Dynamics.cancel`."""
+    _check_free(robot)
+    structure = robot.structure
+    chosen = cancelled_motions(entries, structure)
+    kept = {order: np.ones((structure.n, structure.N, structure.n)) for order in ORDERS}
+    for i, j, k, order in chosen:
+        kept[order][i, j, k] = 0.0
+    acceleration, velocity = (WantedShares(kept[m], None, None, False, False) for m in (2, 1))
+    width = friction_width_of(friction_width, passive)
+    targets = JointTargets(acceleration, velocity, None, False, bool(passive), width)
+    names = structure.joint_names, structure.link_names
+    named = tuple((names[0][i], names[1][j], names[0][k], m) for i, j, k, m in chosen)
+    return Cancellation(robot, targets, named)
+
+
+def _check_free(robot: ControlledRobot) -> None:
+    if robot.backend.ties_joints:
+        raise ValueError(
+            f"the joints of {robot.name} are tied, and are not free to have an impedance each; "
+            "controllers are there for open trees"
+        )
+
+
+def _errors(given: Given) -> Errors:
+    """How far motion is from its target, and the forces, from outside and of a task."""
+    place = given["q"] - given["target"] if "target" in given else None
+    rate = given["qd"] - given["target.qd"] if "target.qd" in given else given["qd"]
+    forces = [given[name] for name in ("external", "task") if name in given]
+    return Errors(place, rate, given.get("target.qdd"), sum(forces[1:], forces[0]) if forces else None)

@@ -1,1 +1,0 @@
-"""What each source accelerates: actuators, velocities, weights, loads and constraints."""

@@ -1,0 +1,319 @@
+"""Calls on frames as one back end answers them, for motion that has been read: samples innermost."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Generic, NamedTuple, Protocol, TypeVar
+
+from ..answers.namespace import side_by_side
+from ..chosen_names import choice, known_as, short, whole_number
+from ..interface import Library, Namespace, Numbers
+from ..packed_engine import PackedEngine
+from ..rule.joint_tree import JointTree
+from ..rule.kinematics import Twists
+from ..rule.rule_tables import converted
+from ..rule.tree_arrays import TreeArrays, formula_sources, own_numbers
+from .frame_arrays import (
+    Carried,
+    FrameTables,
+    acceleration_of,
+    carried,
+    centre_jacobian,
+    centre_jacobian_rate,
+    centre_of_mass,
+    frame_tables,
+    homogeneous,
+    jacobian,
+    jacobian_rate,
+    link_tables,
+    load_torque,
+    moving,
+    point_at,
+    velocity_of,
+)
+
+ALL, LINKS = "all frames", "links"
+"""What is asked of, where it is not one frame by its number."""
+CACHE = 1 << 21
+"""Bytes of the arrays of one piece of a batch, which are to stay in the processor's cache."""
+NUMBERS = 60
+"""Numbers that a joint or a frame has of one sample."""
+VECTORS = {
+    "point": "x, y, z in the frame, in m",
+    "at": "x, y, z in the world, in m",
+    "force": "x, y, z in the world, in N",
+    "moment": "x, y, z in the world, in N m",
+}
+"""What may be given beside motion."""
+
+Vectors = Mapping[str, Numbers]
+"""Some of them, by name."""
+NONE: Vectors = {}
+
+
+class Moved(Protocol):
+    """Tables that tell by how much the memory of a call grows."""
+
+    @property
+    def moved(self) -> int:
+        """Number of joints and frames."""
+
+
+Tables = TypeVar("Tables", bound=Moved)
+
+
+OwnNumbers = tuple[TreeArrays, Numbers]
+"""A tree's numbers, and where each stands among these and those of formulas."""
+
+
+class Asked(NamedTuple, Generic[Tables]):
+    """What a call computes with: constants, the tree's numbers, motion (n, samples) each."""
+
+    xp: Namespace
+    tables: Tables
+    numbers: TreeArrays
+    motion: Sequence[Numbers]
+    vectors: Vectors
+    """(3, 1, samples) each."""
+
+    def some(self, samples: slice) -> "Asked[Tables]":
+        """The same for some of the samples; of a number that all share there is one."""
+        numbers = (a[..., samples] if a.shape[-1] > 1 else a for a in self.numbers)
+        vectors = {name: a[..., samples] for name, a in self.vectors.items()}
+        motion = [a[:, samples] for a in self.motion]
+        return Asked(self.xp, self.tables, TreeArrays(*numbers), motion, vectors)
+
+
+OnFrames = Asked[FrameTables]
+
+
+def _frame(at: OnFrames, from_world: bool = False) -> Carried:
+    """The frame, or all of them."""
+    return carried(at.xp, at.tables, at.numbers, at.numbers.offsets, at.motion[0], from_world)
+
+
+def _centres(at: OnFrames, from_world: bool = False) -> Carried:
+    """Centres of mass of the links."""
+    return carried(at.xp, at.tables, at.numbers, at.numbers.centres, at.motion[0], from_world)
+
+
+def _place(at: OnFrames, found: Carried) -> Numbers:
+    """Where the point is, the frame's origin unless given."""
+    return point_at(found, at.vectors.get("point"))
+
+
+def _moving(at: OnFrames, found: Carried) -> Twists:
+    """Motion of the joints."""
+    qd, *qdd = at.motion[1:]
+    return moving(at.xp, at.tables, at.numbers, found, qd, qdd[0] if qdd else None)
+
+
+def _pose(at: OnFrames) -> Numbers:
+    return homogeneous(at.xp, _frame(at, from_world=True))[:, :, 0]
+
+
+def _poses(at: OnFrames) -> Numbers:
+    matrices = homogeneous(at.xp, _frame(at, from_world=True))
+    # (4, 4, F, samples) -> (F, 4, 4, samples)
+    return at.xp.swapaxes(at.xp.swapaxes(matrices, 0, 2), 1, 2)
+
+
+def _jacobian(at: OnFrames) -> Numbers:
+    found = _frame(at)
+    return jacobian(at.xp, at.tables, found, _place(at, found))
+
+
+def _jacobian_rate(at: OnFrames) -> Numbers:
+    found = _frame(at)
+    return jacobian_rate(at.xp, at.tables, _moving(at, found), _place(at, found))
+
+
+def _velocity(at: OnFrames) -> Numbers:
+    found = _frame(at)
+    return velocity_of(at.xp, at.tables, _moving(at, found), _place(at, found))[:, 0]
+
+
+def _acceleration(at: OnFrames) -> Numbers:
+    found = _frame(at)
+    return acceleration_of(at.xp, at.tables, _moving(at, found), _place(at, found))[:, 0]
+
+
+def _load_torque(at: OnFrames) -> Numbers:
+    given = at.vectors
+    found = _frame(at, from_world="at" in given)
+    x = given["at"] if "at" in given else _place(at, found)
+    return load_torque(at.xp, at.tables, found, x, given["force"], given.get("moment"))
+
+
+def _centre_of_mass(at: OnFrames) -> Numbers:
+    return centre_of_mass(at.numbers.masses, _centres(at, from_world=True))
+
+
+def _centre_jacobian(at: OnFrames) -> Numbers:
+    return centre_jacobian(at.xp, at.tables, at.numbers.masses, _centres(at))
+
+
+def _centre_jacobian_rate(at: OnFrames) -> Numbers:
+    found = _centres(at)
+    return centre_jacobian_rate(at.xp, at.tables, at.numbers.masses, found, _moving(at, found))
+
+
+ANSWERS: Mapping[str, Callable[[OnFrames], Numbers]] = {
+    "pose": _pose,
+    "poses": _poses,
+    "jacobian": _jacobian,
+    "jacobian_rate": _jacobian_rate,
+    "velocity": _velocity,
+    "acceleration": _acceleration,
+    "load_torque": _load_torque,
+    "centre_of_mass": _centre_of_mass,
+    "centre_of_mass_jacobian": _centre_jacobian,
+    "centre_of_mass_jacobian_rate": _centre_jacobian_rate,
+}
+"""Rows of the table by their names; samples are the last axis."""
+
+
+class FrameAnswers:
+    """The calls of one back end; tables are made when first asked for, for each dtype and device."""
+
+    def __init__(
+        self, engine: PackedEngine, tree: JointTree, numbers: Callable[[OwnNumbers, Numbers], TreeArrays]
+    ) -> None:
+        """numbers: the tree's for the parameters and the bodies, to compute with some positions."""
+        self.engine, self.tree, self._numbers = engine, tree, numbers
+        self.names = tuple(frame.name for frame in self.tree.frames)
+        self._own: dict[object, OwnNumbers] = {}
+        self._tables: dict[object, FrameTables] = {}
+        n = engine.structure.n
+        self._shapes = {
+            "pose": (4, 4),
+            "poses": (len(self.names), 4, 4),
+            "jacobian": (6, n),
+            "jacobian_rate": (6, n),
+            "velocity": (6,),
+            "acceleration": (6,),
+            "load_torque": (n,),
+            "centre_of_mass": (3,),
+            "centre_of_mass_jacobian": (3, n),
+            "centre_of_mass_jacobian_rate": (3, n),
+        }
+
+    def shape(self, call: str) -> tuple[int, ...]:
+        """Of a call's answer for one sample."""
+        return self._shapes[call]
+
+    def answer(
+        self, call: str, motion: Sequence[Numbers], part: object = ALL, vectors: Vectors = NONE
+    ) -> Numbers:
+        """Answer (..., *shape) to motion and vectors in one shape of samples.
+
+        part: a frame by its number, all of them, or the links
+        """
+        point, one = vectors.get("point"), self.engine.one_sample
+        if one is not None and isinstance(part, int) and vectors.keys() <= {"point"}:
+            found = one.answer(call, motion, part, point)
+            if found is not None:
+                return found
+        batch = tuple(motion[0].shape[:-1])
+        asked = self.asked(self._tables, part, self._listed, motion, vectors)
+        shape = self._shapes[call]
+        values = in_pieces(self.engine, motion, asked, ANSWERS[call], math.prod(shape))
+        return side_by_side(values.reshape(*batch, *shape))
+
+    def asked(
+        self,
+        tables: dict[object, Tables],
+        part: object,
+        listed: Callable[[object], Tables],
+        motion: Sequence[Numbers],
+        vectors: Vectors = NONE,
+    ) -> Asked[Tables]:
+        """Constants, numbers and motion with samples innermost.
+
+        tables: those of parts, for each dtype and device; listed: makes the one of a part, in float64
+        """
+        q, xp = motion[0], self.engine.xp
+        key = q.dtype, getattr(q, "device", None)
+        if key not in self._own:
+            own: OwnNumbers = own_numbers(self.tree), formula_sources(self.tree)
+            self._own[key] = converted(own, self.engine, q)
+        if (part, key) not in tables:
+            tables[part, key] = converted(listed(part), self.engine, q)
+        numbers = self._numbers(self._own[key], q)
+        flat = [xp.swapaxes(a.reshape(-1, a.shape[-1]), 0, 1) for a in motion]
+        placed = {name: xp.swapaxes(a.reshape(-1, 3), 0, 1)[:, None] for name, a in vectors.items()}
+        return Asked(xp, tables[part, key], numbers, flat, placed)
+
+    def _listed(self, part: object) -> FrameTables:
+        n = self.engine.structure.n
+        if part == LINKS:
+            return link_tables(self.tree, n)
+        return frame_tables(self.tree, n, [part] if isinstance(part, int) else range(len(self.names)))
+
+
+def in_pieces(
+    engine: PackedEngine,
+    motion: Sequence[Numbers],
+    at: Asked[Tables],
+    answer: Callable[[Asked[Tables]], Numbers],
+    count: int,
+) -> Numbers:
+    """Answers (samples, count), as many samples at once as the back end wants."""
+    xp, samples = at.xp, at.motion[0].shape[1]
+    size = engine.chunk(motion, max(16, CACHE // (motion[0].itemsize * (NUMBERS * at.tables.moved + count))))
+    if size is None or samples <= size:
+        return xp.swapaxes(answer(at).reshape(count, samples), 0, 1)
+    whole = xp.empty((samples, count), dtype=motion[0].dtype)
+    for start in range(0, samples, size):
+        piece = slice(start, min(start + size, samples))
+        found = answer(at.some(piece)).reshape(count, piece.stop - start)
+        whole[piece] = xp.swapaxes(found, 0, 1)
+    return whole
+
+
+def with_vectors(
+    library: Library, motion: Sequence[Numbers], beside: Mapping[str, object]
+) -> tuple[Sequence[Numbers], Vectors]:
+    """Motion and vectors in one shape of samples, those away that are None.
+
+    Raises ValueError for a vector that does not go with it.
+    """
+    q, samples = motion[0], tuple(motion[0].shape[:-1])
+    batch = samples
+    vectors = {name: library.weights(name, a, q) for name, a in beside.items() if a is not None}
+    for name, a in vectors.items():
+        if a.ndim == 0 or a.shape[-1] != 3:
+            raise ValueError(f"{name} has shape {tuple(a.shape)}; its last axis must be 3: {VECTORS[name]}")
+        try:
+            batch = library.xp.broadcast_shapes(batch, tuple(a.shape[:-1]))
+        except (ValueError, RuntimeError):  # of NumPy, of torch
+            raise ValueError(
+                f"{name} has shape {tuple(a.shape)}, the motion has samples of shape {samples}; "
+                f"give one {name}, or one for each sample"
+            ) from None
+    if all(a.shape[:-1] == samples for a in vectors.values()):
+        return list(motion), vectors
+    motion = [library.xp.broadcast_to(a, (*batch, a.shape[-1])) for a in motion]
+    return motion, {name: library.xp.broadcast_to(a, (*batch, 3)) for name, a in vectors.items()}
+
+
+def frame_index(given: object, frames: Sequence[str]) -> int:
+    """Index among `frames` of one by its name, or by that index itself: the number that C has for it too.
+
+    Raises ValueError for one that is not there, TypeError for what is neither a name nor a number.
+    """
+    if isinstance(given, str):
+        if (name := known_as(given, frames)) is not None:
+            return frames.index(name)
+        known = choice(given, frames, "kinematics.frames")
+        raise ValueError(f"frame is {short(given)}, which is not there; choose {known}")
+    number = whole_number(given)
+    if number is None:
+        raise TypeError(
+            f"frame is {short(given)}; give the name of a frame, or its number in kinematics.frames"
+        )
+    if not 0 <= number < len(frames):
+        raise ValueError(
+            f"frame is {number}, but frames are numbered 0..{len(frames) - 1}, in the order of "
+            "kinematics.frames; or give a frame's name"
+        )
+    return number

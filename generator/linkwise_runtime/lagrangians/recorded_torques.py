@@ -1,0 +1,186 @@
+"""Partial torques and their parts as they are recorded, one sample, from the Lagrangians of links.
+
+With L = K - P of a link, p_i = dK/dqd_i, and every derivative by autograd:
+
+    tau_ij = sum_k dp_i/dqd_k qdd_k + h_i + g_ij      h_i = sum_s dp_i/dq_s qd_s - dK/dq_i      g_ij = dP/dq_i
+    c2_ijk = dp_i/dqd_k        c1_ijk = 1/2 (dh_i/dqd_k + the same at rest)        c0_ijk = d(tau_ij)/d(q_k)
+
+At rest dh_i/dqd_k is what terms of K linear in the velocities leave: zero for rigid links.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import cast
+
+import torch
+from torch import Tensor
+
+from ..structure import Structure
+from .operation_recorder import Leaf, Operation, OperationRecorder, Ref
+
+MOTIONS = ("q", "qd", "qdd")
+Number = Tensor | float
+Slopes = tuple[dict[int, Number], dict[int, Number], Number]
+"""dp_i/dq_s and dp_i/dqd_s of a link by s, and dK/dq_i."""
+Part = tuple[int | None, int | None]
+"""Coordinate k and order m of a part; (None, None) is the whole torque, (None, 0) gravity."""
+
+
+@dataclass(frozen=True)
+class LinkEnergies:
+    """Energies of one link in J, of sequences of coordinates and velocities."""
+
+    path: tuple[int, ...]
+    linear: bool
+    kinetic: Callable[[Sequence[Tensor], Sequence[Tensor]], Number]
+    potential: Callable[[Sequence[Tensor]], Number]
+
+
+@dataclass(frozen=True)
+class RecordedParts:
+    """What was recorded: all operations in order, the leaves, and the value of each part."""
+
+    operations: Mapping[str, Operation]
+    leaves: Mapping[str, Leaf]
+    values: Mapping[Part, Ref | float]
+
+
+def record(
+    structure: Structure,
+    links: Callable[[Mapping[str, Tensor]], Iterable[LinkEnergies]],
+    beside: Mapping[Leaf, Tensor],
+    joint: int,
+    parts: Iterable[Part],
+) -> RecordedParts:
+    """Record parts of the torque on a joint, through the sum of some links.
+
+    links: energies, for the values of leaves by their keys; beside: those leaves that are no motion
+    """
+    recorder, leaves = OperationRecorder(), dict[str, Leaf]()
+
+    def taken(leaf: Leaf, value: float, varies: bool = False) -> Tensor:
+        leaves[leaf.key] = leaf
+        tensor = torch.tensor(value, dtype=torch.float64, device="cpu", requires_grad=varies)
+        return recorder.leaf(leaf, tensor)
+
+    names = structure.joint_names
+    with torch.inference_mode(False), torch.enable_grad():
+        motion = [
+            [
+                taken(Leaf(f"{kind}[{k}]", kind, name), 0.3 + 0.1 * k, kind != "qdd")
+                for k, name in enumerate(names)
+            ]
+            for kind in MOTIONS
+        ]
+        values = {
+            leaf.key: taken(leaf, value.detach().reshape(-1)[0].item()) for leaf, value in beside.items()
+        }
+        energies = list(links(values))
+        with recorder:
+            recorded = _Torque(recorder, energies, joint, motion)
+            found = {part: cast("Ref | float", recorder.operand(recorded.part(*part))) for part in parts}
+    return RecordedParts(recorder.operations, leaves, found)
+
+
+class _Torque:
+    """Sums over links; a coefficient is multiplied by its motion once."""
+
+    def __init__(
+        self,
+        recorder: OperationRecorder,
+        links: Sequence[LinkEnergies],
+        joint: int,
+        motion: Sequence[Sequence[Tensor]],
+    ) -> None:
+        self._recorder, self._joint = recorder, joint
+        self._q, self._qd, self._qdd = motion
+        self._links = [link for link in links if joint in link.path]
+        self._path = sorted({k for link in self._links for k in link.path})
+
+    def part(self, k: int | None, m: int | None) -> Number:
+        """Value of a part: a tensor, or 0.0."""
+        if m == 0:
+            return self.gravity if k is None else _times(self._at(self.stiffness, k), self._q[k])
+        if k is None:
+            inertial = [self.part(s, 2) for s in self._path] if m != 1 else []
+            moving = [self.velocity_force] if m != 2 else []
+            return _sum([*inertial, *moving, *([self.gravity] if m is None else [])])
+        acceleration = _times(self._at(self.inertia, k), self._qdd[k]) if m != 1 else 0.0
+        velocity = _times(self._at(self.damping, k), self._qd[k]) if m != 2 else 0.0
+        return _sum([acceleration, velocity])
+
+    @cached_property
+    def inertia(self) -> list[Number]:
+        """c2_ik, by k on the path."""
+        return [_sum([rates[k] for _, rates, _ in self._moving if k in rates]) for k in self._path]
+
+    @cached_property
+    def velocity_force(self) -> Number:
+        """h_i."""
+        return _sum([self._force(slopes, self._qd) for slopes in self._moving])
+
+    @cached_property
+    def damping(self) -> list[Number]:
+        """c1_ik in the closing convention, by k on the path."""
+        slopes = [self._slopes(self.velocity_force, [self._qd[k] for k in self._path], 3)]
+        for link in self._links:
+            if link.linear:
+                rest = [torch.zeros_like(v, requires_grad=True) for v in self._qd]
+                force = self._force(self._momentum(link, rest), rest)
+                slopes.append(self._slopes(force, [rest[k] for k in self._path], 3))
+        return [_times(_sum(column), 0.5) for column in zip(*slopes, strict=True)]
+
+    @cached_property
+    def gravity(self) -> Number:
+        """g_i."""
+        at = [self._q[self._joint]]
+        return _sum([slope for link in self._links for slope in self._slopes(link.potential(self._q), at, 1)])
+
+    @cached_property
+    def stiffness(self) -> list[Number]:
+        """c0_ik, by k on the path."""
+        return self._slopes(self.part(None, None), [self._q[k] for k in self._path], 3)
+
+    def _at(self, coefficients: Sequence[Number], k: int) -> Number:
+        return coefficients[self._path.index(k)] if k in self._path else 0.0
+
+    @cached_property
+    def _moving(self) -> list[Slopes]:
+        return [self._momentum(link, self._qd) for link in self._links]
+
+    def _momentum(self, link: LinkEnergies, qd: Sequence[Tensor]) -> Slopes:
+        """dp_i/dq_s and dp_i/dqd_s by s, and dK/dq_i of a link."""
+        kinetic, path = link.kinetic(self._q, qd), link.path
+        momentum, force = self._slopes(kinetic, [qd[self._joint], self._q[self._joint]], 1)
+        slopes = self._slopes(momentum, [*(self._q[s] for s in path), *(qd[s] for s in path)], 2)
+        bends, rates = slopes[: len(path)], slopes[len(path) :]
+        return dict(zip(path, bends, strict=True)), dict(zip(path, rates, strict=True)), force
+
+    def _force(self, slopes: Slopes, qd: Sequence[Tensor]) -> Number:
+        bends, _, force = slopes
+        turned = _sum([_times(bend, qd[s]) for s, bend in bends.items()])
+        if _none(force):
+            return turned
+        return -force if _none(turned) else turned - force
+
+    def _slopes(self, value: Number, by: Sequence[Tensor], order: int) -> list[Number]:
+        """Derivatives of a value, which may be differentiated again; 0.0 where it does not depend on one."""
+        if not torch.is_tensor(value) or not value.requires_grad:
+            return [0.0] * len(by)
+        with self._recorder.derivative(order):
+            found = torch.autograd.grad(value, by, create_graph=True, allow_unused=True)
+        return [0.0 if slope is None else slope for slope in found]
+
+
+def _none(value: Number) -> bool:
+    return not torch.is_tensor(value) and value == 0.0
+
+
+def _times(a: Number, b: Number) -> Number:
+    return 0.0 if _none(a) or _none(b) else a * b
+
+
+def _sum(values: Sequence[Number]) -> Number:
+    there = [value for value in values if not _none(value)]
+    return sum(there[1:], there[0]) if there else 0.0

@@ -1,0 +1,241 @@
+"""What each source accelerates, and what it puts on constraints: sources side by side, solved for at once.
+
+Coordinates answer to forces freely, or with constraints A qd = 0 that they must keep.
+
+With constraints each source x solves
+
+    [M  -A^T; A  0] [qdd_x; lambda_x] = [F_x; b_x]      b = -dA/dt qd for the constraints' own source, else 0
+
+in the null space of A: with qd = G yd of the independent coordinates y and A beta = b,
+
+    qdd_x = G (G^T M G)^-1 G^T (F_x - M beta_x) + beta_x      A^T lambda_x = M qdd_x - F_x
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..answers.inertia_solve import solved_columns
+from ..arrays.array_backend import ArrayBackend
+from ..chosen_names import short
+from ..constraints.closed_places import ClosedPlace, borne
+from ..constraints.robot_constraints import Constraints, TiedRobot
+from ..interface import Numbers
+from ..kinematics.frame_answers import LINKS, frame_index, with_vectors
+from ..quantities import InducedAccelerations
+from ..structure import Structure
+from .source_forces import SourceForces, listed_loads, load_torques, source_forces, with_actuators
+
+
+class DrivenRobot(TiedRobot, Protocol):
+    """What induced accelerations ask of a robot."""
+
+    @property
+    def name(self) -> str:
+        """That of its package."""
+
+    @property
+    def constraints(self) -> Constraints[Any]:
+        """Those of its file."""
+
+
+@dataclass(frozen=True)
+class FreeResponse:
+    """An open tree's: M qdd = F."""
+
+    structure: Structure
+    mass: Numbers
+
+    def accelerations(self, forces: Numbers) -> Numbers:
+        """What columns of forces (..., n, X) accelerate."""
+        return solved_columns(self.mass, forces, self.structure.joint_names)
+
+    def needed(self, forces: Numbers) -> Numbers:
+        """Torques of the actuators that bear these (..., n, X): all of them."""
+        return forces
+
+    def of_velocities(self) -> Numbers:
+        """Accelerations of the constraints' own source, by cause (..., n, n)."""
+        return 0.0 * self.mass
+
+    def reactions(self, forces: Numbers | None, accelerations: Numbers) -> Numbers:
+        """Raises ValueError: nothing reacts."""
+        raise ValueError(
+            f"nothing reacts on {self.structure.name}: it has no constraints; give some, such as "
+            "robot.constrained(contacts=...)"
+        )
+
+
+@dataclass(frozen=True)
+class TiedResponse:
+    """That of coordinates that keep constraints."""
+
+    engine: ArrayBackend
+    mass: Numbers
+    constraints: Constraints[Any]
+    place: ClosedPlace
+    bias: Numbers
+    """beta by cause, (..., n, n)."""
+
+    def accelerations(self, forces: Numbers) -> Numbers:
+        """What columns of forces (..., n, X) accelerate."""
+        g = self.place.found.map
+        projected = g.mT @ self.mass @ g
+        return g @ solved_columns(projected, g.mT @ forces, self.constraints.independent)
+
+    def needed(self, forces: Numbers) -> Numbers:
+        """Torques of actuators at the independent joints that bear these (..., n, X)."""
+        own = np.eye(self.mass.shape[-1])[:, list(self.constraints.ties.chosen.independent)]
+        return self.engine.constant(own, self.mass) @ (self.place.found.map.mT @ forces)
+
+    def of_velocities(self) -> Numbers:
+        """Accelerations of the constraints' own source, by cause (..., n, n)."""
+        return self.bias - self.accelerations(self.mass @ self.bias)
+
+    def reactions(self, forces: Numbers | None, accelerations: Numbers) -> Numbers:
+        """lambda (..., C, X), by columns of forces, None for none, and what they accelerate."""
+        torque = self.mass @ accelerations
+        return borne(self.place.found, torque if forces is None else torque - forces)
+
+
+Response = FreeResponse | TiedResponse
+
+
+def response_of(
+    engine: ArrayBackend, constraints: Constraints[Any] | None, q: Numbers, qd: Numbers, mass: Numbers
+) -> Response:
+    """How coordinates answer at a state that has been read, with these constraints or none."""
+    if constraints is None:
+        return FreeResponse(engine.structure, mass)
+    place = constraints.ties.place(engine, q)
+    return TiedResponse(engine, mass, constraints, place, place.bias_by_cause(place.velocity(place.own(qd))))
+
+
+def constraints_of(robot: DrivenRobot, given: object) -> Constraints[Any] | None:
+    """What a motion keeps: that which is given, or the robot's own; None where it keeps nothing.
+
+    Raises TypeError for what is no constraints, and ValueError for those of another robot.
+    """
+    if given is False:
+        return None
+    if given is not None:
+        if not isinstance(given, Constraints):
+            raise TypeError(
+                f"constraints is {short(given)}; give what robot.constrained(...) makes, or False"
+            )
+        if not given.are_of(robot):
+            raise ValueError(
+                f"constraints are of another robot than this {robot.name} on {robot.backend.name}; make them "
+                "by its own constrained(...)"
+            )
+        return given
+    return robot.constraints if robot.backend.ties_joints else None
+
+
+CENTRE_OF_MASS = "centre of mass"
+"""What `frame` says for it; a frame of this name comes first."""
+
+
+class Driven(NamedTuple):
+    """Arguments as `Dynamics.induced_accelerations` has them."""
+
+    q: object
+    qd: object
+    tau: object
+    qdd: object
+    loads: object
+    passive: bool
+    constraints: object
+
+
+class DrivenSources(NamedTuple):
+    """A motion, the forces of all sources, and what answers to them."""
+
+    engine: ArrayBackend
+    q: Numbers
+    qd: Numbers
+    point: dict[str, Numbers]
+    """Of the frame that is asked for, in as many samples; none where none is given."""
+    forces: SourceForces
+    response: Response
+
+
+def induced_accelerations(
+    robot: DrivenRobot, asked: Driven, frame: object, point: object
+) -> InducedAccelerations[Any]:
+    """See `Dynamics.induced_accelerations`."""
+    if frame is None and point is not None:
+        raise ValueError("point is given without the frame that it is a point of; give frame too")
+    at = _sources(robot, asked, point)
+    by_velocity = at.response.of_velocities()
+    moved = at.forces.split(at.response.accelerations(at.forces.columns))
+    shares: InducedAccelerations[Any] = InducedAccelerations(*[*moved, by_velocity, 0.0 * by_velocity])
+    if frame is None:
+        return shares
+    return shares.mapped(*_jacobians(at, frame), at.qd)
+
+
+def induced_reactions(robot: DrivenRobot, asked: Driven) -> InducedAccelerations[Any]:
+    """See `Dynamics.induced_reactions`."""
+    at = _sources(robot, asked, None)
+    by_velocity = at.response.reactions(None, at.response.of_velocities())
+    moved = at.response.reactions(at.forces.columns, at.response.accelerations(at.forces.columns))
+    return InducedAccelerations(*[*at.forces.split(moved), by_velocity, 0.0 * by_velocity])
+
+
+def _sources(robot: DrivenRobot, asked: Driven, point: object) -> DrivenSources:
+    """Raises ValueError and TypeError as `Dynamics.induced_accelerations` does."""
+    tau, qdd = asked.tau, asked.qdd
+    if (tau is None) == (qdd is None):
+        raise TypeError(
+            "give tau, the torques of the actuators, or qdd, the acceleration that they are to give: one of "
+            "the two"
+        )
+    named = {"q": asked.q, "qd": asked.qd} | ({"qdd": qdd} if tau is None else {"tau": tau})
+    engine, motion = robot.door.read(named)
+    constraints = constraints_of(robot, asked.constraints)
+    pulls = load_torques(engine, motion[0], listed_loads(asked.loads))
+    motion, vectors = with_vectors(engine, motion, {"point": point})
+    q, qd, last = _in_one_shape(engine, motion, pulls)
+    points = {name: engine.xp.broadcast_to(a, (*q.shape[:-1], 3)) for name, a in vectors.items()}
+    place = None if constraints is None else constraints.ties.place(engine, q)
+    if place is not None:
+        qd = place.velocity(place.own(qd))
+    others = source_forces(engine, q, qd, pulls, asked.passive)
+    response: Response = FreeResponse(robot.structure, others.mass)
+    if constraints is not None and place is not None:
+        response = TiedResponse(engine, others.mass, constraints, place, place.bias_by_cause(qd))
+    if tau is None:
+        if place is not None:
+            last = place.velocity(place.own(last)) + place.bias(qd)
+        needed = (others.mass @ last[..., None])[..., 0] - others.columns.sum(-1)
+        last = response.needed(needed[..., None])[..., 0]
+    identity = engine.constant(np.eye(robot.n), q)
+    return DrivenSources(engine, q, qd, points, with_actuators(others, last, identity), response)
+
+
+def _in_one_shape(
+    engine: ArrayBackend, motion: Sequence[Numbers], pulls: Sequence[Numbers]
+) -> Sequence[Numbers]:
+    """Motion in one shape with the torques of loads, which may be of more samples."""
+    xp, n = engine.xp, motion[0].shape[-1]
+    batch = xp.broadcast_shapes(*(tuple(a.shape[:-1]) for a in (motion[0], *pulls)))
+    return motion if batch == motion[0].shape[:-1] else [xp.broadcast_to(a, (*batch, n)) for a in motion]
+
+
+def _jacobians(at: DrivenSources, frame: object) -> tuple[Numbers, Numbers]:
+    frames, motion = at.engine.frames, [at.q, at.qd]
+    if isinstance(frame, str) and frame == CENTRE_OF_MASS and frame not in frames.names:
+        if at.point:
+            raise ValueError("point is given for the centre of mass, which has none; leave it away")
+        return (
+            frames.answer("centre_of_mass_jacobian", motion[:1], LINKS),
+            frames.answer("centre_of_mass_jacobian_rate", motion, LINKS),
+        )
+    number = frame_index(frame, frames.names)
+    return (
+        frames.answer("jacobian", motion[:1], number, at.point),
+        frames.answer("jacobian_rate", motion, number, at.point),
+    )

@@ -1,0 +1,221 @@
+"""How a robot moves over time: arguments are checked, the motion is integrated and collected."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
+from itertools import pairwise
+from numbers import Real
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..answers.namespace import array_of, namespace
+from ..arguments import as_array, check_numbers, shape_of
+from ..arrays.array_backend import ArrayBackend
+from ..chosen_names import short
+from ..constraints.robot_constraints import Constraints
+from ..interface import Numbers
+from ..quantities import Trajectory
+from .equations_of_motion import EquationsOfMotion, Given, State, TiedMotion, checked_torques
+from .induced_accelerations import DrivenRobot, constraints_of
+
+Rates = Callable[[float, State], State]
+ADAPTIVE = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
+"""Methods of SciPy's solve_ivp."""
+
+
+def in_fixed_steps(
+    rates: Rates, settle: Rates, start: State, times: Sequence[float], step: float | None
+) -> Iterator[State]:
+    """States at `times`, between which there are as many equal steps as make none longer than `step`.
+
+    settle: what is made of an instant and a state after each step
+    """
+    yield start
+    state = start
+    for begin, end in pairwise(times):
+        count = 1 if step is None else max(1, math.ceil((end - begin) / step * (1.0 - 1e-12)))
+        length = (end - begin) / count
+        for k in range(count):
+            state = settle(begin + (k + 1) * length, _step(rates, begin + k * length, length, state))
+        yield state
+
+
+def by_scipy(
+    rates: Rates,
+    start: State,
+    times: Sequence[float],
+    method: str,
+    step: float | None,
+    tolerances: tuple[float, float],
+) -> Iterator[State]:
+    """States at `times` of NumPy arrays, by steps that keep the error of each within the tolerances.
+
+    Raises ImportError without SciPy, ValueError where the solver gives up.
+    """
+    try:
+        solve_ivp = import_module("scipy.integrate").solve_ivp
+    except ImportError:
+        raise ImportError(
+            f"method {method!r} is SciPy's, which is not installed here: pip install scipy, or take method "
+            "'RK4'"
+        ) from None
+
+    exact = State(*(np.asarray(a, float) for a in start))
+
+    def flat_rates(t: float, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return _flat(rates(float(t), _shaped(values, exact)))
+
+    if len(times) == 1:
+        return iter([start])
+    span, most = (times[0], times[-1]), math.inf if step is None else step
+    rtol, atol = tolerances
+    found = solve_ivp(
+        flat_rates, span, _flat(exact), method, t_eval=times, max_step=most, rtol=rtol, atol=atol
+    )
+    if not found.success:
+        raise ValueError(f"{method} gave up after t = {times[max(0, found.t.size - 1)]:g} s: {found.message}")
+    return (_shaped(values, start) for values in found.y.T)
+
+
+def _step(rates: Rates, t: float, length: float, state: State) -> State:
+    """y + h/6 (k1 + 2 k2 + 2 k3 + k4)."""
+
+    def moved(by: float, slope: State) -> State:
+        return State(*(a + by * b for a, b in zip(state, slope, strict=True)))
+
+    k1 = rates(t, state)
+    k2 = rates(t + length / 2, moved(length / 2, k1))
+    k3 = rates(t + length / 2, moved(length / 2, k2))
+    k4 = rates(t + length, moved(length, k3))
+    mean = (a + 2.0 * b + 2.0 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
+    return moved(length / 6.0, State(*mean))
+
+
+def _flat(state: State) -> NDArray[np.float64]:
+    return np.concatenate([np.asarray(a, float).reshape(-1) for a in state])
+
+
+def _shaped(values: NDArray[np.float64], like: State) -> State:
+    parts, begin = [], 0
+    for a in map(array_of, like):
+        parts.append(values[begin : begin + a.size].reshape(a.shape).astype(a.dtype))
+        begin += a.size
+    return State(*parts)
+
+
+class Simulated(NamedTuple):
+    """Arguments as `Dynamics.simulate` has them."""
+
+    q: object
+    qd: object
+    time: object
+    tau: object
+    loads: object
+    passive: bool
+    step: object
+    method: object
+    rtol: object
+    atol: object
+    constraints: object
+
+
+def simulated(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
+    """See `Dynamics.simulate`."""
+    constraints = constraints_of(robot, asked.constraints)
+    q, qd = asked.q, asked.qd
+    if constraints is not None:
+        q, qd = _of_all_joints(constraints, q, qd)
+    engine, (start, rate) = robot.door.read({"q": q, "qd": qd})
+    check_numbers({"q": start, "qd": rate}, robot.joint_names)
+    times = _instants(asked.time)
+    step = None if asked.step is None else _positive("step", asked.step)
+    tolerances = _positive("rtol", asked.rtol), _positive("atol", asked.atol)
+    equations, state = _started(engine, start, rate, asked, constraints)
+    if asked.method == "RK4":
+        states = in_fixed_steps(equations.rates, equations.settled, state, times, step)
+    elif asked.method in ADAPTIVE:
+        if not isinstance(start, np.ndarray):
+            raise TypeError(
+                f"method {asked.method!r} computes with arrays and keeps no gradient; take 'RK4', or load "
+                "numpy"
+            )
+        states = by_scipy(equations.rates, state, times, asked.method, step, tolerances)
+    else:
+        raise ValueError(f"method is {short(asked.method)}; choose RK4 or, of SciPy, {', '.join(ADAPTIVE)}")
+    return _collected(equations, times, _finite(states, times, start))
+
+
+def _of_all_joints(constraints: Constraints[Any], q: object, qd: object) -> tuple[object, object]:
+    """The start of all joints, where it is given of the independent ones."""
+    m = len(constraints.independent)
+    if shape_of(q)[-1:] == (m,):
+        q = constraints.closed(cast(Any, q))
+    if shape_of(qd)[-1:] == (m,):
+        qd = constraints.velocity(constraints.closed(cast(Any, q)), cast(Any, qd))
+    return q, qd
+
+
+def _started(
+    engine: ArrayBackend, q: Numbers, qd: Numbers, asked: Simulated, constraints: Constraints[Any] | None
+) -> tuple[EquationsOfMotion, State]:
+    """The equations, and the state that they start from."""
+    work, passive = 0.0 * q.sum(-1), asked.passive and bool(engine.structure.passive)
+    tau: Numbers | Given = 0.0 * q
+    if callable(asked.tau):
+        tau = cast(Given, asked.tau)
+    elif asked.tau is not None:
+        tau = checked_torques(engine, asked.tau, q)
+    if constraints is None:
+        return EquationsOfMotion(engine, tau, asked.loads, passive, None), State(q, qd, work)
+    place = constraints.ties.closed_place(engine, q, q)
+    ties = TiedMotion(constraints.ties, engine, place)
+    return EquationsOfMotion(engine, tau, asked.loads, passive, ties), State(place.q, place.own(qd), work)
+
+
+def _finite(states: Iterator[State], times: Sequence[float], like: Numbers) -> Iterator[State]:
+    """The states; raises ValueError for the first that is not finite."""
+    xp = namespace(like)
+    for t, state in zip(times, states, strict=True):
+        if not bool(xp.isfinite(state.q).all() & xp.isfinite(state.v).all()):
+            raise ValueError(
+                f"the motion is not finite at t = {t:g} s; take smaller steps, or look at the torques"
+            )
+        yield state
+
+
+def _collected(
+    equations: EquationsOfMotion, times: Sequence[float], states: Iterator[State]
+) -> Trajectory[Any]:
+    """The motion at all instants."""
+    rows = []
+    for t, state in zip(times, states, strict=True):
+        q, qd = equations.motion(t, state)
+        tau = equations.torques(t, q, qd)
+        rows.append((q, qd, tau, equations.energy(q, qd), state.work))
+    like = rows[0][0]
+    xp = namespace(like)
+    columns = (xp.stack(column) for column in zip(*rows, strict=True))
+    return Trajectory(equations.engine.weights("time", list(times), like), *columns)
+
+
+def _instants(time: object) -> list[float]:
+    """Raises ValueError for what is not a list of rising finite numbers."""
+    instants = as_array("time", time)
+    if instants.ndim != 1 or not len(instants) or instants.dtype.kind not in "iuf":
+        raise ValueError(
+            f"time has shape {instants.shape} and dtype {instants.dtype}; give the instants in s, such as "
+            "numpy.linspace(0, 1, 101)"
+        )
+    values: list[float] = instants.astype(float).tolist()
+    for k, (one, after) in enumerate(zip(values, [*values[1:], math.inf], strict=True)):
+        if not one < after or not math.isfinite(one):
+            raise ValueError(f"time[{k}] is {one:g}; instants must be finite, each later than the one before")
+    return values
+
+
+def _positive(name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < float(value) < math.inf:
+        raise ValueError(f"{name} is {short(value)}; give a number above 0")
+    return float(value)

@@ -1,0 +1,117 @@
+"""Forces on the coordinates by source, side by side as columns.
+
+    M qdd = u - sum_js c1_ijs qd_s - sum_j g_ij - spring - damping - friction + sum_e J_e^T w_e
+
+with armature on the diagonal of M where the joints' own torques count.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..answers.namespace import namespace
+from ..arrays.array_backend import ArrayBackend
+from ..chosen_names import known_kind
+from ..interface import Numbers
+from ..kinematics.frame_answers import frame_index, with_vectors
+from ..kinematics.robot_kinematics import check_load
+from ..quantities import AppliedLoad
+
+
+class SourceForces(NamedTuple):
+    """Columns of generalised forces (..., n, X): those of actuators first, once they are known."""
+
+    mass: Numbers
+    """M (..., n, n)."""
+    columns: Numbers
+    tails: tuple[tuple[int, ...], ...]
+    """Shape of the sources of each kind, which follow each other in the columns."""
+
+    def split(self, columns: Numbers) -> list[Numbers]:
+        """What belongs to each kind of source, (..., r, *tail), of columns (..., r, X)."""
+        parts, start = [], 0
+        for tail in self.tails:
+            end = start + math.prod(tail)
+            parts.append(columns[..., start:end].reshape(*columns.shape[:-1], *tail))
+            start = end
+        return parts
+
+
+def source_forces(
+    engine: ArrayBackend, q: Numbers, qd: Numbers, pulls: Sequence[Numbers], passive: bool
+) -> SourceForces:
+    """All sources but actuators: velocity (N, n), gravity (N), passive (3, n), loads (L).
+
+    pulls: what each load asks of the joints, (..., n)
+    """
+    structure = engine.structure
+    n, links, own = structure.n, structure.N, structure.passive_sums
+    c2, c1, gravity = engine.answers.coefficients(q, qd)
+    kinds = [-(c1 * qd[..., None, None, :]).reshape(*q.shape, links * n), -gravity]
+    mass, rest = c2.sum(-2), 0.0 * q
+    identity = engine.constant(np.eye(n), q)
+    shares: Sequence[Numbers] = (rest,) * 3
+    if passive and structure.passive:
+        shares = engine.answers.passive_torque(q, qd, rest)[:3]
+        mass = mass + engine.constant(np.diag(own.armature), q)
+    kinds += [-identity * share[..., None, :] for share in shares]
+    kinds += [-torque[..., None] for torque in pulls]
+    return SourceForces(mass, beside(kinds), ((links, n), (links,), (3, n), (len(pulls),)))
+
+
+def with_actuators(forces: SourceForces, tau: Numbers, identity: Numbers) -> SourceForces:
+    """The same with torques (..., n) of actuators before them."""
+    columns = beside([identity * tau[..., None, :], forces.columns])
+    return SourceForces(forces.mass, columns, ((tau.shape[-1],), *forces.tails))
+
+
+def beside(parts: Sequence[Numbers]) -> Numbers:
+    """Columns (..., n, X) side by side, of samples in one shape."""
+    xp = namespace(parts[0])
+    batch = xp.broadcast_shapes(*(tuple(part.shape[:-2]) for part in parts))
+    return xp.concat([xp.broadcast_to(part, (*batch, *part.shape[-2:])) for part in parts], -1)
+
+
+def listed_loads(loads: object) -> list[object]:
+    """Loads as a list, of which one alone may be given; raises TypeError for what is neither."""
+    if isinstance(loads, AppliedLoad):
+        return [loads]
+    if not isinstance(loads, list | tuple) or hasattr(loads, "_fields"):
+        raise TypeError(f"loads is {_kind(loads)}; give a list of AppliedLoad(frame, force, ...)")
+    return list(loads)
+
+
+def _kind(given: object) -> str:
+    """How an error calls what is no load: one of another copy of the runtime, also in a list, by its own."""
+    among = given if isinstance(given, list) else [given]
+    alike = [one for one in among if type(one).__name__ == AppliedLoad.__name__]
+    return known_kind(alike[0], AppliedLoad) if alike else f"a {type(given).__name__}"
+
+
+def load_torques(engine: ArrayBackend, q: Numbers, loads: Sequence[object]) -> list[Numbers]:
+    """What each load adds to the torques that joints need, (..., n); errors tell which load is meant."""
+    found = []
+    for e, load in enumerate(loads):
+        several = [load] if isinstance(load, AppliedLoad) else load
+        if not isinstance(several, list | tuple) or not all(isinstance(a, AppliedLoad) for a in several):
+            raise TypeError(
+                f"loads[{e}] is {_kind(load)}; give AppliedLoad(frame, force, ...), or a list of "
+                "them that counts as one load"
+            )
+        try:
+            torques = [_load_torque(engine, q, each) for each in several]
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"loads[{e}]: {error}") from None
+        found.append(sum(torques, 0.0 * q))
+    return found
+
+
+def _load_torque(engine: ArrayBackend, q: Numbers, load: AppliedLoad) -> Numbers:
+    frame, force, moment, point, at = load
+    check_load(force, point, at)
+    number = frame_index(frame, engine.frames.names)
+    beside = {"force": force, "moment": moment, "point": point, "at": at}
+    motion, vectors = with_vectors(engine, [q], beside)
+    return engine.frames.answer("load_torque", motion, number, vectors)

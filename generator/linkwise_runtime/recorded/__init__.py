@@ -1,1 +1,0 @@
-"""What torch computes while it differentiates, recorded operation by operation."""

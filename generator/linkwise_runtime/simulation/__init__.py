@@ -1,1 +1,0 @@
-"""How a robot moves under torques and loads: its equations of motion over time, and their energy."""

@@ -1,1 +1,0 @@
-"""Sums over the links, and what follows from them: matrices, forward dynamics, energies and power."""
