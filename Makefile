@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .PHONY: docs pictures demo demo-control test lint generate control bench corpus opensim crash random fuzz same mutate report clean
-.PHONY: ship pythons licences embedded exports
+.PHONY: ship pythons licences calls embedded exports
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -106,6 +106,10 @@ pythons: $(READY)
 # The tables of docs/licences.md.
 licences: $(READY)
 	$(BIN)/python tests/licences.py
+
+# The tables of docs/calls.md.
+calls: $(READY)
+	$(BIN)/python tests/call_page.py
 
 # Speed beside Pinocchio and CasADi, reports and motions at length: minutes, on a quiet machine.
 bench: $(READY)
