@@ -76,8 +76,8 @@ ROOMS: dict[str, Room] = {
     **{
         f"runtime/{name}": Room((f"{RUNTIME}{name}/",))
         for name in (
-            *("lagrangians", "recorded", "arrays", "control", "simulation", "induced"),
-            *("constraints", "kinematics", "sums", "rule"),
+            *("lagrangians", "arrays", "control", "motion"),
+            *("constraints", "kinematics", "answers", "rule"),
         )
     },
     "c": _folder("c", *C),
