@@ -261,6 +261,16 @@ def test_what_has_no_names_is_refused_in_one_line(packages: tuple[Any, Any]) -> 
         robot.labelled("mass_matrix", Q, along=("trial", "time"))
     with pytest.raises(ValueError, match="the samples' axis 'joint' is one of the answer too"):
         robot.labelled("mass_matrix", Q, along="joint")
+    for wrong in (5, [5], {5: [0.0, 0.1, 0.2]}):
+        with pytest.raises(TypeError, match=r"^along is .*5.*; give names of the samples' axes$"):
+            robot.labelled("mass_matrix", Q, along=wrong)
+    with pytest.raises(ValueError, match=r"^along 'time' stands what has shape \(2,\); there are 3 samples$"):
+        robot.labelled("mass_matrix", Q, along={"time": [0.0, 0.1]})
+    one = xr.DataArray(Q[0], dims="joint")
+    with pytest.raises(
+        ValueError, match=r"with names are of \(\) samples, with the others there are \(7,\); give"
+    ):
+        robot.labelled("kinematics.velocity", one, one, "tip", point=np.zeros((7, 3)))
     with pytest.raises(TypeError, match="leave out away"):
         robot.labelled("mass_matrix", Q, out=np.zeros((3, 4, 4)))
 

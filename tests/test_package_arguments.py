@@ -1,5 +1,7 @@
 """What the calls of a package take for a motion: every kind that leaves no doubt, and no other."""
 
+import pickle
+import re
 import shutil
 from collections.abc import Callable
 from copy import deepcopy
@@ -135,7 +137,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "words": (lambda: "abc", r"qd has dtype str\d+; give"),
     "nothing": (
         lambda: None,
-        r"^qd is None; give an array, a tensor or a list of shape \(\.\.\., n\), n joints",
+        r"^qd is None; give an array, a tensor or a list of numbers$",
     ),
     "a gap": (lambda: [1.0, None, 2.0], "qd has dtype object; give"),
     "ragged": (lambda: [[1.0, 2.0], [1.0]], "qd does not read as an array: .*inhomogeneous"),
@@ -206,7 +208,7 @@ def test_tensors_that_are_not_dense_are_refused_by_name(
 
 
 @needs_compiler
-@pytest.mark.parametrize(("kind", "axes", "names"), [("tensor", 65, "q, qd, qdd"), ("array", 33, "qd")])
+@pytest.mark.parametrize(("kind", "axes", "names"), [("tensor", 65, "q, qd, qdd"), ("array", 34, "qd")])
 def test_more_axes_than_arrays_have_are_named(
     kind: str, axes: int, names: str, package_of: Callable[[str], ModuleType]
 ) -> None:
@@ -386,3 +388,115 @@ def test_no_samples_have_regressors_of_no_rows(backend: str, package_of: Callabl
     assert robot.regressor(none, none, none).shape == (0, 3, 3, 10)
     c2, _, g = robot.coefficient_regressors(none, none)
     assert (c2.shape, g.shape) == ((0, 3, 3, 3, 10), (0, 3, 3, 10))
+
+
+Vectors = dict[str, tuple[tuple[int, ...], Callable[[Any, Any], Any]]]
+
+
+def calls_beside(package: ModuleType, robot: Any) -> Vectors:
+    """By the name of what stands beside q: its own shape, and a call that takes both."""
+    frame, Target = robot.kinematics.frames[-1], package.Target
+    held = robot.partial_impedance(frame=package.FrameImpedance(frame, stiffness=1.0, rows=("x", "y", "rz")))
+    free = robot.partial_impedance(frame=package.FrameImpedance(frame, rows=("x", "y", "rz")))
+
+    def load(a: Any) -> list[Any]:
+        return [[package.AppliedLoad(frame, a)]]
+
+    return {
+        "point": ((3,), lambda q, a: robot.kinematics.velocity(q, q, frame, point=a)),
+        "force": ((3,), lambda q, a: robot.kinematics.load_torque(q, frame, a)),
+        "at": ((3,), lambda q, a: robot.kinematics.load_torque(q, frame, [1.0, 2.0, 3.0], at=a)),
+        "loads[0][0].force": ((3,), lambda q, a: robot.induced_accelerations(q, q, q, loads=load(a)).loads),
+        "target.velocity": ((6,), lambda q, a: free(q, q, Target(velocity=a))),
+        "target.pose": ((4, 4), lambda q, a: held(q, q, Target(pose=a))),
+        "tau": ((3,), lambda q, a: robot.simulate(q, q, [0.0, 0.01], tau=a).q[-1]),
+        "external": ((3,), lambda q, a: free(q, q, external=a)),
+    }
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_stands_beside_motion_is_taken_by_the_same_rule(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    package = package_of("planar3")
+    robot, known = package.load(backend), package.load("numpy")
+    q = np.array([[0.3, 0.5, 0.7], [0.4, 0.6, 0.8]])
+    whole = calls_beside(package, known)
+    for name, (shape, call) in calls_beside(package, robot).items():
+        turned = known.kinematics.pose(q + 0.1, known.kinematics.frames[-1])
+        given = turned if shape == (4, 4) else np.random.default_rng(2).uniform(-0.3, 0.3, (2, *shape))
+        expected = whole[name][1](q, given)
+        for first, second in (("f4", "f8"), ("f8", "f4")):
+            found = call(q.astype(first), given.astype(second))
+            assert (str(found.dtype).removeprefix("torch."), name) == ("float64", name)
+            np.testing.assert_allclose(np.asarray(found), expected, atol=1e-5)
+        listed = np.asarray(call(q.astype("f4"), given.tolist()))
+        assert (listed.dtype, name) == (np.float32, name)
+        one = np.asarray(call(q[0], given))  # one motion beside several
+        np.testing.assert_allclose(one, whole[name][1](np.stack([q[0], q[0]]), given), atol=1e-12)
+        tensor = torch.tensor(given, requires_grad=True)
+        if backend == "numpy":
+            with pytest.raises(
+                TypeError, match=f"^{re.escape(name)} requires a gradient, which arrays do not"
+            ):
+                call(q, tensor)
+        else:
+            call(q, tensor).sum().backward()
+            assert float(abs(tensor.grad).sum()) > 0.0, name
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_is_wrong_beside_motion_is_told_by_name(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    package = package_of("planar3")
+    robot, q = package.load(backend, check_finite=True), np.full((2, 3), 0.5)
+    for name, (shape, call) in calls_beside(package, robot).items():
+        told, gap = re.escape(name), np.zeros((2, *shape))
+        with pytest.raises(TypeError, match=f"^{told} has dtype bool; give float32, float64 or integers$"):
+            call(q, np.ones((2, *shape), bool))
+        with pytest.raises(ValueError, match="^the shapes do not go together: .*" + told + r" \(5, "):
+            call(q, np.zeros((5, *shape)))
+        with pytest.raises(ValueError, match=f"^{told} has shape .*; its last ax[ie]s must be {shape[0]}"):
+            call(q, np.zeros(2))
+        gap[1, ..., 1] = np.nan
+        with pytest.raises(ValueError, match=f"^{told} is nan at sample 1 (in entry|for joint) "):
+            call(q, gap)
+    with pytest.raises(ValueError, match=r"^the mask is nan in entry 1, 2$"):
+        robot.masked(q, q, q, [[1.0, 0, 0], [0, 0, np.nan], [0, 0, 0]])
+
+
+def test_what_is_given_along_a_motion_is_in_its_precision(package_of: Callable[[str], ModuleType]) -> None:
+    package = package_of("planar3")
+    robot, q = package.load("numpy"), np.full(3, 0.5, np.float32)
+    load = package.AppliedLoad(robot.kinematics.frames[-1], np.array([1.0, 2.0, 0.0]))
+    fixed = robot.simulate(
+        q, q, [0.0, 0.1], tau=np.ones(3, np.float32), loads=[load._replace(force=[1, 2, 0])]
+    )
+    found = robot.simulate(q, q, [0.0, 0.1], tau=lambda t, q, qd: np.ones(3), loads=lambda t, q, qd: [load])
+    assert found.q.dtype == fixed.q.dtype == np.float32
+    np.testing.assert_array_equal(found.q, fixed.q)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_kinematics_and_controllers_are_copied_with_their_robot(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    package = package_of("planar3")
+    robot, q = package.load(backend), np.full((2, 3), 0.5)
+    frame = package.FrameImpedance(robot.kinematics.frames[-1], stiffness=1.0, rows=("x", "y"))
+    held, pose = robot.partial_impedance(frame=frame), robot.kinematics.pose(q + 0.1, frame.frame)
+    cancelled = robot.cancel({(None, None, "joint2", 1)}, friction_width=0.1)
+    for copied in (deepcopy, lambda one: pickle.loads(pickle.dumps(one))):
+        for one, made in (
+            (robot.kinematics, lambda one: one.pose(q, -1 + len(one.frames))),
+            (held, lambda one: one(q, q, package.Target(pose=pose))),
+            (cancelled, lambda one: one(q, q)),
+        ):
+            np.testing.assert_array_equal(np.asarray(made(copied(one))), np.asarray(made(one)))
+
+
+def test_threads_are_set_where_there_are_some_alone(package_of: Callable[[str], ModuleType]) -> None:
+    for backend in ("numpy", "torch"):
+        with pytest.raises(AttributeError, match=f"^{backend} has no threads of its own to set; native has$"):
+            package_of("planar3").load(backend).backend.threads = 2

@@ -171,11 +171,23 @@ def test_copies_are_those_of_the_copied_robot(backend: str, fourbar: ModuleType)
     assert (type(told), str(told)) == (type(info.value), str(info.value))
 
 
+@pytest.mark.parametrize("backend", ["numpy", "torch"])
+def test_loops_of_one_length_a_sample_are_closed_each_by_its_own(backend: str, fourbar: ModuleType) -> None:
+    lengths = np.array([0.6, 0.7, 0.8])
+    given = lengths if backend == "numpy" else torch.from_numpy(lengths)
+    ties = fourbar.load(backend, parameters={"L": given}).constraints
+    led = ties.closed(ties.closed_position[:, :1] + 0.05)
+    for k, length in enumerate(lengths):
+        own = fourbar.load("numpy", parameters={"L": length}).constraints
+        np.testing.assert_allclose(ties.closed_position[k], own.closed_position, atol=1e-9)
+        np.testing.assert_allclose(led[k], own.closed(own.closed_position[:1] + 0.05), atol=1e-9)
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_samples_that_do_not_go_together_are_told_by_name(backend: str, fourbar: ModuleType) -> None:
     ties = fourbar.load(backend).constraints
     held = np.tile(ties.closed_position, (5, 1))
-    told = "the shapes do not go together: q (3, 1), start (3,), held_at (5, 3); before the last axis"
+    told = "the shapes do not go together: q (3, 1), start (3,), held_at (5, 3); before the last axes"
     refused(lambda: ties.closed(ties.closed_position[:1] + np.zeros((3, 1)), held), told)
 
 
@@ -336,7 +348,7 @@ def test_what_c_says_of_a_contact_at_one_sample_is_what_arrays_say_of_many(
     q, qd, tau = draw.uniform(-0.8, 0.8, (3, 4, 7))
     for held in (contacts[:1], contacts[1:]):
         known, own = (module.load(name).constrained(contacts=held) for name in ("numpy", "native"))
-        rest = np.zeros(len(known.independent))
+        rest = np.zeros(len(known.independent), kind)
         expected = [
             *(known.jacobian(q), known.acceleration(q, qd, rest), known.closed(q + 0.01, held_at=q)),
             *known.forward_dynamics(q, qd, tau),
@@ -483,7 +495,9 @@ def test_what_rolls_without_gravity_needs_a_normal(tmp_path: Path) -> None:
 
 def test_a_torque_of_a_wrong_shape_and_forward_dynamics_of_the_open_tree_are_refused(one: Any) -> None:
     q = one.constraints.closed(NEAR)
-    refused(lambda: one.constraints.projected(q, np.zeros(2)), "torque has shape (2,); give (..., n), or")
+    refused(
+        lambda: one.constraints.projected(q, np.zeros(2)), "torque has shape (2,); its last axis must be 3"
+    )
     refused(lambda: one.constraints.velocity(q, np.zeros(2)), "yd has shape (2,); its last axis must be 1")
     refused(lambda: one.forward_dynamics(q, q, q), "call constraints.forward_dynamics(q, qd, tau)")
 

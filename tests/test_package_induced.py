@@ -38,8 +38,14 @@ def test_loads_and_points_may_be_of_more_samples_than_the_state(backend: str, pa
         one = robot.induced_accelerations(q, qd, tau, loads=[load], frame=frame, point=point)
         for share, expected in zip(shares, one, strict=True):
             np.testing.assert_allclose(as_array(share)[k], as_array(expected), rtol=1e-11, atol=1e-11)
-    with pytest.raises(ValueError, match=r"^loads\[0\] is of samples \(4,\), and motions are of \(\)"):
-        robot.simulate(q, qd, [0.0, 0.01], loads=many)
+    moved = robot.simulate(q, qd, [0.0, 0.01], loads=many)
+    one = robot.simulate(q, qd, [0.0, 0.01], loads=[load])
+    np.testing.assert_allclose(as_array(moved.q)[:, -1], as_array(one.q), rtol=1e-12)
+    told = (
+        r"^loads\[0\]\.force: \(4,\) samples are more than the \(\) of q and qd; give these as many from the"
+    )
+    with pytest.raises(ValueError, match=told):
+        robot.simulate(q, qd, [0.0, 0.01], loads=lambda t, q, qd: many)
 
 
 @pytest.mark.parametrize("batch", [(), (2, 3), (0,)])

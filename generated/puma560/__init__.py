@@ -99,11 +99,12 @@ def load(
     nn.Parameters: True for all, or names, of run-time parameters or mass, com, inertia and place, which stand for those
     numbers of each link that hang on no run-time parameter. The others are buffers.
 
-    check_finite: whether every call looks at q, qd and qdd first and raises ValueError for NaN and infinity.
+    check_finite: whether every call looks at its numbers first and raises ValueError for NaN and infinity.
 
-    The calls take q, qd and qdd as arrays, tensors, lists or tuples. Back ends of arrays (numpy) answer with
-    arrays, those of tensors (torch, autograd) with tensors on the device of the tensors given; native answers with
-    tensors if it is given one. float32 is computed in float32, anything with float64 in float64; integers and
+    The calls take motion, and points, forces, loads, targets and what else has samples, as arrays, tensors, lists or
+    tuples, of samples whose shapes broadcast. Back ends of arrays (numpy) answer with arrays, those of tensors
+    (torch, autograd) with tensors on the device of the tensors given; native answers with tensors if it is given one.
+    float32 is computed in float32, anything with float64 in float64; integers and
     lists go along with the others, and alone are computed in float64. Refused are booleans, complex numbers, other
     floats, and, for numpy, tensors that require a gradient or lie on another device.
 

@@ -1,4 +1,4 @@
-"""What every back end takes for q, qd and qdd, and in which precision it then computes.
+"""What every back end takes for motion and what stands beside it, and in which precision it then computes.
 
     float32, float64    computed in as they are; where both occur, in float64
     integers, lists     have no precision of their own: that of the others, float64 if there is none
@@ -6,12 +6,12 @@
     CPU tensors         where arrays are computed: become arrays, unless a gradient would be lost
 
 The rest is refused by name: booleans, complex numbers, other floats, gaps, tensors that are not dense, or on
-different devices.
+different devices. Numbers that belong to a robot or to a controller, and masks, are taken in that precision.
 """
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +26,23 @@ FLOATS = ("float32", "float64")
 INTEGERS = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 REAL = ("bool", "int", "uint", "float", "bfloat")
 """How names of dtypes of real numbers begin."""
+ANY = -1
+"""An axis of any size."""
+
+
+class Beside(NamedTuple):
+    """What is given beside motion, of shape (..., *axes), samples as the motion has them."""
+
+    value: object
+    axes: tuple[int, ...]
+    """Sizes of its own axes."""
+    meaning: str
+    """What stands along them."""
+    joints: Sequence[str] = ()
+    """Names along the first of them, where these are joints."""
+
+
+NOTHING: Mapping[str, Beside] = {}
 
 
 def has_tensors(values: Iterable[object]) -> bool:
@@ -39,7 +56,7 @@ def as_array(name: str, value: object) -> NDArray[Any]:
     if has_tensors([value]):
         return _array_of_tensor(name, cast("Tensor", value))
     if value is None:
-        raise TypeError(f"{name} is None; give an array, a tensor or a list of shape (..., n), n joints")
+        raise TypeError(f"{name} is None; give an array, a tensor or a list of numbers")
     if isinstance(value, np.ma.MaskedArray):
         raise TypeError(f"{name} is a masked array; fill its gaps first")
     if isinstance(value, list | tuple) and has_tensors(value):
@@ -97,13 +114,25 @@ def check_dense(values: Mapping[str, object]) -> None:
                 raise TypeError(f"{name} has the layout {tensor.layout}; pass {name}.to_dense()")
 
 
-def check_axes(arrays: Mapping[str, Numbers], n: int, joints: Sequence[FileJoint] = ()) -> None:
-    """Raise ValueError, which names the argument, where a last axis is not n.
+def as_given(named: Mapping[str, object], beside: Mapping[str, Beside]) -> Mapping[str, object]:
+    """Motion and what stands beside it, by name."""
+    return {**named, **{name: about.value for name, about in beside.items()}} if beside else named
 
-    joints: those of the file, by which positions of simulators have more numbers
+
+def check_axes(
+    arrays: Mapping[str, Numbers],
+    n: int,
+    joints: Sequence[FileJoint] = (),
+    beside: Mapping[str, Beside] = NOTHING,
+) -> None:
+    """Raise ValueError, which names the argument, where the axes behind those of samples are others.
+
+    That of motion is n; joints: those of the file, by which positions of simulators have more numbers
     """
     for name, a in arrays.items():
-        if a.ndim == 0 or a.shape[-1] != n:
+        if name in beside:
+            _check_own_axes(name, a, beside[name])
+        elif a.ndim == 0 or a.shape[-1] != n:
             why = why_wider(joints, a.shape[-1], n) if a.ndim else ""
             told = f" ({why}: robot.from_qpos makes q of it)" if why else ""
             raise ValueError(
@@ -111,13 +140,30 @@ def check_axes(arrays: Mapping[str, Numbers], n: int, joints: Sequence[FileJoint
             )
 
 
-def no_common_shape(arrays: Mapping[str, Numbers], n: int) -> ValueError:
-    """What to raise for arrays (..., n) that do not broadcast."""
+def _check_own_axes(name: str, a: Numbers, about: Beside) -> None:
+    asked, found = about.axes, tuple(a.shape[-len(about.axes) :])
+    if len(found) < len(asked) or any(x not in (y, ANY) for x, y in zip(asked, found, strict=True)):
+        sizes = ", ".join("X" if size == ANY else str(size) for size in asked)
+        axes = "axis" if len(asked) == 1 else "axes"
+        raise ValueError(
+            f"{name} has shape {tuple(a.shape)}; its last {axes} must be {sizes}: {about.meaning}"
+        )
+
+
+def samples_of(name: str, a: Numbers, beside: Mapping[str, Beside]) -> tuple[int, ...]:
+    """Shape of the samples of an argument whose own axes have been checked."""
+    own = len(beside[name].axes) if name in beside else 1
+    return tuple(a.shape[: a.ndim - own])
+
+
+def no_common_shape(
+    arrays: Mapping[str, Numbers], n: int, beside: Mapping[str, Beside] = NOTHING
+) -> ValueError:
+    """What to raise for arrays (..., n), and what stands beside them, whose samples do not broadcast."""
     shapes = ", ".join(f"{name} {tuple(a.shape)}" for name, a in arrays.items())
-    return ValueError(
-        f"the shapes do not go together: {shapes}; before the last axis, {n} for the joints, "
-        "axes must be equal or 1"
-    )
+    own = "".join(f", {len(about.axes)} of {name}" for name, about in beside.items())
+    last = f"the last axes, 1 of motion{own}," if own else f"the last axis, {n} for the joints,"
+    return ValueError(f"the shapes do not go together: {shapes}; before {last} axes must be equal or 1")
 
 
 def too_many_axes(arrays: Mapping[str, Numbers], n: int) -> ValueError:
@@ -130,15 +176,22 @@ def too_many_axes(arrays: Mapping[str, Numbers], n: int) -> ValueError:
     )
 
 
-def check_numbers(given: Mapping[str, object], joint_names: Sequence[str]) -> None:
-    """Raise ValueError, which names argument, sample and joint, for the first NaN or infinity."""
-    for name, value in given.items():
+def check_numbers(
+    given: Mapping[str, object], joint_names: Sequence[str], beside: Mapping[str, Beside] = NOTHING
+) -> None:
+    """Raise ValueError, which names argument, sample and joint or entry, for the first NaN or infinity."""
+    for name, value in as_given(given, beside).items():
         seen = as_array(name, cast("Tensor", value).detach().cpu() if has_tensors([value]) else value)
         wrong = np.argwhere(~np.isfinite(seen))
-        if len(wrong):
-            *sample, joint = wrong[0].tolist()
-            where = f"at sample {', '.join(map(str, sample))} " if sample else ""
-            raise ValueError(f"{name} is {seen[tuple(wrong[0])]:g} {where}for joint {joint_names[joint]!r}")
+        if not len(wrong):
+            continue
+        at: list[int] = wrong[0].tolist()
+        own = len(beside[name].axes) if name in beside else 1
+        sample, entry = at[: len(at) - own], at[len(at) - own :]
+        where = f"at sample {', '.join(map(str, sample))} " if sample else ""
+        joints = beside[name].joints if name in beside else joint_names
+        what = f"for joint {joints[entry[0]]!r}" if joints else f"in entry {', '.join(map(str, entry))}"
+        raise ValueError(f"{name} is {seen[tuple(at)]:g} {where}{what}")
 
 
 def _array_of_tensor(name: str, tensor: "Tensor") -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""Where calls come in: motion is read in one library, and places are taken where the answer can stand."""
+"""Where calls come in: what is given is read in one library, and places are taken for the answer."""
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, cast
 
 import numpy as np
 
-from .arguments import check_numbers, has_tensors
+from .arguments import NOTHING, Beside, check_numbers, has_tensors
 from .interface import Numbers
 from .structure import Structure
 
@@ -20,8 +20,10 @@ Read = TypeVar("Read", covariant=True)
 class Reads(Protocol[Read]):
     """A back end, which chooses the library that it then computes with."""
 
-    def read(self, named: Mapping[str, object], n: int) -> tuple[Read, Sequence[Numbers]]:
-        """What computes, and the motion by name as it computes with it, broadcast to one shape (..., n)."""
+    def read(
+        self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside]
+    ) -> tuple[Read, Sequence[Numbers]]:
+        """What computes, and motion (..., n), then what is beside it, as it computes with them."""
 
 
 class Door(Generic[Read]):
@@ -31,16 +33,20 @@ class Door(Generic[Read]):
         self._structure, self._backend, self.check_finite = structure, backend, check_finite
 
     def read(
-        self, named: Mapping[str, object], joints: Sequence[str] | None = None
+        self,
+        named: Mapping[str, object],
+        joints: Sequence[str] | None = None,
+        beside: Mapping[str, Beside] = NOTHING,
     ) -> tuple[Read, Sequence[Numbers]]:
-        """What computes, and the motion that is given by name, of these joints: all unless given.
+        """What computes, and motion of these joints, all unless given, then what is beside it.
 
-        Raises ValueError and TypeError, which name the argument, for what cannot be taken.
+        All are broadcast to one shape of samples. Raises ValueError and TypeError, which name the argument,
+        for what cannot be taken.
         """
         names = self._structure.joint_names if joints is None else joints
-        read = self._backend.read(named, len(names))
+        read = self._backend.read(named, len(names), beside)
         if self.check_finite:
-            check_numbers(named, names)
+            check_numbers(named, names, beside)
         return read
 
 

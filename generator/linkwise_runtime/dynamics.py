@@ -18,6 +18,7 @@ from typing import Any, Literal, overload
 
 from numpy.typing import ArrayLike
 
+from .arguments import Beside, check_numbers
 from .arrays.array_backend import ArrayBackend
 from .call_table import CALLS
 from .constraints.robot_constraints import Constraints, constraints_of
@@ -144,7 +145,7 @@ class Dynamics:
     @cached_property
     def kinematics(self) -> Kinematics[Any]:
         """Poses, Jacobians and their rates of the robot's frames; raises ValueError for links of energies."""
-        return Kinematics(self.door, self.backend.frames.names)
+        return Kinematics(self, self.backend.frames.names)
 
     @cached_property
     def constraints(self) -> Constraints[Any]:
@@ -340,6 +341,8 @@ class Dynamics:
             raise ValueError(
                 f"the mask has shape {tuple(weights.shape)}; it must be (3, {self.n}): order, coordinate"
             )
+        if self.door.check_finite:
+            check_numbers({}, (), {"the mask": Beside(mask, (3, self.n), "order, coordinate")})
         torque: Array = self._answer("masked", engine, motion, out, (weights,))
         return torque
 

@@ -83,10 +83,16 @@ def _before(
     """Dimensions before those of the quantities, and what stands along them."""
     quantity, values = part
     first = [] if instants is None else ["time"]
+    shape = values.shape[len(first) : values.ndim - len(quantity.axes)]
     if samples is None:
-        samples = samples_along(along, values.ndim - len(quantity.axes) - len(first))
+        samples = samples_along(along, shape)
     elif along is not None:
         raise ValueError("along is given, but arguments name the axes of their samples; leave it away")
+    elif samples.shape != shape:
+        raise ValueError(
+            f"the arguments with names are of {samples.shape} samples, with the others there are "
+            f"{shape}; give names to those that have more"
+        )
     over = {} if instants is None else {"time": ("time", instants, {"units": "s"})}
     return [*first, *samples.dimensions], samples.coordinates | over
 

@@ -13,8 +13,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .arguments import shape_of
 from .call_table import ORDER, Quantity
-from .chosen_names import choice
+from .chosen_names import choice, short
 from .robot_axes import NamedAxis, Unit, inertial, measured, product, written
 
 Values = NDArray[np.generic]
@@ -61,6 +62,7 @@ class SampleAxes(NamedTuple):
 
     dimensions: Sequence[str]
     coordinates: dict[str, object]
+    shape: tuple[int, ...]
 
 
 def xarray() -> ModuleType:
@@ -216,7 +218,8 @@ def taken(
         if set(coordinate.dims) <= set(dimensions)
     }
     values = [array.transpose(*dimensions, ...).to_numpy() for array in alike]
-    return arguments | dict(zip(named, values, strict=True)), SampleAxes(dimensions, along)
+    samples = SampleAxes(dimensions, along, values[0].shape[: len(dimensions)])
+    return arguments | dict(zip(named, values, strict=True)), samples
 
 
 def _of_frame(value: object, xr: ModuleType) -> object:
@@ -246,19 +249,28 @@ def _check_named(name: str, array: NamedArray) -> None:
         raise ValueError(f"{name} has the dimensions ({there}); call that of the joints 'joint'")
 
 
-def samples_along(along: str | Iterable[str] | None, count: int) -> SampleAxes:
-    """The axes of samples without names, of which there are so many, as `along` names them.
+def samples_along(along: object, shape: tuple[int, ...]) -> SampleAxes:
+    """The axes of samples without names, as `along` names them.
 
-    Raises ValueError where it names more or fewer.
+    Raises TypeError for what is no names, ValueError where they are more or fewer, and where what stands
+    along an axis is.
     """
+    count = len(shape)
     if along is None:
-        return SampleAxes(["sample"] if count == 1 else [f"sample_{at}" for at in range(count)], {})
-    names = [along] if isinstance(along, str) else list(along)
+        return SampleAxes(["sample"] if count == 1 else [f"sample_{at}" for at in range(count)], {}, shape)
+    if not isinstance(along, Iterable) or not all(isinstance(name, str) for name in along):
+        raise TypeError(f"along is {short(along)}; give names of the samples' axes")
+    names: list[str] = [along] if isinstance(along, str) else list(along)
     if len(names) != count:
         raise ValueError(f"along has {len(names)} names, {names}; the samples have {count} axes")
     if not isinstance(along, Mapping):
-        return SampleAxes(names, {})
-    return SampleAxes(names, {name: _along(name, values) for name, values in along.items()})
+        return SampleAxes(names, {}, shape)
+    for (name, values), size in zip(along.items(), shape, strict=True):
+        if shape_of(values) != (size,):
+            raise ValueError(
+                f"along {name!r} stands what has shape {shape_of(values)}; there are {size} samples"
+            )
+    return SampleAxes(names, {name: _along(name, values) for name, values in along.items()}, shape)
 
 
 def _along(name: str, values: object) -> tuple[str, object, dict[str, str]]:

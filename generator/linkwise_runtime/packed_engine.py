@@ -22,8 +22,8 @@ class OneSample(Protocol):
 class TorqueOfOne(Protocol):
     """A controller's torque of one sample that a back end has beside that of many."""
 
-    def torque(self, given: Mapping[str, Numbers], target: object) -> Numbers | None:
-        """The torque (n,) for motion by name and a `Target`; None for what the function does not answer."""
+    def torque(self, given: Mapping[str, Numbers]) -> Numbers | None:
+        """The torque (n,) for motion and targets by name; None for what the function does not answer."""
 
 
 class PackedEngine:
@@ -38,8 +38,8 @@ class PackedEngine:
     """Empty ones of kinds that tables are made for in advance: no compiler traces how they are made."""
 
     @property
-    def differs_by_sample(self) -> bool:
-        """Whether a parameter or a body is not the same for all samples."""
+    def samples(self) -> tuple[int, ...]:
+        """Shape of the samples that have a parameter or a body each; () where they are the same for all."""
         raise NotImplementedError
 
     regresses: bool

@@ -254,7 +254,7 @@ typedef struct {
    for zeros; both are of the point, and all six are there, whichever rows count.
    Returns 0; the number of a joint, as above, also where H is not positive; - the number of a row, from 1, along which the
    frame cannot move beside those before it, or its M_e is not positive; or -7 where the frame is half a turn away from a
-   pose_d to which it is to turn. tau is then as it was. Below -7 tau is written, and fewer than half of the digits are known:
+   pose_d to which it is to turn, or that is no rotation. tau is then as it was. Below -7 tau is written, and fewer than half of the digits are known:
    -7 - the number of a joint, as above, or -7 - JOINTS - the number of a row, as near where the frame cannot move along it.
    Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
    velocity_d, acceleration_d (6); writes tau (JOINTS). */
@@ -420,7 +420,7 @@ typedef struct {
    for zeros; both are of the point, and all six are there, whichever rows count.
    Returns 0; the number of a joint, as above, also where H is not positive; - the number of a row, from 1, along which the
    frame cannot move beside those before it, or its M_e is not positive; or -7 where the frame is half a turn away from a
-   pose_d to which it is to turn. tau is then as it was. Below -7 tau is written, and fewer than half of the digits are known:
+   pose_d to which it is to turn, or that is no rotation. tau is then as it was. Below -7 tau is written, and fewer than half of the digits are known:
    -7 - the number of a joint, as above, or -7 - JOINTS - the number of a row, as near where the frame cannot move along it.
    Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
    velocity_d, acceleration_d (6); writes tau (JOINTS). */

@@ -221,7 +221,7 @@ class Answers:
         units = self._engine.constant(np.eye(n), q)
         if hidden(q):
             return (side_by_side(self._of_units(q, units, made)),)
-        if self._engine.differs_by_sample:  # samples stay with their numbers
+        if self._engine.samples:  # samples stay with their numbers
             rates = max(1, AT_ONCE // (each * max(1, math.prod(batch))))
             return (side_by_side(_joined([self._of_units(q, u, made) for u in _pieces(units, rates)], -1)),)
         samples, rates = max(1, AT_ONCE // (n * each)), max(1, AT_ONCE // each)

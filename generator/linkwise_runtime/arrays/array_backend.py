@@ -4,8 +4,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import ClassVar
 
+import numpy as np
+
 from ..answers.answers import Answers
-from ..arguments import as_array
+from ..arguments import NOTHING, Beside, as_array, shape_of
 from ..interface import ClosedForms, Numbers
 from ..kinematics.frame_answers import FrameAnswers
 from ..packed_engine import PackedEngine, TorqueOfOne
@@ -61,10 +63,24 @@ class ArrayBackend(PackedEngine):
             self.bodies = checked_bodies(bodies, structure.N, reads)
 
     @property
-    def differs_by_sample(self) -> bool:
-        """Whether a parameter or a body is not the same for all samples."""
-        values = any(getattr(value, "ndim", 0) for value in self.parameters.values())
-        return values or (self.bodies is not None and next(iter(self.bodies)).ndim > 1)
+    def threads(self) -> int:
+        """Threads that a large batch may use; raises AttributeError where the library has them by itself."""
+        raise AttributeError(f"{self.name} has no threads of its own; native has")
+
+    @threads.setter
+    def threads(self, count: int) -> None:
+        raise AttributeError(f"{self.name} has no threads of its own to set; native has")
+
+    @property
+    def samples(self) -> tuple[int, ...]:
+        """Shape of the samples that have a parameter or a body each; () where they are the same for all."""
+        shapes = [shape_of(value) for value in self.parameters.values()]
+        if self.bodies is not None:
+            shapes.append(shape_of(next(iter(self.bodies)))[:-1])
+        try:
+            return np.broadcast_shapes(*shapes)
+        except ValueError:  # which the first call tells by name
+            return max(shapes, key=len)
 
     @property
     def ties_joints(self) -> bool:
@@ -86,12 +102,19 @@ class ArrayBackend(PackedEngine):
             )
         return FrameAnswers(self, self.tree, self.tree_numbers)
 
-    def read(self, named: Mapping[str, object], n: int) -> tuple["ArrayBackend", Sequence[Numbers]]:
-        """What computes with this motion, and it as one shape (..., n); errors name the argument."""
-        return self, self.arrays(named, n)
+    def read(
+        self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
+    ) -> tuple["ArrayBackend", Sequence[Numbers]]:
+        """What computes, and `arrays` as it computes with them."""
+        return self, self.arrays(named, n, beside)
 
-    def arrays(self, named: Mapping[str, object], n: int) -> Sequence[Numbers]:
-        """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
+    def arrays(
+        self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
+    ) -> Sequence[Numbers]:
+        """Motion (..., n), then what is beside it, checked and of one shape of samples.
+
+        Errors name the argument.
+        """
         raise NotImplementedError
 
     def read_beside_motion(self) -> Iterable[object]:

@@ -6,7 +6,18 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import as_array, as_weights, check_axes, no_common_shape, precision, too_many_axes
+from ..arguments import (
+    NOTHING,
+    Beside,
+    as_array,
+    as_given,
+    as_weights,
+    check_axes,
+    no_common_shape,
+    precision,
+    samples_of,
+    too_many_axes,
+)
 from ..interface import ClosedForms, EnergyForms, Entries, Namespace, Numbers
 from ..parameter_values import fits
 from ..rule.joint_tree import Bodies
@@ -56,8 +67,10 @@ class NumpyBackend(ArrayBackend):
             if self.kernel == "auto"
         }
 
-    def arrays(self, named: Mapping[str, object], n: int) -> Sequence[Numbers]:
-        """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
+    def arrays(
+        self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
+    ) -> Sequence[Numbers]:
+        """Motion (..., n), then what is beside it, checked and of one shape of samples."""
         motion = [*named.values()]
         first = motion[0]
         if type(first) is np.ndarray and first.dtype in FLOATS and first.shape[-1:] == (n,):
@@ -65,18 +78,31 @@ class NumpyBackend(ArrayBackend):
                 if type(a) is not np.ndarray or a.shape != first.shape or a.dtype != first.dtype:
                     break
             else:
-                return cast("list[Numbers]", motion)
-        read = {name: as_array(name, value) for name, value in named.items()}
-        kind = precision(named, read)
+                if not beside:
+                    return cast("list[Numbers]", motion)
+                for about in beside.values():
+                    b: Any = about.value
+                    shape = first.shape[:-1] + about.axes
+                    if type(b) is not np.ndarray or b.shape != shape or b.dtype != first.dtype:
+                        break
+                else:
+                    return cast("list[Numbers]", [*motion, *(about.value for about in beside.values())])
+        given = as_given(named, beside)
+        read = {name: as_array(name, value) for name, value in given.items()}
+        kind = precision(given, read)
         arrays = {name: a.astype(kind, copy=False) for name, a in read.items()}
-        check_axes(arrays, n, self.structure.file_joints)
+        check_axes(arrays, n, self.structure.file_joints, beside)
+        batches = [samples_of(name, a, beside) for name, a in arrays.items()]
         try:
-            shape = np.broadcast_shapes(*(a.shape for a in arrays.values()))
+            batch = np.broadcast_shapes(*batches)
         except ValueError:
-            raise no_common_shape(arrays, n) from None
+            raise no_common_shape(arrays, n, beside) from None
         except RuntimeError:  # of more than 32 axes
             raise too_many_axes(arrays, n) from None
-        return [a if a.shape == shape else np.broadcast_to(a, shape) for a in arrays.values()]
+        return [
+            a if own == batch else np.broadcast_to(a, (*batch, *a.shape[len(own) :]))
+            for a, own in zip(arrays.values(), batches, strict=True)
+        ]
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""

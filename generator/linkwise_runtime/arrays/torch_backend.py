@@ -11,7 +11,18 @@ from torch import Tensor
 from torch._subclasses.fake_tensor import unset_fake_temporarily
 from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
-from ..arguments import as_array, as_weights, check_axes, check_dense, no_common_shape, precision
+from ..arguments import (
+    NOTHING,
+    Beside,
+    as_array,
+    as_given,
+    as_weights,
+    check_axes,
+    check_dense,
+    no_common_shape,
+    precision,
+    samples_of,
+)
 from ..interface import ClosedForms, EnergyForms, Entries, Namespace, Numbers
 from ..parameter_values import fits
 from ..rule.joint_tree import Bodies, JointTree
@@ -67,21 +78,29 @@ class TorchBackend(ArrayBackend):
             for like in self.examples:
                 self.rule.tables(self, like)
 
-    def arrays(self, named: Mapping[str, object], n: int) -> Sequence[Numbers]:
-        """The motion, checked and broadcast to a common shape (..., n); errors name the argument."""
+    def arrays(
+        self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
+    ) -> Sequence[Numbers]:
+        """Motion (..., n), then what is beside it, checked and of one shape of samples."""
         self.check_untraced()
-        check_dense(named)
-        given = [value for value in named.values() if torch.is_tensor(value)]
-        if len({t.device for t in given}) > 1:
-            raise TypeError(f"{', '.join(named)} lie on different devices; move them to one")
-        read = cast("Mapping[str, Tensor]", named)
-        if len(given) < len(named) or {t.dtype for t in given} not in FLOATS:
-            read = _tensors(named, given[0].device if given else torch.device("cpu"))
-        check_axes(read, n, self.structure.file_joints)
+        given = as_given(named, beside)
+        check_dense(given)
+        tensors = [value for value in given.values() if torch.is_tensor(value)]
+        if len({t.device for t in tensors}) > 1:
+            raise TypeError(f"{', '.join(given)} lie on different devices; move them to one")
+        read = cast("Mapping[str, Tensor]", given)
+        if len(tensors) < len(given) or {t.dtype for t in tensors} not in FLOATS:
+            read = _tensors(given, tensors)
+        check_axes(read, n, self.structure.file_joints, beside)
+        batches = [samples_of(name, a, beside) for name, a in read.items()]
         try:
-            return torch.broadcast_tensors(*read.values())  # type: ignore[no-any-return, no-untyped-call]
+            batch = torch.broadcast_shapes(*batches)  # type: ignore[no-untyped-call]
         except RuntimeError:
-            raise no_common_shape(read, n) from None
+            raise no_common_shape(read, n, beside) from None
+        return [
+            a if own == batch else a.expand(*batch, *a.shape[len(own) :])
+            for a, own in zip(read.values(), batches, strict=True)
+        ]
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
@@ -238,8 +257,15 @@ def _tensor(name: str, value: object) -> Numbers:
     return value if torch.is_tensor(value) else as_array(name, value)
 
 
-def _tensors(named: Mapping[str, object], device: torch.device) -> dict[str, Tensor]:
-    """Motion of any kind as tensors of one dtype; arrays are copied, as a gradient may need them later."""
+def _tensors(named: Mapping[str, object], tensors: Sequence[Tensor]) -> dict[str, Tensor]:
+    """Numbers of any kind as tensors of one dtype; arrays are copied, as a gradient may need them later.
+
+    tensors: those among them
+    """
+    device = tensors[0].device if tensors else torch.device("cpu")
+    if tensors and torch.compiler.is_dynamo_compiling():  # which knows no dtypes of arrays
+        wide = torch.float64 if any(t.dtype == torch.float64 for t in tensors) else torch.float32
+        return {k: torch.as_tensor(value, dtype=wide, device=device) for k, value in named.items()}
     read = {k: value if torch.is_tensor(value) else as_array(k, value) for k, value in named.items()}
     kind = precision(named, read)
     dtype = torch.float32 if kind == "float32" else torch.float64

@@ -1,6 +1,6 @@
 """The dynamics of a robot whose joints are tied: closed loops, coupled joints, contacts."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from numbers import Real
 from typing import Any, Generic, Protocol, cast
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.answers import Answers
-from ..answers.namespace import array_of, hidden, namespace, side_by_side
-from ..arguments import check_numbers, shape_of
+from ..answers.namespace import array_of, hidden, side_by_side
+from ..arguments import ANY, NOTHING, Beside, shape_of
 from ..arrays.array_backend import ArrayBackend
 from ..door import Door
 from ..interface import Array, Numbers
@@ -153,7 +153,7 @@ class Constraints(Generic[Array]):
 
     @property
     def closed_position(self) -> NDArray[np.float64]:
-        """A position of all joints in which the ties close, (n,).
+        """A position of all joints in which the ties close, (n,), or (..., n) where parameters have samples.
 
         It is the one that generating found, near zero if ties close there; of `Dynamics.constrained` with
         other joints or contacts the one at which these were chosen.
@@ -189,14 +189,14 @@ class Constraints(Generic[Array]):
 
     def velocity(self, q: Array, yd: Array) -> Array:
         """qd of all joints, (..., n), for that of the independent ones, (..., m)."""
-        engine, (at,) = self._read(q=q)
-        return cast("Array", self.ties.place(engine, at).velocity(self._own("yd", yd, engine, at)))
+        engine, (at, own) = self._read(self._own("yd", yd), q=q)
+        return cast("Array", self.ties.place(engine, at).velocity(own))
 
     def acceleration(self, q: Array, qd: Array, ydd: Array) -> Array:
         """qdd of all joints, (..., n), for that of the independent ones, (..., m)."""
-        place, engine, (at, moved) = self._moving(q, qd)
-        own = self._own("ydd", ydd, engine, at)
-        return cast("Array", place.velocity(own) + place.bias(moved))
+        engine, (at, moved, own) = self._read(self._own("ydd", ydd), q=q, qd=qd)
+        place = self.ties.place(engine, at)
+        return cast("Array", place.velocity(own) + place.bias(place.velocity(place.own(moved))))
 
     def velocity_accelerations(self, q: Array, qd: Array) -> Array:
         """The bias of qdd = G ydd + bias by its causes, (..., n, n): what joint k gets through qd_s.
@@ -211,8 +211,7 @@ class Constraints(Generic[Array]):
 
         by_link: torque is (..., n, X), for X links, loads or others, and the answer (..., m, X)
         """
-        engine, (at,) = self._read(q=q)
-        found = projected(self.ties.place(engine, at).found, self._torque(torque, engine, at, by_link))
+        found = projected(*self._loaded(q, torque, by_link))
         return cast("Array", found if by_link else found[..., 0])
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
@@ -249,8 +248,7 @@ class Constraints(Generic[Array]):
         by_link: torque is (..., n, X), and the answer (..., C, X). Actuators, springs or loads of dependent
         joints are taken from the torque first.
         """
-        engine, (at,) = self._read(q=q)
-        found = borne(self.ties.place(engine, at).found, self._torque(torque, engine, at, by_link))
+        found = borne(*self._loaded(q, torque, by_link))
         return cast("Array", found if by_link else found[..., 0])
 
     def forward_dynamics(
@@ -267,33 +265,29 @@ class Constraints(Generic[Array]):
 
     @cached_property
     def _closed_position(self) -> NDArray[np.float64]:
-        engine, (q,) = self._read(q=self.ties.chosen.closed_position)
+        chosen = self.ties.chosen.closed_position
+        engine, (q,) = self._read(q=np.broadcast_to(chosen, (*self._robot.backend.samples, len(chosen))))
         with without_gradient(q):
             found = self.ties.closed(engine, q, q).q
         return np.array(array_of(found), dtype=np.float64)
 
     def _led(self, q: object, held_at: object, start: object) -> Numbers:
         """Closed positions for independent joints (..., m)."""
-        engine, (own,) = self._robot.door.read({"q": q}, self.independent)
-        n = self._robot.n
+        joints = self._robot.joint_names
+        # As a list it has no precision of its own.
+        begin = self._closed_position.tolist() if start is None else start
+        asked = {"start": begin} if held_at is None else {"start": begin, "held_at": held_at}
+        given = {
+            name: Beside(value, (len(joints),), "all joints in a closed position", joints)
+            for name, value in asked.items()
+        }
+        engine, (own, begin, *last) = self._robot.door.read({"q": q}, self.independent, given)
+        held = last[0] if last else begin
         if hidden(own):
             raise ValueError(
                 "joints cannot be led where nobody may look at numbers, as under vmap or a compiler; give "
-                f"closed(q) all {n} joints"
+                f"closed(q) all {len(joints)} joints"
             )
-        begin = self._positions("start", self._closed_position if start is None else start, engine, own)
-        held = begin if held_at is None else self._positions("held_at", held_at, engine, own)
-        shapes: dict[str, Numbers] = {"q": own, "start": begin, "held_at": held}
-        batch: tuple[int, ...]
-        try:
-            batch = engine.xp.broadcast_shapes(*(tuple(a.shape[:-1]) for a in shapes.values()))
-        except (ValueError, RuntimeError):  # of NumPy, of torch
-            told = ", ".join(f"{name} {tuple(a.shape)}" for name, a in shapes.items())
-            raise ValueError(
-                f"the shapes do not go together: {told}; before the last axis, axes must be equal or 1"
-            ) from None
-        own = engine.xp.broadcast_to(own, (*batch, own.shape[-1]))
-        begin, held = (engine.xp.broadcast_to(a, (*batch, n)) for a in (begin, held))
         columns = self.ties.columns(engine, own)
         with without_gradient(own):
             found = led(
@@ -305,44 +299,30 @@ class Constraints(Generic[Array]):
             )
         return self.ties.closed(engine, with_independent(found, own, columns), held).q
 
-    def _positions(self, name: str, given: object, engine: ArrayBackend, like: Numbers) -> Numbers:
-        """Positions of all joints that are given beside those of the independent ones."""
-        values, n = engine.weights(name, given, like), self._robot.n
-        if values.shape[-1:] != (n,):
-            raise ValueError(f"{name} has shape {tuple(values.shape)}; give a closed position ({n},)")
-        if self._robot.door.check_finite:
-            check_numbers({name: values}, self._robot.joint_names)
-        return values
+    def _read(
+        self, beside: Mapping[str, Beside] = NOTHING, **named: object
+    ) -> tuple[ArrayBackend, Sequence[Numbers]]:
+        return self._robot.door.read(named, beside=beside)
 
-    def _read(self, **named: object) -> tuple[ArrayBackend, Sequence[Numbers]]:
-        return self._robot.door.read(named)
-
-    def _own(self, name: str, given: object, engine: ArrayBackend, q: Numbers) -> Numbers:
+    def _own(self, name: str, given: object) -> dict[str, Beside]:
         """What is given of the independent joints, (..., m)."""
-        values, m = engine.weights(name, given, q), len(self.independent)
-        if values.ndim == 0 or values.shape[-1] != m:
-            told = f"its last axis must be {m}, one for each of {', '.join(self.independent)}"
-            raise ValueError(f"{name} has shape {tuple(values.shape)}; {told}")
-        if self._robot.door.check_finite:
-            check_numbers({name: values}, self.independent)
-        return values
+        joints = self.independent
+        return {name: Beside(given, (len(joints),), f"one for each of {', '.join(joints)}", joints)}
 
-    def _torque(self, given: object, engine: ArrayBackend, q: Numbers, by_link: bool) -> Numbers:
-        """Torques (..., n, X)."""
-        values, axis, n = engine.weights("torque", given, q), -2 if by_link else -1, self._robot.n
-        if values.ndim < -axis or values.shape[axis] != n:
-            shape = "(..., n, X)" if by_link else "(..., n), or with by_link=True (..., n, X)"
-            raise ValueError(f"torque has shape {tuple(values.shape)}; give {shape}, n = {n}")
-        if self._robot.door.check_finite:
-            joints = namespace(values).swapaxes(values, -1, -2) if by_link else values
-            check_numbers({"torque": joints}, self._robot.joint_names)
-        return values if by_link else values[..., None]
+    def _loaded(self, q: object, torque: object, by_link: bool) -> tuple[Followers, Numbers]:
+        """How joints follow, and torques (..., n, X)."""
+        joints = self._robot.joint_names
+        about = Beside(torque, (len(joints),), "one for each joint; with by_link=True (..., n, X)", joints)
+        if by_link:
+            about = Beside(torque, (len(joints), ANY), "joints, and X that load them", joints)
+        engine, (at, values) = self._read({"torque": about}, q=q)
+        return self.ties.place(engine, at).found, values if by_link else values[..., None]
 
     def _moving(
         self, q: object, qd: object, **more: object
     ) -> tuple[ClosedPlace, ArrayBackend, Sequence[Numbers]]:
         """How joints follow, what computes, and q, qd in which all follow, with what else was given."""
-        engine, (at, moved, *others) = self._read(q=q, qd=qd, **more)
+        engine, (at, moved, *others) = self._read(NOTHING, q=q, qd=qd, **more)
         place = self.ties.place(engine, at)
         return place, engine, (at, place.velocity(place.own(moved)), *others)
 

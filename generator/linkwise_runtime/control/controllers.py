@@ -5,13 +5,14 @@ from typing import Any, Generic, Protocol, cast
 
 import numpy as np
 
+from ..arguments import NOTHING, Beside
 from ..arrays.array_backend import ArrayBackend
 from ..chosen_names import known_kind
 from ..constraints.robot_constraints import TiedRobot
 from ..interface import Array, Numbers
 from ..packed_engine import TorqueOfOne
 from ..targets import FrameImpedance, Target
-from .frame_impedance import FrameTargets
+from .frame_impedance import OF_FRAME, FrameTargets
 from .gains import WantedShares, stiffness_of, wanted
 from .joint_impedance import (
     ORDERS,
@@ -24,6 +25,7 @@ from .joint_impedance import (
     times,
 )
 
+Made = tuple[str, tuple[object, ...]]
 Given = Mapping[str, Numbers]
 """What a call was given, by name, in one shape (..., n)."""
 
@@ -39,30 +41,38 @@ class ControlledRobot(TiedRobot, Protocol):
 class Controller:
     """What controllers have in common: targets of a robot, and how its state is told."""
 
-    def __init__(self, robot: ControlledRobot, targets: JointTargets, frame: FrameTargets | None) -> None:
-        self._robot, self._frame = robot, frame
+    def __init__(
+        self, robot: ControlledRobot, targets: JointTargets, frame: FrameTargets | None, made: Made
+    ) -> None:
+        """made: the robot's method that makes it again, as for a copy, and its arguments."""
+        self._robot, self._frame, self._made = robot, frame, made
         self._joints = JointImpedance(robot.structure, targets)
         self._of_one: dict[ArrayBackend, TorqueOfOne | None] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled or copied, it is made again by the robot, which is copied with it."""
+        call, arguments = self._made
+        return _again, (self._robot, call, arguments)
 
     def _about(self) -> str:
         """The robot, and the frame that is controlled."""
         frame = "" if self._frame is None else f", frame {self._frame.frame!r}"
         return f"{self._robot.name} on {self._robot.backend.name}{frame}"
 
-    def _torque_of_one(self, engine: ArrayBackend, given: Given, target: Target) -> Numbers | None:
+    def _torque_of_one(self, engine: ArrayBackend, given: Given) -> Numbers | None:
         """The torque, where a back end has it for one sample without these arrays; None where it does not."""
         if engine not in self._of_one:
             self._of_one[engine] = engine.controller(self._joints.targets, self._frame)
         of_one = self._of_one[engine]
-        return None if of_one is None else of_one.torque(given, target)
+        return None if of_one is None else of_one.torque(given)
 
     def _arrays(
-        self, q: object, qd: object, beside: Mapping[str, object]
+        self, q: object, qd: object, motion: Mapping[str, object], beside: Mapping[str, Beside] = NOTHING
     ) -> tuple[ArrayBackend, dict[str, Numbers]]:
-        """What computes, and what was given."""
-        named = {"q": q, "qd": qd} | {name: a for name, a in beside.items() if a is not None}
-        engine, arrays = self._robot.door.read(named)
-        return engine, dict(zip(named, arrays, strict=True))
+        """What computes, and what was given; motion: what else is of shape (..., n)."""
+        named = {"q": q, "qd": qd} | {name: a for name, a in motion.items() if a is not None}
+        engine, arrays = self._robot.door.read(named, beside=beside)
+        return engine, dict(zip((*named, *beside), arrays, strict=True))
 
 
 class PartialImpedance(Controller, Generic[Array]):
@@ -113,44 +123,43 @@ class PartialImpedance(Controller, Generic[Array]):
 
     def __call__(self, q: Array, qd: Array, target: object = None, external: Array | None = None) -> Array:
         """Torque u of the actuators, (..., n), in N m or N."""
-        read, engine, given = self._given(q, qd, target, external)
-        torque = self._torque_of_one(engine, given, read)
+        engine, given = self._given(q, qd, target, external)
+        torque = self._torque_of_one(engine, given)
         if torque is None and self._frame is None and self._joints.targets.inertia.natural:
             state = self._joints.state(engine, given["q"], given["qd"])
             torque = self._joints.natural_torque(engine, state, given["qd"], _errors(given))
-        return cast("Array", self._followed(engine, given, read)[1] if torque is None else torque)
+        return cast("Array", self._followed(engine, given)[1] if torque is None else torque)
 
     def acceleration(
         self, q: Array, qd: Array, target: object = None, external: Array | None = None
     ) -> Array:
         """qdd that follows, (..., n)."""
-        read, engine, given = self._given(q, qd, target, external)
-        return cast("Array", self._followed(engine, given, read)[0])
+        return cast("Array", self._followed(*self._given(q, qd, target, external))[0])
 
     def stored_energy(self, q: Array, qd: Array, target: object = None) -> Array:
         """(ed' M* ed + e' K* e) / 2 in J, (...); with a frame that of the frame."""
-        read, engine, given = self._given(q, qd, target, None)
+        engine, given = self._given(q, qd, target, None)
         at, moved = given["q"], given["qd"]
         state = self._joints.state(engine, at, moved)
         if self._frame is None:
             return cast("Array", self._joints.stored(engine, state, _errors(given)))
-        framed = self._frame.state(engine, state, at, moved, read)
+        framed = self._frame.state(engine, state, given)
         return cast("Array", self._frame.stored(engine, framed))
 
-    def _followed(self, engine: ArrayBackend, given: Given, target: Target) -> tuple[Numbers, Numbers]:
+    def _followed(self, engine: ArrayBackend, given: Given) -> tuple[Numbers, Numbers]:
         """Acceleration that follows, and torque for it."""
         q, qd, external = given["q"], given["qd"], given.get("external")
         state = self._joints.state(engine, q, qd)
         qdd = self._joints.acceleration(engine, state, _errors(given), told=self._frame is not None)
         if self._frame is not None:
-            framed = self._frame.state(engine, state, q, qd, target)
+            framed = self._frame.state(engine, state, given)
             qdd = self._frame.acceleration(engine, framed, qdd, external)
         return qdd, self._joints.torque(state, qd, qdd, external)
 
     def _given(
         self, q: object, qd: object, target: object, external: object
-    ) -> tuple[Target, ArrayBackend, dict[str, Numbers]]:
-        """Target, what computes, and motion; positions alone are a target."""
+    ) -> tuple[ArrayBackend, dict[str, Numbers]]:
+        """What computes, and what was given; positions alone are a target."""
         read = target if isinstance(target, Target) else Target(q=target)
         if hasattr(read.q, "_fields"):
             raise TypeError(
@@ -162,13 +171,18 @@ class PartialImpedance(Controller, Generic[Array]):
             raise ValueError(
                 "target has what a frame shall do, but none is controlled; give frame=FrameImpedance(...)"
             )
-        beside: dict[str, object] = {
+        motion: dict[str, object] = {
             "target": read.q,
             "target.qd": read.qd,
             "target.qdd": read.qdd,
             "external": external,
         }
-        return read, *self._arrays(q, qd, beside)
+        beside = {
+            f"target.{name}": Beside(getattr(read, name), axes, meaning)
+            for name, (axes, meaning) in OF_FRAME.items()
+            if getattr(read, name) is not None
+        }
+        return self._arrays(q, qd, motion, beside)
 
 
 class Cancellation(Controller, Generic[Array]):
@@ -186,9 +200,13 @@ class Cancellation(Controller, Generic[Array]):
     """What is cancelled, by joint, link, coordinate and order."""
 
     def __init__(
-        self, robot: ControlledRobot, targets: JointTargets, entries: tuple[tuple[str, str, str, int], ...]
+        self,
+        robot: ControlledRobot,
+        targets: JointTargets,
+        entries: tuple[tuple[str, str, str, int], ...],
+        made: Made,
     ) -> None:
-        super().__init__(robot, targets, None)
+        super().__init__(robot, targets, None, made)
         self.entries = entries
 
     def __repr__(self) -> str:
@@ -211,7 +229,7 @@ class Cancellation(Controller, Generic[Array]):
         """
         engine, given = self._arrays(q, qd, {"task": tau, "external": external, "qdd": qdd})
         at, moved, accelerated = given["q"], given["qd"], given.pop("qdd", None)
-        if accelerated is None and (torque := self._torque_of_one(engine, given, Target())) is not None:
+        if accelerated is None and (torque := self._torque_of_one(engine, given)) is not None:
             return cast("Array", torque)
         state = self._joints.state(engine, at, moved)
         if accelerated is None:
@@ -251,7 +269,8 @@ def partial_impedance(
         friction_width_of(friction_width, passive),
     )
     held = None if frame is None else FrameTargets(robot.backend.frames, frame)
-    return PartialImpedance(robot, targets, held)
+    asked = (inertia, damping, stiffness, frame, passive, friction_width)
+    return PartialImpedance(robot, targets, held, ("partial_impedance", asked))
 
 
 def cancellation(
@@ -269,7 +288,11 @@ def cancellation(
     targets = JointTargets(acceleration, velocity, None, False, bool(passive), width)
     names = structure.joint_names, structure.link_names
     named = tuple((names[0][i], names[1][j], names[0][k], m) for i, j, k, m in chosen)
-    return Cancellation(robot, targets, named)
+    return Cancellation(robot, targets, named, ("cancel", (named, passive, friction_width)))
+
+
+def _again(robot: object, call: str, arguments: tuple[object, ...]) -> object:
+    return getattr(robot, call)(*arguments)
 
 
 def _check_free(robot: ControlledRobot) -> None:

@@ -11,7 +11,7 @@ velocities to rates of the rotation vector. qdd_0 is what the joints' targets as
 approach for motion and force control of robot manipulators, 1987.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -23,13 +23,21 @@ from ..arguments import refuse_gradient
 from ..arrays.array_backend import ArrayBackend
 from ..chosen_names import known_kind, short
 from ..interface import Library, Namespace, Numbers
-from ..kinematics.frame_answers import FrameAnswers, frame_index, with_vectors
+from ..kinematics.frame_answers import FrameAnswers, frame_index
 from ..rule.joint_tree import JointTree
-from ..targets import ROWS, FrameImpedance, Natural, Target
+from ..targets import ROWS, FrameImpedance, Natural
 from .frame_rotation import rates_of_turning, rotation_vector
 from .gains import Gain
 from .joint_impedance import JointState, times
 from .wanted_solve import WantedInertia, solved_wanted
+
+SIX = "turns about and moves along the world's x, y, z, whichever rows are controlled"
+OF_FRAME = {
+    "pose": ((4, 4), "the matrix that kinematics.pose answers with"),
+    "velocity": ((6,), SIX),
+    "acceleration": ((6,), SIX),
+}
+"""What a target has of a frame: own axes, and what stands along them."""
 
 
 class FramePart(NamedTuple):
@@ -105,13 +113,12 @@ class FrameTargets:
                 f"{len(joints)} joint{'s' * (len(joints) != 1)} move it; choose rows, such as rows=('x', 'y')"
             )
 
-    def state(
-        self, engine: ArrayBackend, joints: JointState, q: Numbers, qd: Numbers, target: Target
-    ) -> FrameState:
-        """The frame at q and qd, by a target."""
-        xp, frames = engine.xp, engine.frames
+    def state(self, engine: ArrayBackend, joints: JointState, given: Mapping[str, Numbers]) -> FrameState:
+        """The frame at q and qd, by a target, all of them by name."""
+        xp, frames, q, qd = engine.xp, engine.frames, given["q"], given["qd"]
         rows = engine.index(np.array(self.rows, np.intp), q)
-        motion, vectors = with_vectors(engine, [q, qd], {"point": self.point})
+        point = engine.constant(self.point, q)
+        motion, vectors = (q, qd), {"point": xp.broadcast_to(point, (*q.shape[:-1], 3))}
         whole = frames.answer("jacobian", motion[:1], self.number, vectors)
         j = whole[..., rows, :]
         rate = frames.answer("jacobian_rate", motion, self.number, vectors)[..., rows, :]
@@ -131,13 +138,10 @@ class FrameTargets:
         inertia = solved_wanted(about, compliance, ones, _reach(whole, sizes)[..., rows])
         dual = moved @ inertia
         natural = (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.coriolis - rate)) @ dual
-        place, turning = self._place(engine, q, target)
+        place, turning = self._place(engine, q, given.get("target.pose"))
         velocity, wanted = (
-            None if a is None else _six(name, engine.weights(name, a, q))[..., rows]
-            for name, a in (
-                ("target.velocity", target.velocity),
-                ("target.acceleration", target.acceleration),
-            )
+            given[name][..., rows] if name in given else None
+            for name in ("target.velocity", "target.acceleration")
         )
         speed = times(j, qd)
         return FrameState(
@@ -186,20 +190,17 @@ class FrameTargets:
         return times(self.stiffness.matrix(library, place), place)
 
     def _place(
-        self, engine: ArrayBackend, q: Numbers, target: Target
+        self, engine: ArrayBackend, q: Numbers, wanted: Numbers | None
     ) -> tuple[Numbers | None, Numbers | None]:
         """x and E of the chosen rows; None where nothing is stiff."""
         if self.stiffness is None:
             return None, None
-        if target.pose is None:
+        if wanted is None:
             raise ValueError(
                 f"frame {self.frame!r} is stiff, but target has no pose; give Target(pose=...), (..., 4, 4), "
                 "such as robot.kinematics.pose(q, frame) of where it shall be"
             )
         xp = engine.xp
-        wanted = engine.weights("target.pose", target.pose, q)
-        if tuple(wanted.shape[-2:]) != (4, 4):
-            raise ValueError(f"target.pose has shape {tuple(wanted.shape)}; its last axes must be 4, 4")
         point = engine.constant(self.point, q)
         pose = engine.frames.answer("pose", [q], self.number)
         places = [times(m[..., :3, :3], point) + m[..., :3, 3] for m in (pose, wanted)]
@@ -241,16 +242,6 @@ def _point(given: object) -> NDArray[np.float64]:
     if point.shape != (3,) or not np.isfinite(point).all():
         raise ValueError(f"frame.point is {short(given)}; give x, y, z in the frame, in m")
     return point
-
-
-def _six(name: str, given: Numbers) -> Numbers:
-    """Raises ValueError for other than the six of a frame and its point."""
-    if not given.ndim or given.shape[-1] != 6:
-        raise ValueError(
-            f"{name} has shape {tuple(given.shape)}; its last axis must be 6, turns about and moves along "
-            "the world's x, y, z, whichever rows are controlled"
-        )
-    return given
 
 
 def _chosen(rows: Sequence[str]) -> tuple[int, ...]:

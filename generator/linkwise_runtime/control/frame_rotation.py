@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..answers.namespace import array_of, hidden
 from ..chosen_names import sample_of
@@ -46,12 +45,6 @@ def rotation_vector(library: Library, turn: Numbers, wanted: Numbers) -> Numbers
         1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0 + square * 35.0 / 1152.0))
     )
     return xp.where(near, series, angle / sine)[..., None] * twice / 2.0
-
-
-def is_rotation(turn: NDArray[np.floating]) -> bool:
-    """Whether one matrix (3, 3) would be taken."""
-    skewed = np.abs(turn @ turn.T - np.eye(3)).max() > SKEWED
-    return not skewed and bool(np.linalg.det(turn) > 0.0)
 
 
 def rates_of_turning(library: Library, theta: Numbers) -> Numbers:

@@ -5,8 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from ..answers.namespace import side_by_side
+from ..arguments import Beside
 from ..chosen_names import choice, known_as, short, whole_number
-from ..interface import Library, Namespace, Numbers
+from ..interface import Namespace, Numbers
 from ..packed_engine import PackedEngine
 from ..rule.joint_tree import JointTree
 from ..rule.kinematics import Twists
@@ -270,30 +271,9 @@ def in_pieces(
     return whole
 
 
-def with_vectors(
-    library: Library, motion: Sequence[Numbers], beside: Mapping[str, object]
-) -> tuple[Sequence[Numbers], Vectors]:
-    """Motion and vectors in one shape of samples, those away that are None.
-
-    Raises ValueError for a vector that does not go with it.
-    """
-    q, samples = motion[0], tuple(motion[0].shape[:-1])
-    batch = samples
-    vectors = {name: library.weights(name, a, q) for name, a in beside.items() if a is not None}
-    for name, a in vectors.items():
-        if a.ndim == 0 or a.shape[-1] != 3:
-            raise ValueError(f"{name} has shape {tuple(a.shape)}; its last axis must be 3: {VECTORS[name]}")
-        try:
-            batch = library.xp.broadcast_shapes(batch, tuple(a.shape[:-1]))
-        except (ValueError, RuntimeError):  # of NumPy, of torch
-            raise ValueError(
-                f"{name} has shape {tuple(a.shape)}, the motion has samples of shape {samples}; "
-                f"give one {name}, or one for each sample"
-            ) from None
-    if all(a.shape[:-1] == samples for a in vectors.values()):
-        return list(motion), vectors
-    motion = [library.xp.broadcast_to(a, (*batch, a.shape[-1])) for a in motion]
-    return motion, {name: library.xp.broadcast_to(a, (*batch, 3)) for name, a in vectors.items()}
+def vectors_beside(given: Mapping[str, object], prefix: str = "") -> dict[str, Beside]:
+    """Vectors that are to be read beside motion, those away that are None; prefix: before their names."""
+    return {prefix + name: Beside(a, (3,), VECTORS[name]) for name, a in given.items() if a is not None}
 
 
 def frame_index(given: object, frames: Sequence[str]) -> int:

@@ -1,12 +1,13 @@
 """The kinematics of a robot's frames: where they are, how they move, and what moves the centre of mass."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from operator import attrgetter
 from typing import Any, Generic, Protocol
 
 from ..call_table import CALLS
 from ..door import Door, accepted
 from ..interface import Array, Library, Numbers
-from .frame_answers import ALL, LINKS, FrameAnswers, frame_index, with_vectors
+from .frame_answers import ALL, LINKS, FrameAnswers, frame_index, vectors_beside
 
 
 class FramesEngine(Library, Protocol):
@@ -18,6 +19,14 @@ class FramesEngine(Library, Protocol):
 
     def read_beside_motion(self) -> Iterable[object]:
         """Arrays or tensors that results hang on, beside the motion."""
+
+
+class FramedRobot(Protocol):
+    """What kinematics ask of a robot."""
+
+    @property
+    def door(self) -> Door[FramesEngine]:
+        """Where motion comes in."""
 
 
 class Kinematics(Generic[Array]):
@@ -40,8 +49,12 @@ class Kinematics(Generic[Array]):
     frames: tuple[str, ...]
     """Names of the frames, by number: those on the ground, then link by link."""
 
-    def __init__(self, door: Door[FramesEngine], frames: tuple[str, ...]) -> None:
-        self._door, self.frames = door, frames
+    def __init__(self, robot: FramedRobot, frames: tuple[str, ...]) -> None:
+        self._robot, self.frames = robot, frames
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled or copied, they are those of the robot, which is copied with them."""
+        return attrgetter("kinematics"), (self._robot,)
 
     def __repr__(self) -> str:
         return f"<kinematics of {len(self.frames)} frames>"
@@ -139,11 +152,12 @@ class Kinematics(Generic[Array]):
         self, call: str, given: Sequence[object], part: object, beside: Mapping[str, object], out: object
     ) -> Any:
         names = CALLS[f"kinematics.{call}"].motion
-        engine, motion = self._door.read(dict(zip(names, given, strict=True)))
-        motion, vectors = with_vectors(engine, motion, beside)
+        asked = vectors_beside(beside)
+        engine, numbers = self._robot.door.read(dict(zip(names, given, strict=True)), beside=asked)
+        motion, vectors = numbers[: len(names)], dict(zip(asked, numbers[len(names) :], strict=True))
         if out is None:
             return engine.frames.answer(call, motion, part, vectors)
-        read: dict[str, Numbers] = dict(zip(names, motion, strict=True)) | dict(vectors)
+        read: dict[str, Numbers] = dict(zip(names, motion, strict=True)) | vectors
         shapes = (engine.frames.shape(call),)
         (place,) = accepted(out, (), shapes, read, engine.read_beside_motion(), False)
         place[...] = engine.frames.answer(call, motion, part, vectors)

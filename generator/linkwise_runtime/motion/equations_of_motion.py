@@ -8,21 +8,21 @@ With constraints the dependent joints of every q are closed first, by Newton's m
 qd = G v: they do not drift.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ..answers.namespace import array_of, hidden
-from ..arguments import check_axes, no_common_shape
+from ..arguments import NOTHING, Beside
 from ..arrays.array_backend import ArrayBackend
 from ..chosen_names import listed, sample_of
 from ..constraints.closed_places import ClosedPlace
 from ..constraints.independent_joints import least_left, why_not_following
 from ..constraints.tied_joints import TiedJoints, without_gradient
 from ..interface import Numbers
-from .source_forces import listed_loads, load_torques
+from .source_forces import AppliedLoads, loads_of
 
 HALVES = 30
 """Of the way to a position that does not close, to find how far it goes."""
@@ -132,6 +132,13 @@ class State(NamedTuple):
     """(...)."""
 
 
+class ReadLoads(NamedTuple):
+    """Loads, and their vectors as they were read."""
+
+    loads: AppliedLoads
+    vectors: Sequence[Numbers]
+
+
 @dataclass(frozen=True)
 class EquationsOfMotion:
     """Those of a robot on one back end."""
@@ -139,8 +146,8 @@ class EquationsOfMotion:
     engine: ArrayBackend
     tau: Numbers | Given
     """Torques (..., n), or what gives them."""
-    loads: object
-    """A list of loads, or what gives it."""
+    loads: ReadLoads | Given
+    """Loads, or what gives them."""
     passive: bool
     ties: TiedMotion | None
     """None for an open tree."""
@@ -182,21 +189,18 @@ class EquationsOfMotion:
 
     def torques(self, t: float, q: Numbers, qd: Numbers) -> Numbers:
         """What the actuators give, (..., n)."""
-        return checked_torques(self.engine, self.tau(t, q, qd), q) if callable(self.tau) else self.tau
+        if not callable(self.tau):
+            return self.tau
+        (tau,) = read_at(self.engine, q, {"tau": self.tau(t, q, qd)})
+        return tau
 
     def load_torque(self, t: float, q: Numbers, qd: Numbers) -> Numbers | None:
-        """What loads ask of the joints, (..., n); None for none.
-
-        Raises ValueError for loads of more samples than there are motions.
-        """
-        given = self.loads(t, q, qd) if callable(self.loads) else self.loads
-        torques = load_torques(self.engine, q, listed_loads(given))
-        for e, torque in enumerate(torques):
-            if torque.shape != q.shape:
-                raise ValueError(
-                    f"loads[{e}] is of samples {tuple(torque.shape[:-1])}, and motions are of "
-                    f"{tuple(q.shape[:-1])}; give q and qd of as many"
-                )
+        """What loads ask of the joints, (..., n); None for none."""
+        found = self.loads
+        if callable(found):
+            loads = loads_of(self.engine, found(t, q, qd))
+            found = ReadLoads(loads, read_at(self.engine, q, {}, loads.beside))
+        torques = found.loads.torques(self.engine, q, found.vectors)
         return sum(torques[1:], torques[0]) if torques else None
 
     def energy(self, q: Numbers, qd: Numbers) -> Numbers:
@@ -211,17 +215,20 @@ class EquationsOfMotion:
         return total
 
 
-def checked_torques(engine: ArrayBackend, given: object, q: Numbers) -> Numbers:
-    """Torques of the shape and kind of q (..., n); raises ValueError for what does not fit."""
-    tau, n = engine.weights("tau", given, q), q.shape[-1]
-    check_axes({"tau": tau}, n)
-    try:
-        fits = np.broadcast_shapes(tuple(tau.shape), tuple(q.shape)) == tuple(q.shape)
-    except ValueError:
-        fits = False
-    if not fits:
-        raise no_common_shape({"q": q, "tau": tau}, n)
-    return tau + 0.0 * q
+def read_at(
+    engine: ArrayBackend, q: Numbers, named: Mapping[str, object], beside: Mapping[str, Beside] = NOTHING
+) -> list[Numbers]:
+    """What somebody gave at an instant, as q (..., n) is: by then it is settled how many motions there are.
+
+    Raises ValueError for what is of more samples, and as `arrays` does.
+    """
+    at, *read = engine.arrays({"q": q, **named}, q.shape[-1], beside)
+    if at.shape != q.shape:
+        raise ValueError(
+            f"{', '.join((*named, *beside))}: {tuple(at.shape[:-1])} samples are more than the "
+            f"{tuple(q.shape[:-1])} of q and qd; give these as many from the start"
+        )
+    return [engine.weights(name, a, q) for name, a in zip((*named, *beside), read, strict=True)]
 
 
 def _conserved(engine: ArrayBackend, q: Numbers, qd: Numbers) -> Numbers:

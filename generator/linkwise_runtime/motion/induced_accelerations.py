@@ -11,7 +11,6 @@ in the null space of A: with qd = G yd of the independent coordinates y and A be
     qdd_x = G (G^T M G)^-1 G^T (F_x - M beta_x) + beta_x      A^T lambda_x = M qdd_x - F_x
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -23,10 +22,10 @@ from ..chosen_names import short
 from ..constraints.closed_places import ClosedPlace, borne
 from ..constraints.robot_constraints import Constraints, TiedRobot
 from ..interface import Numbers
-from ..kinematics.frame_answers import LINKS, frame_index, with_vectors
+from ..kinematics.frame_answers import LINKS, frame_index, vectors_beside
 from ..quantities import InducedAccelerations
 from ..structure import Structure
-from .source_forces import SourceForces, listed_loads, load_torques, source_forces, with_actuators
+from .source_forces import SourceForces, loads_of, source_forces, with_actuators
 
 
 class DrivenRobot(TiedRobot, Protocol):
@@ -194,12 +193,10 @@ def _sources(robot: DrivenRobot, asked: Driven, point: object) -> DrivenSources:
             "the two"
         )
     named = {"q": asked.q, "qd": asked.qd} | ({"qdd": qdd} if tau is None else {"tau": tau})
-    engine, motion = robot.door.read(named)
+    loads, points = loads_of(robot.backend, asked.loads), vectors_beside({"point": point})
+    engine, (q, qd, last, *vectors) = robot.door.read(named, beside={**loads.beside, **points})
     constraints = constraints_of(robot, asked.constraints)
-    pulls = load_torques(engine, motion[0], listed_loads(asked.loads))
-    motion, vectors = with_vectors(engine, motion, {"point": point})
-    q, qd, last = _in_one_shape(engine, motion, pulls)
-    points = {name: engine.xp.broadcast_to(a, (*q.shape[:-1], 3)) for name, a in vectors.items()}
+    pulls = loads.torques(engine, q, vectors[: len(loads.beside)])
     place = None if constraints is None else constraints.ties.place(engine, q)
     if place is not None:
         qd = place.velocity(place.own(qd))
@@ -213,16 +210,8 @@ def _sources(robot: DrivenRobot, asked: Driven, point: object) -> DrivenSources:
         needed = (others.mass @ last[..., None])[..., 0] - others.columns.sum(-1)
         last = response.needed(needed[..., None])[..., 0]
     identity = engine.constant(np.eye(robot.n), q)
-    return DrivenSources(engine, q, qd, points, with_actuators(others, last, identity), response)
-
-
-def _in_one_shape(
-    engine: ArrayBackend, motion: Sequence[Numbers], pulls: Sequence[Numbers]
-) -> Sequence[Numbers]:
-    """Motion in one shape with the torques of loads, which may be of more samples."""
-    xp, n = engine.xp, motion[0].shape[-1]
-    batch = xp.broadcast_shapes(*(tuple(a.shape[:-1]) for a in (motion[0], *pulls)))
-    return motion if batch == motion[0].shape[:-1] else [xp.broadcast_to(a, (*batch, n)) for a in motion]
+    placed = dict(zip(points, vectors[len(loads.beside) :], strict=True))
+    return DrivenSources(engine, q, qd, placed, with_actuators(others, last, identity), response)
 
 
 def _jacobians(at: DrivenSources, frame: object) -> tuple[Numbers, Numbers]:

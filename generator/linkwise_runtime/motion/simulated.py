@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from importlib import import_module
 from itertools import pairwise
 from numbers import Real
@@ -12,13 +13,13 @@ from numpy.typing import NDArray
 
 from ..answers.namespace import array_of, namespace
 from ..arguments import as_array, check_numbers, shape_of
-from ..arrays.array_backend import ArrayBackend
 from ..chosen_names import short
 from ..constraints.robot_constraints import Constraints
 from ..interface import Numbers
 from ..quantities import Trajectory
-from .equations_of_motion import EquationsOfMotion, Given, State, TiedMotion, checked_torques
+from .equations_of_motion import EquationsOfMotion, Given, ReadLoads, State, TiedMotion
 from .induced_accelerations import DrivenRobot, constraints_of
+from .source_forces import loads_of
 
 Rates = Callable[[float, State], State]
 ADAPTIVE = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -127,12 +128,24 @@ def simulated(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
     q, qd = asked.q, asked.qd
     if constraints is not None:
         q, qd = _of_all_joints(constraints, q, qd)
-    engine, (start, rate) = robot.door.read({"q": q, "qd": qd})
-    check_numbers({"q": start, "qd": rate}, robot.joint_names)
+    named: dict[str, object] = {"q": q, "qd": qd}
+    if asked.tau is not None and not callable(asked.tau):
+        named["tau"] = asked.tau
+    loads = loads_of(robot.backend, () if callable(asked.loads) else asked.loads)
+    engine, numbers = robot.door.read(named, beside=loads.beside)
+    motion = dict(zip(named, numbers[: len(named)], strict=True))
+    check_numbers(motion, robot.joint_names)
+    start, rate = motion["q"], motion["qd"]
+    tau = cast(Given, asked.tau) if callable(asked.tau) else motion.get("tau", 0.0 * start)
+    pulls = ReadLoads(loads, numbers[len(named) :])
+    given = cast(Given, asked.loads) if callable(asked.loads) else pulls
     times = _instants(asked.time)
     step = None if asked.step is None else _positive("step", asked.step)
     tolerances = _positive("rtol", asked.rtol), _positive("atol", asked.atol)
-    equations, state = _started(engine, start, rate, asked, constraints)
+    passive = asked.passive and bool(engine.structure.passive)
+    equations, state = _started(
+        EquationsOfMotion(engine, tau, given, passive, None), start, rate, constraints
+    )
     if asked.method == "RK4":
         states = in_fixed_steps(equations.rates, equations.settled, state, times, step)
     elif asked.method in ADAPTIVE:
@@ -158,20 +171,15 @@ def _of_all_joints(constraints: Constraints[Any], q: object, qd: object) -> tupl
 
 
 def _started(
-    engine: ArrayBackend, q: Numbers, qd: Numbers, asked: Simulated, constraints: Constraints[Any] | None
+    free: EquationsOfMotion, q: Numbers, qd: Numbers, constraints: Constraints[Any] | None
 ) -> tuple[EquationsOfMotion, State]:
-    """The equations, and the state that they start from."""
-    work, passive = 0.0 * q.sum(-1), asked.passive and bool(engine.structure.passive)
-    tau: Numbers | Given = 0.0 * q
-    if callable(asked.tau):
-        tau = cast(Given, asked.tau)
-    elif asked.tau is not None:
-        tau = checked_torques(engine, asked.tau, q)
+    """Equations of an open tree, or the same with constraints, and the state that they start from."""
+    work = 0.0 * q.sum(-1)
     if constraints is None:
-        return EquationsOfMotion(engine, tau, asked.loads, passive, None), State(q, qd, work)
-    place = constraints.ties.closed_place(engine, q, q)
-    ties = TiedMotion(constraints.ties, engine, place)
-    return EquationsOfMotion(engine, tau, asked.loads, passive, ties), State(place.q, place.own(qd), work)
+        return free, State(q, qd, work)
+    place = constraints.ties.closed_place(free.engine, q, q)
+    ties = TiedMotion(constraints.ties, free.engine, place)
+    return replace(free, ties=ties), State(place.q, place.own(qd), work)
 
 
 def _finite(states: Iterator[State], times: Sequence[float], like: Numbers) -> Iterator[State]:

@@ -6,16 +6,18 @@ with armature on the diagonal of M where the joints' own torques count.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ..answers.namespace import namespace
+from ..arguments import Beside
 from ..arrays.array_backend import ArrayBackend
 from ..chosen_names import known_kind
 from ..interface import Numbers
-from ..kinematics.frame_answers import frame_index, with_vectors
+from ..kinematics.frame_answers import frame_index, vectors_beside
 from ..kinematics.robot_kinematics import check_load
 from ..quantities import AppliedLoad
 
@@ -74,13 +76,64 @@ def beside(parts: Sequence[Numbers]) -> Numbers:
     return xp.concat([xp.broadcast_to(part, (*batch, *part.shape[-2:])) for part in parts], -1)
 
 
-def listed_loads(loads: object) -> list[object]:
-    """Loads as a list, of which one alone may be given; raises TypeError for what is neither."""
-    if isinstance(loads, AppliedLoad):
-        return [loads]
-    if not isinstance(loads, list | tuple) or hasattr(loads, "_fields"):
-        raise TypeError(f"loads is {_kind(loads)}; give a list of AppliedLoad(frame, force, ...)")
-    return list(loads)
+class OnFrame(NamedTuple):
+    """A force and moment on a frame."""
+
+    frame: int
+    vectors: Mapping[str, str]
+    """Names under which its vectors are read, by what they are."""
+
+
+@dataclass(frozen=True)
+class AppliedLoads:
+    """Loads as they were given, whose vectors are read beside motion."""
+
+    each: Sequence[Sequence[OnFrame]]
+    """What counts as one load."""
+    beside: Mapping[str, Beside]
+
+    def torques(self, engine: ArrayBackend, q: Numbers, vectors: Sequence[Numbers]) -> list[Numbers]:
+        """What each load adds to the torques that joints need, (..., n).
+
+        vectors: what `beside` was read as
+        """
+        named = dict(zip(self.beside, vectors, strict=True))
+
+        def torque(frame: int, names: Mapping[str, str]) -> Numbers:
+            own = {what: named[name] for what, name in names.items()}
+            return engine.frames.answer("load_torque", [q], frame, own)
+
+        return [sum((torque(*one) for one in load), 0.0 * q) for load in self.each]
+
+
+def loads_of(backend: ArrayBackend, given: object) -> AppliedLoads:
+    """Loads of a robot on this back end; raises TypeError and ValueError, which tell which load is meant."""
+    if isinstance(given, AppliedLoad):
+        given = [given]
+    if not isinstance(given, list | tuple) or hasattr(given, "_fields"):
+        raise TypeError(f"loads is {_kind(given)}; give a list of AppliedLoad(frame, force, ...)")
+    each: list[list[OnFrame]] = []
+    asked: dict[str, Beside] = {}
+    for e, load in enumerate(given):
+        several = [load] if isinstance(load, AppliedLoad) else load
+        if not isinstance(several, list | tuple) or not all(isinstance(a, AppliedLoad) for a in several):
+            raise TypeError(
+                f"loads[{e}] is {_kind(load)}; give AppliedLoad(frame, force, ...), or a list of "
+                "them that counts as one load"
+            )
+        each.append([])
+        for s, (frame, force, moment, point, at) in enumerate(several):
+            place = f"loads[{e}]" if several[0] is load else f"loads[{e}][{s}]"
+            try:
+                check_load(force, point, at)
+                number = frame_index(frame, backend.frames.names)
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"{place}: {error}") from None
+            vectors = {"force": force, "moment": moment, "point": point, "at": at}
+            found = vectors_beside(vectors, f"{place}.")
+            each[-1].append(OnFrame(number, {name.removeprefix(f"{place}."): name for name in found}))
+            asked |= found
+    return AppliedLoads(each, asked)
 
 
 def _kind(given: object) -> str:
@@ -88,30 +141,3 @@ def _kind(given: object) -> str:
     among = given if isinstance(given, list) else [given]
     alike = [one for one in among if type(one).__name__ == AppliedLoad.__name__]
     return known_kind(alike[0], AppliedLoad) if alike else f"a {type(given).__name__}"
-
-
-def load_torques(engine: ArrayBackend, q: Numbers, loads: Sequence[object]) -> list[Numbers]:
-    """What each load adds to the torques that joints need, (..., n); errors tell which load is meant."""
-    found = []
-    for e, load in enumerate(loads):
-        several = [load] if isinstance(load, AppliedLoad) else load
-        if not isinstance(several, list | tuple) or not all(isinstance(a, AppliedLoad) for a in several):
-            raise TypeError(
-                f"loads[{e}] is {_kind(load)}; give AppliedLoad(frame, force, ...), or a list of "
-                "them that counts as one load"
-            )
-        try:
-            torques = [_load_torque(engine, q, each) for each in several]
-        except (TypeError, ValueError) as error:
-            raise type(error)(f"loads[{e}]: {error}") from None
-        found.append(sum(torques, 0.0 * q))
-    return found
-
-
-def _load_torque(engine: ArrayBackend, q: Numbers, load: AppliedLoad) -> Numbers:
-    frame, force, moment, point, at = load
-    check_load(force, point, at)
-    number = frame_index(frame, engine.frames.names)
-    beside = {"force": force, "moment": moment, "point": point, "at": at}
-    motion, vectors = with_vectors(engine, [q], beside)
-    return engine.frames.answer("load_torque", motion, number, vectors)

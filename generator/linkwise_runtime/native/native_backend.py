@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
 
 from ..answers.answers import Answers
-from ..arguments import has_tensors
+from ..arguments import NOTHING, Beside, as_given, has_tensors
 from ..arrays.array_backend import ArrayBackend
 from ..arrays.numpy_backend import NumpyBackend
 from ..call_table import CALLS
@@ -145,11 +145,13 @@ class NativeBackend(NumpyBackend):
 
         return TorchSide(self.calls, self.quick.run, self._forms, self.rule)
 
-    def read(self, named: Mapping[str, object], n: int) -> tuple[ArrayBackend, Sequence[Numbers]]:
-        """What computes with this motion, and it as one shape (..., n); errors name the argument."""
-        if "torch" in sys.modules and has_tensors(named.values()):
-            return self.on_torch, self.on_torch.arrays(named, n)
-        return self, self.arrays(named, n)
+    def read(
+        self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
+    ) -> tuple[ArrayBackend, Sequence[Numbers]]:
+        """What computes, and `arrays` as it computes with them: a tensor among them makes all tensors."""
+        if "torch" in sys.modules and has_tensors(as_given(named, beside).values()):
+            return self.on_torch, self.on_torch.arrays(named, n, beside)
+        return self, self.arrays(named, n, beside)
 
     def controller(self, joints: object, frame: object) -> TorqueOfOne | None:
         """C's torque of one sample."""

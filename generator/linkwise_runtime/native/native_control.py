@@ -1,17 +1,16 @@
 """C functions of one sample: frames, the mass matrix, forward dynamics and the torques of controllers."""
 
 import ctypes
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..control.frame_impedance import FrameTargets
-from ..control.frame_rotation import is_rotation
+from ..control.frame_impedance import OF_FRAME, FrameTargets
 from ..control.joint_impedance import JointTargets
 from ..interface import Numbers
-from ..targets import Target
 from .native_calls import NativeCalls
 from .native_library import CONTROL, IMPEDANCE, OneSampleCall, OneSamplePool, one_sample_call, symbol
 from .native_memory import NumberArray, NumberType, address
@@ -21,7 +20,7 @@ FieldType = RealType | type[ctypes.c_void_p] | type[ctypes.c_int]
 
 JOINTS = ("target", "target.qd", "target.qdd", "task", "external")
 """What a call of joints may be given beside q and qd, in the order of C; a frame is given no task."""
-OF_FRAME = {"pose": 16, "velocity": 6, "acceleration": 6}
+ON_FRAME = {f"target.{name}": math.prod(axes) for name, (axes, _) in OF_FRAME.items()}
 """What stands in place of a task for a frame, and how many numbers."""
 
 
@@ -115,7 +114,8 @@ class NativeTorque:
     ) -> None:
         self._calls, self._structure = calls, calls.structure
         self._targets, self._frame = targets, frame
-        self._beside = JOINTS if frame is None else (*JOINTS[:3], *OF_FRAME, *JOINTS[4:])
+        self._beside = JOINTS if frame is None else (*JOINTS[:3], *ON_FRAME, *JOINTS[4:])
+        self._aims = frame is not None and frame.stiffness is not None
         self._settings: dict[NumberType, Settings] = {}
         self._of_one = OneSamplePool(self._one_sample)
         gains = [targets.inertia.added, targets.damping.added, targets.stiffness]
@@ -127,47 +127,24 @@ class NativeTorque:
         fixed = fixed and not any(gain is not None and gain.learned for gain in gains)
         self._known = fixed and compensated and is_rigid
 
-    def torque(self, given: Mapping[str, Numbers], target: object) -> NumberArray | None:
+    def torque(self, given: Mapping[str, Numbers]) -> NumberArray | None:
         """The torque (n,); None for what C does not answer, of which arrays say what is wrong."""
         q = given["q"]
         if not self._known or self._calls.learned or type(q) is not np.ndarray or q.ndim > 1:
             return None
-        beside = cast("dict[str, NumberArray]", given)
-        if self._frame is not None:
-            asked = self._of_frame(self._frame, cast(Target, target))
-            if asked is None:
-                return None
-            beside = {**beside, **asked}
-        names = tuple(name for name in self._beside if name in beside)
-        arrays = [beside[name] for name in ("q", "qd", *names)]
-        numbers = b"".join(a.astype(q.dtype, copy=False).tobytes() for a in arrays)
+        of_one = cast("Mapping[str, NumberArray]", given)
+        if self._aims and "target.pose" not in given:
+            return None
+        names = tuple(name for name in self._beside if name in of_one)
+        numbers = b"".join(of_one[name].tobytes() for name in ("q", "qd", *names))
         found = self._of_one.results((q.dtype, names), numbers)
         return found[0] if found else None
-
-    def _of_frame(self, frame: FrameTargets, target: Target) -> dict[str, NumberArray] | None:
-        """Arrays of a frame's target that are plainly those of one sample; None for others."""
-        pose = target.pose if frame.stiffness is not None else None
-        found: dict[str, NumberArray] = {}
-        for name, a, shape in (
-            ("pose", pose, (4, 4)),
-            ("velocity", target.velocity, (6,)),
-            ("acceleration", target.acceleration, (6,)),
-        ):
-            if a is None:
-                continue
-            if type(a) is not np.ndarray or a.shape != shape or a.dtype.kind != "f":
-                return None
-            found[name] = a
-        if frame.stiffness is None:
-            return found
-        turns = min(frame.rows) < 3
-        return found if "pose" in found and (not turns or is_rotation(found["pose"][:3, :3])) else None
 
     def _one_sample(self, key: tuple[NumberType, tuple[str, ...]]) -> OneSampleCall:
         """A call that is given these arrays beside q and qd."""
         kind, names = key
         n, settings = self._structure.n, self._set(kind)
-        sizes = [n, n, *(OF_FRAME.get(name, n) for name in names)]
+        sizes = [n, n, *(ON_FRAME.get(name, n) for name in names)]
         memory = np.empty(sum(sizes), kind)
         q, qd, *parts = np.split(memory, np.cumsum(sizes)[:-1])
         placed = dict(zip(names, parts, strict=True))

@@ -14,7 +14,7 @@ from torch import Tensor
 from torch._subclasses.fake_tensor import is_fake
 
 from ..answers.answers import Answers
-from ..arguments import too_many_axes
+from ..arguments import NOTHING, Beside, too_many_axes
 from ..arrays.torch_backend import TorchBackend
 from ..call_table import CALLS, QDD
 from ..interface import ClosedForms, Numbers
@@ -78,17 +78,19 @@ class TorchSide(TorchBackend):
         """Rows of the table: C writes those that it has, where nothing is recorded."""
         return TensorAnswers(self)
 
-    def arrays(self, named: Mapping[str, object], n: int) -> Sequence[Numbers]:
-        """The motion, checked and broadcast to a common shape (..., n); it must lie in the CPU's memory."""
+    def arrays(
+        self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
+    ) -> Sequence[Numbers]:
+        """Motion, then what is beside it, of one shape of samples; they must lie in the CPU's memory."""
         self.check_untraced()
         motion = cast("list[Tensor]", list(named.values()))
         q = motion[0]
         plain = all(
             type(t) is Tensor and t.is_cpu and t.layout is torch.strided and not t.is_nested for t in motion
         )
-        alike = plain and q.dtype in FLOATS and q.shape[-1:] == (n,)
+        alike = plain and not beside and q.dtype in FLOATS and q.shape[-1:] == (n,)
         if not alike or not all(t.dtype == q.dtype and t.shape == q.shape for t in motion[1:]):
-            motion = cast("list[Tensor]", list(super().arrays(named, n)))
+            motion = cast("list[Tensor]", list(super().arrays(named, n, beside)))
             if not motion[0].is_cpu:
                 raise TypeError(
                     f"the tensors lie on {motion[0].device}; this back end takes CPU tensors, torch takes all"

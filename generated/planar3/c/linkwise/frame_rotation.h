@@ -84,7 +84,20 @@ static inline int rotation_of(const real *quaternion, real *v, real *e)
     return w < R(5e-7);
 }
 
-/* -E' K_e x, by the chosen rows, added to `force`; returns -7 at half a turn, and otherwise 0. */
+/* Whether the first three columns of a pose turn, to 1e-4: they may be rounded, but neither stretch nor mirror. */
+static inline int turns_only(const real *pose)
+{
+    for (int r = 0; r < 3; ++r)
+        for (int k = r; k < 3; ++k) {
+            const real *const a = pose + 4 * r, *const b = pose + 4 * k;
+            if (!(F(fabs)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] - (r == k)) <= R(1e-4)))
+                return 0;
+        }
+    const vector x = {pose[0], pose[1], pose[2]}, y = {pose[4], pose[5], pose[6]}, z = cross(x, y);
+    return z.x * pose[8] + z.y * pose[9] + z.z * pose[10] > 0;
+}
+
+/* -E' K_e x, by the chosen rows, added to `force`; returns -7 at half a turn from a target, and for one that is none. */
 static inline int pull(const struct sample *s, const API(frame_impedance) * wanted, const real *target, vector at, real *force)
 {
     const real place[3] = {at.x, at.y, at.z};
@@ -101,7 +114,7 @@ static inline int pull(const struct sample *s, const API(frame_impedance) * want
         turns = turns || wanted->row[r] < 3;
         chosen[r] = x[wanted->row[r]];
     }
-    if (turns && opposite)
+    if (turns && (opposite || !turns_only(target)))
         return -7;
     resist(wanted->rows, wanted->stiffness, chosen, pulled);
     for (int r = 0; r < wanted->rows; ++r)
