@@ -11,6 +11,7 @@ from answers import random_states, relative_error
 from conftest import DATA, needs_compiler
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
+from urdf_text import chain, joint
 
 torch = pytest.importorskip("torch")
 
@@ -350,6 +351,22 @@ def test_c_takes_no_pose_for_one_sample_that_arrays_refuse(package_of: Packages)
     for pose in (2.0 * np.eye(4), np.zeros((4, 4)), np.diag([1.0, 1.0, -1.0, 1.0])):
         with pytest.raises(ValueError, match=r"target\.pose is no rotation"):
             turned(np.zeros(3), np.zeros(3), package.Target(pose=pose))
+
+
+@pytest.mark.parametrize("backend", ["numpy", pytest.param("native", marks=needs_compiler)])
+def test_rows_that_move_by_rounding_alone_are_told_by_name(backend: str, tmp_path: Path) -> None:
+    """Axes that are parallel turn about one line: of x, y and z there is one that no joint moves."""
+    ends, skew = ("ab", "bc", "cd"), {"rpy": "0 0 0", "axis": "0.36 0.48 0.8"}
+    arm = chain(*(joint(f"j{k}", *pair, **skew) for k, pair in enumerate(ends)))
+    (tmp_path / "arm.urdf").write_text(arm)
+    write_package(generate(read_system(tmp_path / "arm.urdf"), [backend]), tmp_path / "arm")
+    package = import_package(tmp_path / "arm")
+    held = package.FrameImpedance("d", rows=("x", "y", "z"), point=(0.1, 0.2, 0.3))
+    control = package.load(backend).partial_impedance(frame=held)
+    told = r"^frame 'd' (cannot|can hardly) move along rows each by itself: along [xyz], "
+    for q in np.random.default_rng(0).uniform(-3.0, 3.0, (100, 3)):
+        with pytest.raises((ValueError, RuntimeWarning), match=told):  # warnings are errors here
+            control(q, q)
 
 
 def test_states_that_cannot_be_controlled_are_refused_with_the_sample(package_of: Packages) -> None:

@@ -133,8 +133,7 @@ class FrameTargets:
         compliance = j @ moved
         ones = engine.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
         hardly = f"frame {self.frame!r} can hardly move along rows each by itself"
-        singular = f"frame {self.frame!r} cannot move along rows each by itself"
-        about = WantedInertia(singular, Told(hardly, self.names, of_frame=True))
+        about = WantedInertia(self._unmovable(), Told(hardly, self.names, of_frame=True))
         inertia = solved_wanted(about, compliance, ones, _reach(whole, sizes)[..., rows])
         dual = moved @ inertia
         natural = (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.coriolis - rate)) @ dual
@@ -171,7 +170,8 @@ class FrameTargets:
         vague = Told(f"{what} is nearly singular", self.names, of_frame=True)
         natural = self.inertia.kept * state.inertia.diagonal(0, -2, -1)
         told = self.inertia.added is None  # a share of L is known as well as L
-        about = WantedInertia(f"{what} is not positive", vague)
+        singular = self._unmovable() if told else f"{what} is not positive"
+        about = WantedInertia(singular, vague)
         moved = solved_wanted(about, state.wanted_inertia, pull[..., None], natural, told=told)[..., 0]
         if state.wanted is not None:
             moved = moved + state.wanted
@@ -183,6 +183,9 @@ class FrameTargets:
         if state.place is None:
             return energy
         return energy + (state.place * self._pull(engine, state.place)).sum(-1) / 2.0
+
+    def _unmovable(self) -> str:
+        return f"frame {self.frame!r} cannot move along rows each by itself"
 
     def _pull(self, library: Library, place: Numbers) -> Numbers:
         """K_e x."""

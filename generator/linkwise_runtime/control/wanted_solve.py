@@ -106,15 +106,15 @@ def _largest_when_free(matrices: NDArray[np.floating]) -> NDArray[np.floating]:
     """
     try:
         pivots = np.linalg.cholesky(matrices).diagonal(0, -2, -1) ** 2
-    except np.linalg.LinAlgError:
-        least = np.linalg.eigvalsh(matrices)[..., 0]
-        return _inverted(least)
-    if pivots.min(initial=1.0) >= SMALL * epsilon_of(matrices) ** 0.5:
-        return _inverted(pivots.min(-1))
-    unit = np.eye(matrices.shape[-1], dtype=matrices.dtype)[pivots.argmin(-1)]
-    moved = np.linalg.solve(matrices, unit[..., None])[..., 0]
+        if pivots.min(initial=1.0) >= SMALL * epsilon_of(matrices) ** 0.5:
+            return _inverted(pivots.min(-1))
+        unit = np.eye(matrices.shape[-1], dtype=matrices.dtype)[pivots.argmin(-1)]
+        moved = np.linalg.solve(matrices, unit[..., None])[..., 0]
+    except np.linalg.LinAlgError:  # of the root or, where rounding has left that a pivot, of the solution
+        return _inverted(np.linalg.eigvalsh(matrices)[..., 0])
     mobility: NDArray[np.floating] = (moved * unit).sum(-1)
-    return np.where(mobility > 0.0, mobility, np.inf)  # rounding may leave less than nothing
+    # Rounding may leave less than nothing, and less than what moves while those behind are held.
+    return np.where(mobility > 0.0, np.maximum(mobility, _inverted(pivots.min(-1))), np.inf)
 
 
 def _largest_of_inverse(matrices: NDArray[np.floating]) -> NDArray[np.floating]:
