@@ -82,6 +82,8 @@ def test_what_cannot_hold_the_answer_is_named(backend: str, package_of: Callable
         wrong["^out is not contiguous; give what empty"] = flipped(right)
     else:
         assert (robot.partial_torque(*motion, out=flipped(right)) == right).all()
+    if torch.is_tensor(right):
+        wrong["^out lies on meta; the answer lies on cpu$"] = right.to("meta")
     for message, out in wrong.items():
         if out is None:
             room = right.reshape(-1)

@@ -343,6 +343,17 @@ def test_targets_that_cannot_be_are_refused_in_one_line(package_of: Packages) ->
             robot.cancel(entries)
 
 
+def test_what_is_cancelled_is_told_in_order(package_of: Packages) -> None:
+    robot = package_of("planar3").load("numpy")
+    told = robot.cancel([(2, 2, 2, 2), ("joint1", None, "joint2", 1), (0, 2, 0, 2)]).entries
+    assert told == (
+        ("joint1", "link2", "joint2", 1),
+        ("joint1", "link3", "joint1", 2),
+        ("joint1", "link3", "joint2", 1),
+        ("joint3", "link3", "joint3", 2),
+    )
+
+
 @needs_compiler
 def test_c_takes_no_pose_for_one_sample_that_arrays_refuse(package_of: Packages) -> None:
     package = package_of("planar3")
