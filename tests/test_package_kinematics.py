@@ -136,6 +136,26 @@ def test_a_load_asks_joints_for_the_torque_that_holds_it(arm: ModuleType, backen
     assert not as_array(kinematics.load_torque(q, "base", [1.0, 2.0, 3.0])).any()
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_where_an_arm_stands_takes_no_digits_from_how_it_moves(backend: str, tmp_path: Path) -> None:
+    """A thousand kilometres from the world's origin float32 knows places to a tenth of a metre."""
+    near, far = tmp_path / "near.toml", tmp_path / "far.toml"
+    near.write_text(TOOL)
+    far.write_text(TOOL.replace('child = "upper"}', 'child = "upper", xyz = [1e6, -2e6, 0]}'))
+    for path in (near, far):
+        write_package(generate(read_system(path), [backend]), path.with_suffix(""))
+    one, other = (import_package(path.with_suffix("")).load(backend).kinematics for path in (near, far))
+    q, qd = Q.astype("f4"), QD.astype("f4")
+    answers = (
+        lambda k: k.jacobian(q, "tool"),
+        lambda k: k.jacobian_rate(q, qd, "tool"),
+        lambda k: k.load_torque(q, "tool", [1.0, 2.0, 3.0]),
+        lambda k: k.centre_of_mass_jacobian(q),
+    )
+    for call in answers:
+        np.testing.assert_allclose(as_array(call(other)), as_array(call(one)), atol=1e-6)
+
+
 def test_a_loads_torque_has_gradients_and_names_what_is_wrong(arm: ModuleType) -> None:
     kinematics = arm.load("torch").kinematics
     q = torch.from_numpy(Q)
