@@ -343,6 +343,15 @@ def test_targets_that_cannot_be_are_refused_in_one_line(package_of: Packages) ->
             robot.cancel(entries)
 
 
+def test_what_is_added_to_natural_inertia_and_damping_leaves_all_of_them(package_of: Packages) -> None:
+    package = package_of("planar3")
+    robot, natural = package.load("numpy"), package.Natural(plus=0.5)
+    q, qd, push = np.array([[0.1, 0.4, -0.2], [0.7, -0.3, 0.5], [1.0, 2.0, 3.0]])
+    moved = robot.partial_impedance(inertia=natural, damping=natural).acceleration(q, qd, external=push)
+    mass, damping = (m + 0.5 * np.eye(3) for m in (robot.mass_matrix(q), robot.coriolis_matrix(q, qd)))
+    np.testing.assert_allclose(moved, np.linalg.solve(mass, push - damping @ qd), rtol=1e-12)
+
+
 def test_what_is_cancelled_is_told_in_order(package_of: Packages) -> None:
     robot = package_of("planar3").load("numpy")
     told = robot.cancel([(2, 2, 2, 2), ("joint1", None, "joint2", 1), (0, 2, 0, 2)]).entries
