@@ -5,8 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import DATA
-from linkwise import LinkwiseError, check_package, identify
+from conftest import DATA, needs_compiler
+from linkwise import (
+    LinkwiseError,
+    Options,
+    check_package,
+    generate,
+    identify,
+    read_system,
+    write_package,
+)
 from linkwise.analysis.show.poses import poses
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
@@ -62,6 +70,19 @@ def test_the_stick_figure_stands_where_the_robot_does(directory_of: Callable[[st
             turned = np.array(frame.rotation).T @ (np.array(own[:3]) - np.array(frame.translation))
             place = robot.kinematics.pose(q, body.link) @ (*turned, 1.0)
             np.testing.assert_allclose(place[:, :3], centre, atol=1e-13)
+
+
+@needs_compiler
+def test_a_frame_behind_slides_that_follow_curves_is_pulled_to_where_arrays_pull_it(tmp_path: Path) -> None:
+    hips = {f"hip_{turn}": 0.1 for turn in ("adduction", "rotation", "flexion")}
+    system = read_system(DATA / "knee.osim", Options(lock=hips))
+    write_package(generate(system, ["numpy", "native"]), tmp_path / "knee")
+    package = import_package(tmp_path / "knee")
+    known, own = (package.load(backend) for backend in ("numpy", "native"))
+    q, frame = np.array([-0.4, 0.2]), package.FrameImpedance("foot", stiffness=2.0, rows=("x",))
+    target = package.Target(pose=known.kinematics.pose(q + 0.05, "foot"))
+    expected, found = (robot.partial_impedance(frame=frame)(q, q, target) for robot in (known, own))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
 def test_links_behind_curves_are_not_identified(directory_of: Callable[[str], Path], tmp_path: Path) -> None:
