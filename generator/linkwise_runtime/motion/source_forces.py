@@ -60,20 +60,15 @@ def source_forces(
         mass = mass + engine.constant(np.diag(own.armature), q)
     kinds += [-identity * share[..., None, :] for share in shares]
     kinds += [-torque[..., None] for torque in pulls]
-    return SourceForces(mass, beside(kinds), ((links, n), (links,), (3, n), (len(pulls),)))
+    return SourceForces(
+        mass, namespace(mass).concat(kinds, -1), ((links, n), (links,), (3, n), (len(pulls),))
+    )
 
 
 def with_actuators(forces: SourceForces, tau: Numbers, identity: Numbers) -> SourceForces:
     """The same with torques (..., n) of actuators before them."""
-    columns = beside([identity * tau[..., None, :], forces.columns])
+    columns = namespace(tau).concat([identity * tau[..., None, :], forces.columns], -1)
     return SourceForces(forces.mass, columns, ((tau.shape[-1],), *forces.tails))
-
-
-def beside(parts: Sequence[Numbers]) -> Numbers:
-    """Columns (..., n, X) side by side, of samples in one shape."""
-    xp = namespace(parts[0])
-    batch = xp.broadcast_shapes(*(tuple(part.shape[:-2]) for part in parts))
-    return xp.concat([xp.broadcast_to(part, (*batch, *part.shape[-2:])) for part in parts], -1)
 
 
 class OnFrame(NamedTuple):
