@@ -57,6 +57,17 @@ def test_every_back_end_moves_joints_along_their_curves(directory_of: Callable[[
     assert not failed
 
 
+def test_stiffness_along_curves_is_the_slope_of_each_links_torques(
+    directory_of: Callable[[str], Path],
+) -> None:
+    robot = import_package(directory_of(KNEE)).load("numpy")
+    q, qd, qdd = np.random.default_rng(1).uniform(-0.5, 0.5, (3, robot.n))
+    steps = 1e-5 * np.eye(robot.n)
+    slopes = (robot.partial_torque(q + steps, qd, qdd) - robot.partial_torque(q - steps, qd, qdd)) / 2e-5
+    found = robot.position_gradient(q, qd, qdd)
+    np.testing.assert_allclose(np.moveaxis(found, -1, 0), slopes, atol=1e-7 * np.abs(slopes).max())
+
+
 def test_the_stick_figure_stands_where_the_robot_does(directory_of: Callable[[str], Path]) -> None:
     manifest = Manifest.read(directory_of(KNEE))
     robot = import_package(directory_of(KNEE)).load("numpy")

@@ -16,6 +16,7 @@ import pytest
 from linkwise import check_package, generate, read_system, write_package
 from linkwise.emit.backend import BACKENDS
 from linkwise.package.load import import_package
+from linkwise_runtime import version
 from linkwise_runtime.arrays.numpy_backend import NumpyBackend
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.structure import Structure
@@ -325,3 +326,17 @@ def test_a_package_and_its_user_are_typed_strictly(tmp_path: Path) -> None:
     found = [line for line in done.stdout.splitlines() if ": error:" in line]
     assert [line.split(": error:")[0] for line in found] == expected, done.stdout + done.stderr
     assert "numpy.ndarray[tuple[Any, ...], numpy.dtype[Any]]" in done.stdout
+
+
+@pytest.mark.parametrize("made_for", ["0.0.9", "0.2.0", "1.1.0", "0.1.1", "0.1", "none"])
+def test_a_runtime_runs_packages_of_its_own_minor_version_up_to_its_own_patch(
+    made_for: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(version, "VERSION", "0.1.0")
+    version.require("0.1.0")
+    with pytest.raises(
+        ImportError, match=rf"^this package is made for linkwise_runtime {made_for}, but 0\.1\.0"
+    ):
+        version.require(made_for)
+    monkeypatch.setattr(version, "VERSION", "0.1.3")
+    version.require("0.1.2")
