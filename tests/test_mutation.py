@@ -13,7 +13,7 @@ import pytest
 from mutation import rooms, verdicts
 from mutation.decide import Decider
 from mutation.mutants import Mutant, mutants
-from mutation.reach import Map, Reached, digest, digest_of_test, name_at
+from mutation.reach import Map, Reached, digest, digest_of_code, digest_of_test, name_at
 from mutation.rooms import LEFT_OUT, NOT_COUNTED, ROOMS, drawn, rooms_of, sources
 from mutation.tree import ROOT, Ended
 from mutation.verdicts import END, HEAD, MARK, Record, explained
@@ -203,7 +203,7 @@ def test_a_verdict_stays_for_the_same_texts_alone(tmp_path: Path, monkeypatch: p
     again.all_tests = "one more test"
     assert again.decided(one)
     assert not again.decided(other)
-    for changed in ("digest", "digest_of_test"):
+    for changed in ("digest_of_code", "digest_of_test"):
         with monkeypatch.context() as patch:
             patch.setattr(verdicts, changed, lambda *of: "new")
             assert not again.decided(one)
@@ -224,14 +224,30 @@ def test_a_verdict_hangs_on_its_test_and_what_the_file_has_beside_tests(tmp_path
         assert found(text.replace(*other)) != own, other
 
 
+def test_a_verdict_hangs_on_code_and_not_on_what_is_said_of_it(tmp_path: Path) -> None:
+    file = tmp_path / "one.py"
+    text = (
+        '"""Say."""\n\nA = 1\n"""Is said."""\n\n\n'
+        'def f(x):\n    """Say."""\n    return "text" if x else A  # why\n'
+    )
+
+    def found(new: str) -> str:
+        file.write_text(new)
+        return digest_of_code(file)
+
+    own = found(text)
+    for same in (("Say", "Tell"), ("Is said", "Is told"), ("# why", "# therefore"), ("\n\n\n", "\n\n\n\n")):
+        assert found(text.replace(*same)) == own, same
+    for other in (("A = 1", "A = 2"), ('"text"', '"words"'), ("if x", "if not x")):
+        assert found(text.replace(*other)) != own, other
+
+
 def test_what_caught_a_mutant_is_tried_first_once_the_text_is_another(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mutant, files = some_mutants()[0], (tmp_path / "survived.json", tmp_path / "caught.json")
     Record(*files).add(mutant, "killed", f"{BY}[one]")
-    monkeypatch.setattr(
-        verdicts, "digest", lambda path: "new" if path == ROOT / mutant.path else digest(path)
-    )
+    monkeypatch.setattr(verdicts, "digest_of_code", lambda path: "new")
     reach = Map(tmp_path / "reach")
     seconds = {"tests/test_graphs.py::quick": 1.0, BY: 2.0}
     monkeypatch.setattr(reach, "files", {"tests/test_graphs.py": Reached("", seconds, {}, {})})

@@ -66,6 +66,26 @@ def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
+def digest_of_code(path: Path) -> str:
+    """Short hash of what a file does: of Python without docstrings, comments and layout."""
+    return _bare_digest(path.read_text(encoding="utf-8")) if path.suffix == ".py" else digest(path)
+
+
+@cache
+def _bare_digest(text: str) -> str:
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(body := getattr(node, "body", None), list):
+            node.body = [one for one in body if not _is_text(one)]  # type: ignore[attr-defined]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()[:16]
+
+
+def _is_text(node: ast.stmt) -> bool:
+    """Whether a statement is a docstring, or a string that stands below what it tells of."""
+    text = node.value if isinstance(node, ast.Expr) else None
+    return isinstance(text, ast.Constant) and isinstance(text.value, str)
+
+
 def digest_of_test(path: Path, test: str) -> str:
     """Short hash of a test and of what its file has beside tests and imports: other tests may change."""
     text = path.read_text(encoding="utf-8")

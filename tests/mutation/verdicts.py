@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from mutation.mutants import Mutant
-from mutation.reach import digest, digest_of_test, test_of
+from mutation.reach import digest, digest_of_code, digest_of_test, test_of
 from mutation.rooms import ROOMS, drawn, test_files
 from mutation.tree import ROOT
 
@@ -25,7 +25,8 @@ class Verdict:
     """What became of a mutant.
 
     verdict: killed, too slow or survived; by: the test that failed, else how much was run;
-    source: digest of the file that is changed; tests: of the test that failed, else of all together
+    source: digest of the code of the file that is changed; tests: of the test that failed, else of all
+    together
     """
 
     verdict: str
@@ -62,7 +63,7 @@ class Record:
     def decided(self, mutant: Mutant) -> Verdict | None:
         """Verdict on a mutant for the texts as they are."""
         kept = self.verdicts.get(mutant.key)
-        if kept is None or kept.source != digest(ROOT / mutant.path):
+        if kept is None or kept.source != digest_of_code(ROOT / mutant.path):
             return None
         return kept if kept.tests == self.tests(kept.verdict, kept.by) else None
 
@@ -74,14 +75,14 @@ class Record:
     def survived(self, mutant: Mutant) -> set[str]:
         """Files of tests, as they are now, that this mutant of the text as it is has survived before."""
         kept, now = self.verdicts.get(mutant.key), self.suites[self.all_tests]
-        if kept is None or kept.verdict in CAUGHT or kept.source != digest(ROOT / mutant.path):
+        if kept is None or kept.verdict in CAUGHT or kept.source != digest_of_code(ROOT / mutant.path):
             return set()
         return {name for name, text in self.suites.get(kept.tests, {}).items() if now.get(name) == text}
 
     def add(self, mutant: Mutant, verdict: str, by: str) -> None:
         """Keep a verdict."""
         tests = self.tests(verdict, by)
-        self.verdicts[mutant.key] = Verdict(verdict, by, digest(ROOT / mutant.path), tests)
+        self.verdicts[mutant.key] = Verdict(verdict, by, digest_of_code(ROOT / mutant.path), tests)
         self.save()
 
     def save(self) -> None:
