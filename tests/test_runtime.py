@@ -20,6 +20,7 @@ from linkwise_runtime import version
 from linkwise_runtime.arrays.numpy_backend import NumpyBackend
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.structure import Structure
+from linkwise_runtime.targets import FrameImpedance, Natural, Target
 
 torch = pytest.importorskip("torch")
 
@@ -340,3 +341,15 @@ def test_a_runtime_runs_packages_of_its_own_minor_version_up_to_its_own_patch(
         version.require(made_for)
     monkeypatch.setattr(version, "VERSION", "0.1.3")
     version.require("0.1.2")
+
+
+def test_what_targets_leave_open_is_natural_and_at_rest() -> None:
+    assert Natural() == (1.0, None)
+    assert FrameImpedance("hand")[1:] == (
+        Natural(),
+        Natural(),
+        0.0,
+        ("rx", "ry", "rz", "x", "y", "z"),
+        (0.0,) * 3,
+    )
+    assert Target() == (None,) * 6

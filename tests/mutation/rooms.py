@@ -41,6 +41,7 @@ C = (
     "tests/test_native.py",
     "tests/test_impedance_c.py",
     "tests/test_passive_torque.py",
+    "tests/test_curves.py",
     "tests/test_check.py",
     "tests/numeric/test_regressors.py",
 )
