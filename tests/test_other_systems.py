@@ -302,3 +302,15 @@ def test_no_package_is_called_as_a_device_of_windows_is() -> None:
         assert checked_identifier(None, name.upper()) == f"robot_{name}"
         with pytest.raises(LinkwiseError, match="is what a device of Windows is called"):
             checked_identifier(name, "robot")
+
+
+def test_what_a_program_writes_to_a_file_is_read_once_and_after_its_end_alone() -> None:
+    """Both write and read at one place: whoever read before the end would move where the rest is written."""
+    said = bytearray()
+    with Windows().outlet() as stream:
+        stream.write(b"half")
+        Windows().hear(stream, said, ended=False)
+        stream.write(b" and whole")
+        Windows().hear(stream, said, ended=True)
+        Windows().hear(stream, said, ended=True)
+    assert said == b"half and whole"

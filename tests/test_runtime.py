@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from linkwise import check_package, generate, read_system, write_package
 from linkwise.emit.backend import BACKENDS
+from linkwise.own_runtime import require_own_runtime
 from linkwise.package.load import import_package
 from linkwise_runtime import version
 from linkwise_runtime.arrays.numpy_backend import NumpyBackend
@@ -353,3 +354,10 @@ def test_what_targets_leave_open_is_natural_and_at_rest() -> None:
         (0.0,) * 3,
     )
     assert Target() == (None,) * 6
+
+
+def test_another_runtime_in_the_place_of_linkwises_own_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "10.1.0")
+    told = f"^linkwise 10.1.0 finds linkwise_runtime {version.VERSION} in its place; install linkwise again"
+    with pytest.raises(ImportError, match=told):
+        require_own_runtime.__wrapped__()

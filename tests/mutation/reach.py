@@ -140,9 +140,11 @@ class Map:
                 names = of_line[file] or set()
             elif function and is_known:
                 names = set(here.get(function, ()))
-            else:  # what runs at import may matter to all that use the module
+            elif function:
                 names = {name for found in here.values() for name in found if name}
-            if not (names or (here and not function)):
+            else:  # what runs at import may matter to all that use the module
+                names = {""} if here else set()
+            if not names:
                 continue
             ranked = sorted(reached.seconds.items(), key=lambda item: item[1])
             close = [item for item in ranked if item[0] in names or "" in names]
@@ -155,6 +157,8 @@ class Map:
         def joined(part: list[tuple[float, list[tuple[str, float]]]]) -> list[tuple[str, float]]:
             return [item for _, group in sorted(part, key=lambda pair: pair[0]) for item in group]
 
+        if not function:
+            return sorted((item for _, group in near for item in group), key=lambda item: item[1]), []
         return joined(near), joined(far)
 
 
