@@ -137,6 +137,15 @@ def test_a_load_asks_joints_for_the_torque_that_holds_it(arm: ModuleType, backen
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
+def test_where_a_pose_is_written_need_not_be_contiguous(arm: ModuleType, backend: str) -> None:
+    kinematics = arm.load(backend).kinematics
+    pose = kinematics.pose(Q, "tool")
+    out = torch.zeros(4, 4, dtype=torch.float64).T if torch.is_tensor(pose) else np.zeros((4, 4)).T
+    assert kinematics.pose(torch.from_numpy(Q) if torch.is_tensor(pose) else Q, "tool", out=out) is out
+    np.testing.assert_array_equal(as_array(out), as_array(pose))
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_where_an_arm_stands_takes_no_digits_from_how_it_moves(backend: str, tmp_path: Path) -> None:
     """A thousand kilometres from the world's origin float32 knows places to a tenth of a metre."""
     near, far = tmp_path / "near.toml", tmp_path / "far.toml"

@@ -399,3 +399,17 @@ def test_an_arm_far_from_another_one_keeps_its_digits(far: str, tmp_path: Path) 
         assert relative_error(one, other) <= 1e-14
     for one, other in zip(single, exact, strict=True):
         assert relative_error(one, other) <= 3e-6
+
+
+@pytest.mark.parametrize("backend", ["numpy", "torch"])
+@pytest.mark.parametrize("field", ["masses", "centres", "inertias"])
+def test_of_bodies_one_quantity_alone_may_differ_by_sample(
+    backend: str, field: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    package = package_of("puma560")
+    own, q = package.bodies(), np.random.default_rng(3).uniform(-1.0, 1.0, (3, 6))
+    several = np.stack([scale * getattr(own, field) for scale in (1.0, 1.1, 0.9)])
+    found = package.load(backend, bodies=own._replace(**{field: several})).partial_torque(q, q, q)
+    for k, one in enumerate(several):
+        alone = package.load(backend, bodies=own._replace(**{field: one}))
+        assert relative_error(np.asarray(found[k]), np.asarray(alone.partial_torque(*[q[k]] * 3))) <= 1e-13
