@@ -330,18 +330,18 @@ def test_a_package_and_its_user_are_typed_strictly(tmp_path: Path) -> None:
     assert "numpy.ndarray[tuple[Any, ...], numpy.dtype[Any]]" in done.stdout
 
 
-@pytest.mark.parametrize("made_for", ["0.0.9", "0.2.0", "1.1.0", "0.1.1", "0.1", "none"])
+@pytest.mark.parametrize("made_for", ["4.2.9", "4.4.0", "5.3.0", "4.3.1", "4.3", "none"])
 def test_a_runtime_runs_packages_of_its_own_minor_version_up_to_its_own_patch(
     made_for: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(version, "VERSION", "0.1.0")
-    version.require("0.1.0")
+    monkeypatch.setattr(version, "VERSION", "4.3.0")
+    version.require("4.3.0")
     with pytest.raises(
-        ImportError, match=rf"^this package is made for linkwise_runtime {made_for}, but 0\.1\.0"
+        ImportError, match=rf"^this package is made for linkwise_runtime {made_for}, but 4\.3\.0"
     ):
         version.require(made_for)
-    monkeypatch.setattr(version, "VERSION", "0.1.3")
-    version.require("0.1.2")
+    monkeypatch.setattr(version, "VERSION", "4.3.3")
+    version.require("4.3.2")
 
 
 def test_what_targets_leave_open_is_natural_and_at_rest() -> None:
