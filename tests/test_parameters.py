@@ -16,6 +16,7 @@ from linkwise.package.load import import_package
 from linkwise.robot import mass
 from linkwise.robot.description import Body
 from linkwise_runtime import parameter_values
+from linkwise_runtime.parameter_values import REASONS, faults
 from urdf_text import chain, joint, link, robot
 
 torch = pytest.importorskip("torch")
@@ -319,3 +320,22 @@ def test_a_package_judges_bodies_as_reading_does() -> None:
         assert words in fault
         verdicts.append(words)
     assert set(verdicts) == {"", "negative mass", "not positive", "triangle"}
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ((1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0), ""),
+        ((np.nan, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0), "a mass or an inertia that is NaN or infinite"),
+        ((1.0, 1.0, 1.0, np.inf, 0.0, 0.0, 0.0), "a mass or an inertia that is NaN or infinite"),
+        ((-1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0), "a negative mass"),
+        (
+            (1.0, 1.0, 1.0, 1.0, 2.0, 0.0, 0.0),
+            "an inertia that is not positive: a principal moment is negative",
+        ),
+        ((1.0, 1.0, 1.0, 3.0, 0.0, 0.0, 0.0), "an inertia that breaks the triangle inequality"),
+    ],
+)
+def test_what_no_body_has_is_told_by_its_reason(values: tuple[float, ...], reason: str) -> None:
+    found = REASONS[int(faults(np.array(values)))]
+    assert found == reason or (reason and found.startswith(reason))
