@@ -500,3 +500,40 @@ def test_threads_are_set_where_there_are_some_alone(package_of: Callable[[str], 
     for backend in ("numpy", "torch"):
         with pytest.raises(AttributeError, match=f"^{backend} has no threads of its own to set; native has$"):
             package_of("planar3").load(backend).backend.threads = 2
+
+
+@pytest.mark.parametrize("kind", ["float32", "float64", "int64"])
+@pytest.mark.parametrize("given", ["list", "array", "tensor"])
+def test_a_compiler_takes_what_stands_beside_motion_as_python_does(
+    kind: str, given: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    kinematics = package_of("planar3").load("torch").kinematics
+    frame, q = kinematics.frames[-1], torch.tensor([1, 2, 3]).to(getattr(torch, kind))
+    point: Any = np.array([0.1, 0.2, 0.3])
+    point = {"list": point.tolist(), "array": point, "tensor": torch.from_numpy(point)}[given]
+    expected = kinematics.jacobian(q, frame, point)
+    kinematics.jacobian(q.float(), frame)  # no compiler traces how tables are made
+    torch._dynamo.reset()
+    found = torch.compile(lambda q: kinematics.jacobian(q, frame, point), backend="eager")(q)
+    assert found.dtype == expected.dtype
+    torch.testing.assert_close(found, expected)
+
+
+@pytest.mark.parametrize("batch", [(3,), (2, 3)])
+@pytest.mark.parametrize("field", ["masses", "centres", "inertias"])
+def test_symbols_of_bodies_of_which_one_quantity_differs_by_sample_are_each_ones_own(
+    field: str,
+    batch: tuple[int, ...],
+    package_of: Callable[[str], ModuleType],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    package = package_of("planar3")
+    draw, own = np.random.default_rng(1), package.bodies()
+    q, scale = draw.uniform(-1.0, 1.0, (*batch, 3)), draw.uniform(0.9, 1.1, batch)
+    one = getattr(own, field)
+    several = own._replace(**{field: scale.reshape(*batch, *[1] * one.ndim) * one})
+    monkeypatch.setattr("linkwise_runtime.answers.answers.AT_ONCE", 100)  # as many samples, and one at a time
+    found = package.load("numpy", bodies=several).christoffel(q)
+    for at in np.ndindex(batch):
+        alone = package.load("numpy", bodies=own._replace(**{field: scale[at] * one}))
+        np.testing.assert_allclose(found[at], alone.christoffel(q[at]), atol=1e-13)

@@ -22,11 +22,14 @@ AT_ONCE = 1 << 22
 Shapes = tuple[tuple[int, ...], ...]
 
 
-def answer_shapes(structure: Structure) -> dict[str, Shapes]:
-    """Shapes for one sample of each call's results, by its key; without those that hang on what is asked."""
+def answer_shapes(structure: Structure, frames: int = 0) -> dict[str, Shapes]:
+    """Shapes for one sample of each call's results, by its key; without those that hang on what is asked.
+
+    frames: how many there are, where that is known
+    """
     axes = axes_of(structure.joint_names, structure.joint_units, structure.link_names)
     sizes = {axis: len(named.names) for axis, named in axes.items()}
-    sizes |= dict(zip(PACKED, structure.sizes, strict=True))
+    sizes |= dict(zip(PACKED, structure.sizes, strict=True)) | ({"frame": frames} if frames else {})
     return {
         key: tuple(tuple(sizes[axis] for axis in quantity.axes) for quantity in row.answers)
         for key, row in CALLS.items()

@@ -76,7 +76,7 @@ class ArrayBackend(PackedEngine):
         """Shape of the samples that have a parameter or a body each; () where they are the same for all."""
         shapes = [shape_of(value) for value in self.parameters.values()]
         if self.bodies is not None:
-            shapes.append(shape_of(next(iter(self.bodies)))[:-1])
+            shapes += [shape_of(a)[: -1 - own] for own, a in enumerate(self.bodies)]
         try:
             return np.broadcast_shapes(*shapes)
         except ValueError:  # which the first call tells by name

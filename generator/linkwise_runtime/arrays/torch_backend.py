@@ -32,6 +32,7 @@ from .array_backend import ArrayBackend
 from .array_kernels import Crossing
 from .torch_modules import CallModule, ReloadableRobot
 
+KINDS = {"float32": torch.float32, "float64": torch.float64}
 FLOATS = ({torch.float32}, {torch.float64})
 CROSSINGS = {
     "decomposition": Crossing(164, ((164, 16), (1016, 256), (3279, 512), (11719, 1024))),
@@ -85,12 +86,13 @@ class TorchBackend(ArrayBackend):
         self.check_untraced()
         given = as_given(named, beside)
         check_dense(given)
-        tensors = [value for value in given.values() if torch.is_tensor(value)]
+        # By its type: a compiler takes an array for a tensor, whose device is none of torch's.
+        tensors = [value for value in given.values() if isinstance(value, Tensor)]
         if len({t.device for t in tensors}) > 1:
             raise TypeError(f"{', '.join(given)} lie on different devices; move them to one")
         read = cast("Mapping[str, Tensor]", given)
         if len(tensors) < len(given) or {t.dtype for t in tensors} not in FLOATS:
-            read = _tensors(given, tensors)
+            read = _tensors(given)
         check_axes(read, n, self.structure.file_joints, beside)
         batches = [samples_of(name, a, beside) for name, a in read.items()]
         try:
@@ -257,20 +259,18 @@ def _tensor(name: str, value: object) -> Numbers:
     return value if torch.is_tensor(value) else as_array(name, value)
 
 
-def _tensors(named: Mapping[str, object], tensors: Sequence[Tensor]) -> dict[str, Tensor]:
-    """Numbers of any kind as tensors of one dtype; arrays are copied, as a gradient may need them later.
-
-    tensors: those among them
-    """
-    device = tensors[0].device if tensors else torch.device("cpu")
-    if tensors and torch.compiler.is_dynamo_compiling():  # which knows no dtypes of arrays
-        wide = torch.float64 if any(t.dtype == torch.float64 for t in tensors) else torch.float32
-        return {k: torch.as_tensor(value, dtype=wide, device=device) for k, value in named.items()}
-    read = {k: value if torch.is_tensor(value) else as_array(k, value) for k, value in named.items()}
+def _tensors(named: Mapping[str, object]) -> dict[str, Tensor]:
+    """Numbers of any kind as tensors of one dtype; arrays are copied, as a gradient may need them later."""
+    own = {k: value for k, value in named.items() if isinstance(value, Tensor)}
+    device = next(iter(own.values())).device if own else torch.device("cpu")
+    if own and torch.compiler.is_dynamo_compiling():  # which knows no dtypes of arrays
+        own |= {k: torch.as_tensor(a) for k, a in named.items() if isinstance(a, np.ndarray)}
+        dtype = KINDS[precision(own, own)]
+        return {k: torch.as_tensor(value, dtype=dtype, device=device) for k, value in named.items()}
+    read = {k: own[k] if k in own else as_array(k, value) for k, value in named.items()}
     kind = precision(named, read)
-    dtype = torch.float32 if kind == "float32" else torch.float64
     return {
-        k: a.to(dtype)
+        k: a.to(KINDS[kind])
         if torch.is_tensor(a)
         else torch.from_numpy(np.array(a, dtype=kind, order="C")).to(device)
         for k, a in read.items()

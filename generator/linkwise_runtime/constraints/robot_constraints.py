@@ -89,7 +89,7 @@ class Constraints(Generic[Array]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled or copied, they are made again by the robot, which is copied with them."""
-        return _again, (self._robot, self._made)
+        return made_again, (self._robot, "constrained", self._made)
 
     def are_of(self, robot: object) -> bool:
         """Whether they were made by this robot, on this back end."""
@@ -335,8 +335,9 @@ class Constraints(Generic[Array]):
         return place.found, engine.answers, (at, moved, qdd_there)
 
 
-def _again(robot: Any, made: tuple[object, ...]) -> object:
-    return robot.constrained(*made)
+def made_again(robot: object, call: str, arguments: tuple[object, ...]) -> object:
+    """What a robot's method makes: a copy's arguments are copied with the robot."""
+    return getattr(robot, call)(*arguments)
 
 
 def constraints_of(

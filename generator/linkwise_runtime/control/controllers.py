@@ -8,7 +8,7 @@ import numpy as np
 from ..arguments import NOTHING, Beside
 from ..arrays.array_backend import ArrayBackend
 from ..chosen_names import known_kind
-from ..constraints.robot_constraints import TiedRobot
+from ..constraints.robot_constraints import TiedRobot, made_again
 from ..interface import Array, Numbers
 from ..packed_engine import TorqueOfOne
 from ..targets import FrameImpedance, Target
@@ -52,7 +52,7 @@ class Controller:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled or copied, it is made again by the robot, which is copied with it."""
         call, arguments = self._made
-        return _again, (self._robot, call, arguments)
+        return made_again, (self._robot, call, arguments)
 
     def _about(self) -> str:
         """The robot, and the frame that is controlled."""
@@ -289,10 +289,6 @@ def cancellation(
     names = structure.joint_names, structure.link_names
     named = tuple((names[0][i], names[1][j], names[0][k], m) for i, j, k, m in chosen)
     return Cancellation(robot, targets, named, ("cancel", (named, passive, friction_width)))
-
-
-def _again(robot: object, call: str, arguments: tuple[object, ...]) -> object:
-    return getattr(robot, call)(*arguments)
 
 
 def _check_free(robot: ControlledRobot) -> None:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
+from ..answers.answers import answer_shapes
 from ..answers.namespace import side_by_side
 from ..arguments import Beside
 from ..chosen_names import choice, known_as, short, whole_number
@@ -184,23 +185,11 @@ class FrameAnswers:
         self.names = tuple(frame.name for frame in self.tree.frames)
         self._own: dict[object, OwnNumbers] = {}
         self._tables: dict[object, FrameTables] = {}
-        n = engine.structure.n
-        self._shapes = {
-            "pose": (4, 4),
-            "poses": (len(self.names), 4, 4),
-            "jacobian": (6, n),
-            "jacobian_rate": (6, n),
-            "velocity": (6,),
-            "acceleration": (6,),
-            "load_torque": (n,),
-            "centre_of_mass": (3,),
-            "centre_of_mass_jacobian": (3, n),
-            "centre_of_mass_jacobian_rate": (3, n),
-        }
+        self._shapes = answer_shapes(engine.structure, len(self.names))
 
     def shape(self, call: str) -> tuple[int, ...]:
         """Of a call's answer for one sample."""
-        return self._shapes[call]
+        return self._shapes[f"kinematics.{call}"][0]
 
     def answer(
         self, call: str, motion: Sequence[Numbers], part: object = ALL, vectors: Vectors = NONE
@@ -216,7 +205,7 @@ class FrameAnswers:
                 return found
         batch = tuple(motion[0].shape[:-1])
         asked = self.asked(self._tables, part, self._listed, motion, vectors)
-        shape = self._shapes[call]
+        shape = self.shape(call)
         values = in_pieces(self.engine, motion, asked, ANSWERS[call], math.prod(shape))
         return side_by_side(values.reshape(*batch, *shape))
 

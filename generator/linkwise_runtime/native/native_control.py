@@ -62,16 +62,7 @@ class ControlCalls:
     """C functions that take one sample, each on memory of its own."""
 
     def __init__(self, calls: NativeCalls) -> None:
-        n = calls.structure.n
         self._calls = calls
-        self._shapes = {
-            "pose": (4, 4),
-            "jacobian": (6, n),
-            "jacobian_rate": (6, n),
-            "mass_matrix": (n, n),
-            "forward_dynamics": (n,),
-            "forward_dynamics_of_links": (n,),
-        }
         self._of_one = OneSamplePool(self._one_sample)
 
     def answer(
@@ -96,13 +87,14 @@ class ControlCalls:
         """A call, in whose memory a point stands before the motion."""
         call, frame, at_origin, kind = key
         about, n = CONTROL[call], self._calls.structure.n
+        (shape,) = self._calls.shapes[call if frame is None else f"kinematics.{call}"]
         memory = np.empty((0 if at_origin else 3) + about.motion * n, kind)
         motion = memory[memory.size - about.motion * n :].reshape(-1, n)
         told: list[object] = [] if frame is None else [ctypes.c_int(frame)]
         if about.point:
             told.append(None if at_origin else memory[:3])
         found = symbol(self._calls.sources, call, kind.str[1:])
-        given, result = (*told, *motion, self._calls.constants(kind)), np.empty(self._shapes[call], kind)
+        given, result = (*told, *motion, self._calls.constants(kind)), np.empty(shape, kind)
         return one_sample_call(found, call.startswith("forward_dynamics"), given, memory, [result])
 
 
