@@ -537,3 +537,19 @@ def test_symbols_of_bodies_of_which_one_quantity_differs_by_sample_are_each_ones
     for at in np.ndindex(batch):
         alone = package.load("numpy", bodies=own._replace(**{field: scale[at] * one}))
         np.testing.assert_allclose(found[at], alone.christoffel(q[at]), atol=1e-13)
+
+
+@pytest.mark.parametrize(("samples", "batch"), [((3,), ()), ((3, 3), (3,)), ((3, 1), (2,))])
+def test_symbols_of_bodies_of_other_samples_than_the_motions_are_refused(
+    samples: tuple[int, ...], batch: tuple[int, ...], package_of: Callable[[str], ModuleType]
+) -> None:
+    """Three unit velocities stand before the samples: so many bodies would be laid along them."""
+    package = package_of("planar3")
+    own = package.bodies()
+    robot = package.load(
+        "numpy", kernel="rule", bodies=own._replace(masses=np.ones((*samples, 1)) * own.masses)
+    )
+    told = re.escape(f"the motion has samples of shape {batch}")
+    for call in (robot.mass_matrix, robot.christoffel):
+        with pytest.raises(ValueError, match=told):
+            call(np.ones((*batch, 3)))

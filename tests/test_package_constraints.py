@@ -456,6 +456,7 @@ def test_a_position_where_all_bars_lie_in_line_is_singular(tmp_path: Path) -> No
         ({"independent": "crank"}, "independent is 'crank'; give a list of joints", TypeError),
         ({"contacts": ["a"]}, "contacts[0] is 'a'; give a Contact", TypeError),
         ({"at": [0.0, 0.0]}, "at has shape (2,); give one position of shape (3,)", ValueError),
+        ({"at": [0.0, np.inf, 0.0]}, "at is inf for joint 'knee'", ValueError),
         ({"tolerance": -1.0}, "tolerance is -1.0; give a number of m and rad, 0 or more", ValueError),
     ],
 )

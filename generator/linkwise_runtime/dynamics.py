@@ -537,7 +537,8 @@ class Dynamics:
         """How the robot moves from q and qd on, (..., n), at the instants `time`, (T,), in s.
 
         tau: what the actuators give: nothing unless given; (..., n), or a function of (t, q, qd) that is
-        called wherever the method evaluates, also between steps
+        called wherever the method evaluates, also between steps; what functions give is taken in the library
+        and the precision of q and qd, and is of no more samples
         loads: as in `induced_accelerations`, or a function of (t, q, qd) that gives them
         passive: as in `forward_dynamics`
         step: of RK4 the longest, in s; from instant to instant unless given; of the others a bound

@@ -225,6 +225,8 @@ class Answers:
         if hidden(q):
             return (side_by_side(self._of_units(q, units, made)),)
         if self._engine.samples:  # samples stay with their numbers
+            # What is not of the motion's samples is refused here: the unit velocities below are samples too.
+            self._engine.torque(q, self._rest(q), self._rest(q))
             rates = max(1, AT_ONCE // (each * max(1, math.prod(batch))))
             return (side_by_side(_joined([self._of_units(q, u, made) for u in _pieces(units, rates)], -1)),)
         samples, rates = max(1, AT_ONCE // (n * each)), max(1, AT_ONCE // each)

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import as_array
+from ..arguments import as_array, check_numbers
 from ..chosen_names import listed, short
 from ..rule.joint_tree import JointTree
 from ..structure import Structure
@@ -117,5 +117,6 @@ class ChosenConstraints:
         found = as_array("at", at)
         if found.shape != (self._structure.n,) or found.dtype.kind not in "fiu":
             raise ValueError(f"at has shape {found.shape}; give one position of shape ({self._structure.n},)")
+        check_numbers({"at": found}, self._structure.joint_names)
         position: NDArray[np.float64] = found.astype(float)
         return position
