@@ -1,7 +1,7 @@
 """Partial impedance of the emitted C through the functions of its header, and its formulas in NumPy."""
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,11 @@ point."""
 class ImpedanceInC:
     """Functions of a package, compiled with both number types; `parameters` are those at run time."""
 
-    def __init__(self, directory: Path, target: Path, parameters: Any = ()) -> None:
+    def __init__(
+        self, directory: Path, target: Path, parameters: Any = (), flags: Sequence[str] = ()
+    ) -> None:
         self.name, self.parameters = name_of(directory), parameters
-        compile_library(directory, target)
+        compile_library(directory, target, ("gcc", "-std=c99", *flags))
         self.library = ctypes.CDLL(str(target))
         tree = Manifest.read(directory).tree
         self.frames = [frame.name for frame in tree.frames] if tree else []

@@ -21,7 +21,7 @@ from linkwise_runtime.kinematics.robot_kinematics import Kinematics
 from linkwise_runtime.quantities import AppliedLoad
 from linkwise_runtime.robot_axes import axes_of, tied_axes
 
-pytest.importorskip("torch")
+torch = pytest.importorskip("torch")
 
 TIED = """schema = 1
 name = "press"
@@ -66,6 +66,7 @@ KINDS = [
 INSTANTS, PARTS = [0.0, 0.01, 0.02], 7
 """Of `simulate`; and the entries of an axis that any torques may have."""
 on_every_back_end = pytest.mark.parametrize(("backend", "tensors"), KINDS)
+on_a_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 key_of = attrgetter("key")
 for_every_row = pytest.mark.parametrize("row", CALLS.values(), ids=key_of)
 Load = Callable[..., Any]
@@ -135,8 +136,6 @@ def cast_to(value: Any, tensors: bool, dtype: str = "float64") -> Any:
         return [AppliedLoad("hand", *(cast_to(a, tensors, dtype) for a in value[0][1:])) for _ in value]
     if not isinstance(value, np.ndarray):
         return value
-    import torch
-
     array = value.astype(dtype)
     return torch.from_numpy(array) if tensors else array
 
@@ -255,6 +254,87 @@ def test_out_is_where_the_answer_goes(row: Call, backend: str, tensors: bool, lo
         assert [id(value) for value in found] == [id(place) for place in places]
         for place, value in zip(places, expected, strict=True):
             np.testing.assert_allclose(np.asarray(place), np.asarray(value), rtol=1e-12, atol=1e-12)
+
+
+def moved(asked: Mapping[str, Any], dtype: str = "float64") -> dict[str, Any]:
+    """What a row is given, on a GPU; frames, masks and instants stay what they are."""
+
+    def there(value: Any) -> Any:
+        if isinstance(value, list) and value and isinstance(value[0], AppliedLoad):
+            return [AppliedLoad(load.frame, *(there(a) for a in load[1:])) for load in value]
+        return value.cuda() if hasattr(value, "cuda") else value
+
+    return {name: there(value) for name, value in taken(asked, True, dtype).items()}
+
+
+@on_a_gpu
+@pytest.mark.parametrize("backend", ["torch", "autograd"])
+@for_every_row
+def test_tensors_on_a_gpu_are_answered_there_with_gradients(row: Call, backend: str, load: Load) -> None:
+    if backend in row.lacking:
+        return
+    robot = load(of(row), backend)
+    for dtype, limit in (("float64", 1e-11), ("float32", 2e-4)):
+        for batch in ((), (2, 3)):
+            asked = given(load, row, batch)
+            expected = answered(load(of(row)), row, taken(taken(asked, False, dtype), False))
+            found = answered(robot, row, moved(asked, dtype))
+            for quantity, value, right in zip(row.answers, found, expected, strict=True):
+                assert (value.device.type, str(value.dtype)) == ("cuda", f"torch.{dtype}"), quantity.name
+                bound = limit * np.abs(right).max(initial=1.0)
+                np.testing.assert_allclose(value.cpu().numpy(), right, rtol=0, atol=bound)
+    slopes = []
+    for given_to in (moved(given(load, row, (2,))), taken(given(load, row, (2,)), True)):
+        q = given_to["q"].requires_grad_()
+        total = sum(value.sum() for value in answered(robot, row, given_to) if value.requires_grad)
+        slopes.append(q.grad if not hasattr(total, "backward") else total.backward() or q.grad)
+    if slopes[1] is not None:
+        assert slopes[0].device.type == "cuda"
+        np.testing.assert_allclose(slopes[0].cpu().numpy(), slopes[1].numpy(), rtol=1e-9, atol=1e-9)
+
+
+@on_a_gpu
+@pytest.mark.parametrize("row", [row for row in CALLS.values() if row.out], ids=key_of)
+def test_out_on_a_gpu_is_filled_and_elsewhere_refused(row: Call, load: Load) -> None:
+    robot, asked = load(of(row), "torch"), moved(given(load, row, (3,)))
+    expected = answered(robot, row, asked)
+    for where in ("cuda", "cpu"):
+        places = [torch.full_like(value, torch.nan, device=where) for value in expected]
+        out = places if row.record else places[0]
+        if where == "cpu":
+            with pytest.raises(TypeError, match="lies on cpu; the answer lies on cuda"):
+                answered(robot, row, asked, out=out)
+            continue
+        found = answered(robot, row, asked, out=out)
+        assert [id(value) for value in found] == [id(place) for place in places]
+        assert all(torch.equal(place, value) for place, value in zip(places, expected, strict=True))
+
+
+@on_a_gpu
+def test_what_does_not_lie_on_the_gpu_of_the_motion_is_told(load: Load, package_at: Load) -> None:
+    row = CALLS["partial_torque"]
+    asked, here = moved(given(load, row, (3,))), taken(given(load, row, (3,)), True)
+    with pytest.raises(TypeError, match="lie on different devices; move them to one"):
+        answered(load("tied", "torch"), row, {**asked, "qd": here["qd"]})
+    with pytest.raises(TypeError, match="cuda"):
+        answered(load("tied", "numpy"), row, asked)
+    expected = answered(load("tied", "torch"), row, here)[0]
+    arrays = {**taken(given(load, row, (3,)), False), "q": asked["q"]}
+    inertias = {"I": torch.tensor([0.2, 0.3, 0.4], dtype=torch.float64).cuda()}
+    of_samples = import_package(package_at("tied")).load("torch", parameters=inertias)
+    for found in (answered(load("tied", "torch"), row, arrays)[0], answered(of_samples, row, asked)[0]):
+        assert found.device.type == "cuda"
+        torch.testing.assert_close(found[0].cpu(), expected[0], rtol=1e-12, atol=1e-12)
+
+
+@on_a_gpu
+@pytest.mark.filterwarnings("ignore:.torch.jit:DeprecationWarning")
+def test_compiled_calls_answer_on_a_gpu(load: Load) -> None:
+    call = load("free", "torch").partial_torque
+    motion = [torch.linspace(-1.0, 1.0, 256, dtype=torch.float64).view(64, 4).cuda() + m for m in range(3)]
+    found = torch.compile(call)(*motion)
+    assert found.device.type == "cuda"
+    torch.testing.assert_close(found, call(*motion), rtol=1e-11, atol=1e-11)
 
 
 def same(some: tuple[Any, ...], others: tuple[Any, ...]) -> bool:

@@ -274,6 +274,22 @@ def test_a_frame_half_a_turn_away_is_told(dtype: Any, robots: Any) -> None:
             np.testing.assert_allclose(found, tau, rtol=0, atol=100 * PRECISION[dtype])
 
 
+def test_equations_of_nine_joints_stay_within_their_arrays(tmp_path: Path) -> None:
+    """Their rows have 15 numbers, which are filled up to 16; too large an index ends the process."""
+    system = read_system("planar9")
+    write_package(generate(system, ["c", "numpy"], kernel="loops"), tmp_path / "planar9")
+    checked = ("-fsanitize=bounds", "-fsanitize-undefined-trap-on-error")
+    c = ImpedanceInC(tmp_path / "planar9", tmp_path / "planar9.so", flags=checked)
+    model = import_package(tmp_path / "planar9").load("numpy")
+    q, qd = np.linspace(0.1, 0.9, 9), np.linspace(-0.5, 0.5, 9)
+    given = ({"rows": [3, 4]}, (model.kinematics.pose(q, 9), None, None), {}, (None, None, None), None)
+    refused, found = c.frame(q, qd, model.kinematics.frames[9], *given)
+    assert refused == 0
+    np.testing.assert_allclose(
+        found, frame_formula(model, q, qd, model.kinematics.frames[9], *given)[1], rtol=1e-11
+    )
+
+
 def test_an_arm_of_parallel_slides_has_one_motion_too_many(tmp_path: Path) -> None:
     """Its mass matrix is regular, and its hand moves along one axis by two of them."""
     slides = [joint("ab"[k] + "bc"[k], "ab"[k], "bc"[k], type="prismatic", rpy="0 0 0") for k in (0, 1)]

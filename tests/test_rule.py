@@ -26,12 +26,16 @@ def motion_of(backend: str, n: int, *batch: int, dtype: str = "float64") -> list
     return list(arrays) if backend == "numpy" else [torch.from_numpy(a) for a in arrays]
 
 
-FEW = pytest.mark.parametrize("few", [True, False], ids=["in matrices", "samples innermost"])
+WAYS = {"in matrices": (True, False), "samples innermost": (False, False), "fused": (False, True)}
+"""How the rule computes: for few samples, for many, and for a compiler, here without one."""
+in_every_way = pytest.mark.parametrize("way", WAYS)
 
 
-def told(robot: Any, few: bool, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The robot, computing as it does for few samples or for many."""
+def told(robot: Any, way: str, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The robot, computing in a way of these."""
+    few, fuses = WAYS[way]
     monkeypatch.setattr(type(robot.backend), "few", lambda self, samples, links: few)
+    monkeypatch.setattr(type(robot.backend), "fuses", fuses)
     return robot
 
 
@@ -47,9 +51,9 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
 
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("each", [False, True])
-@FEW
+@in_every_way
 def test_the_rule_takes_parameters_one_for_all_or_one_a_sample(
-    backend: str, each: bool, few: bool, arm: ModuleType, monkeypatch: pytest.MonkeyPatch
+    backend: str, each: bool, way: str, arm: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     share = np.array([0.9, 1.0, 1.05]) if each else np.float64(1.05)
     given = {name: value * share for name, value in arm.parameters.items()}
@@ -57,16 +61,16 @@ def test_the_rule_takes_parameters_one_for_all_or_one_a_sample(
     rule, straight = (
         arm.load(backend, given, allow_unphysical=True, kernel=kernel) for kernel in ("rule", "straight")
     )
-    told(rule, few, monkeypatch)
+    told(rule, way, monkeypatch)
     for call in CALLS:
         assert relative_error(getattr(rule, call)(*motion), getattr(straight, call)(*motion)) <= 1e-14
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("batch", [(0,), (2, 0)], ids=str)
-@FEW
+@in_every_way
 def test_parameters_and_bodies_may_be_those_of_no_samples(
-    backend: str, batch: tuple[int, ...], few: bool, arm: ModuleType, monkeypatch: pytest.MonkeyPatch
+    backend: str, batch: tuple[int, ...], way: str, arm: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     motion, own = motion_of(backend, 3, *batch), arm.bodies()
     none = [np.broadcast_to(a, (*batch, *a.shape)) for a in own]
@@ -75,7 +79,7 @@ def test_parameters_and_bodies_may_be_those_of_no_samples(
     each = [none, *([*own[:i], none[i], *own[i + 1 :]] for i in range(len(BODIES)))]
     robots += [arm.load(backend, bodies=arm.Bodies(*bodies)) for bodies in each]
     for robot in robots:
-        told(robot, few, monkeypatch)
+        told(robot, way, monkeypatch)
         for call in CALLS:
             value, expected = getattr(robot, call)(*motion), getattr(arm.load(backend), call)(*motion)
             assert (value.shape, value.dtype) == (expected.shape, expected.dtype)
@@ -95,7 +99,7 @@ def test_large_batches_in_pieces_are_what_single_samples_are(
     else:
         given = {name: value * np.linspace(0.9, 1.05, 23) for name, value in arm.parameters.items()}
         robot = arm.load(backend, given, allow_unphysical=True, kernel="rule")
-    told(robot, False, monkeypatch)
+    told(robot, "samples innermost", monkeypatch)
     q, qd, qdd = motion_of(backend, robot.n, 23)
 
     def answers() -> list[Any]:
@@ -112,17 +116,17 @@ def test_large_batches_in_pieces_are_what_single_samples_are(
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("batch", [(), (2, 3), (0,)])
-@FEW
+@in_every_way
 def test_the_rule_keeps_dtype_and_shape(
     backend: str,
     dtype: str,
     batch: tuple[int, ...],
-    few: bool,
+    way: str,
     package_of: Callable[[str], ModuleType],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     robot, other = (package_of("puma560").load(backend, kernel=kernel) for kernel in ("rule", "straight"))
-    told(robot, few, monkeypatch)
+    told(robot, way, monkeypatch)
     motion = motion_of(backend, 6, *batch, dtype=dtype)
     for call in ("partial_torque", "position_gradient"):
         value, expected = getattr(robot, call)(*motion), getattr(other, call)(*motion)
@@ -165,12 +169,12 @@ def test_slopes_by_bodies_are_pinocchios_regressor(package_of: Callable[[str], M
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-@FEW
+@in_every_way
 def test_bodies_may_differ_from_sample_to_sample(
-    backend: str, few: bool, package_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
+    backend: str, way: str, package_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = package_of("torso")
-    motion = motion_of(backend, told(package.load(backend), few, monkeypatch).n, 4)
+    motion = motion_of(backend, told(package.load(backend), way, monkeypatch).n, 4)
     scale = np.array([0.5, 1.0, 2.0, 3.0])
     own = package.bodies()
     bodies = package.Bodies(

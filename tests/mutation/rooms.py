@@ -44,6 +44,7 @@ C = (
     "tests/test_curves.py",
     "tests/test_check.py",
     "tests/numeric/test_regressors.py",
+    "tests/test_embedded.py",
 )
 ROOMS: dict[str, Room] = {
     "cli": _folder("cli"),
