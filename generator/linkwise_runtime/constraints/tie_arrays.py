@@ -73,7 +73,7 @@ def pairs(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> 
     at = ends(xp, tables, numbers, q)
     if at is None or tables.frames is None:
         return None
-    screws = joint_screws(xp, tables.frames.from_world, at.carried.joints)[:, :, None]
+    screws = joint_screws(xp, tables.frames.joints, at.carried.joints)[:, :, None]
     one, z = tables.moved_apart, screws[:, 0]
     linear = one * screws[:3, 1] + cross(z, _arms(xp, tables, at.places))
     return paired(xp, tables, at, by_coordinate(tables.frames, xp.concat([one * z[:3], linear], 0)))
@@ -92,7 +92,7 @@ def pair_changes(
     if at is None or tables.frames is None:
         return None
     places = at.ends.places
-    moved = moving(xp, tables.frames, numbers, at.ends.carried, qd, from_world=True)
+    moved = moving(xp, tables.frames, numbers, at.ends.carried, qd)
     twist = of_frames(tables.frames, moved.twists)
     speeds = point_velocity(xp, twist, places)
     z, zd, sd = moved.screws[:, 0, None], moved.rates[:, 0, None], moved.rates[:3, 1, None]

@@ -184,12 +184,11 @@ def moving(
     found: Carried,
     qd: Numbers,
     qdd: Numbers | None = None,
-    from_world: bool = False,
 ) -> Twists:
     """Screws and motion of the joints, without gravity; qd, qdd: (n, samples), no qdd for none."""
-    joints = tables.from_world if from_world else tables.joints
-    velocity = taken(qd, tables.joints.coordinates)
-    acceleration = 0.0 * velocity if qdd is None else taken(qdd, tables.joints.coordinates)
+    joints = tables.joints
+    velocity = taken(qd, joints.coordinates)
+    acceleration = 0.0 * velocity if qdd is None else taken(qdd, joints.coordinates)
     return twists(xp, joints, found.joints, 0.0 * numbers.gravity, velocity, acceleration)
 
 
