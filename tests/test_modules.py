@@ -201,6 +201,16 @@ def test_what_cannot_be_learned_is_refused(
         planar2.load(backend, requires_grad=asked)
 
 
+@pytest.mark.parametrize(("given", "kept"), [(2, "float64"), (2.0, "float32")], ids=["whole", "real"])
+def test_a_learned_tensor_keeps_its_precision_and_a_whole_one_becomes_real(
+    given: float, kept: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    load = package_of("planar3 symbolic").load
+    learned = load("autograd", parameters={"m_2": torch.tensor(given)}, requires_grad="m_2").values["m_2"]
+    assert learned.requires_grad
+    assert learned.dtype == getattr(torch, kept)
+
+
 def test_constants_that_hang_on_run_time_parameters_in_every_link_cannot_be_asked_for(
     package_of: Callable[[str], ModuleType],
 ) -> None:

@@ -221,12 +221,12 @@ def test_what_is_not_plain_is_read_as_by_the_other_back_ends(
 def test_nothing_is_leaked_or_freed_twice(planar3: ModuleType) -> None:
     robot = planar3.load("native")
     q, qd, qdd = motion = [np.ones((5, 3)) for _ in range(3)]
-    out = robot.packed(*motion)
+    out, one = robot.packed(*motion), robot.partial_torque(*motion)
     kinds = [type(out), type(robot.propagation(*motion))]
 
     def counts() -> list[int]:
         gc.collect()
-        return [sys.getrefcount(o) for o in (*motion, *out, out, None, *kinds)]
+        return [sys.getrefcount(o) for o in (*motion, *out, out, one, None, *kinds)]
 
     def rise() -> list[int]:
         before = counts()
@@ -234,6 +234,7 @@ def test_nothing_is_leaked_or_freed_twice(planar3: ModuleType) -> None:
             for call in CALLS.values():
                 call(robot, *motion)
             robot.packed(*motion, out=out)
+            robot.partial_torque(*motion, out=one)
             with pytest.raises(ValueError, match="no convention 'half'"):
                 robot.propagation(*motion, "half")
             with pytest.raises(ValueError, match="qd has shape"):

@@ -34,23 +34,26 @@ class Decider:
     def stages(self, room: str, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
         """Tests of each process, and their seconds: what reaches the change, else what the room names.
 
-        First what caught it before; what it is known to survive is left out.
+        First what caught it before; what it is known to survive is left out. Last what the room names and no
+        map has measured: tests of `make ship`.
         """
         tried = self.record.survived(mutant)
         near, far = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
-        limits = STAGES
+        limits, last = STAGES, self._named(room)
         if not near:
-            near, limits = self._named(room), (*STAGES[:2], float("inf"))
+            near, limits, last = last, (*STAGES[:2], float("inf")), []
+        last = [item for item in last if item[0] in ROOMS[room].tests]
         before = test_of(self.record.caught_before(mutant))
         known = self.reach.files.get(before.partition("::")[0])
         if known and before in known.seconds:
             yield [before], known.seconds[before]
             tried = tried | {before}
-        close, beside = (
+        close, beside, apart = (
             iter([item for item in part if not tried & {item[0], item[0].partition("::")[0]}])
-            for part in (near, far)
+            for part in (near, far, last)
         )
-        for ranked, limit in (*((close, limit) for limit in limits), (beside, BESIDE)):
+        every = (*((close, limit) for limit in limits), (beside, BESIDE), (apart, float("inf")))
+        for ranked, limit in every:
             tests: list[str] = []
             total = 0.0
             for name, seconds in ranked:

@@ -75,12 +75,10 @@ ROOMS: dict[str, Room] = {
     ),
     "runtime": Room((RUNTIME,)),
     "runtime/native": Room((f"{RUNTIME}native/",), ("tests/test_native_module.py", "tests/test_native.py")),
+    "runtime/arrays": Room((f"{RUNTIME}arrays/",), ("tests/test_exports.py",)),
     **{
         f"runtime/{name}": Room((f"{RUNTIME}{name}/",))
-        for name in (
-            *("lagrangians", "arrays", "control", "motion"),
-            *("constraints", "kinematics", "answers", "rule"),
-        )
+        for name in (*("lagrangians", "control", "motion", "constraints", "kinematics", "answers", "rule"),)
     },
     "c": _folder("c", *C),
     "cmake": _folder("cmake", "tests/test_cmake.py"),
