@@ -246,6 +246,17 @@ def test_nothing_is_leaked_or_freed_twice(planar3: ModuleType) -> None:
     assert max(least) < 50, least
 
 
+def test_what_it_is_made_of_is_looked_at(planar3: ModuleType) -> None:
+    made, plain = module_of(planar3).compiled_calls(), [np.zeros(2), np.zeros(2, "f4")]
+    if made is None:
+        pytest.skip("Python's headers are not there")
+    for joints, parameters in ((0, plain), (3, [plain[0][::-1], plain[1]]), (3, [plain[0], plain[1][::-1]])):
+        with pytest.raises(ValueError, match="joints are one or more, parameters plain arrays"):
+            made(joints, 10, *parameters, {})
+    with pytest.raises(KeyError, match="packed"):
+        made(3, 10, *plain, {})
+
+
 def test_robots_that_nobody_holds_are_gone_and_let_go_of_what_they_held(planar3: ModuleType) -> None:
     def called() -> Any:
         robot = planar3.load("native")
