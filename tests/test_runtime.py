@@ -20,6 +20,7 @@ from linkwise.package.load import import_package
 from linkwise_runtime import version
 from linkwise_runtime.arrays.numpy_backend import NumpyBackend
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.parameter_values import ParametricBody
 from linkwise_runtime.structure import Structure
 from linkwise_runtime.targets import FrameImpedance, Natural, Target
 
@@ -55,6 +56,14 @@ def test_given_parameters_replace_built_in_ones_by_name() -> None:
         FORK.values({"k": 1.0})
     with pytest.raises(ValueError, match="no parameter 'k': this package has no parameters; generate it"):
         replace(FORK, parameters={}).values({"k": 1.0})
+
+
+def test_masses_that_no_body_has_are_refused_unless_they_are_asked_for() -> None:
+    stem = ParametricBody("stem", ("m",), lambda values: (values["m"], 1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    fork = replace(FORK, bodies=(stem,))
+    with pytest.raises(ValueError, match="link 'stem' would have"):
+        fork.values({"m": -1.0})
+    assert fork.values({"m": -1.0}, allow_unphysical=True) == {"m": -1.0}
 
 
 FILES = sorted(path.relative_to(RUNTIME).as_posix() for path in RUNTIME.rglob("*.py"))
