@@ -224,6 +224,21 @@ def test_deriving_by_sympy_stops_at_its_limit_of_time() -> None:
     assert min(first.rule, second.rule) > 0.0
 
 
+def _derive_for_seconds(folder: Path, _: object, answer: Any) -> None:
+    answer.send("ready")
+    time.sleep(5.0)
+    (folder / "done").touch()
+
+
+def test_a_derivation_past_its_limit_of_time_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(derivation_seconds, "_derive", _derive_for_seconds)
+    bounded: Any = derivation_seconds._bounded
+    assert bounded(tmp_path, (), 0.0) is None
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_deriving_by_sympy_is_timed_up_to_the_last_link(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(derivation_seconds, "_bounded", lambda lagrangian, moving, limit: float(len(moving)))
     times = measure_derivations(planar(3), (1, 3), silent)
