@@ -243,6 +243,9 @@ def test_one_value_a_sample_must_fit_the_motion(backend: str, arm: ModuleType) -
         ValueError, match=r"'m_upper' has shape \(3,\), the motion has samples of shape \(4,\)"
     ):
         arm.load(backend, {"m_upper": np.ones(3)}).partial_torque(*motion)
+    of_two_axes = [np.stack([m, m]) if backend == "numpy" else torch.stack([m, m]) for m in motion]
+    with pytest.raises(ValueError, match=r"has shape \(2, 3\), the motion has samples of shape \(2, 4\)"):
+        arm.load(backend, {"m_upper": np.ones((2, 3))}).partial_torque(*of_two_axes)
     each = arm.load(backend, {"m_upper": np.arange(4.0)}).partial_torque(*motion)
     alone = arm.load(backend, {"m_upper": 2.0}).partial_torque(*motion)
     assert np.array_equal(np.asarray(each)[2], np.asarray(alone)[2])
