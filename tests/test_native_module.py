@@ -249,7 +249,7 @@ def test_nothing_is_leaked_or_freed_twice(planar3: ModuleType) -> None:
 def test_what_it_is_made_of_is_looked_at(planar3: ModuleType) -> None:
     made, plain = module_of(planar3).compiled_calls(), [np.zeros(2), np.zeros(2, "f4")]
     if made is None:
-        pytest.skip("Python's headers are not there")
+        pytest.skip("needs headers of Python: apt-get install python3-dev")
     for joints, parameters in ((0, plain), (3, [plain[0][::-1], plain[1]]), (3, [plain[0], plain[1][::-1]])):
         with pytest.raises(ValueError, match="joints are one or more, parameters plain arrays"):
             made(joints, 10, *parameters, {})
