@@ -1,5 +1,6 @@
 """Work apart: its answer and its errors come back, and it ends when its limits or this process say so."""
 
+import mmap
 import os
 import signal
 import time
@@ -35,11 +36,18 @@ def test_what_a_library_says_of_its_end_is_told_by_nobody_else(capfd: pytest.Cap
     assert capfd.readouterr() == ("answer", "")
 
 
+def mapped(size: int) -> int:
+    """Take memory of the system's, past what malloc has."""
+    return len(mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS))
+
+
 def test_limits_are_of_what_the_work_takes_itself() -> None:
     held = bytearray(256 << 20)
     assert in_own_process(lambda: len(bytearray(16 << 20)), LIMITS) == 16 << 20
-    with pytest.raises(MemoryError):
-        # more than what this process may have freed, and malloc kept, before
+    assert in_own_process(lambda: mapped(48 << 20), LIMITS) == 48 << 20
+    with pytest.raises(OSError, match="Cannot allocate memory"):
+        in_own_process(lambda: mapped(72 << 20), LIMITS)
+    with pytest.raises(MemoryError):  # of more than malloc may have kept of what this process freed before
         in_own_process(lambda: len(bytearray(2 << 30)), LIMITS)
     with pytest.raises(OutOfTime, match="it took more than 1 s"):
         in_own_process(turn, LIMITS)

@@ -46,8 +46,8 @@ class InducedSources:
     def of(cls, robot: LoadedRobot, columns: Sequence[Column]) -> "InducedSources":
         """columns: of torques, in the result's order."""
         found: dict[tuple[Quantity, int | None, int | None], list[tuple[int, int]]] = {}
-        for *key, i, at in _parts(robot, columns):
-            found.setdefault(tuple(key), []).append((i, at))  # type: ignore[arg-type]
+        for quantity, link, cause, i, at in _parts(robot, columns):
+            found.setdefault((quantity, link, cause), []).append((i, at))
         return cls(robot, tuple(ForceSource(*key, tuple(parts)) for key, parts in found.items()))
 
     def mass_and_forces(

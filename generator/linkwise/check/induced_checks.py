@@ -122,7 +122,7 @@ def _of_a_point(
     moment, force = np.random.default_rng(6).uniform(-1.0, 1.0, (2, 3))
     wrench = np.concatenate([moment, force])
     lifted, bound = wrench @ jacobian, np.abs(wrench) @ reach
-    sources.forces["loads"] = tuple(np.stack([a, 2.0 * a], -1) for a in (lifted, bound))  # type: ignore[assignment]
+    sources.forces["loads"] = np.stack([lifted, 2.0 * lifted], -1), np.stack([bound, 2.0 * bound], -1)
     load = load_of(frame, force, moment, point)
     q, qd, tau = sources.states.motion
     found: Any = model.induced_accelerations(

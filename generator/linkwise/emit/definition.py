@@ -59,7 +59,7 @@ def rigid_tree(system: System) -> RigidTree | None:
                 link.joint.kind,
                 link.joint.coordinate,
                 link.joint.ratio,
-                link.joint.rotation,  # type: ignore[arg-type]
+                link.joint.rotation,  # type: ignore[arg-type]  # three rows; the type has any number
                 numbers(link.joint.translation),
                 number(link.mass),
                 numbers(link.com),
@@ -72,7 +72,7 @@ def rigid_tree(system: System) -> RigidTree | None:
             FrameEntry(
                 frame.name,
                 frame.link,
-                frame.rotation,  # type: ignore[arg-type]
+                frame.rotation,  # type: ignore[arg-type]  # likewise
                 numbers(frame.translation),
             )
             for frame in robot.named_frames

@@ -7,7 +7,7 @@ With T of `Standing.transfer`, of every term c_ijk of the free robot
 is left with joint i. It is of the link and the cause that c_bjk is of, and no longer symmetric in i and k.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,5 +88,5 @@ class ContactTerms:
         return Side(*found)
 
 
-def _index(numbers: object) -> Index:
-    return np.fromiter(numbers, dtype=np.intp)  # type: ignore[call-overload,no-any-return]
+def _index(numbers: Iterable[int]) -> Index:
+    return np.fromiter(numbers, dtype=np.intp)

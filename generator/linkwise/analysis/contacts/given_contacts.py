@@ -39,7 +39,7 @@ class Contacts:
     Raises LinkwiseError for values that do not go together.
     """
 
-    given: tuple[Contact, ...] = ()
+    given: Sequence[Contact] = ()
     columns: Mapping[str, WhileColumn] = field(default_factory=dict)
     loads: tuple[Load | str | Path, ...] = ()
     threshold: float | None = None
@@ -75,7 +75,7 @@ class Contacts:
     @classmethod
     def of(cls, given: "Contacts | Sequence[Contact]") -> "Contacts":
         """Themselves, or contacts that are on all the time."""
-        return given if isinstance(given, Contacts) else cls(given)  # type: ignore[arg-type]
+        return given if isinstance(given, Contacts) else cls(given)
 
     @property
     def measured(self) -> Loads:

@@ -26,7 +26,7 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     numbers = cause_numbers(result, i)
     phases = numbers.phases
     height = (0.17 * len(phases) + 0.13) * len(numbers.labels)
-    figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.3 + height), layout="constrained")
+    figure: Figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.3 + height), layout="constrained")
     grid = figure.add_gridspec(2, 2, height_ratios=(1.3, height))
     over_time = figure.add_subplot(grid[0, :])
     means = figure.add_subplot(grid[1, 0])
@@ -54,7 +54,7 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     figure.draw_without_rendering()  # places the panels, so that labels have a width in their numbers
     for panel in (means, sizes):
         _make_room(panel)
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 def _over_time(panel: Any, result: AnalysisResult, i: int, numbers: CauseNumbers) -> None:

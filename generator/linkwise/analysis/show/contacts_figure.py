@@ -36,7 +36,7 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
     alone = largest_few(asked.sum(axis=(0, 1))[:-1], MOST)[0]
     joints = [_joints(result, c) for c in range(len(ground.names))]
     count = len(shown) + max(map(len, joints))
-    figure = extra("matplotlib.figure").Figure(
+    figure: Figure = extra("matplotlib.figure").Figure(
         figsize=(WIDTH * len(ground.names) + 1.4, HEIGHT * count + 1.3), layout="constrained"
     )
     panels = figure.subplots(count, len(ground.names), sharex=True, sharey="row", squeeze=False)
@@ -75,7 +75,7 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
         ha="left",
         fontsize=11,
     )
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 def _forces(result: AnalysisResult) -> Array:

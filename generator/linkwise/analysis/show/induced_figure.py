@@ -20,7 +20,9 @@ def induced(result: AnalysisResult, point: int) -> "Figure":
     """A panel for each component, of a frame those of its point: shares by source, and their sum."""
     name = result.induced[point]
     shown = components(result, point, angular=False)
-    figure = extra("matplotlib.figure").Figure(figsize=(8.4, 1.2 + 1.7 * len(shown)), layout="constrained")
+    figure: Figure = extra("matplotlib.figure").Figure(
+        figsize=(8.4, 1.2 + 1.7 * len(shown)), layout="constrained"
+    )
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     curves = source_curves(result, point, list(shown))
     for at, (panel, (component, unit)) in enumerate(zip(panels, shown.values(), strict=True)):
@@ -41,7 +43,7 @@ def induced(result: AnalysisResult, point: int) -> "Figure":
         fontsize=11,
     )
     figure.supxlabel(textwrap.fill(foot(result), 140), x=0.01, ha="left", fontsize=7, color="#5A6270")
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 def _look(curve: SourceCurve, joints: int) -> dict[str, Any]:

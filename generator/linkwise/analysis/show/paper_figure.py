@@ -35,7 +35,9 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
     named = (("Joints", robot.plot_joints), ("Links and loads" if result.loads else "Links", carried))
     legends = [_legend_rows(names) for _, names in named]
     heights = [PANEL] * len(panels) + [LINE * (rows + 1) for rows in legends]
-    figure = extra("matplotlib.figure").Figure(figsize=(7.6, sum(heights) + 0.9), layout="constrained")
+    figure: Figure = extra("matplotlib.figure").Figure(
+        figsize=(7.6, sum(heights) + 0.9), layout="constrained"
+    )
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     axes = [figure.add_subplot(grid[0])]
     axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(1, len(panels))]
@@ -51,7 +53,7 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
     figure.suptitle(f"{drawn(robot.name, 60)} · {drawn(result.source, 60)}", x=0.01, ha="left", fontsize=11)
     below = "\n".join(textwrap.wrap(_left_out(result), 125) + textwrap.wrap(foot(result), 125))
     figure.supxlabel(below, x=0.01, ha="left", fontsize=7, color="#5A6270")
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:

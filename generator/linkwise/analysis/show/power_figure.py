@@ -32,7 +32,7 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     ground = () if robot.contacts is None else robot.contacts.names
     givers = [*joints, *(drawn(f"ground at {name}") for name in ground)]
     height = 0.9 + (0.34 if len(givers) <= MANY else 0.26) * len(givers)
-    figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.4 + height), layout="constrained")
+    figure: Figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.4 + height), layout="constrained")
     curves, bars = figure.subplots(2, 1, height_ratios=(2.4, height))
     _curves(curves, result, joints)
     targets = [drawn(name) for name in (*robot.plot_links, *result.load_labels)]
@@ -47,7 +47,7 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     figure.suptitle(f"{drawn(robot.name, 40)} · {drawn(result.source, 50)}", x=0.01, ha="left", fontsize=11)
     made = textwrap.fill(foot(result), 140)
     figure.supxlabel(made, x=0.01, ha="left", fontsize=7, color="#5A6270")
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> None:

@@ -19,7 +19,7 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     fixed, movement = share_parts(result)
     every = [*fixed, *movement]
     rows = -(-len(every) // 3)
-    figure = extra("matplotlib.figure").Figure(
+    figure: Figure = extra("matplotlib.figure").Figure(
         figsize=(8.4, 1.3 + (0.42 if len(movement) > 3 else 0.3) * len(robot.driven) + 0.2 * rows),
         layout="constrained",
     )
@@ -51,7 +51,7 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
         handlelength=2,
         fontsize=8,
     )
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 def _name_beside(axis: Any, part: SharePart) -> None:
